@@ -1,0 +1,1 @@
+"""Complete brakes, rigs and ECUs: wiring of elements, nothing else."""

@@ -1,0 +1,1 @@
+"""Cited parameter sets, one file per source."""

@@ -1,0 +1,57 @@
+"""Current PI with tracking anti-wind-up: duty cycle from the current error."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, DutyPerCurrent, DutyPerCurrentTime, Fraction
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+
+
+class Parameters(ParameterSet):
+    """Gains of the sampled PI, forward Euler."""
+
+    k_p: DutyPerCurrent
+    """proportional gain"""
+    k_i: DutyPerCurrentTime
+    """integral gain"""
+    T_t: Duration
+    """tracking time of the anti-wind-up"""
+    D_max: Fraction
+    """limit of the duty cycle that the ECU asks for"""
+
+
+class State(NamedTuple):
+    """Integral part."""
+
+    integral: Annotated[float, Signal("1", "integral part", 0.3)]
+
+
+class Input(NamedTuple):
+    """Set point and measurement."""
+
+    i_ref: Annotated[float, Signal("A", "current set point", 5.0)]
+    i_meas: Annotated[float, Signal("A", "measured current", 5.0)]
+
+
+class Output(NamedTuple):
+    """Duty cycle within its limits."""
+
+    duty: Annotated[float, Signal("1", "duty cycle", 0.3)]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the controller by one sample.
+
+    .. math:: D = k_p (i_{ref} - i) + I, \quad
+        I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{lim} - D) / T_t)
+    """
+    error = u.i_ref - u.i_meas
+    wanted = par.k_p * error + x.integral
+    duty = ops.clip(wanted, -par.D_max, par.D_max)
+    growth = par.k_i * error + (duty - wanted) / par.T_t
+    return State(integral=x.integral + T * growth), Output(duty=duty)

@@ -1,0 +1,106 @@
+"""Dither against stick-slip: a periodic current that overcomes the believed breakaway torque."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    BreakawayFactor,
+    Frequency,
+    Gain,
+    Torque,
+    TorqueConstant,
+    TorquePerPressure,
+)
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+
+
+class Parameters(ParameterSet):
+    """Shape of the dither."""
+
+    waveform: Literal["off", "sine", "square", "triangle"]
+    """waveform; the paper's sine has the least harmonic distortion"""
+    f_dit: Frequency
+    """frequency: above the pressure loop's band, inside the current loop's"""
+    gain: Gain
+    """amplitude over the believed breakaway current"""
+
+
+class Believed(ParameterSet):
+    """Friction and motor as the ECU believes them; possibly wrong."""
+
+    K_e: TorqueConstant
+    """torque constant"""
+    T_pr: Torque
+    """friction torque at zero pressure"""
+    f_cfr_p: TorquePerPressure
+    """growth of the Coulomb torque with pressure, apply direction"""
+    k_brk_p: BreakawayFactor
+    """breakaway torque over Coulomb torque, apply direction"""
+
+
+class State(NamedTuple):
+    """Phase as a share of the period, 0 to 1."""
+
+    phase: Annotated[float, Signal("1", "dither phase", 0.5)]
+
+
+class Output(NamedTuple):
+    """Dither current."""
+
+    i: Annotated[float, Signal("A", "dither current", 1.0)]
+
+
+def breakaway_current(
+    p: Annotated[float, Signal("Pa", "measured pressure", 2e6)], est_par: Believed
+) -> Annotated[float, Signal("A", "breakaway current", 1.0)]:
+    r"""Return the current that breaks the piston away.
+
+    .. math:: i_{brkf} = \frac{k_{brk,p}}{K_e} (T_{pr} + f_{cfr,p} p_{mc})
+
+    The gear's efficiency is left out, as in the paper; negative pressure counts as zero.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eqs. (18) and (19).
+    """
+    torque = est_par.T_pr + est_par.f_cfr_p * ops.fmax(p, 0.0)
+    return est_par.k_brk_p * torque / est_par.K_e
+
+
+def output(
+    x: State,
+    p: Annotated[float, Signal("Pa", "measured pressure", 2e6)],
+    T: SampleTime,
+    par: Parameters,
+    est_par: Believed,
+) -> tuple[State, Output]:
+    r"""Advance the dither by one sample.
+
+    .. math:: i_{dit}(t) = A_{dit} \sin(2 \pi f_{dit} t), \quad A_{dit} = i_{brkf}
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (20).
+    """
+    advanced = x.phase + par.f_dit * T
+    amplitude = par.gain * breakaway_current(p, est_par)
+    wave = _wave(x.phase, par.waveform)
+    return State(phase=advanced - ops.floor(advanced)), Output(i=amplitude * wave)
+
+
+def _wave(phase: float, waveform: str) -> float:
+    if waveform == "off":
+        return 0.0 * phase
+    if waveform == "square":
+        return ops.where(phase < 0.5, 1.0, -1.0)
+    if waveform == "triangle":
+        return ops.where(
+            phase < 0.25, 4.0 * phase, ops.where(phase < 0.75, 2.0 - 4.0 * phase, 4.0 * phase - 4.0)
+        )
+    return ops.sin(2.0 * math.pi * phase)

@@ -1,0 +1,67 @@
+"""Second-order low-pass filter, sampled."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Factor, Frequency
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+
+
+class Parameters(ParameterSet):
+    """Filter between pressure and current controller, eq. (20)'s neighbor in the signal chain.
+
+    ``place`` says where the dither joins: ``"after-dither"`` filters demand and dither together
+    (the paper's wording), ``"before-dither"`` the demand alone.
+    """
+
+    f_c: Frequency
+    """cut-off frequency"""
+    zeta: Factor
+    """damping ratio; 1/sqrt(2) puts -3 dB at the cut-off"""
+    place: Literal["after-dither", "before-dither"]
+    """whether the filter acts on demand and dither, or on the demand alone"""
+
+
+class State(NamedTuple):
+    """States of the two integrators (transposed trapezoidal form)."""
+
+    s1: Annotated[float, Signal("A", "first integrator", 1.0)]
+    s2: Annotated[float, Signal("A", "second integrator", 5.0)]
+
+
+class Output(NamedTuple):
+    """Filtered signal."""
+
+    y: Annotated[float, Signal("A", "filtered current demand", 5.0)]
+
+
+def output(
+    x: State,
+    u: Annotated[float, Signal("A", "current demand", 5.0)],
+    T: SampleTime,
+    par: Parameters,
+) -> tuple[State, Output]:
+    r"""Advance the filter by one sample.
+
+    .. math:: \frac{\omega_c^2}{s^2 + 2 \zeta \omega_c s + \omega_c^2}
+
+    by the trapezoidal rule with the cut-off prewarped, so that it stays at f_c; valid for
+    f_c T < 0.5.
+    """
+    angle = math.pi * par.f_c * T
+    g = ops.sin(angle) / ops.cos(angle)
+    a = 1.0 / (1.0 + 2.0 * par.zeta * g + g * g)
+    band = a * (x.s1 + g * (u - x.s2))
+    low = x.s2 + g * band
+    return State(s1=2.0 * band - x.s1, s2=2.0 * low - x.s2), Output(y=low)
+
+
+def at_rest(y: float) -> State:
+    """Return the state that holds a constant signal ``y`` [A]."""
+    return State(s1=0.0 * y, s2=y)

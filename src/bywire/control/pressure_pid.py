@@ -1,0 +1,85 @@
+"""Pressure PID with set-point weights, filtered derivative and tracking anti-wind-up."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    Current,
+    CurrentPerPressure,
+    CurrentPerPressureTime,
+    CurrentTimePerPressure,
+    Duration,
+    TimeConstant,
+    Weight,
+)
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+
+
+class Parameters(ParameterSet):
+    """Gains of the continuous PID; discretized by backward differences."""
+
+    k_p: CurrentPerPressure
+    """proportional gain"""
+    k_i: CurrentPerPressureTime
+    """integral gain"""
+    k_d: CurrentTimePerPressure
+    """derivative gain"""
+    tau_d: TimeConstant
+    """time constant of the derivative's filter"""
+    b: Weight
+    """set-point weight of the proportional part"""
+    c: Weight
+    """set-point weight of the derivative part; 0 acts on the measurement alone"""
+    T_t: Duration
+    """tracking time of the anti-wind-up"""
+    i_max: Current
+    """limit of the current demand's magnitude"""
+
+
+class State(NamedTuple):
+    """Integral, filtered derivative, and the signal that it is taken of."""
+
+    integral: Annotated[float, Signal("A", "integral part", 3.0)]
+    slope: Annotated[float, Signal("A", "derivative part", 1.0)]
+    last: Annotated[float, Signal("Pa", "last differentiated signal", 2e6)]
+
+
+class Input(NamedTuple):
+    """Set point and measurement."""
+
+    p_ref: Annotated[float, Signal("Pa", "set point", 2e6)]
+    p_meas: Annotated[float, Signal("Pa", "measured pressure", 2e6)]
+
+
+class Output(NamedTuple):
+    """Current demand within its limits."""
+
+    i: Annotated[float, Signal("A", "current demand", 3.0)]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the controller by one sample.
+
+    .. math:: i = k_p (b r - p) + I + D, \quad
+        D_k = \frac{\tau_d D_{k-1} + k_d (d_k - d_{k-1})}{\tau_d + T}, \quad d = c r - p
+
+    The integral takes up the difference between the limited and the wanted demand with the time
+    constant T_t, so that it cannot wind up.
+    """
+    signal = par.c * u.p_ref - u.p_meas
+    slope = (par.tau_d * x.slope + par.k_d * (signal - x.last)) / (par.tau_d + T)
+    wanted = par.k_p * (par.b * u.p_ref - u.p_meas) + x.integral + slope
+    i = ops.clip(wanted, -par.i_max, par.i_max)
+    growth = par.k_i * (u.p_ref - u.p_meas) + (i - wanted) / par.T_t
+    return State(integral=x.integral + T * growth, slope=slope, last=signal), Output(i=i)
+
+
+def at_rest(u: Input, i: float, par: Parameters) -> State:
+    """Return the state that holds a current demand ``i`` [A] at a constant input."""
+    integral = i - par.k_p * (par.b * u.p_ref - u.p_meas)
+    return State(integral=integral, slope=0.0, last=par.c * u.p_ref - u.p_meas)

@@ -1,0 +1,1 @@
+"""Foundations that know no brake: quantities, operations, parameters, signals, the model protocol."""

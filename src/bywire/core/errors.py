@@ -1,0 +1,88 @@
+"""Every error that bywire raises on purpose.
+
+::
+
+    BywireError
+    ├── InputError                exit status 2: something the user gave is wrong
+    │   ├── ParameterError        a value outside its range, a missing or contradictory value
+    │   ├── UnitError             a quantity whose unit does not fit
+    │   ├── UnknownNameError      a name that nothing answers to
+    │   ├── FileError             a file that cannot be read, understood or written
+    │   └── StepError             steps and sample times that do not divide each other
+    └── RunError                  exit status 3: the computation failed
+        ├── SolverError           a trajectory that left the numbers or did not settle
+        └── CompilerError         a compiler that failed on a generated kernel
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import get_close_matches
+
+
+class BywireError(Exception):
+    """Base of all errors raised on purpose; its text is meant for the user."""
+
+    exit_status = 3
+
+
+class InputError(BywireError):
+    """Something the user gave is wrong."""
+
+    exit_status = 2
+
+
+class ParameterError(InputError):
+    """A value outside its range, or values that contradict each other."""
+
+
+class UnitError(InputError):
+    """A quantity whose unit does not fit the place where it stands."""
+
+
+class UnknownNameError(InputError):
+    """A name that nothing answers to."""
+
+
+class FileError(InputError):
+    """A file that cannot be read, understood or written."""
+
+
+class StepError(InputError):
+    """Steps and sample times that do not divide each other."""
+
+
+class RunError(BywireError):
+    """The computation failed."""
+
+
+class SolverError(RunError):
+    """A trajectory that left the numbers or did not settle."""
+
+
+class CompilerError(RunError):
+    """A compiler that failed on a generated kernel."""
+
+
+def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+    """Build the error for an unknown name, with the nearest known ones.
+
+    Parameters
+    ----------
+    kind
+        What was looked for, for instance ``"experiment"``.
+    name
+        What the user wrote.
+    known
+        Every name that would have been accepted.
+    """
+    candidates = sorted(known)
+    close = get_close_matches(name, candidates, n=3, cutoff=0.5)
+    hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
+    return UnknownNameError(f"unknown {kind} {name!r}: {hint}")
+
+
+def _listing(candidates: list[str]) -> str:
+    shown = ", ".join(candidates[:12])
+    more = f" and {len(candidates) - 12} more" if len(candidates) > 12 else ""
+    return f"known are {shown}{more}" if candidates else "none is known here"

@@ -1,0 +1,148 @@
+"""The model protocol: all that the engine asks of a brake, a rig or any other system.
+
+A model is written as pure functions of named tuples. The engine evaluates them once on symbols
+and knows nothing else about the system. What a model gives:
+
+* smooth dynamics in mass form, ``mass_k(xe) dx_k/dt = balance_k(x, xe, ...)``;
+* dry *frictions*: a velocity state whose equation carries a set-valued force between two bounds
+  while it is exactly zero;
+* one-sided *limits*: a state that cannot fall below zero (a check valve, a stop);
+* *contact groups*: unilateral contacts whose compliances couple them;
+* *tasks*: the sampled controllers, each with its own period, working on a shared memory;
+* *powers*, integrated along with the states, for the energy balance.
+
+``x`` enters the implicit solve; ``xe`` is the same state but value-only: it is not
+differentiated for the Newton matrix. Use it for slowly varying geometry and periodic terms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+Bounds = tuple[float, float]
+Matrix = tuple[tuple[float, ...], ...]
+
+
+@dataclass(frozen=True)
+class Task:
+    """One sampled controller.
+
+    Parameters
+    ----------
+    name
+        What recordings and messages call it.
+    period
+        Sample time [s] from the parameters; a whole number of substeps.
+    tick
+        ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant
+        and returns the memory with the fields that this task owns renewed.
+    """
+
+    name: str
+    period: Callable[[Any], float]
+    tick: Callable[[Any, Any, Any, Any], Any]
+
+
+class Model(Protocol):
+    """What the engine integrates. All methods are pure and symbolic-ready."""
+
+    @property
+    def name(self) -> str:
+        """Identify the model in messages and recordings."""
+        ...
+
+    @property
+    def State(self) -> type[NamedTuple]:
+        """Continuous states."""
+        ...
+
+    @property
+    def Memory(self) -> type[NamedTuple]:
+        """What the tasks hold between their ticks: controller states and outputs."""
+        ...
+
+    @property
+    def Stimulus(self) -> type[NamedTuple]:
+        """External inputs, sampled at the rate of the fastest task."""
+        ...
+
+    @property
+    def Flow(self) -> type[NamedTuple]:
+        """Energies and other integrals of ``powers``."""
+        ...
+
+    @property
+    def Output(self) -> type[NamedTuple]:
+        """What a recording holds."""
+        ...
+
+    @property
+    def frictions(self) -> tuple[str, ...]:
+        """Velocity states with dry friction."""
+        ...
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """States that cannot fall below zero; rarely at zero for long (see ``scheme``)."""
+        ...
+
+    def tasks(self, par: Any) -> tuple[Task, ...]:
+        """Return the controllers, in the order in which they run when due together."""
+        ...
+
+    def mass(self, xe: Any, par: Any) -> Any:
+        """Return the factor of each state's derivative, a State."""
+        ...
+
+    def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
+        """Return the smooth right-hand side of the mass form, a State; without frictions and limits."""
+        ...
+
+    def bounds(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[Bounds, ...]:
+        """Return (low, high) per friction, low <= 0 <= high, in the unit of its equation.
+
+        The force is ``low`` where the velocity is positive, ``high`` where it is negative.
+        """
+        ...
+
+    def compliance(self, par: Any) -> tuple[Matrix, ...]:
+        """Return one positive definite compliance matrix per contact group."""
+        ...
+
+    def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:
+        """Return per group the overlaps d, affine in x (and its rates through the states).
+
+        The contact forces F >= 0 of a group solve ``C F - d >= 0, F (C F - d) = 0``.
+        """
+        ...
+
+    def powers(
+        self,
+        x: Any,
+        rate: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> Any:
+        """Return the rates of the Flow at the midpoint of a substep.
+
+        ``rate`` is dx/dt; ``reaction`` holds the friction forces, then those of the limits.
+        """
+        ...
+
+    def output(
+        self,
+        x: Any,
+        memory: Any,
+        par: Any,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Any,
+    ) -> Any:
+        """Return what is recorded at an instant; ``reaction`` is that of the last substep."""
+        ...

@@ -1,0 +1,118 @@
+"""Elementary functions that dispatch on the type of their argument.
+
+The equations of plant and control call these and nothing else, so that the same function runs
+on floats, NumPy arrays, CasADi symbols and any object that brings its own operations (a method
+``_bywire_op``, as the unit-carrying numbers of the dimension tests do). Floats need no CasADi.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+_FLOATS = {
+    "exp": math.exp,
+    "log": math.log,
+    "sqrt": math.sqrt,
+    "sin": math.sin,
+    "cos": math.cos,
+    "fabs": abs,
+    "floor": math.floor,
+    "fmax": max,
+    "fmin": min,
+    "power": math.pow,
+}
+_CASADI = {"where": "if_else"}
+_PLAIN = (float, int)  # bool is an int
+
+
+def _apply(name: str, *args: Any) -> Any:
+    special = next((a for a in args if not isinstance(a, _PLAIN)), None)
+    if special is None:
+        return _FLOATS[name](*args)
+    own = getattr(special, "_bywire_op", None)
+    if own is not None:
+        return own(name, *args)
+    if type(special).__module__.startswith("casadi"):
+        import casadi
+
+        return getattr(casadi, _CASADI.get(name, name))(*args)
+    return getattr(np, name)(*args)
+
+
+def exp(x: float) -> float:
+    """Return e to the power of x; x is a pure number."""
+    return _apply("exp", x)  # type: ignore[no-any-return]
+
+
+def log(x: float) -> float:
+    """Return the natural logarithm of x; x is a pure number > 0."""
+    return _apply("log", x)  # type: ignore[no-any-return]
+
+
+def sqrt(x: float) -> float:
+    """Return the square root; keep x away from 0, where its derivative is infinite."""
+    return _apply("sqrt", x)  # type: ignore[no-any-return]
+
+
+def sin(x: float) -> float:
+    """Return the sine of x [rad]."""
+    return _apply("sin", x)  # type: ignore[no-any-return]
+
+
+def cos(x: float) -> float:
+    """Return the cosine of x [rad]."""
+    return _apply("cos", x)  # type: ignore[no-any-return]
+
+
+def fabs(x: float) -> float:
+    """Return the magnitude of x."""
+    return _apply("fabs", x)  # type: ignore[no-any-return]
+
+
+def floor(x: float) -> float:
+    """Return the largest whole number that is not above x; x is a pure number."""
+    return _apply("floor", x)  # type: ignore[no-any-return]
+
+
+def fmax(x: float, y: float) -> float:
+    """Return the larger of two quantities of one unit."""
+    return _apply("fmax", x, y)  # type: ignore[no-any-return]
+
+
+def fmin(x: float, y: float) -> float:
+    """Return the smaller of two quantities of one unit."""
+    return _apply("fmin", x, y)  # type: ignore[no-any-return]
+
+
+def power(x: float, exponent: float) -> float:
+    """Return x to a real power; x is a pure number >= 0."""
+    return _apply("power", x, exponent)  # type: ignore[no-any-return]
+
+
+def clip(x: float, low: float, high: float) -> float:
+    """Return x limited to [low, high]."""
+    return fmin(fmax(x, low), high)
+
+
+def where(condition: Any, then: float, otherwise: float) -> float:
+    """Return ``then`` where the condition holds, else ``otherwise``; both are evaluated."""
+    if isinstance(condition, (bool, np.bool_)):
+        return then if condition else otherwise
+    return _apply("where", condition, then, otherwise)  # type: ignore[no-any-return]
+
+
+def interpolate(x: float, xs: tuple[float, ...], ys: tuple[float, ...]) -> float:
+    """Return the piecewise linear function through (xs, ys), constant outside.
+
+    Parameters
+    ----------
+    xs, ys
+        Nodes, shape (n,) each, xs increasing.
+    """
+    y = ys[0]
+    for x0, x1, y0, y1 in zip(xs[:-1], xs[1:], ys[:-1], ys[1:], strict=True):
+        y = y + (y1 - y0) / (x1 - x0) * (clip(x, x0, x1) - x0)
+    return y

@@ -1,0 +1,212 @@
+"""Parameter sets: frozen, validated trees of physical values and structural choices.
+
+A *leaf* is a number with a unit; its dotted name (``motor.R_m``) is the same in Python, in
+bench files, in recordings and on the command line. A *choice* is a field that selects
+equations (``gear.law = "directional"``); it takes part in what is compiled, never in a value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, Self, TypeVar, cast
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic.fields import FieldInfo
+
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.quantities import Unit
+
+
+T = TypeVar("T", bound="ParameterSet")
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """What is known about one number of a parameter set."""
+
+    name: str
+    unit: Unit
+    low: float
+    high: float
+    low_open: bool
+    high_open: bool
+    description: str
+
+    @property
+    def range_text(self) -> str:
+        """Admissible range as a user reads it, for instance ``> 0 ohm``."""
+        unit = "" if self.unit.symbol == "1" else f" {self.unit.symbol}"
+        parts = []
+        if not math.isinf(self.low):
+            parts.append(f"{'>' if self.low_open else '>='} {self.low:g}{unit}")
+        if not math.isinf(self.high):
+            parts.append(f"{'<' if self.high_open else '<='} {self.high:g}{unit}")
+        return " and ".join(parts) or f"any finite number{unit and ' in' + unit}"
+
+
+class ParameterSet(BaseModel):
+    """Base of all parameter sets: immutable, no unknown keys, no silent defaults."""
+
+    model_config = ConfigDict(
+        frozen=True,
+        extra="forbid",
+        use_attribute_docstrings=True,
+        validate_default=True,
+        ser_json_inf_nan="constants",
+    )
+
+    @classmethod
+    def create(cls, values: Mapping[str, Any]) -> Self:
+        """Build the set from dotted names.
+
+        Raises
+        ------
+        ParameterError
+            With field, value, unit and admissible range.
+        UnknownNameError
+            With the nearest known names.
+        """
+        tree: dict[str, Any] = {}
+        for name, value in values.items():
+            _require_known(cls, name)
+            *groups, last = name.split(".")
+            node = tree
+            for group in groups:
+                node = node.setdefault(group, {})
+            node[last] = value
+        return _validated(cls, tree)
+
+    def replace(self, values: Mapping[str, Any]) -> Self:
+        """Return a copy with other values at dotted names, validated again."""
+        return type(self).create(self.flat() | dict(values))
+
+    def flat(self) -> dict[str, Any]:
+        """Return all leaves and choices by dotted name."""
+        return dict(_walk(self, ""))
+
+    def leaves(self) -> dict[str, float]:
+        """Return the numbers by dotted name, tables spread as ``name.0``, ``name.1``, ..."""
+        numbers: dict[str, float] = {}
+        for name, value in _walk(self, ""):
+            if isinstance(value, tuple):
+                numbers |= {f"{name}.{k}": float(v) for k, v in enumerate(value)}
+            elif _is_number(value):
+                numbers[name] = float(value)
+        return numbers
+
+    def choices(self) -> dict[str, Any]:
+        """Return the structural choices by dotted name, with the length of every table."""
+        found: dict[str, Any] = {}
+        for name, value in _walk(self, ""):
+            if isinstance(value, tuple):
+                found[name] = len(value)
+            elif not _is_number(value):
+                found[name] = value
+        return found
+
+    def with_leaves(self, values: Mapping[str, Any]) -> Self:
+        """Return a set of the same structure that carries other objects as its numbers.
+
+        The objects (symbols, quantities with units) are not validated: for evaluating
+        equations, not for building parameter sets.
+        """
+        return cast(Self, _rebuilt(self, "", values))
+
+
+def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, Leaf]:
+    """Return the description of every number of a parameter class, by dotted name."""
+    found: dict[str, Leaf] = {}
+    for name, info in cls.model_fields.items():
+        dotted = f"{prefix}{name}"
+        inner = info.annotation
+        if isinstance(inner, type) and issubclass(inner, ParameterSet):
+            found |= leaf_fields(inner, f"{dotted}.")
+            continue
+        unit = next((m for m in info.metadata if isinstance(m, Unit)), None)
+        if unit is not None:
+            found[dotted] = _leaf(dotted, unit, info)
+    return found
+
+
+def choice_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, str]:
+    """Return the description of every structural choice of a class, by dotted name."""
+    found: dict[str, str] = {}
+    for name, info in cls.model_fields.items():
+        dotted = f"{prefix}{name}"
+        inner = info.annotation
+        if isinstance(inner, type) and issubclass(inner, ParameterSet):
+            found |= choice_fields(inner, f"{dotted}.")
+        elif not any(isinstance(m, Unit) for m in info.metadata):
+            found[dotted] = info.description or ""
+    return found
+
+
+def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
+    low, high, low_open, high_open = -math.inf, math.inf, False, False
+    for note in info.metadata:
+        if isinstance(note, Gt):
+            low, low_open = float(cast(float, note.gt)), True
+        elif isinstance(note, Ge):
+            low = float(cast(float, note.ge))
+        elif isinstance(note, Lt):
+            high, high_open = float(cast(float, note.lt)), True
+        elif isinstance(note, Le):
+            high = float(cast(float, note.le))
+    return Leaf(dotted, unit, low, high, low_open, high_open, info.description or "")
+
+
+def _walk(node: ParameterSet, prefix: str) -> Iterator[tuple[str, Any]]:
+    for name in type(node).model_fields:
+        value = getattr(node, name)
+        if isinstance(value, ParameterSet):
+            yield from _walk(value, f"{prefix}{name}.")
+        else:
+            yield f"{prefix}{name}", value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
+    fields: dict[str, Any] = {}
+    for name in type(node).model_fields:
+        value = getattr(node, name)
+        dotted = f"{prefix}{name}"
+        if isinstance(value, ParameterSet):
+            fields[name] = _rebuilt(value, f"{dotted}.", values)
+        elif isinstance(value, tuple):
+            fields[name] = tuple(values[f"{dotted}.{k}"] for k in range(len(value)))
+        else:
+            fields[name] = values[dotted] if _is_number(value) else value
+    return type(node).model_construct(**fields)
+
+
+def _require_known(cls: type[ParameterSet], name: str) -> None:
+    known = leaf_fields(cls).keys() | choice_fields(cls).keys()
+    if name not in known:
+        raise unknown_name("parameter", name, known)
+
+
+def _validated(cls: type[T], tree: Mapping[str, Any]) -> T:
+    try:
+        return cls.model_validate(tree)
+    except ValidationError as error:
+        lines = [_explain(cls, dict(detail)) for detail in error.errors()]
+        raise ParameterError("\n".join(lines)) from None
+
+
+def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
+    name = ".".join(str(part) for part in detail["loc"])
+    value = detail["input"]
+    if detail["type"] == "missing":
+        return f"{cls.__name__}: {name} is missing: give it a value"
+    leaf = leaf_fields(cls).get(name)
+    if leaf is not None:
+        unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
+        return f"{name} = {value}{unit} is not admissible: it must be {leaf.range_text}"
+    message = str(detail["msg"]).removeprefix("Value error, ")
+    return f"{name or cls.__name__}: {message}" + ("" if isinstance(value, dict) else f", got {value!r}")

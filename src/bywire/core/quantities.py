@@ -1,0 +1,89 @@
+"""Physical quantities: unit and admissible range, declared once, read by everything else.
+
+A parameter's type says all there is to know about it: ``R_m: Resistance`` carries the unit
+``ohm`` and the range ``> 0``. SI and radians inside; the edges show ``display`` units.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import Field
+
+
+@dataclass(frozen=True)
+class Unit:
+    """SI unit of a quantity and its usual magnitude.
+
+    Parameters
+    ----------
+    symbol
+        Unit in the syntax of pint, for instance ``"N*m/A"``; ``"1"`` for a pure number.
+    nominal
+        Usual magnitude in that unit: scales tolerances and the samples of contract tests.
+    """
+
+    symbol: str
+    nominal: float = 1.0
+
+
+# How the edges (files, command line, figures) show a quantity that is SI inside.
+DISPLAY_UNITS = {"Pa": "bar", "m": "mm", "s": "s", "m**3": "ml", "m**2": "mm**2"}
+
+
+def display_unit(symbol: str) -> str:
+    """Return the unit in which the edges show an SI unit."""
+    return DISPLAY_UNITS.get(symbol, symbol)
+
+
+_POSITIVE = Field(gt=0, allow_inf_nan=False)
+_NOT_NEGATIVE = Field(ge=0, allow_inf_nan=False)
+_FINITE = Field(allow_inf_nan=False)
+
+# Electrical
+Resistance = Annotated[float, Unit("ohm", 0.5), _POSITIVE]
+InternalResistance = Annotated[float, Unit("ohm", 0.02), _NOT_NEGATIVE]
+Inductance = Annotated[float, Unit("H", 1e-4), _POSITIVE]
+Voltage = Annotated[float, Unit("V", 12.0), _POSITIVE]
+Current = Annotated[float, Unit("A", 10.0), _POSITIVE]
+SignedCurrent = Annotated[float, Unit("A", 10.0), _FINITE]
+TorqueConstant = Annotated[float, Unit("N*m/A", 0.03), _POSITIVE]
+
+# Mechanical
+Mass = Annotated[float, Unit("kg", 0.01), _POSITIVE]
+Inertia = Annotated[float, Unit("kg*m**2", 3e-5), _POSITIVE]
+Torque = Annotated[float, Unit("N*m", 0.01), _NOT_NEGATIVE]
+Force = Annotated[float, Unit("N", 10.0), _NOT_NEGATIVE]
+Length = Annotated[float, Unit("m", 0.01), _POSITIVE]
+Position = Annotated[float, Unit("m", 0.01), _FINITE]
+Area = Annotated[float, Unit("m**2", 1e-4), _POSITIVE]
+Volume = Annotated[float, Unit("m**3", 1e-6), _NOT_NEGATIVE]
+GearRatio = Annotated[float, Unit("m/rad", 3e-4), _POSITIVE]
+Stiffness = Annotated[float, Unit("N/m", 1e6), _POSITIVE]
+Damping = Annotated[float, Unit("N*s/m", 2e4), _NOT_NEGATIVE]
+RotaryDamping = Annotated[float, Unit("N*m*s/rad", 2e-7), _NOT_NEGATIVE]
+InverseSpeed = Annotated[float, Unit("s/rad", 5.0), _POSITIVE]
+TorquePerPressure = Annotated[float, Unit("N*m/Pa", 1e-8), _NOT_NEGATIVE]
+
+# Hydraulic
+Pressure = Annotated[float, Unit("Pa", 2e6), _POSITIVE]
+SignedPressure = Annotated[float, Unit("Pa", 2e6), _FINITE]
+Density = Annotated[float, Unit("kg/m**3", 1e3), _POSITIVE]
+KinematicViscosity = Annotated[float, Unit("m**2/s", 5e-4), _POSITIVE]
+Conductance = Annotated[float, Unit("m**3/(s*Pa)", 1e-11), _NOT_NEGATIVE]
+
+# Signals and control
+Duration = Annotated[float, Unit("s", 1e-3), _POSITIVE]
+TimeConstant = Annotated[float, Unit("s", 1e-3), _NOT_NEGATIVE]
+Frequency = Annotated[float, Unit("Hz", 100.0), _POSITIVE]
+Fraction = Annotated[float, Unit("1", 0.9), Field(gt=0, le=1, allow_inf_nan=False)]
+Weight = Annotated[float, Unit("1", 1.0), Field(ge=0, le=1, allow_inf_nan=False)]
+Factor = Annotated[float, Unit("1", 1.0), _POSITIVE]
+Gain = Annotated[float, Unit("1", 1.0), _NOT_NEGATIVE]
+BreakawayFactor = Annotated[float, Unit("1", 2.0), Field(ge=1, allow_inf_nan=False)]
+CurrentPerPressure = Annotated[float, Unit("A/Pa", 1e-6), _NOT_NEGATIVE]
+CurrentPerPressureTime = Annotated[float, Unit("A/(Pa*s)", 1e-5), _NOT_NEGATIVE]
+CurrentTimePerPressure = Annotated[float, Unit("A*s/Pa", 1e-7), _NOT_NEGATIVE]
+DutyPerCurrent = Annotated[float, Unit("1/A", 5e-3), _NOT_NEGATIVE]
+DutyPerCurrentTime = Annotated[float, Unit("1/(A*s)", 10.0), _NOT_NEGATIVE]

@@ -1,0 +1,66 @@
+"""Signals: what the fields of a State, Input, Output or Memory tuple mean."""
+
+from __future__ import annotations
+
+import typing
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any, NamedTuple, TypeVar
+
+T = TypeVar("T", bound=tuple[Any, ...])
+
+
+@dataclass(frozen=True)
+class Signal:
+    """Meaning of one field of a signal tuple.
+
+    Parameters
+    ----------
+    unit
+        SI unit in the syntax of pint; ``"1"`` for a pure number.
+    label
+        What an axis of a figure says.
+    nominal
+        Usual magnitude in that unit.
+    """
+
+    unit: str
+    label: str
+    nominal: float = 1.0
+
+
+Power = Annotated[float, Signal("W", "power")]
+Energy = Annotated[float, Signal("J", "energy")]
+Torque = Annotated[float, Signal("N*m", "torque", 0.01)]
+Speed = Annotated[float, Signal("rad/s", "shaft speed", 10.0)]
+Angle = Annotated[float, Signal("rad", "shaft angle", 20.0)]
+Pressure = Annotated[float, Signal("Pa", "pressure", 2e6)]
+EnthalpyDensity = Annotated[float, Signal("J/m**3", "flow energy per volume", 2e6)]
+PressureEnergy = Annotated[float, Signal("Pa**2", "integral of pressure", 4e12)]
+FluidCompliance = Annotated[float, Signal("m**3/Pa", "compliance", 1e-15)]
+FlowResistance = Annotated[float, Signal("Pa*s/m**3", "flow resistance", 4e9)]
+ReflectedInertia = Annotated[float, Signal("kg*m**2/rad**2", "inertia", 3e-5)]
+ContactCompliance = Annotated[float, Signal("m/N", "compliance", 1e-8)]
+Overlap = Annotated[float, Signal("m", "overlap", 1e-4)]
+
+
+@cache
+def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
+    """Return the signals of a NamedTuple class, in the order of its fields.
+
+    Every field must be annotated ``Annotated[float, Signal(...)]``.
+    """
+    hints = typing.get_type_hints(tuple_type, include_extras=True)
+    found: dict[str, Signal] = {}
+    for name in tuple_type._fields:
+        notes = getattr(hints[name], "__metadata__", ())
+        signal = next((note for note in notes if isinstance(note, Signal)), None)
+        if signal is None:
+            raise TypeError(f"{tuple_type.__qualname__}.{name} has no Signal annotation")
+        found[name] = signal
+    return found
+
+
+def zeros(tuple_type: type[T]) -> T:
+    """Return a signal tuple whose every field is 0.0."""
+    return tuple_type(*(0.0 for _ in tuple_type._fields))  # type: ignore[attr-defined]

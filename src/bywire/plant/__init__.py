@@ -1,0 +1,1 @@
+"""Physical elements, one per file: parameters, states and equations, nothing else."""

@@ -1,0 +1,42 @@
+"""Analog-to-digital converter: noise at its input, then resolution; the tick holds the sample."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Factor, Unit
+from bywire.core.signals import Signal
+
+Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+Noise = Annotated[float, Signal("1", "standard normal noise", 1.0)]
+
+
+class Parameters(ParameterSet):
+    """Uniform quantizer over the sensor's span, rounding to the nearest code."""
+
+    law: Literal["ideal", "quantized"]
+    """whether the reading is rounded to whole codes"""
+    codes: Factor
+    """number of codes over the span, 4096 for 12 bits"""
+    noise: Annotated[float, Unit("1", 1e-3), Field(ge=0, le=1, allow_inf_nan=False)]
+    """standard deviation of the noise at the input, share of the span"""
+
+
+def sample(reading: Reading, noise: Noise, par: Parameters) -> Reading:
+    """Return the converted reading.
+
+    Parameters
+    ----------
+    reading
+        Share of the span at the input.
+    noise
+        A sample of a standard normal variable; the recording keeps its seed.
+    """
+    noisy = reading + par.noise * noise
+    if par.law == "ideal":
+        return noisy
+    return ops.clip(ops.floor(noisy * par.codes + 0.5) / par.codes, 0.0, 1.0)

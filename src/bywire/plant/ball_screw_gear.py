@@ -1,0 +1,150 @@
+"""Rotor, gear and ball screw: motion of the drive train with its transmission losses."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Fraction, GearRatio, Inertia, Mass
+from bywire.core.signals import Energy, Power, ReflectedInertia, Signal, Torque
+
+
+class Parameters(ParameterSet):
+    """Rigid drive train with one efficiency.
+
+    ``law = "paper"`` keeps eq. (8), whose constant efficiency lets the gear *give* energy when
+    the load drives it. ``law = "directional"`` makes the loss a load-dependent friction,
+    (1/eta_g - 1) times the load torque, in both directions (back-driven efficiency
+    2 - 1/eta_g): it never gives energy and holds at rest.
+    """
+
+    k_g: GearRatio
+    """piston travel per shaft angle"""
+    eta_g: Fraction
+    """efficiency of gear and screw, driving"""
+    law: Literal["paper", "directional"]
+    """how the efficiency acts: as in eq. (8), or as a friction that depends on direction"""
+    J_mot: Inertia
+    """inertia of rotor, gear and screw at the motor shaft"""
+    M_mc: Mass
+    """mass of the piston"""
+
+
+class State(NamedTuple):
+    """Shaft angle and speed, zero at the retracted end, positive toward clamping."""
+
+    theta: Annotated[float, Signal("rad", "motor angle", 20.0)]
+    omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
+
+
+class Input(NamedTuple):
+    """Motor torque, piston load, and the dry friction torque on the shaft."""
+
+    torque: Annotated[float, Signal("N*m", "motor torque", 0.1)]
+    force: Annotated[float, Signal("N", "load on the piston, against clamping", 200.0)]
+    friction: Annotated[float, Signal("N*m", "friction torque", 0.01)]
+
+
+class Bounds(NamedTuple):
+    """Limits of the set-valued friction torque on the shaft."""
+
+    low: Annotated[float, Signal("N*m", "friction torque while applying", 0.05)]
+    high: Annotated[float, Signal("N*m", "friction torque while releasing", 0.05)]
+
+
+class Output(NamedTuple):
+    """Piston travel and speed."""
+
+    x: Annotated[float, Signal("m", "piston travel", 7e-3)]
+    v: Annotated[float, Signal("m/s", "piston speed", 0.02)]
+
+
+def inertia(par: Parameters) -> ReflectedInertia:
+    r"""Return the inertia that the shaft moves.
+
+    .. math:: M' = \eta_g J_{mot} + k_g^2 M_{mc}
+
+    (law "paper"; without eta_g for "directional").
+    """
+    rotor = par.eta_g * par.J_mot if par.law == "paper" else par.J_mot
+    return rotor + par.k_g * par.k_g * par.M_mc
+
+
+def mass(x: State, par: Parameters) -> Annotated[tuple[float, float], "1; kg*m**2"]:
+    """Return the factors of the derivatives: 1 and the inertia."""
+    return (1.0, inertia(par))
+
+
+def balance(x: State, u: Input, par: Parameters) -> State:
+    r"""Return the shaft's speed and the torque that accelerates it.
+
+    .. math:: M' \dot\Omega = \eta_g T - k_g F + T_{fr}
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (8).
+    """
+    drive = par.eta_g * u.torque if par.law == "paper" else u.torque
+    return State(theta=x.omega, omega=drive - par.k_g * u.force + u.friction)
+
+
+def output(x: State, par: Parameters) -> Output:
+    """Return travel and speed of the piston, eq. (7)."""
+    return Output(x=par.k_g * x.theta, v=par.k_g * x.omega)
+
+
+def friction_bounds(
+    seal_p: Torque, seal_n: Torque, load: Annotated[float, Signal("N", "piston load", 200.0)],
+    par: Parameters,
+) -> Bounds:
+    """Return the limits of the dry friction on the shaft: seals, and gear when directional.
+
+    Parameters
+    ----------
+    seal_p, seal_n
+        Magnitudes of the seal friction, apply and release.
+    load
+        Force on the piston, against clamping.
+    """
+    if par.law == "paper":
+        return Bounds(low=-seal_p, high=seal_n)
+    share = 1.0 / par.eta_g - 1.0
+    torque = par.k_g * load
+    return Bounds(
+        low=-(seal_p + share * ops.fabs(torque + seal_p)),
+        high=seal_n + share * ops.fabs(torque - seal_n),
+    )
+
+
+def energy(x: State, par: Parameters) -> Energy:
+    """Return the kinetic energy of rotor and piston."""
+    return 0.5 * (par.J_mot + par.k_g * par.k_g * par.M_mc) * x.omega * x.omega
+
+
+def power_in(x: State, u: Input, par: Parameters) -> Power:
+    """Return the motor's power less the power that the piston gives."""
+    return (u.torque - par.k_g * u.force) * x.omega
+
+
+def transmission_loss(
+    x: State, torque: Torque, acceleration: Annotated[float, Signal("rad/s**2", "", 1e3)],
+    par: Parameters,
+) -> Power:
+    r"""Return the loss of law "paper"; negative where the gear gives energy.
+
+    .. math:: -W_l = (1 - \eta_g) (T - J_{mot} \dot\Omega) \Omega
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (6).
+    """
+    if par.law != "paper":
+        return 0.0 * torque * x.omega
+    return (1.0 - par.eta_g) * (torque - par.J_mot * acceleration) * x.omega
+
+
+def power_loss(x: State, u: Input, par: Parameters) -> Power:
+    """Return transmission and friction losses together."""
+    acceleration = balance(x, u, par).omega / inertia(par)
+    return transmission_loss(x, u.torque, acceleration, par) - u.friction * x.omega

@@ -1,0 +1,48 @@
+"""Battery with internal resistance."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import InternalResistance, Voltage
+from bywire.core.signals import Power, Signal
+
+
+class Parameters(ParameterSet):
+    """Ideal voltage source behind a resistance; no dynamics of the cells."""
+
+    V_bat: Voltage
+    """open-circuit voltage of the battery"""
+    R_bat: InternalResistance
+    """internal resistance of battery and leads"""
+
+
+class Input(NamedTuple):
+    """What the load does."""
+
+    i_dc: Annotated[float, Signal("A", "battery current", 5.0)]
+
+
+class Output(NamedTuple):
+    """What the load sees."""
+
+    v_bus: Annotated[float, Signal("V", "bus voltage", 12.0)]
+
+
+def output(u: Input, par: Parameters) -> Output:
+    r"""Return the voltage at the terminals.
+
+    .. math:: v_{bus} = V_{bat} - R_{bat} i_{dc}
+    """
+    return Output(v_bus=par.V_bat - par.R_bat * u.i_dc)
+
+
+def power_source(u: Input, par: Parameters) -> Power:
+    """Return the power that the cells deliver, V_bat i_dc."""
+    return par.V_bat * u.i_dc
+
+
+def power_loss(u: Input, par: Parameters) -> Power:
+    """Return the heat in the internal resistance."""
+    return par.R_bat * u.i_dc * u.i_dc

@@ -1,0 +1,104 @@
+"""Brake fluid: constant bulk modulus, viscosity, and optionally entrained air."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Density, KinematicViscosity, Pressure, Unit, Volume
+from bywire.core.signals import (
+    Energy,
+    EnthalpyDensity,
+    FluidCompliance,
+    Power,
+    PressureEnergy,
+    Signal,
+)
+
+
+
+class Parameters(ParameterSet):
+    """Newtonian fluid of constant bulk modulus; air, if any, stays where it is, undissolved."""
+
+    beta: Pressure
+    """bulk modulus"""
+    nu: KinematicViscosity
+    """kinematic viscosity"""
+    rho: Density
+    """density"""
+    air: Literal["none", "entrained"]
+    """whether gas bubbles sit in the master cylinder's chamber"""
+    V_air: Volume
+    """volume of the gas at ambient pressure"""
+    n_air: Annotated[float, Unit("1", 1.2), Field(gt=1, le=1.7, allow_inf_nan=False)]
+    """polytropic exponent of the gas (toward 1 isothermal, 1.4 adiabatic)"""
+    p_atm: Pressure
+    """ambient pressure, absolute"""
+
+
+class Chamber(NamedTuple):
+    """Fluid volume and gauge pressure of a chamber."""
+
+    V: Annotated[float, Signal("m**3", "fluid volume", 3e-7)]
+    p: Annotated[float, Signal("Pa", "pressure", 2e6)]
+
+
+def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
+    r"""Return dV/dp of the fluid in a chamber, with its gas.
+
+    .. math:: \frac{V}{\beta} + \frac{V_{air}}{n (p_{atm} + p)}
+        \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
+    """
+    fluid = u.V / par.beta
+    if par.air == "none":
+        return fluid
+    absolute = par.p_atm + ops.fmax(u.p, 0.0)
+    gas = par.V_air * ops.power(par.p_atm / absolute, 1.0 / par.n_air) / (par.n_air * absolute)
+    return fluid + gas
+
+
+def gas_energy(p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters) -> Energy:
+    """Return the work stored in the compressed gas, the integral of p dV from ambient."""
+    if par.air == "none":
+        return 0.0 * p * par.V_air
+    n = par.n_air
+    ratio = (par.p_atm + ops.fmax(p, 0.0)) / par.p_atm
+    head = (ops.power(ratio, 1.0 - 1.0 / n) - 1.0) * n / (n - 1.0)
+    tail = n * (ops.power(ratio, -1.0 / n) - 1.0)
+    return par.V_air * par.p_atm / n * (head + tail)
+
+
+def flow_energy(p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters) -> EnthalpyDensity:
+    r"""Return the energy that a volume flow carries at a pressure, per volume.
+
+    .. math:: h(p) = \beta (e^{p/\beta} - 1) \approx
+        p (1 + \tfrac{z}{2} (1 + \tfrac{z}{3} (1 + \tfrac{z}{4}))), \quad z = p/\beta
+
+    Flow work plus the compression energy that the fluid takes along. The series is off by
+    z^4/120 of the value, below 1e-11 up to 50 bar.
+    """
+    z = p / par.beta
+    return p * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))
+
+
+def flow_energy_integral(
+    p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters
+) -> PressureEnergy:
+    """Return the integral of ``flow_energy`` over pressure from 0 to p.
+
+    Divided by beta it is the compression energy stored per volume.
+    """
+    z = p / par.beta
+    return 0.5 * p * p * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0)))
+
+
+def convected_power(
+    q: Annotated[float, Signal("m**3/s", "flow", 1e-6)],
+    p: Annotated[float, Signal("Pa", "pressure", 2e6)],
+    par: Parameters,
+) -> Power:
+    """Return the power that a flow q carries at pressure p."""
+    return q * flow_energy(p, par)

@@ -1,0 +1,112 @@
+"""Caliper with pad spring: pressure that grows with the volume taken in."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field, model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Area, Stiffness, Unit
+from bywire.core.signals import Energy, FluidCompliance, Power, Signal
+from bywire.plant import brake_fluid
+
+Table = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
+
+
+class Parameters(ParameterSet):
+    """Single-acting cylinder against the pads' elasticity.
+
+    ``law``: ``"linear"`` is eq. (11); ``"compressible"`` is eq. (10), with the compressibility
+    of the fluid in the caliper; ``"table"`` interpolates a measured pressure-volume curve, whose
+    flat start can hold the volume of a knock-back.
+    """
+
+    law: Literal["linear", "compressible", "table"]
+    """which relation of pressure and volume holds"""
+    A_pd: Area
+    """piston area"""
+    K_pd: Stiffness
+    """stiffness of pads and caliper"""
+    p_table: Annotated[Table, Unit("Pa", 1e6)]
+    """pressures of the table, from 0, increasing; used by law "table" only"""
+    V_table: Annotated[Table, Unit("m**3", 1e-7)]
+    """volumes of the table, from 0, increasing; used by law "table" only"""
+
+    @model_validator(mode="after")
+    def _table_is_a_curve(self) -> Parameters:
+        p, V = self.p_table, self.V_table
+        if len(p) != len(V):
+            raise ValueError(f"caliper.p_table has {len(p)} nodes and V_table {len(V)}")
+        if self.law == "table" and len(p) < 2:
+            raise ValueError("caliper.law = 'table' needs p_table and V_table of 2 nodes or more")
+        for name, nodes in (("p_table", p), ("V_table", V)):
+            rising = all(a < b for a, b in zip(nodes, nodes[1:], strict=False))
+            if nodes and (nodes[0] != 0.0 or not rising):
+                raise ValueError(f"caliper.{name} must start at 0 and increase, got {nodes}")
+        return self
+
+
+class State(NamedTuple):
+    """Pressure at the pads, gauge."""
+
+    p: Annotated[float, Signal("Pa", "caliper pressure", 2e6)]
+
+
+def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompliance:
+    r"""Return dV/dp, the factor of dp/dt.
+
+    .. math:: (1 + p_{pd}/\beta) \frac{A_{pd}^2}{K_{pd}} \frac{dp_{pd}}{dt} = q_{pd}
+
+    without the first factor for law "linear"; the slope of the table for law "table".
+
+    Notes
+    -----
+    Eq. (10) as printed divides by the volume V_pd = A_pd x_pd, which is 0/0 at zero pressure;
+    with p_pd A_pd = K_pd x_pd it is the form above.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eqs. (10) and (11).
+    """
+    if par.law == "table":
+        return _slope(x.p, par)
+    spring = par.A_pd * par.A_pd / par.K_pd
+    return spring if par.law == "linear" else spring * (1.0 + x.p / fluid.beta)
+
+
+def _slope(p: float, par: Parameters) -> float:
+    nodes = list(zip(par.p_table, par.V_table, strict=True))
+    slopes = [(V1 - V0) / (p1 - p0) for (p0, V0), (p1, V1) in zip(nodes, nodes[1:], strict=False)]
+    slope = slopes[0]
+    for (p0, _), s in zip(nodes[1:], slopes[1:], strict=False):
+        slope = ops.where(p > p0, s, slope)
+    return slope
+
+
+def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
+    """Return the energy of the pads and of the fluid that came in: integral of h(p) dV."""
+    H = brake_fluid.flow_energy_integral
+    if par.law == "table":
+        total = 0.0 * H(x.p, fluid) * _slope(x.p, par)
+        last = len(par.p_table) - 2
+        for k in range(last + 1):
+            p0, p1 = par.p_table[k], par.p_table[k + 1]
+            slope = (par.V_table[k + 1] - par.V_table[k]) / (p1 - p0)
+            upper = ops.fmax(x.p, p0) if k == last else ops.clip(x.p, p0, p1)
+            total = total + slope * (H(upper, fluid) - H(p0, fluid))
+        return total
+    spring = par.A_pd * par.A_pd / par.K_pd
+    stored = H(x.p, fluid)
+    if par.law == "compressible":
+        z = x.p / fluid.beta
+        stored = stored + x.p * x.p * z / 3.0 * (1.0 + 3.0 * z / 8.0 * (1.0 + 4.0 * z / 15.0))
+    return spring * stored
+
+
+def power_in(
+    x: State, q: Annotated[float, Signal("m**3/s", "flow in", 1e-6)], fluid: brake_fluid.Parameters
+) -> Power:
+    """Return what the inflow carries."""
+    return brake_fluid.convected_power(q, x.p, fluid)

@@ -1,0 +1,42 @@
+"""Hall-effect current sensor: current as a share of its span."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import SignedCurrent
+from bywire.core.signals import Signal
+
+MotorCurrent = Annotated[float, Signal("A", "motor current", 5.0)]
+Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+
+
+class Parameters(ParameterSet):
+    """Linear between the ends of its range, saturating there; no dynamics of its own."""
+
+    i_low: SignedCurrent
+    """lowest current that it shows"""
+    i_high: SignedCurrent
+    """highest current that it shows"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Parameters:
+        if not self.i_low < self.i_high:
+            raise ValueError(
+                f"current_sensor.i_low = {self.i_low:g} A must be below i_high = {self.i_high:g} A"
+            )
+        return self
+
+
+def reading(i: MotorCurrent, par: Parameters) -> Reading:
+    """Return the reading, 0 to 1, for a current."""
+    return ops.clip((i - par.i_low) / (par.i_high - par.i_low), 0.0, 1.0)
+
+
+def value(share: Reading, par: Parameters) -> MotorCurrent:
+    """Return the current that a reading stands for."""
+    return par.i_low + share * (par.i_high - par.i_low)

@@ -1,0 +1,81 @@
+"""Permanent-magnet DC motor: winding and torque."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Inductance, Resistance, TorqueConstant
+from bywire.core.signals import Energy, Power, Signal
+
+
+class Parameters(ParameterSet):
+    """Constant coefficients: no saturation, no temperature, no brush voltage."""
+
+    R_m: Resistance
+    """winding resistance"""
+    L_m: Inductance
+    """winding inductance"""
+    K_e: TorqueConstant
+    """torque and back-EMF constant"""
+
+
+class State(NamedTuple):
+    """Winding current."""
+
+    i: Annotated[float, Signal("A", "motor current", 5.0)]
+
+
+class Input(NamedTuple):
+    """Voltage at the terminals, speed of the rotor."""
+
+    v: Annotated[float, Signal("V", "motor voltage", 6.0)]
+    omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
+
+
+class Output(NamedTuple):
+    """Electromagnetic torque."""
+
+    torque: Annotated[float, Signal("N*m", "motor torque", 0.1)]
+
+
+def mass(x: State, par: Parameters) -> State:
+    """Return the factor of di/dt, the inductance."""
+    return State(i=par.L_m)
+
+
+def balance(x: State, u: Input, par: Parameters) -> State:
+    r"""Return the voltage across the inductance.
+
+    .. math:: L_m \frac{di}{dt} = v - R_m i - K_e \Omega
+
+    Notes
+    -----
+    The printed equation carries the opposite sign on its right-hand side; current must rise
+    with voltage.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (1), first line.
+    """
+    return State(i=u.v - par.R_m * x.i - par.K_e * u.omega)
+
+
+def output(x: State, par: Parameters) -> Output:
+    """Return the torque T = K_e i of eq. (1)."""
+    return Output(torque=par.K_e * x.i)
+
+
+def energy(x: State, par: Parameters) -> Energy:
+    """Return the magnetic energy."""
+    return 0.5 * par.L_m * x.i * x.i
+
+
+def power_in(x: State, u: Input, par: Parameters) -> Power:
+    """Return the electrical power taken in less the mechanical power given out."""
+    return u.v * x.i - par.K_e * x.i * u.omega
+
+
+def power_loss(x: State, par: Parameters) -> Power:
+    """Return the copper loss."""
+    return par.R_m * x.i * x.i

@@ -1,0 +1,111 @@
+"""Master cylinder: piston, pressure chamber, and the force that the piston feels."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import model_validator
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Area, Damping, Length
+from bywire.core.signals import Energy, FluidCompliance, Power, Signal
+from bywire.plant import brake_fluid
+
+
+class Parameters(ParameterSet):
+    """Chamber that the piston empties; gauge pressures."""
+
+    A_mc: Area
+    """piston area"""
+    s_mc: Length
+    """chamber length at zero travel: where the chamber's volume would vanish"""
+    x_rest: Length
+    """travel of the retracted piston, at its near end stop and zero pressure"""
+    x_end: Length
+    """travel at which the piston meets its end stop"""
+    x_nominal: Length
+    """travel at the nominal operating point"""
+    k_damp: Damping
+    """damping of the fluid's kinetic energy"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Parameters:
+        if not self.x_nominal < self.s_mc:
+            raise ValueError(
+                f"master_cylinder.x_nominal = {self.x_nominal:g} m must be less than the "
+                f"chamber length s_mc = {self.s_mc:g} m"
+            )
+        if not self.x_rest < self.x_end:
+            raise ValueError(
+                f"master_cylinder.x_end = {self.x_end:g} m must lie beyond "
+                f"x_rest = {self.x_rest:g} m"
+            )
+        if not self.x_end < self.s_mc:
+            raise ValueError(
+                f"master_cylinder.x_end = {self.x_end:g} m must be less than the chamber length "
+                f"s_mc = {self.s_mc:g} m: move the end stop forward or lengthen the chamber"
+            )
+        return self
+
+
+class State(NamedTuple):
+    """Chamber pressure, gauge."""
+
+    p: Annotated[float, Signal("Pa", "master-cylinder pressure", 2e6)]
+
+
+class Input(NamedTuple):
+    """Piston travel and speed, flow into the pipeline."""
+
+    x: Annotated[float, Signal("m", "piston travel", 7e-3)]
+    v: Annotated[float, Signal("m/s", "piston speed", 0.02)]
+    q: Annotated[float, Signal("m**3/s", "flow out of the chamber", 1e-6)]
+
+
+class Output(NamedTuple):
+    """Load that the piston puts on the drive, against clamping."""
+
+    force: Annotated[float, Signal("N", "piston load", 200.0)]
+
+
+def volume(u: Input, par: Parameters) -> Annotated[float, Signal("m**3", "volume", 3e-7)]:
+    """Return the fluid volume of the chamber, V_mc = A_mc (s_mc - x_mc)."""
+    return par.A_mc * (par.s_mc - u.x)
+
+
+def mass(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompliance:
+    """Return the factor of dp/dt, the compliance of the enclosed fluid."""
+    return brake_fluid.compliance(brake_fluid.Chamber(V=volume(u, par), p=x.p), fluid)
+
+
+def balance(u: Input, par: Parameters) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
+    r"""Return the flow that compresses the chamber.
+
+    .. math:: \frac{V_{mc}}{\beta} \frac{dp_{mc}}{dt} = A_{mc} v_{mc} - q_{mc}
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (9).
+    """
+    return par.A_mc * u.v - u.q
+
+
+def output(x: State, u: Input, par: Parameters) -> Output:
+    """Return the piston's load, pressure and damping force of eq. (4), without friction."""
+    return Output(force=x.p * par.A_mc + par.k_damp * u.v)
+
+
+def energy(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
+    """Return the compression energy of the fluid and of the gas in it."""
+    density = brake_fluid.flow_energy_integral(x.p, fluid) / fluid.beta
+    return volume(u, par) * density + brake_fluid.gas_energy(x.p, fluid)
+
+
+def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+    """Return the piston's work less what the outflow carries."""
+    return output(x, u, par).force * u.v - brake_fluid.convected_power(u.q, x.p, fluid)
+
+
+def power_loss(u: Input, par: Parameters) -> Power:
+    """Return the heat of the damping force."""
+    return par.k_damp * u.v * u.v

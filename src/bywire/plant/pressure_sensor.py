@@ -1,0 +1,45 @@
+"""Piezo-resistive pressure sensor: absolute pressure as a share of its span."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import SignedPressure
+from bywire.core.signals import Signal
+
+AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
+Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+
+
+class Parameters(ParameterSet):
+    """Linear between the ends of its range, saturating there; no dynamics of its own."""
+
+    p_low: SignedPressure
+    """lowest absolute pressure that it shows"""
+    p_high: SignedPressure
+    """highest absolute pressure that it shows"""
+    place: Literal["master-cylinder", "mid-pipeline"]
+    """where it sits; mid-pipeline sees the mean of the pressures at both ends"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Parameters:
+        if not self.p_low < self.p_high:
+            raise ValueError(
+                f"pressure_sensor.p_low = {self.p_low:g} Pa must be below "
+                f"p_high = {self.p_high:g} Pa"
+            )
+        return self
+
+
+def reading(p: AbsolutePressure, par: Parameters) -> Reading:
+    """Return the reading, 0 to 1, for an absolute pressure."""
+    return ops.clip((p - par.p_low) / (par.p_high - par.p_low), 0.0, 1.0)
+
+
+def value(share: Reading, par: Parameters) -> AbsolutePressure:
+    """Return the absolute pressure that a reading stands for."""
+    return par.p_low + share * (par.p_high - par.p_low)

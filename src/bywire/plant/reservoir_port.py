@@ -1,0 +1,52 @@
+"""Reservoir port of the master cylinder: makeup flow, and optionally a dead stroke."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Conductance, Length
+from bywire.core.signals import Power, Signal
+from bywire.plant import brake_fluid
+
+
+class Parameters(ParameterSet):
+    """Port between chamber and reservoir.
+
+    With either law the cup seal lets fluid in at once when the pressure would fall below
+    ambient (the model's one-sided limit). ``law = "dead-stroke"`` also opens an orifice while
+    the piston is behind ``x_port``.
+    """
+
+    law: Literal["makeup", "dead-stroke"]
+    """whether the piston uncovers a port near its retracted end"""
+    x_port: Length
+    """travel at which the piston covers the port (law "dead-stroke")"""
+    G_port: Conductance
+    """conductance of the fully open port (law "dead-stroke")"""
+
+
+class Input(NamedTuple):
+    """Piston travel and chamber pressure."""
+
+    x: Annotated[float, Signal("m", "piston travel", 1e-3)]
+    p: Annotated[float, Signal("Pa", "master-cylinder pressure", 1e5)]
+
+
+class Output(NamedTuple):
+    """Conductance of the port as it stands."""
+
+    G: Annotated[float, Signal("m**3/(s*Pa)", "port conductance", 1e-12)]
+
+
+def output(u: Input, par: Parameters) -> Output:
+    """Return the conductance, which falls linearly to 0 while the piston covers the port."""
+    if par.law == "makeup":
+        return Output(G=0.0 * par.G_port)
+    return Output(G=par.G_port * ops.clip(1.0 - u.x / par.x_port, 0.0, 1.0))
+
+
+def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+    """Return what the flow into the reservoir carries away, >= 0."""
+    return brake_fluid.convected_power(output(u, par).G * u.p, u.p, fluid)

@@ -1,0 +1,80 @@
+"""Friction of the master cylinder's seals: Stribeck curve that grows with pressure."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    BreakawayFactor,
+    InverseSpeed,
+    RotaryDamping,
+    Torque,
+    TorquePerPressure,
+)
+from bywire.core.signals import Power, Signal
+
+
+class Parameters(ParameterSet):
+    """Asymmetric Stribeck friction, torques at the motor shaft.
+
+    Valid for pressures >= 0. At rest the friction is set-valued: it takes any value between
+    its two breakaway torques, and the piston truly sticks.
+    """
+
+    T_pr: Torque
+    """friction torque of the seals' preload, at zero pressure"""
+    f_cfr_p: TorquePerPressure
+    """growth of the Coulomb torque with pressure, apply direction"""
+    f_cfr_n: TorquePerPressure
+    """growth of the Coulomb torque with pressure, release direction"""
+    k_brk_p: BreakawayFactor
+    """breakaway torque over Coulomb torque, apply direction"""
+    k_brk_n: BreakawayFactor
+    """breakaway torque over Coulomb torque, release direction"""
+    c: InverseSpeed
+    """decay of the Stribeck peak with speed"""
+    mu_T: RotaryDamping
+    """viscous friction torque per shaft speed"""
+
+
+class Input(NamedTuple):
+    """Shaft speed and chamber pressure."""
+
+    omega: Annotated[float, Signal("rad/s", "motor speed", 0.5)]
+    p: Annotated[float, Signal("Pa", "master-cylinder pressure", 2e6)]
+
+
+class Output(NamedTuple):
+    """Magnitudes of the friction torque in both directions, at the same speed."""
+
+    T_p: Annotated[float, Signal("N*m", "friction torque, apply", 0.05)]
+    T_n: Annotated[float, Signal("N*m", "friction torque, release", 0.05)]
+
+
+def output(u: Input, par: Parameters) -> Output:
+    r"""Return the magnitudes of the friction torque at the motor shaft.
+
+    .. math::
+        T_{fr} = \pm T_{cf} (1 + (k_{brk} - 1) e^{-c |\Omega|}) + \mu_T \Omega, \quad
+        T_{cf} = T_{pr} + f_{cfr} p_{mc}
+
+    with k_brk and f_cfr of the direction. At rest these are the breakaway torques.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (16).
+    """
+    speed = ops.fabs(u.omega)
+    decay = ops.exp(-par.c * speed)
+    p = ops.fmax(u.p, 0.0)
+    T_p = (par.T_pr + par.f_cfr_p * p) * (1.0 + (par.k_brk_p - 1.0) * decay) + par.mu_T * speed
+    T_n = (par.T_pr + par.f_cfr_n * p) * (1.0 + (par.k_brk_n - 1.0) * decay) + par.mu_T * speed
+    return Output(T_p=T_p, T_n=T_n)
+
+
+def power_loss(u: Input, par: Parameters) -> Power:
+    """Return the heat of the sliding friction."""
+    friction = output(u, par)
+    return ops.where(u.omega > 0, friction.T_p, friction.T_n) * ops.fabs(u.omega)

@@ -1,0 +1,108 @@
+"""Fewer points for long lines, with every peak kept."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+COLUMNS = 700
+"""pixel columns of a figure on a screen: finer detail than this is not visible"""
+
+
+def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
+    """Return at most five points per pixel column that draw the same line.
+
+    Of every column the first, the lowest, the highest and the last sample stay, so that a line
+    drawn through them covers the same pixels; a gap (NaN) stays a gap.
+
+    Parameters
+    ----------
+    x
+        Abscissa, not decreasing, shape ``(n,)``.
+    y
+        Ordinate, shape ``(n,)``.
+    columns
+        Pixel columns.
+
+    Returns
+    -------
+    tuple
+        The points that stay, in their order. Short lines come back whole.
+
+    References
+    ----------
+    U. Jugel et al., "M4: a visualization-oriented time series data aggregation", Proc. VLDB
+    Endowment 7 (10), 2014.
+    """
+    if len(x) <= 4 * columns:
+        return x, y
+    column = _columns(x, columns)
+    starts = np.flatnonzero(np.diff(column, prepend=-1))
+    ends = np.append(starts[1:], len(x)) - 1
+    gaps = np.isnan(y)
+    lowest = _first_of_each(column, np.where(gaps, np.inf, y))
+    highest = _first_of_each(column, np.where(gaps, np.inf, -y))
+    gap = np.flatnonzero(gaps)
+    gap = gap[np.diff(column[gap], prepend=-1) > 0]
+    kept = np.unique(np.concatenate([starts, lowest, highest, ends, gap]))
+    return x[kept], y[kept]
+
+
+def phases(
+    time: FloatArray, active: NDArray[np.bool_], columns: int = COLUMNS
+) -> list[tuple[float, float]]:
+    """Return the time spans in which a mode is active, no finer than the eye can tell.
+
+    Parameters
+    ----------
+    time
+        Time axis [s], shape ``(n,)``.
+    active
+        Whether the mode is active from this sample to the next, shape ``(n,)``.
+    columns
+        Pixel columns. Where there are more spans than half of them, a column counts as active
+        when the mode is active for at least half of it.
+
+    Returns
+    -------
+    list
+        Start and end of every span [s], ascending, without overlap.
+    """
+    if len(time) < 2:
+        return []
+    spans = _spans(time, active)
+    if len(spans) <= columns // 2:
+        return spans
+    column = _columns(time, columns)
+    lasting = np.diff(time, append=time[-1])
+    share = np.bincount(column, lasting * active, columns) / np.maximum(
+        np.bincount(column, lasting, columns), np.finfo(float).tiny
+    )
+    edges = np.linspace(time[0], time[-1], columns + 1)
+    return _spans(edges, np.append(share >= 0.5, False))
+
+
+def _columns(x: FloatArray, columns: int) -> IntArray:
+    span = x[-1] - x[0]
+    if not span > 0:
+        return np.zeros(len(x), dtype=np.intp)
+    return np.minimum(((x - x[0]) / span * columns).astype(np.intp), columns - 1)
+
+
+def _first_of_each(column: IntArray, key: FloatArray) -> IntArray:
+    """Return the position of the smallest key in every column."""
+    order = np.lexsort((key, column))
+    return order[np.flatnonzero(np.diff(column[order], prepend=-1))]
+
+
+def _spans(time: FloatArray, active: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    padded = np.concatenate([[False], active, [False]]).astype(np.int8)
+    change = np.diff(padded)
+    starts = np.flatnonzero(change == 1)
+    ends = np.minimum(np.flatnonzero(change == -1), len(time) - 1)
+    return [
+        (float(time[a]), float(time[b])) for a, b in zip(starts, ends, strict=True) if b > a
+    ]

@@ -1,0 +1,180 @@
+"""How every figure looks: colors, line styles by meaning, axes, legends.
+
+Nothing here changes matplotlib's global state, and pyplot is never imported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from bywire.core.quantities import display_unit
+from bywire.report.channel import Channel, FloatArray
+from bywire.report.decimation import decimate
+from bywire.report.wording import clean, unit_text
+
+# Okabe and Ito, "Color universal design", 2008: told apart with any kind of color vision.
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
+SKY = "#56B4E9"
+ORANGE = "#E69F00"
+YELLOW = "#F0E442"
+BLACK = "#1A1A1A"
+GRAY = "#7F7F7F"
+PALE = "#DDDDDD"
+SEQUENCE = (BLUE, VERMILLION, GREEN, PURPLE, SKY, ORANGE, BLACK)
+"""colors of lines without a meaning of their own, in order"""
+
+WIDTH = 7.2
+"""width of a figure [inch]"""
+TEXT_SIZE = 8.5
+"""size of all text in a figure [points]"""
+
+
+class Role(Enum):
+    """What a line means; the same meaning looks the same in every figure."""
+
+    MAIN = "main"
+    SECOND = "second"
+    SET_POINT = "set point"
+    MEASURED = "measured"
+    SIMULATED = "simulated"
+    LIMIT = "limit"
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """Color, line style, width [points] and drawing order of a line."""
+
+    color: str
+    linestyle: str
+    linewidth: float
+    zorder: float
+
+
+STROKES = {
+    Role.MAIN: Stroke(BLUE, "-", 1.2, 3.0),
+    Role.SECOND: Stroke(ORANGE, "-", 1.1, 2.8),
+    Role.SET_POINT: Stroke(BLACK, "--", 1.0, 3.2),
+    Role.MEASURED: Stroke(BLUE, "-", 1.4, 2.9),
+    Role.SIMULATED: Stroke(VERMILLION, "--", 1.3, 3.1),
+    Role.LIMIT: Stroke(VERMILLION, ":", 1.2, 2.5),
+}
+
+
+def new_figure(height: float, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
+    """Return a figure with panels one above the other that share their abscissa.
+
+    Parameters
+    ----------
+    height
+        Height of the figure [inch].
+    heights
+        Relative heights of the panels.
+    """
+    figure = Figure(figsize=(WIDTH, height), layout="constrained", facecolor="white")
+    grid = figure.subplots(
+        len(heights), 1, sharex=True, squeeze=False, gridspec_kw={"height_ratios": list(heights)}
+    )
+    panels: list[Axes] = list(grid[:, 0])
+    for axes in panels:
+        dress(axes)
+    return figure, panels
+
+
+def dress(axes: Axes) -> None:
+    """Give axes the house look: thin grid behind the data, no box."""
+    axes.grid(True, color=PALE, linewidth=0.5)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)
+    axes.spines[["left", "bottom"]].set_color(GRAY)
+    axes.tick_params(labelsize=TEXT_SIZE, color=GRAY, length=3.0)
+    axes.xaxis.label.set_size(TEXT_SIZE)
+    axes.yaxis.label.set_size(TEXT_SIZE)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.get_offset_text().set_size(TEXT_SIZE)
+
+
+def few_ticks(axes: Axes, count: int) -> None:
+    """Leave at most ``count`` intervals on the ordinate of a low panel."""
+    axes.yaxis.set_major_locator(MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]))
+
+
+def plain(text: object) -> str:
+    """Return text that matplotlib draws as it stands: no formulas, no control characters."""
+    return clean(text).replace("$", r"\$")
+
+
+def axis_label(label: str, symbol: str) -> str:
+    """Return the label of an axis in the display unit of an SI unit.
+
+    Examples
+    --------
+    >>> axis_label("caliper pressure", "Pa"), axis_label("duty cycle", "1")
+    ('caliper pressure [bar]', 'duty cycle [-]')
+    """
+    return plain(f"{label} [{unit_text(display_unit(symbol)) or '-'}]")
+
+
+def channel_label(shown: Channel) -> str:
+    """Return the label of an axis that shows one channel."""
+    return axis_label(shown.label, shown.symbol)
+
+
+def time_scale(time: FloatArray) -> tuple[float, str]:
+    """Return factor and unit of a time axis: ms for recordings of up to 0.2 s."""
+    short = len(time) > 0 and float(time[-1] - time[0]) <= 0.2
+    return (1e3, "ms") if short else (1.0, "s")
+
+
+def draw_channel(axes: Axes, shown: Channel, role: Role, suffix: str = "") -> None:
+    """Draw a channel over time, labeled by its name and ``suffix``."""
+    scale, _ = time_scale(shown.time)
+    time, values = decimate(scale * shown.time, shown.values)
+    look = STROKES[role]
+    axes.plot(
+        time, values, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
+        zorder=look.zorder, label=plain(shown.label + suffix),
+    )
+
+
+def legend_above(axes: Axes, columns: int = 5) -> None:
+    """Put the legend above the axes, where it never hides data."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            handles,
+            labels,
+            loc="lower left",
+            bbox_to_anchor=(0.0, 1.0),
+            ncols=columns,
+            fontsize=TEXT_SIZE,
+            frameon=False,
+            borderaxespad=0.2,
+            borderpad=0.1,
+            handlelength=2.2,
+            columnspacing=1.4,
+        )
+
+
+def legend_beside(axes: Axes) -> None:
+    """Put the legend to the right of the axes, where it never hides data."""
+    handles, labels = axes.get_legend_handles_labels()
+    if handles:
+        axes.legend(
+            handles,
+            labels,
+            loc="upper left",
+            bbox_to_anchor=(1.01, 1.0),
+            fontsize=TEXT_SIZE,
+            frameon=False,
+            borderaxespad=0.0,
+            handlelength=2.2,
+        )

@@ -1,0 +1,84 @@
+"""Words for people: units, amounts and untrusted text, for figures, tables and pages alike."""
+
+from __future__ import annotations
+
+import math
+import re
+
+from bywire.core.quantities import display_unit
+from bywire.core.units import convert
+
+_SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_NAMES = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°"}
+
+
+def clean(text: object) -> str:
+    """Return text without what could disturb a page, a figure or a terminal.
+
+    White space becomes a plain space (line breaks stay); control characters, marks that reverse
+    the reading direction and broken code points become the replacement character.
+
+    Examples
+    --------
+    >>> clean("brake" + chr(27) + "[31m test")
+    'brake�[31m test'
+    """
+    return "".join(map(_clean_character, str(text)))
+
+
+def unit_text(symbol: str) -> str:
+    """Return a unit as people write it; empty for a pure number.
+
+    Examples
+    --------
+    >>> unit_text("N*m"), unit_text("m**3/s"), unit_text("1")
+    ('N·m', 'm³/s', '')
+    """
+    if symbol == "1":
+        return ""
+    raised = re.sub(r"\*\*(-?\d+)", lambda m: m[1].translate(_SUPERSCRIPTS), clean(symbol))
+    dotted = re.sub(r"\s*\*\s*", "·", raised)
+    return re.sub(r"[A-Za-z]+", lambda m: _NAMES.get(m[0], m[0]), dotted)
+
+
+def in_display_unit(value: float, symbol: str) -> tuple[float, str]:
+    """Return a value and its unit as the edges show them, for instance bar instead of Pa."""
+    unit = display_unit(symbol)
+    return convert(value, symbol, unit), unit
+
+
+def amount(value: float | None, symbol: str, digits: int = 4) -> str:
+    """Return a value with its unit in ``digits`` significant digits.
+
+    Parameters
+    ----------
+    value
+        Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
+    symbol
+        Unit in the syntax of pint; SI units are shown in their display unit.
+    digits
+        Significant digits.
+
+    Examples
+    --------
+    >>> amount(2.5e6, "Pa"), amount(None, "Pa"), amount(0.034, "1")
+    ('25 bar', '-', '0.034')
+    """
+    if value is None:
+        return "-"
+    if math.isnan(value):
+        return "not defined"
+    number, unit = in_display_unit(float(value), symbol)
+    written = unit_text(unit)
+    return f"{number:.{digits}g}" + (f" {written}" if written else "")
+
+
+def duration(seconds: float) -> str:
+    """Return a time span in ms or s, whichever reads better."""
+    return f"{1e3 * seconds:.3g} ms" if abs(seconds) < 1.0 else f"{seconds:.4g} s"
+
+
+def _clean_character(character: str) -> str:
+    if character == "\n" or character.isprintable():
+        return character
+    return " " if character.isspace() and character not in "\x1c\x1d\x1e\x1f" else "\N{REPLACEMENT CHARACTER}"

@@ -1,0 +1,1 @@
+"""The engine: time stepping, kernel emission, compilation, runs. It knows no brake."""

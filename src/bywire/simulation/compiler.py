@@ -1,0 +1,144 @@
+"""The C compiler: found once, run on generated source, results cached by content."""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+from platformdirs import user_cache_path
+
+from bywire.core.errors import CompilerError
+
+_COMMON = ("-shared", "-fPIC", "-std=c11", "-fno-math-errno", "-fno-trapping-math")
+PLAIN = ("-O2",)
+VECTOR = ("-O3", "-march=native", "-fopenmp-simd", "-mprefer-vector-width=512")
+TIMEOUT = 300.0
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """How to call a C compiler.
+
+    Parameters
+    ----------
+    command
+        Program and leading arguments.
+    label
+        What messages and recordings call it, with its version.
+    """
+
+    command: tuple[str, ...]
+    label: str
+
+
+@cache
+def find_compiler() -> Compiler | None:
+    """Return the system's C compiler, else that of the extra ``bywire[compiler]``, else None.
+
+    ``BYWIRE_CC`` names another one; ``BYWIRE_CC=none`` does without.
+    """
+    wanted = os.environ.get("BYWIRE_CC", "")
+    if wanted == "none":
+        return None
+    for name in [wanted] if wanted else ["cc", "gcc", "clang"]:
+        path = shutil.which(name)
+        if path:
+            return _labelled((path,))
+    if wanted:
+        raise CompilerError(
+            f"BYWIRE_CC = {wanted!r} names no program: unset it, or set it to a C compiler or 'none'"
+        )
+    if importlib.util.find_spec("ziglang") is not None:
+        return _labelled((sys.executable, "-m", "ziglang", "cc"))
+    return None
+
+
+def _labelled(command: tuple[str, ...]) -> Compiler:
+    try:
+        done = subprocess.run(
+            [*command, "--version"], capture_output=True, text=True, timeout=60, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise CompilerError(f"the C compiler {command[0]} does not start: {error}") from None
+    first = (done.stdout.splitlines() or [Path(command[0]).name])[0]
+    return Compiler(command, first.strip())
+
+
+def cache_folder() -> Path:
+    """Return the folder of compiled kernels (``BYWIRE_CACHE`` moves it)."""
+    moved = os.environ.get("BYWIRE_CACHE")
+    return Path(moved) if moved else user_cache_path("bywire", "bywire") / "kernels"
+
+
+def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> Path:
+    """Return the shared library of a C source, compiled unless the cache has it.
+
+    The library is written to a temporary name and renamed, so that processes which compile the
+    same kernel at once do not disturb each other. A digest beside it guards against damage.
+
+    Raises
+    ------
+    CompilerError
+        With the first lines of the compiler's message.
+    """
+    key = hashlib.sha256("\0".join((source, *flags, compiler.label)).encode()).hexdigest()[:32]
+    folder = _writable(cache_folder())
+    library, digest = folder / f"{key}.so", folder / f"{key}.sha256"
+    if _intact(library, digest):
+        return library
+    with tempfile.TemporaryDirectory(dir=folder) as scratch:
+        text, built = Path(scratch) / "kernel.c", Path(scratch) / "kernel.so"
+        text.write_text(source)
+        _compile(compiler, flags, text, built)
+        fresh = Path(scratch) / "digest"
+        fresh.write_text(_sha256(built))
+        os.replace(built, library)
+        os.replace(fresh, digest)
+    return library
+
+
+def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: Path) -> None:
+    command = [*compiler.command, *_COMMON, *flags, str(source), "-o", str(target), "-lm"]
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=TIMEOUT, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise CompilerError(f"{compiler.label} did not run: {error}") from None
+    if done.returncode != 0:
+        message = "\n".join(done.stderr.splitlines()[:6])
+        raise CompilerError(f"{compiler.label} refused a generated kernel:\n{message}")
+
+
+def _writable(folder: Path) -> Path:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError:
+        fallback = Path(tempfile.gettempdir()) / f"bywire-{os.getuid()}"
+        fallback.mkdir(mode=0o700, exist_ok=True)
+        if fallback.stat().st_uid != os.getuid():
+            raise CompilerError(
+                f"neither {folder} nor {fallback} can hold compiled kernels: set BYWIRE_CACHE"
+            ) from None
+        return fallback
+
+
+def _intact(library: Path, digest: Path) -> bool:
+    try:
+        return _sha256(library) == digest.read_text()
+    except OSError:
+        return False
+
+
+def _sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -1,0 +1,116 @@
+"""Common parts of kernel emission: names of values, blocks of statements, the exact pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from bywire.simulation.expressions import condition, needed, text
+from bywire.simulation.graph import Graph, Node
+from bywire.simulation.stages import STATE, Stages
+
+Namer = Callable[[Node], str]
+CAP = 8  # passes through one substep before it is counted as unsettled
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the parts of the state vector start.
+
+    The vector holds x, d, r, F, q, the memory m, and two counters: substeps that did not
+    settle, substeps that were repeated.
+    """
+
+    start: dict[str, int]
+    length: dict[str, int]
+
+    @property
+    def total(self) -> int:
+        """Length of the state vector."""
+        return self.start["counters"] + 2
+
+
+def layout_of(stages: Stages) -> Layout:
+    """Return the layout of a model's state vector."""
+    length = {kind: len(stages.fast[kind]) for kind in STATE}
+    length["m"] = len(stages.ticks[0])
+    start, at = {}, 0
+    for kind, count in length.items():
+        start[kind] = at
+        at += count
+    start["counters"] = at
+    return Layout(start, length)
+
+
+def literal(graph: Graph, node: Node) -> str:
+    """Return a constant as C text."""
+    value = str(graph.nodes[node].args[0])
+    return f"({value})" if value.startswith("-") else value
+
+
+def leaf_namer(graph: Graph, leaf: Callable[[str, int], str], other: Namer) -> Namer:
+    """Return the namer that knows constants and leaves and leaves operations to another."""
+
+    def name(node: Node) -> str:
+        operation = graph.nodes[node]
+        if operation.op == "const":
+            return literal(graph, node)
+        if operation.op == "leaf":
+            return leaf(*operation.args)
+        return other(node)
+
+    return name
+
+
+def statements(graph: Graph, order: Iterable[Node], name: Namer, declare: str) -> list[str]:
+    """Return one declaration per operation; truth values are written where they are used."""
+    lines = []
+    for node in order:
+        if not graph.is_boolean(node):
+            lines.append(f"{declare}{name(node)} = {text(graph, node, name)};")
+    return lines
+
+
+def result(graph: Graph, node: Node, name: Namer) -> str:
+    """Return the C text of a result, also of a truth value."""
+    if graph.is_boolean(node):
+        return f"({condition(graph, node, name)} ? 1.0 : 0.0)"
+    return name(node)
+
+
+def exact_pass(stages: Stages) -> str:
+    """Return the C functions of the rare, exact pass and of its repetition until it settles.
+
+    They stand alone and compute everything anew: what is rare need not be hoisted.
+    """
+    graph = stages.graph
+    roots = [node for kind in (*STATE, "flag") for node in stages.exact[kind]]
+
+    def leaf(kind: str, index: int) -> str:
+        return "h" if kind == "h" else f"{kind}[{index}]"
+
+    name = leaf_namer(graph, leaf, lambda node: f"v{node}")
+    body = statements(graph, needed(graph, roots, lambda _: False), name, "const double ")
+    body += [f"o[{k}] = {result(graph, node, name)};" for k, node in enumerate(roots)]
+    nx, flag = len(stages.exact["x"]), len(roots) - 1
+    return f"""
+static __attribute__((noinline, cold)) void exact_pass(const double *p, double h,
+    const double *m, const double *x, const double *d, double *o) {{
+  {indented(body, 2)}
+}}
+
+static __attribute__((noinline, cold)) int settle(const double *p, double h, const double *m,
+    const double *x, double *d, double *o) {{
+  for (int pass = 0; pass < {CAP}; ++pass) {{
+    exact_pass(p, h, m, x, d, o);
+    if (o[{flag}] == 0.0) return 0;
+    memcpy(d, o + {nx}, {nx} * sizeof(double));
+  }}
+  return 1;
+}}
+"""
+
+
+def indented(lines: Iterable[str], spaces: int) -> str:
+    """Return lines joined with an indentation."""
+    return ("\n" + " " * spaces).join(lines)

@@ -1,0 +1,149 @@
+"""Kernel of a single run: everything in local scalars, one function."""
+
+from __future__ import annotations
+
+from bywire.simulation.c_runtime import PRELUDE
+from bywire.simulation.emission import (
+    STATE,
+    Layout,
+    exact_pass,
+    indented,
+    layout_of,
+    leaf_namer,
+    result,
+    statements,
+)
+from bywire.simulation.expressions import needed
+from bywire.simulation.stages import Stages
+
+SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,
+    double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
+    double *restrict rec)"""
+
+# plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
+# row, frames a recorded row, first recorded row, recorded signals, frames a tick of each task.
+PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
+  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
+
+
+def emit_single(stages: Stages) -> str:
+    """Return the C source of the kernel for one run.
+
+    What depends on parameters alone is computed once, what depends on the tick's data once a
+    frame, the rest in every substep.
+    """
+    graph, level, layout = stages.graph, stages.level(), layout_of(stages)
+
+    def leaf(kind: str, index: int) -> str:
+        if kind in ("p", "u"):
+            return f"{kind}[{index}]" if kind == "p" else f"uk[{index}]"
+        return "h" if kind == "h" else f"{kind}{index}"
+
+    name = leaf_namer(graph, leaf, lambda node: f"v{node}")
+    pass_roots = [node for kind in (*STATE, "flag") for node in stages.fast[kind]]
+    tick_roots = [node for task in stages.ticks for node in task]
+    every_root = pass_roots + tick_roots + stages.output
+    once = needed(graph, every_root, lambda _: False)
+    hoisted = [node for node in once if level[node] == 0]
+    framed = [
+        node for node in needed(graph, pass_roots, lambda n: level[n] == 0) if level[node] == 1
+    ]
+    substep = needed(graph, pass_roots, lambda n: level[n] < 2)
+
+    def block(order: list[int]) -> list[str]:
+        return statements(graph, order, name, "const double ")
+
+    ticks = []
+    for k, roots in enumerate(stages.ticks):
+        lines = block(needed(graph, roots, lambda n: level[n] == 0))
+        lines += [f"const double w{j} = {result(graph, n, name)};" for j, n in enumerate(roots)]
+        lines += [f"m{j} = w{j};" for j in range(len(roots))]
+        ticks.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
+    outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
+    outputs += [f"o[{j}] = {result(graph, n, name)};" for j, n in enumerate(stages.output)]
+    return f"""{PRELUDE}{exact_pass(stages)}
+{SIGNATURE} {{
+  {PLAN}
+  double failures = state[{layout.start["counters"]}], repeats = state[{layout.start["counters"] + 1}];
+  {indented(_loads(layout), 2)}
+  {indented(block(hoisted), 2)}
+  for (int64_t f = begin; f < end + last; ++f) {{
+    const double *restrict uk = u + (f / stim) * {_stimuli(stages)};
+    (void)uk;
+    {indented(ticks, 4)}
+    if (f % every == 0) {{
+      double o[{max(len(stages.output), 1)}];
+      {indented(outputs, 6)}
+      double *row = rec + (f / every - row0) * chosen;
+      for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];
+    }}
+    if (f == end) break;
+    {indented(block(framed), 4)}
+    for (int64_t s = 0; s < substeps; ++s) {{
+      {indented(block(substep), 6)}
+      if (__builtin_expect({result(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
+        {indented(_repeat(layout, len(pass_roots)), 8)}
+      }} else {{
+        {indented(_commit(stages, layout, name), 8)}
+      }}
+    }}
+  }}
+  {indented(_stores(layout), 2)}
+  state[{layout.start["counters"]}] = failures;
+  state[{layout.start["counters"] + 1}] = repeats;
+}}
+"""
+
+
+def _stimuli(stages: Stages) -> int:
+    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == "u")
+
+
+def _entries(layout: Layout) -> list[tuple[str, int]]:
+    return [
+        (f"{kind}{k}", layout.start[kind] + k)
+        for kind, count in layout.length.items()
+        for k in range(count)
+    ]
+
+
+def _loads(layout: Layout) -> list[str]:
+    return [f"double {name} = state[{at}];" for name, at in _entries(layout)]
+
+
+def _stores(layout: Layout) -> list[str]:
+    return [f"state[{at}] = {name};" for name, at in _entries(layout)]
+
+
+def _commit(stages: Stages, layout: Layout, name: object) -> list[str]:
+    graph = stages.graph
+    lines, after = [], []
+    for kind in STATE:
+        for k, node in enumerate(stages.fast[kind]):
+            value = result(graph, node, name)  # type: ignore[arg-type]
+            if kind == "q":
+                after.append(f"q{k} += {value};")
+            else:
+                lines.append(f"const double {kind}{k}_ = {value};")
+                after.append(f"{kind}{k} = {kind}{k}_;")
+    return lines + after
+
+
+def _repeat(layout: Layout, size: int) -> list[str]:
+    nx, nm = layout.length["x"], layout.length["m"]
+    xs = ", ".join(f"x{k}" for k in range(nx))
+    ds = ", ".join(f"d{k}" for k in range(nx))
+    ms = ", ".join(f"m{k}" for k in range(nm)) or "0.0"
+    lines = [
+        f"double o[{size}];",
+        f"const double xs[] = {{{xs}}}, ms[] = {{{ms}}};",
+        f"double ds[] = {{{ds}}};",
+        "failures += settle(p, h, ms, xs, ds, o);",
+        "repeats += 1.0;",
+    ]
+    at = 0
+    for kind in STATE:
+        sign = "+=" if kind == "q" else "="
+        lines += [f"{kind}{k} {sign} o[{at + k}];" for k in range(layout.length[kind])]
+        at += layout.length[kind]
+    return lines

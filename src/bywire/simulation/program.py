@@ -1,0 +1,133 @@
+"""All symbolic functions of a model: what kernels are emitted from and the machine evaluates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import Signal, signals_of
+from bywire.simulation.scheme import Pass, Symbols, build_pass
+from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Lengths of the vectors that a kernel works on."""
+
+    x: int
+    memory: int
+    stimulus: int
+    parameters: int
+    reaction: int
+    contact: int
+    flow: int
+    output: int
+
+
+@dataclass(frozen=True)
+class Program:
+    """Symbolic functions of a model with a fixed structure.
+
+    Parameters
+    ----------
+    fast, exact
+        ``(x, d, m, p, h) -> (x, d, reaction, contact, flow, flag)``, see ``scheme.Pass``.
+    ticks
+        One ``(x, m, u, p) -> m`` per task.
+    output
+        ``(x, m, p, reaction, contact, flow) -> o``.
+    """
+
+    model: Model
+    parameter_names: tuple[str, ...]
+    task_names: tuple[str, ...]
+    sizes: Sizes
+    fast: Any
+    exact: Any
+    ticks: tuple[Any, ...]
+    output: Any
+
+    @property
+    def outputs(self) -> dict[str, Signal]:
+        """Recorded signals, in order."""
+        return signals_of(self.model.Output)
+
+
+def build_program(model: Model, par: ParameterSet) -> Program:
+    """Evaluate a model on symbols.
+
+    Parameters
+    ----------
+    model
+        The system.
+    par
+        Any parameter set of the wanted structure: its numbers are not used, they become
+        arguments.
+    """
+    names = tuple(par.leaves())
+    p = SX.sym("p", len(names))
+    symbolic = par.with_leaves(dict(zip(names, scalars(p), strict=True)))
+    x = SX.sym("x", len(model.State._fields))
+    s = Symbols(
+        x=x,
+        d=SX.sym("d", x.shape[0]),
+        m=SX.sym("m", len(model.Memory._fields)),
+        p=p,
+        h=SX.sym("h"),
+    )
+    fast = build_pass(model, symbolic, s, exact=False)
+    exact = build_pass(model, symbolic, s, exact=True)
+    output = _output(model, symbolic, s, fast)
+    tasks = model.tasks(par)
+    u = SX.sym("u", len(model.Stimulus._fields))
+    return Program(
+        model=model,
+        parameter_names=names,
+        task_names=tuple(t.name for t in tasks),
+        sizes=Sizes(
+            x=x.shape[0],
+            memory=s.m.shape[0],
+            stimulus=u.shape[0],
+            parameters=p.shape[0],
+            reaction=fast.reaction.shape[0],
+            contact=fast.contact.shape[0],
+            flow=fast.flow.shape[0],
+            output=len(model.Output._fields),
+        ),
+        fast=_pass_function("fast", s, fast),
+        exact=_pass_function("exact", s, exact),
+        ticks=tuple(
+            ca.Function(
+                f"tick_{k}",
+                [s.x, s.m, u, p],
+                [column(task.tick(symbol_tuple(model.State, s.x), symbol_tuple(model.Memory, s.m),
+                                  symbol_tuple(model.Stimulus, u), symbolic))],
+            )
+            for k, task in enumerate(tasks)
+        ),
+        output=output,
+    )
+
+
+def _pass_function(name: str, s: Symbols, result: Pass) -> Any:
+    results = [result.x, result.d, result.reaction, result.contact, result.flow, result.flag]
+    return ca.Function(name, [s.x, s.d, s.m, s.p, s.h], [ca.densify(SX(r)) for r in results])
+
+
+def _output(model: Model, par: ParameterSet, s: Symbols, shape: Pass) -> Any:
+    reaction = SX.sym("r", shape.reaction.shape[0])
+    contact = SX.sym("F", shape.contact.shape[0])
+    flow = SX.sym("q", shape.flow.shape[0])
+    out = model.output(
+        symbol_tuple(model.State, s.x),
+        symbol_tuple(model.Memory, s.m),
+        par,
+        scalars(contact),
+        scalars(reaction),
+        symbol_tuple(model.Flow, flow),
+    )
+    return ca.Function("output", [s.x, s.m, s.p, reaction, contact, flow], [column(out)])

@@ -1,0 +1,135 @@
+"""A program as one expression graph: which node is which result, and when it must be computed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from bywire.simulation.graph import Graph, Node
+from bywire.simulation.program import Program
+
+# When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
+LEVEL = {"p": 0, "h": 0, "sp": 0, "m": 1, "sm": 1}
+SEEDS = frozenset({"sp", "sm", "sx", "sd", "sr", "sF", "sq"})
+STATE = ("x", "d", "r", "F", "q")  # what a substep renews, in the order of the state vector
+
+
+@dataclass(frozen=True)
+class Stages:
+    """Result nodes of every stage of a kernel.
+
+    Parameters
+    ----------
+    fast, exact
+        Nodes per result of a pass: x, d, r (reactions), F (contacts), q (flows), flag.
+    ticks
+        Nodes of the memory after each task.
+    output
+        Nodes of the recorded signals.
+    fast_t, exact_t, ticks_t, output_t
+        Tangents of the same along one direction; empty lists without sensitivities.
+    """
+
+    graph: Graph
+    fast: dict[str, list[Node]]
+    exact: dict[str, list[Node]]
+    ticks: list[list[Node]]
+    output: list[Node]
+    fast_t: dict[str, list[Node]]
+    exact_t: dict[str, list[Node]]
+    ticks_t: list[list[Node]]
+    output_t: list[Node]
+
+    def level(self) -> list[int]:
+        """Return for every node how often it must be computed, as in ``LEVEL``."""
+        levels: list[int] = []
+        for node, operation in enumerate(self.graph.nodes):
+            if operation.op == "leaf":
+                levels.append(LEVEL.get(operation.args[0], 2))
+            else:
+                levels.append(max((levels[a] for a in self.graph.arguments(node)), default=0))
+        return levels
+
+    def varies(self, kinds: frozenset[str]) -> list[bool]:
+        """Return for every node whether it depends on a leaf of one of the kinds."""
+        found: list[bool] = []
+        for node, operation in enumerate(self.graph.nodes):
+            if operation.op == "leaf":
+                found.append(operation.args[0] in kinds)
+            else:
+                found.append(any(found[a] for a in self.graph.arguments(node)))
+        return found
+
+
+def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
+    """Put all functions of a program into one graph.
+
+    Parameters
+    ----------
+    program
+        The symbolic functions.
+    directions
+        Indices of the parameters that tangents are taken along; empty for none.
+    """
+    graph, n = Graph(), program.sizes
+    lengths = {
+        "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction, "F": n.contact,
+        "q": n.flow, "p": n.parameters, "h": 1,
+    }  # fmt: skip
+    leaves = {kind: [graph.leaf(kind, k) for k in range(length)] for kind, length in lengths.items()}
+
+    def add(function: Any, kinds: str) -> list[list[Node]]:
+        return graph.add_function(function, [leaves[k] for k in kinds])
+
+    def tangent(function: Any, kinds: str) -> list[list[Node]]:
+        if not directions:
+            return [[] for _ in range(function.n_out())]
+        seeded = _with_tangents(function, kinds, directions)
+        inputs = [leaves[k] for k in kinds]
+        for kind in kinds:
+            if kind == "p":
+                inputs.append([graph.leaf("sp", k) for k in range(len(directions))])
+            elif kind not in ("h", "u"):
+                inputs.append([graph.leaf(f"s{kind}", k) for k in range(lengths[kind])])
+        return graph.add_function(seeded, inputs)
+
+    parts = ("x", "d", "r", "F", "q", "flag")
+    return Stages(
+        graph=graph,
+        fast=dict(zip(parts, add(program.fast, "xdmph"), strict=True)),
+        exact=dict(zip(parts, add(program.exact, "xdmph"), strict=True)),
+        ticks=[add(tick, "xmup")[0] for tick in program.ticks],
+        output=add(program.output, "xmprFq")[0],
+        fast_t=dict(zip(parts, tangent(program.fast, "xdmph"), strict=True)),
+        exact_t=dict(zip(parts, tangent(program.exact, "xdmph"), strict=True)),
+        ticks_t=[tangent(tick, "xmup")[0] for tick in program.ticks],
+        output_t=tangent(program.output, "xmprFq")[0],
+    )
+
+
+def _with_tangents(function: Any, kinds: str, directions: Sequence[int]) -> Any:
+    """Return the function of the tangents: the same arguments, then seeds of x, d, m, p, ..."""
+    arguments = function.sx_in()
+    seeds, points, extra = [], [], []
+    for kind, argument in zip(kinds, arguments, strict=True):
+        if kind in ("h", "u"):
+            continue
+        if kind == "p":
+            chosen = ca.SX.sym("sp", len(directions))
+            seed = ca.SX.zeros(argument.shape[0])
+            for k, index in enumerate(directions):
+                seed[index] = chosen[k]
+            extra.append(chosen)
+        else:
+            seed = ca.SX.sym(f"s{kind}", argument.shape[0])
+            extra.append(seed)
+        seeds.append(seed)
+        points.append(argument)
+    results = function(*arguments)
+    results = results if isinstance(results, tuple) else (results,)
+    point, seed = ca.vertcat(*points), ca.vertcat(*seeds)
+    tangents = [ca.densify(ca.jtimes(r, point, seed)) for r in results]
+    return ca.Function(f"{function.name()}_t", [*arguments, *extra], tangents)
