@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from annotated_types import Gt
+
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, DutyPerCurrent, DutyPerCurrentTime, Fraction
 from bywire.core.signals import Signal
 
-SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, NamedTuple
 
+from annotated_types import Gt
+
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
@@ -17,7 +19,7 @@ from bywire.core.quantities import (
 )
 from bywire.core.signals import Signal
 
-SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):

@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal, NamedTuple
 
+from annotated_types import Gt
+
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Frequency
 from bywire.core.signals import Signal
 
-SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
@@ -62,6 +64,6 @@ def output(
     return State(s1=2.0 * band - x.s1, s2=2.0 * low - x.s2), Output(y=low)
 
 
-def at_rest(y: float) -> State:
-    """Return the state that holds a constant signal ``y`` [A]."""
+def at_rest(y: Annotated[float, Signal("A", "filtered current demand", 5.0)]) -> State:
+    """Return the state that holds a constant signal ``y``."""
     return State(s1=0.0 * y, s2=y)

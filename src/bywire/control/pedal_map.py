@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated
 
 from pydantic import Field, model_validator
@@ -29,7 +30,7 @@ class Parameters(ParameterSet):
             raise ValueError(
                 f"pedal_map needs V_nodes and p_nodes of one length >= 2, got {len(V)} and {len(p)}"
             )
-        if any(a >= b for a, b in zip(V, V[1:], strict=False)):
+        if any(a >= b for a, b in pairwise(V)):
             raise ValueError(f"pedal_map.V_nodes must increase, got {V}")
         return self
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from annotated_types import Gt
+
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
@@ -17,7 +19,7 @@ from bywire.core.quantities import (
 )
 from bywire.core.signals import Signal
 
-SampleTime = Annotated[float, Signal("s", "sample time", 1e-3)]
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
 class Parameters(ParameterSet):
@@ -79,7 +81,9 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     return State(integral=x.integral + T * growth, slope=slope, last=signal), Output(i=i)
 
 
-def at_rest(u: Input, i: float, par: Parameters) -> State:
-    """Return the state that holds a current demand ``i`` [A] at a constant input."""
+def at_rest(
+    u: Input, i: Annotated[float, Signal("A", "current demand", 3.0)], par: Parameters
+) -> State:
+    """Return the state that holds a current demand ``i`` at a constant input."""
     integral = i - par.k_p * (par.b * u.p_ref - u.p_meas)
     return State(integral=integral, slope=0.0, last=par.c * u.p_ref - u.p_meas)

@@ -8,7 +8,7 @@ from pydantic import Field
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Factor, Unit
+from bywire.core.quantities import Unit
 from bywire.core.signals import Signal
 
 Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
@@ -20,7 +20,7 @@ class Parameters(ParameterSet):
 
     law: Literal["ideal", "quantized"]
     """whether the reading is rounded to whole codes"""
-    codes: Factor
+    codes: Annotated[float, Unit("1", 4096.0), Field(gt=0, allow_inf_nan=False)]
     """number of codes over the span, 4096 for 12 bits"""
     noise: Annotated[float, Unit("1", 1e-3), Field(ge=0, le=1, allow_inf_nan=False)]
     """standard deviation of the noise at the input, share of the span"""

@@ -38,6 +38,20 @@ class State(NamedTuple):
     omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
 
 
+class Factors(NamedTuple):
+    """Factors of the derivatives of angle and speed."""
+
+    theta: Annotated[float, Signal("1", "unity")]
+    omega: Annotated[float, Signal("kg*m**2", "inertia", 3e-5)]
+
+
+class Balance(NamedTuple):
+    """What drives angle and speed."""
+
+    theta: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
+    omega: Annotated[float, Signal("N*m", "accelerating torque", 0.1)]
+
+
 class Input(NamedTuple):
     """Motor torque, piston load, and the dry friction torque on the shaft."""
 
@@ -71,12 +85,12 @@ def inertia(par: Parameters) -> ReflectedInertia:
     return rotor + par.k_g * par.k_g * par.M_mc
 
 
-def mass(x: State, par: Parameters) -> Annotated[tuple[float, float], "1; kg*m**2"]:
+def mass(x: State, par: Parameters) -> Factors:
     """Return the factors of the derivatives: 1 and the inertia."""
-    return (1.0, inertia(par))
+    return Factors(theta=1.0, omega=inertia(par))
 
 
-def balance(x: State, u: Input, par: Parameters) -> State:
+def balance(x: State, u: Input, par: Parameters) -> Balance:
     r"""Return the shaft's speed and the torque that accelerates it.
 
     .. math:: M' \dot\Omega = \eta_g T - k_g F + T_{fr}
@@ -86,7 +100,7 @@ def balance(x: State, u: Input, par: Parameters) -> State:
     Dardanelli, Alli, Savaresi (2010), eq. (8).
     """
     drive = par.eta_g * u.torque if par.law == "paper" else u.torque
-    return State(theta=x.omega, omega=drive - par.k_g * u.force + u.friction)
+    return Balance(theta=x.omega, omega=drive - par.k_g * u.force + u.friction)
 
 
 def output(x: State, par: Parameters) -> Output:
@@ -95,7 +109,9 @@ def output(x: State, par: Parameters) -> Output:
 
 
 def friction_bounds(
-    seal_p: Torque, seal_n: Torque, load: Annotated[float, Signal("N", "piston load", 200.0)],
+    seal_p: Torque,
+    seal_n: Torque,
+    load: Annotated[float, Signal("N", "piston load", 200.0)],
     par: Parameters,
 ) -> Bounds:
     """Return the limits of the dry friction on the shaft: seals, and gear when directional.
@@ -128,7 +144,9 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
 
 
 def transmission_loss(
-    x: State, torque: Torque, acceleration: Annotated[float, Signal("rad/s**2", "", 1e3)],
+    x: State,
+    torque: Torque,
+    acceleration: Annotated[float, Signal("rad/s**2", "acceleration of the shaft", 1e3)],
     par: Parameters,
 ) -> Power:
     r"""Return the loss of law "paper"; negative where the gear gives energy.
@@ -145,6 +163,6 @@ def transmission_loss(
 
 
 def power_loss(x: State, u: Input, par: Parameters) -> Power:
-    """Return transmission and friction losses together."""
+    """Return transmission and friction losses together, signed: law "paper" can give energy."""
     acceleration = balance(x, u, par).omega / inertia(par)
     return transmission_loss(x, u.torque, acceleration, par) - u.friction * x.omega

@@ -44,5 +44,5 @@ def power_source(u: Input, par: Parameters) -> Power:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat in the internal resistance."""
+    """Return the heat in the internal resistance, >= 0."""
     return par.R_bat * u.i_dc * u.i_dc

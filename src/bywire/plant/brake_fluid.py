@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
+from annotated_types import Ge
 from pydantic import Field
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Density, KinematicViscosity, Pressure, Unit, Volume
+from bywire.core.quantities import Density, KinematicViscosity, Unit, Volume
 from bywire.core.signals import (
     Energy,
     EnthalpyDensity,
@@ -18,12 +19,13 @@ from bywire.core.signals import (
     Signal,
 )
 
+GaugePressure = Annotated[float, Signal("Pa", "pressure", 2e6), Ge(0)]
 
 
 class Parameters(ParameterSet):
     """Newtonian fluid of constant bulk modulus; air, if any, stays where it is, undissolved."""
 
-    beta: Pressure
+    beta: Annotated[float, Unit("Pa", 1e9), Field(gt=0, allow_inf_nan=False)]
     """bulk modulus"""
     nu: KinematicViscosity
     """kinematic viscosity"""
@@ -35,32 +37,49 @@ class Parameters(ParameterSet):
     """volume of the gas at ambient pressure"""
     n_air: Annotated[float, Unit("1", 1.2), Field(gt=1, le=1.7, allow_inf_nan=False)]
     """polytropic exponent of the gas (toward 1 isothermal, 1.4 adiabatic)"""
-    p_atm: Pressure
+    p_atm: Annotated[float, Unit("Pa", 1e5), Field(gt=0, allow_inf_nan=False)]
     """ambient pressure, absolute"""
 
 
 class Chamber(NamedTuple):
-    """Fluid volume and gauge pressure of a chamber."""
+    """Volume of a chamber, fluid and gas together, and its gauge pressure."""
 
-    V: Annotated[float, Signal("m**3", "fluid volume", 3e-7)]
-    p: Annotated[float, Signal("Pa", "pressure", 2e6)]
+    V: Annotated[float, Signal("m**3", "chamber volume", 3e-7), Ge(0)]
+    p: GaugePressure
+
+
+def gas_volume(p: GaugePressure, par: Parameters) -> Annotated[float, Signal("m**3", "gas", 1e-7)]:
+    r"""Return the volume of the gas.
+
+    .. math:: V_g = V_{air} \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
+    """
+    if par.air == "none":
+        return 0.0 * par.V_air
+    absolute = par.p_atm + ops.fmax(p, 0.0)
+    return par.V_air * ops.power(par.p_atm / absolute, 1.0 / par.n_air)
 
 
 def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
     r"""Return dV/dp of the fluid in a chamber, with its gas.
 
-    .. math:: \frac{V}{\beta} + \frac{V_{air}}{n (p_{atm} + p)}
-        \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
+    .. math:: \frac{V - V_g}{\beta} + \frac{V_g}{n (p_{atm} + p)}
+
+    The fluid fills what the gas leaves: with V in the place of V - V_g the stored energy is not
+    the integral of the powers.
     """
-    fluid = u.V / par.beta
     if par.air == "none":
-        return fluid
-    absolute = par.p_atm + ops.fmax(u.p, 0.0)
-    gas = par.V_air * ops.power(par.p_atm / absolute, 1.0 / par.n_air) / (par.n_air * absolute)
-    return fluid + gas
+        return u.V / par.beta
+    gas = gas_volume(u.p, par)
+    return (u.V - gas) / par.beta + gas / (par.n_air * (par.p_atm + ops.fmax(u.p, 0.0)))
 
 
-def gas_energy(p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters) -> Energy:
+def compression_energy(u: Chamber, par: Parameters) -> Energy:
+    """Return the energy stored in a chamber by compressing its fluid and its gas."""
+    density = flow_energy_integral(u.p, par) / par.beta
+    return (u.V - gas_volume(u.p, par)) * density + gas_energy(u.p, par)
+
+
+def gas_energy(p: GaugePressure, par: Parameters) -> Energy:
     """Return the work stored in the compressed gas, the integral of p dV from ambient."""
     if par.air == "none":
         return 0.0 * p * par.V_air
@@ -71,7 +90,9 @@ def gas_energy(p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Paramete
     return par.V_air * par.p_atm / n * (head + tail)
 
 
-def flow_energy(p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters) -> EnthalpyDensity:
+def flow_energy(
+    p: Annotated[float, Signal("Pa", "pressure", 2e6)], par: Parameters
+) -> EnthalpyDensity:
     r"""Return the energy that a volume flow carries at a pressure, per volume.
 
     .. math:: h(p) = \beta (e^{p/\beta} - 1) \approx

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple
 
+from annotated_types import Ge
 from pydantic import Field, model_validator
 
 from bywire.core import ops
@@ -13,6 +15,7 @@ from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.plant import brake_fluid
 
 Table = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
+Flow = Annotated[float, Signal("m**3/s", "flow in", 1e-6)]
 
 
 class Parameters(ParameterSet):
@@ -42,7 +45,7 @@ class Parameters(ParameterSet):
         if self.law == "table" and len(p) < 2:
             raise ValueError("caliper.law = 'table' needs p_table and V_table of 2 nodes or more")
         for name, nodes in (("p_table", p), ("V_table", V)):
-            rising = all(a < b for a, b in zip(nodes, nodes[1:], strict=False))
+            rising = all(a < b for a, b in pairwise(nodes))
             if nodes and (nodes[0] != 0.0 or not rising):
                 raise ValueError(f"caliper.{name} must start at 0 and increase, got {nodes}")
         return self
@@ -51,7 +54,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Pressure at the pads, gauge."""
 
-    p: Annotated[float, Signal("Pa", "caliper pressure", 2e6)]
+    p: Annotated[float, Signal("Pa", "caliper pressure", 2e6), Ge(0)]
 
 
 def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompliance:
@@ -76,9 +79,14 @@ def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompl
     return spring if par.law == "linear" else spring * (1.0 + x.p / fluid.beta)
 
 
+def balance(q: Flow) -> Flow:
+    """Return the flow that the pads take up: all that comes in."""
+    return q
+
+
 def _slope(p: float, par: Parameters) -> float:
     nodes = list(zip(par.p_table, par.V_table, strict=True))
-    slopes = [(V1 - V0) / (p1 - p0) for (p0, V0), (p1, V1) in zip(nodes, nodes[1:], strict=False)]
+    slopes = [(V1 - V0) / (p1 - p0) for (p0, V0), (p1, V1) in pairwise(nodes)]
     slope = slopes[0]
     for (p0, _), s in zip(nodes[1:], slopes[1:], strict=False):
         slope = ops.where(p > p0, s, slope)
@@ -105,8 +113,6 @@ def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
     return spring * stored
 
 
-def power_in(
-    x: State, q: Annotated[float, Signal("m**3/s", "flow in", 1e-6)], fluid: brake_fluid.Parameters
-) -> Power:
+def power_in(x: State, q: Flow, fluid: brake_fluid.Parameters) -> Power:
     """Return what the inflow carries."""
     return brake_fluid.convected_power(q, x.p, fluid)

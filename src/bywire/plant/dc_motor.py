@@ -26,6 +26,18 @@ class State(NamedTuple):
     i: Annotated[float, Signal("A", "motor current", 5.0)]
 
 
+class Factors(NamedTuple):
+    """Factor of the current's derivative."""
+
+    i: Annotated[float, Signal("H", "inductance", 1e-4)]
+
+
+class Balance(NamedTuple):
+    """What drives the current."""
+
+    i: Annotated[float, Signal("V", "voltage across the inductance", 6.0)]
+
+
 class Input(NamedTuple):
     """Voltage at the terminals, speed of the rotor."""
 
@@ -39,12 +51,12 @@ class Output(NamedTuple):
     torque: Annotated[float, Signal("N*m", "motor torque", 0.1)]
 
 
-def mass(x: State, par: Parameters) -> State:
+def mass(x: State, par: Parameters) -> Factors:
     """Return the factor of di/dt, the inductance."""
-    return State(i=par.L_m)
+    return Factors(i=par.L_m)
 
 
-def balance(x: State, u: Input, par: Parameters) -> State:
+def balance(x: State, u: Input, par: Parameters) -> Balance:
     r"""Return the voltage across the inductance.
 
     .. math:: L_m \frac{di}{dt} = v - R_m i - K_e \Omega
@@ -58,7 +70,7 @@ def balance(x: State, u: Input, par: Parameters) -> State:
     ----------
     Dardanelli, Alli, Savaresi (2010), eq. (1), first line.
     """
-    return State(i=u.v - par.R_m * x.i - par.K_e * u.omega)
+    return Balance(i=u.v - par.R_m * x.i - par.K_e * u.omega)
 
 
 def output(x: State, par: Parameters) -> Output:
@@ -77,5 +89,5 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
 
 
 def power_loss(x: State, par: Parameters) -> Power:
-    """Return the copper loss."""
+    """Return the copper loss, >= 0."""
     return par.R_m * x.i * x.i

@@ -28,6 +28,14 @@ class Input(NamedTuple):
     x_end: Annotated[float, Signal("m", "position of the far stop", 1e-3)]
 
 
+class InputRate(NamedTuple):
+    """Derivatives of the inputs that the stored energy depends on; the stops stand still."""
+
+    x: Annotated[float, Signal("m/s", "speed", 0.02)]
+    x_rest: Annotated[float, Signal("m/s", "speed of the near stop", 0.02)]
+    x_end: Annotated[float, Signal("m/s", "speed of the far stop", 0.02)]
+
+
 class Forces(NamedTuple):
     """Contact forces, both >= 0."""
 
@@ -55,15 +63,31 @@ def compliance(par: Parameters) -> ContactCompliance:
     return 1.0 / par.k_stop
 
 
+def forces(u: Input, par: Parameters) -> Forces:
+    """Return the contact forces on a body that no other contact holds: F >= d / C, F >= 0."""
+    d, c = overlaps(u, par), compliance(par)
+    return Forces(near=ops.fmax(d.near / c, 0.0), far=ops.fmax(d.far / c, 0.0))
+
+
 def load(f: Forces) -> Annotated[float, Signal("N", "load on the body", 100.0)]:
     """Return the force of the stops on the body, against positive travel."""
     return f.far - f.near
+
+
+def input_rate(u: Input) -> InputRate:
+    """Return how the travel moves: the stops store energy, and the body's travel is their port."""
+    return InputRate(x=u.v, x_rest=0.0, x_end=0.0)
 
 
 def energy(u: Input, par: Parameters) -> Energy:
     """Return the elastic energy of the stops."""
     near, far = ops.fmax(u.x_rest - u.x, 0.0), ops.fmax(u.x - u.x_end, 0.0)
     return 0.5 * par.k_stop * (near * near + far * far)
+
+
+def power_in(u: Input, f: Forces) -> Power:
+    """Return the work that the body does on the stops."""
+    return load(f) * u.v
 
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Power:

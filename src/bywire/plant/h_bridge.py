@@ -34,10 +34,10 @@ class Output(NamedTuple):
     i_dc: Annotated[float, Signal("A", "battery current", 5.0)]
 
 
-def limited(duty: Annotated[float, Signal("1", "duty cycle", 0.5)], par: Parameters) -> Annotated[
-    float, Signal("1", "duty cycle", 0.5)
-]:
-    """Return the duty cycle within the limits of the bridge, \\|D\\| <= D_max."""
+def limited(
+    duty: Annotated[float, Signal("1", "duty cycle", 0.5)], par: Parameters
+) -> Annotated[float, Signal("1", "duty cycle", 0.5)]:
+    r"""Return the duty cycle within the limits of the bridge, :math:`|D| \le D_{max}`."""
     return ops.clip(duty, -par.D_max, par.D_max)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from annotated_types import Ge
 from pydantic import model_validator
 
 from bywire.core.parameters import ParameterSet
@@ -51,7 +52,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Chamber pressure, gauge."""
 
-    p: Annotated[float, Signal("Pa", "master-cylinder pressure", 2e6)]
+    p: Annotated[float, Signal("Pa", "master-cylinder pressure", 2e6), Ge(0)]
 
 
 class Input(NamedTuple):
@@ -60,6 +61,12 @@ class Input(NamedTuple):
     x: Annotated[float, Signal("m", "piston travel", 7e-3)]
     v: Annotated[float, Signal("m/s", "piston speed", 0.02)]
     q: Annotated[float, Signal("m**3/s", "flow out of the chamber", 1e-6)]
+
+
+class InputRate(NamedTuple):
+    """Derivatives of the inputs that the stored energy depends on."""
+
+    x: Annotated[float, Signal("m/s", "piston speed", 0.02)]
 
 
 class Output(NamedTuple):
@@ -95,10 +102,14 @@ def output(x: State, u: Input, par: Parameters) -> Output:
     return Output(force=x.p * par.A_mc + par.k_damp * u.v)
 
 
+def input_rate(u: Input) -> InputRate:
+    """Return how the travel moves: the chamber's volume is a port, not a state."""
+    return InputRate(x=u.v)
+
+
 def energy(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
     """Return the compression energy of the fluid and of the gas in it."""
-    density = brake_fluid.flow_energy_integral(x.p, fluid) / fluid.beta
-    return volume(u, par) * density + brake_fluid.gas_energy(x.p, fluid)
+    return brake_fluid.compression_energy(brake_fluid.Chamber(V=volume(u, par), p=x.p), fluid)
 
 
 def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
@@ -107,5 +118,5 @@ def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters)
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the damping force."""
+    """Return the heat of the damping force, >= 0."""
     return par.k_damp * u.v * u.v

@@ -66,6 +66,6 @@ def output(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
-    """Return the heat of the flow, with the compression energy that it gives up."""
+    """Return the heat of the flow, with the compression energy that it gives up, >= 0."""
     q = output(u, par, fluid).q
     return q * (brake_fluid.flow_energy(u.p_a, fluid) - brake_fluid.flow_energy(u.p_b, fluid))

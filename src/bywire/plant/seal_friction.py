@@ -75,6 +75,6 @@ def output(u: Input, par: Parameters) -> Output:
 
 
 def power_loss(u: Input, par: Parameters) -> Power:
-    """Return the heat of the sliding friction."""
+    """Return the heat of the sliding friction, >= 0."""
     friction = output(u, par)
     return ops.where(u.omega > 0, friction.T_p, friction.T_n) * ops.fabs(u.omega)

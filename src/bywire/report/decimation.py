@@ -12,8 +12,8 @@ COLUMNS = 700
 """pixel columns of a figure on a screen: finer detail than this is not visible"""
 
 
-def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
-    """Return at most five points per pixel column that draw the same line.
+def kept_samples(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> IntArray:
+    """Return the positions of at most five samples per pixel column that draw the same line.
 
     Of every column the first, the lowest, the highest and the last sample stay, so that a line
     drawn through them covers the same pixels; a gap (NaN) stays a gap.
@@ -29,8 +29,8 @@ def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[Floa
 
     Returns
     -------
-    tuple
-        The points that stay, in their order. Short lines come back whole.
+    ndarray
+        Positions of the samples that stay, ascending. Short lines stay whole.
 
     References
     ----------
@@ -38,7 +38,7 @@ def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[Floa
     Endowment 7 (10), 2014.
     """
     if len(x) <= 4 * columns:
-        return x, y
+        return np.arange(len(x), dtype=np.intp)
     column = _columns(x, columns)
     starts = np.flatnonzero(np.diff(column, prepend=-1))
     ends = np.append(starts[1:], len(x)) - 1
@@ -47,7 +47,12 @@ def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[Floa
     highest = _first_of_each(column, np.where(gaps, np.inf, -y))
     gap = np.flatnonzero(gaps)
     gap = gap[np.diff(column[gap], prepend=-1) > 0]
-    kept = np.unique(np.concatenate([starts, lowest, highest, ends, gap]))
+    return np.unique(np.concatenate([starts, lowest, highest, ends, gap]))
+
+
+def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
+    """Return the points of :func:`kept_samples`."""
+    kept = kept_samples(x, y, columns)
     return x[kept], y[kept]
 
 

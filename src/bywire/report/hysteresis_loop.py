@@ -13,13 +13,15 @@ from matplotlib.lines import Line2D
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import Channel, FloatArray, channel
-from bywire.report.decimation import decimate
+from bywire.report.decimation import kept_samples
 
 if TYPE_CHECKING:
     import xarray as xr
 
+Dash = str | tuple[int, tuple[int, int]]
+
 ARROWS_AT = (0.35, 0.75)
-"""where along the time of a branch its arrows sit, as shares"""
+"""where along a branch its arrows sit, as shares of its drawn length"""
 
 
 def hysteresis_loop(
@@ -54,8 +56,8 @@ def hysteresis_loop(
         x, y = channel(recording, pressure), channel(recording, current)
         by = channel(recording, demand) if demand in recording.data_vars else y
         turn = _turn(by.values)
-        for branch, dash in ((slice(0, turn + 1), "-"), (slice(turn, None), (0, (4, 2)))):
-            _draw_branch(axes, x, y, branch, color, dash)
+        _draw_branch(axes, x, y, slice(0, turn + 1), color, "-")
+        _draw_branch(axes, x, y, slice(turn, None), color, (0, (4, 2)))
         axes.plot([], [], color=color, label=style.plain(label))
     handles, _ = axes.get_legend_handles_labels()
     handles += [
@@ -77,14 +79,31 @@ def _turn(values: FloatArray) -> int:
 
 
 def _draw_branch(
-    axes: Axes, x: Channel, y: Channel, branch: slice, color: str, dash: object
+    axes: Axes, x: Channel, y: Channel, branch: slice, color: str, dash: Dash
 ) -> None:
     """Draw one branch, thinned over time so that the extremes of both variables stay."""
     time, xs, ys = x.time[branch], x.values[branch], y.values[branch]
     if len(time) < 2:
         return
-    kept = np.union1d(decimate(time, xs)[0], decimate(time, ys)[0])
-    xs, ys = np.interp(kept, time, xs), np.interp(kept, time, ys)
-    axes.plot(xs, ys, color=color, linestyle=dash, linewidth=1.1)
+    kept = np.union1d(kept_samples(time, xs), kept_samples(time, ys))
+    axes.plot(xs[kept], ys[kept], color=color, linestyle=dash, linewidth=1.1)
+    length = _length_along(xs[kept], ys[kept])
     for share in ARROWS_AT:
-        _draw_arrow(axes, xs, ys, share, color)
+        tail, tip = np.searchsorted(length, [share - 0.01, share + 0.01])
+        tip = min(tip, len(kept) - 1)
+        axes.annotate(
+            "",
+            xy=(xs[kept[tip]], ys[kept[tip]]),
+            xytext=(xs[kept[tail]], ys[kept[tail]]),
+            arrowprops={
+                "arrowstyle": "-|>", "color": color, "linewidth": 0.0, "mutation_scale": 11.0,
+                "shrinkA": 0.0, "shrinkB": 0.0,
+            },
+        )
+
+
+def _length_along(x: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the share of the drawn length up to every point, 0 to 1."""
+    steps = np.hypot(*(np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (x, y)))
+    length = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])
+    return length / (length[-1] or 1.0)

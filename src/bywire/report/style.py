@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -145,13 +146,24 @@ def draw_channel(axes: Axes, shown: Channel, role: Role, suffix: str = "") -> No
     )
 
 
-def legend_above(axes: Axes, columns: int = 5) -> None:
-    """Put the legend above the axes, where it never hides data."""
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
+def legend_above(
+    axes: Axes, columns: int = 5, handles: Sequence[Artist] | None = None
+) -> None:
+    """Put the legend above the axes, where it never hides data.
+
+    Parameters
+    ----------
+    axes
+        Axes to put it on.
+    columns
+        Entries per row.
+    handles
+        Entries; by default everything in the axes that has a label.
+    """
+    entries = axes.get_legend_handles_labels()[0] if handles is None else list(handles)
+    if entries:
         axes.legend(
-            handles,
-            labels,
+            handles=entries,
             loc="lower left",
             bbox_to_anchor=(0.0, 1.0),
             ncols=columns,
@@ -161,20 +173,4 @@ def legend_above(axes: Axes, columns: int = 5) -> None:
             borderpad=0.1,
             handlelength=2.2,
             columnspacing=1.4,
-        )
-
-
-def legend_beside(axes: Axes) -> None:
-    """Put the legend to the right of the axes, where it never hides data."""
-    handles, labels = axes.get_legend_handles_labels()
-    if handles:
-        axes.legend(
-            handles,
-            labels,
-            loc="upper left",
-            bbox_to_anchor=(1.01, 1.0),
-            fontsize=TEXT_SIZE,
-            frameon=False,
-            borderaxespad=0.0,
-            handlelength=2.2,
         )

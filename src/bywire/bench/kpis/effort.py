@@ -1,0 +1,125 @@
+"""What an experiment costs: currents, powers and energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Array, Undefined, defect, integral, measure, signal
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Names of the signals in the recording."""
+
+    current: str = "i"
+    power: str = "P_el"
+    energy: str = "E_source"
+
+
+@dataclass(frozen=True, eq=False)
+class Effort:
+    """Samples of current, electrical power and energy.
+
+    Parameters
+    ----------
+    t
+        Times [s], increasing, shape ``(n,)``.
+    current
+        Motor current [A], shape ``(n,)``, or None where it is not recorded.
+    power
+        Electrical power drawn [W], shape ``(n,)``, or None.
+    energy
+        Energy drawn since the start [J], shape ``(n,)``, or None: then the power is integrated
+        between the samples, which misses what happens between them.
+    """
+
+    t: Array
+    current: Array | None = None
+    power: Array | None = None
+    energy: Array | None = None
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """No placeholder is used."""
+        return {}
+
+    @property
+    def defect(self) -> str:
+        """Why no figure is defined."""
+        given = (s for s in (self.current, self.power, self.energy) if s is not None)
+        return defect(self.t, *given)
+
+    @property
+    def note(self) -> str:
+        """Nothing is treated."""
+        return ""
+
+
+def select(recording: xr.Dataset, setting: Setting) -> Effort:
+    """Return what the figures need; a signal that is not recorded leaves its figures undefined."""
+    t, _ = signal(recording, "time")
+    names = (setting.current, setting.power, setting.energy)
+    found = (signal(recording, name)[0] if name in recording else None for name in names)
+    return Effort(t, *found)
+
+
+@measure("A")
+def peak_current(data: Effort) -> float | Undefined:
+    """Largest magnitude of the motor current.
+
+    Over the recorded samples; dither and ripple count.
+    """
+    if data.current is None:
+        return Undefined("no current is recorded")
+    return float(np.max(np.abs(data.current)))
+
+
+@measure("A")
+def mean_current(data: Effort) -> float | Undefined:
+    """Mean over time of the magnitude of the motor current.
+
+    Trapezoidal rule over the samples. Dither that changes the current's sign counts in full.
+    """
+    if data.current is None:
+        return Undefined("no current is recorded")
+    return integral(data.t, np.abs(data.current)) / float(data.t[-1] - data.t[0])
+
+
+@measure("W")
+def peak_power(data: Effort) -> float | Undefined:
+    """Largest electrical power drawn from battery or source.
+
+    Signed: power fed back is negative. Over the recorded samples; dither and ripple count.
+    """
+    if data.power is None:
+        return Undefined("no electrical power is recorded")
+    return float(np.max(data.power))
+
+
+@measure("W")
+def mean_power(data: Effort) -> float | Undefined:
+    """Energy drawn over the duration of the recording."""
+    drawn = _drawn(data)
+    return drawn if isinstance(drawn, Undefined) else drawn / float(data.t[-1] - data.t[0])
+
+
+@measure("J")
+def energy(data: Effort) -> float | Undefined:
+    """Energy drawn from battery or source during the recording.
+
+    The recorded energy at the end less that at the beginning; where no energy is recorded, the
+    integral of the recorded power by the trapezoidal rule.
+    """
+    return _drawn(data)
+
+
+def _drawn(data: Effort) -> float | Undefined:
+    if data.energy is not None:
+        return float(data.energy[-1] - data.energy[0])
+    if data.power is not None:
+        return integral(data.t, data.power)
+    return Undefined("neither energy nor electrical power is recorded")

@@ -1,0 +1,162 @@
+r"""Hysteresis of a brake: its loop of drive (current) and response (pressure).
+
+The loop is one slow cycle of the drive, for instance the ramp of eq. (17) of Dardanelli, Alli,
+Savaresi (2010). Its *apply* branch runs from the smallest to the largest response, its *release*
+branch back. At a given response the width is the drive needed to apply less that at which the
+brake releases: twice the friction, as a current. Widths and area are positive when friction
+dissipates, negative for a loop run through the other way around.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Array, Undefined, defect, measure, signal
+from bywire.bench.kpis.smoothing import smoothed, treatment
+
+_OPEN = 0.05  # of the drive's range: more than this between both ends is no closed loop
+_LEVELS = 401  # levels at which the width is looked up, both extremes left out
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Names of drive and response in the recording, and an averaging time [s], 0 for none."""
+
+    drive: str = "i"
+    response: str = "p_mc"
+    smoothing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """Samples of one loop.
+
+    Parameters
+    ----------
+    t
+        Times [s], increasing, shape ``(n,)``.
+    drive, response
+        Current and pressure, for instance, shape ``(n,)`` each.
+    drive_unit, response_unit
+        Their SI units.
+    note
+        How the samples were treated.
+    """
+
+    t: Array
+    drive: Array
+    response: Array
+    drive_unit: str = "A"
+    response_unit: str = "Pa"
+    note: str = ""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Units of drive and of drive times response."""
+        return {
+            "drive": self.drive_unit,
+            "drive*response": f"{self.drive_unit}*{self.response_unit}",
+        }
+
+    @cached_property
+    def defect(self) -> str:
+        """Why no figure is defined."""
+        broken = defect(self.t, self.drive, self.response)
+        if broken:
+            return broken
+        span, height = float(np.ptp(self.drive)), float(np.ptp(self.response))
+        if span == 0.0 or height == 0.0:
+            return f"{'the drive' if span == 0.0 else 'the response'} is constant: no loop"
+        apart = abs(float(self.drive[-1] - self.drive[0]))
+        if apart > _OPEN * span:
+            return (
+                f"the loop is open: the drive ends {apart:.3g} {self.drive_unit} away from its "
+                "beginning; record the way back, or smooth the dither away"
+            )
+        loops = _cycles(self.response)
+        return "" if loops == 1 else f"{loops} loops: cut the recording to one"
+
+    @cached_property
+    def branches(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        """Drive and response of the apply branch, then of the release branch."""
+        first = int(np.argmin(self.response))
+        x, y = np.roll(self.drive, -first), np.roll(self.response, -first)
+        top = int(np.argmax(y))
+        return (x[: top + 1], y[: top + 1]), (np.append(x[top:], x[0]), np.append(y[top:], y[0]))
+
+
+def select(recording: xr.Dataset, setting: Setting) -> Loop:
+    """Return the loop.
+
+    Raises
+    ------
+    UnknownNameError
+        When the recording does not hold drive or response.
+    """
+    t, _ = signal(recording, "time")
+    x, x_unit = signal(recording, setting.drive)
+    y, y_unit = signal(recording, setting.response)
+    x, y = smoothed(t, x, setting.smoothing), smoothed(t, y, setting.smoothing)
+    return Loop(t, x, y, x_unit, y_unit, treatment(setting.smoothing))
+
+
+@measure("drive")
+def loop_width_mid(loop: Loop) -> float | Undefined:
+    """Width of the loop, as drive, at mid-height of the response's range.
+
+    Mean drive of the apply branch's crossings of that level less the mean of the release
+    branch's, each interpolated between samples. Ripple makes a branch cross several times: the
+    mean over the crossings keeps its effect small; `smoothed` removes it.
+    """
+    return _width(loop, 0.5 * float(np.min(loop.response) + np.max(loop.response)))
+
+
+@measure("drive")
+def loop_width_max(loop: Loop) -> float | Undefined:
+    """Width of the loop, as drive, where it is widest.
+
+    The width of largest magnitude at 401 levels spread evenly inside the response's range,
+    defined at each as in `loop_width_mid`. Ripple widens it by up to its peak to peak value.
+    """
+    levels = np.linspace(np.min(loop.response), np.max(loop.response), _LEVELS + 2)[1:-1]
+    widths = [_width(loop, float(level)) for level in levels]
+    return max(widths, key=abs)
+
+
+@measure("drive*response")
+def loop_area(loop: Loop) -> float | Undefined:
+    r"""Area of the closed loop of drive over response.
+
+    .. math:: W = \oint i \, dp = \sum_k \tfrac12 (i_k + i_{k+1}) (p_{k+1} - p_k)
+
+    The sum runs around the loop; a straight line joins the last sample to the first. Ripple adds
+    the areas of its own small loops.
+    """
+    x, y = loop.drive, loop.response
+    return float(np.sum(0.5 * (x + np.roll(x, -1)) * (np.roll(y, -1) - y)))
+
+
+def _width(loop: Loop, level: float) -> float:
+    apply, release = (_mean_crossing(x, y, level) for x, y in loop.branches)
+    return apply - release
+
+
+def _mean_crossing(x: Array, y: Array, level: float) -> float:
+    """Return the mean drive of the crossings of a level strictly inside the branch's range."""
+    above = y >= level
+    k = np.flatnonzero(above[1:] != above[:-1])
+    share = (level - y[k]) / (y[k + 1] - y[k])
+    return float(np.mean(x[k] + share * (x[k + 1] - x[k])))
+
+
+def _cycles(y: Array) -> int:
+    """Return how often the closed course rises from its lowest to its highest quarter."""
+    low, high = np.quantile([np.min(y), np.max(y)], [0.25, 0.75])
+    marks = np.where(y <= low, -1, np.where(y >= high, 1, 0))
+    marks = marks[marks != 0]
+    return int(np.count_nonzero((marks == 1) & (np.roll(marks, 1) == -1)))

@@ -1,0 +1,69 @@
+"""A sum of harmonics of one base frequency with Schroeder's phases: flat spectrum, low peak."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import model_validator
+
+from bywire.bench.stimuli.quantities import Amplitude, Count, Level, reached
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Frequency, TimeConstant
+
+
+class Parameters(ParameterSet):
+    """Mean, amplitude and harmonics."""
+
+    mean: Level
+    """mean value, and the value before ``t_start``"""
+    amplitude: Amplitude
+    """amplitude of every single harmonic"""
+    f_base: Frequency
+    """base frequency: first harmonic and spacing; one period lasts its inverse"""
+    n: Count
+    """number of harmonics: 1, 2, ..., n times the base frequency"""
+    t_start: TimeConstant
+    """instant at which the first period begins; the signal jumps there"""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _counts_harmonics(cls, data: Any) -> Any:
+        n = data.get("n") if isinstance(data, dict) else None
+        if isinstance(n, float) and not n.is_integer():
+            raise ValueError(f"n = {n:g} is not admissible: it must be a whole number")
+        return data
+
+
+def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
+    r"""Return the multisine.
+
+    .. math:: u = \bar u + \hat u \sum_{k=1}^{n} \cos(2 \pi k f_b (t - t_0) - \pi k (k - 1) / n)
+
+    No random numbers: the same parameters always give the same signal. Its RMS value is
+    :math:`\hat u \sqrt{n / 2}`, its peak about 1.7 times that for many harmonics.
+
+    Parameters
+    ----------
+    t
+        Times [s], any shape.
+    par
+        Mean, amplitude, base frequency, harmonics and start.
+
+    Returns
+    -------
+    numpy.ndarray
+        Driven signal [level], shape of ``t``.
+
+    References
+    ----------
+    M. R. Schroeder, "Synthesis of low-peak-factor signals and binary sequences with low
+    autocorrelation", IEEE Transactions on Information Theory 16 (1970).
+    """
+    angle = 2.0 * math.pi * par.f_base * (t - par.t_start)
+    wave = np.zeros_like(angle)
+    for k in range(1, par.n + 1):
+        wave += np.cos(k * angle - math.pi * k * (k - 1) / par.n)
+    return par.mean + par.amplitude * np.where(reached(t, par.t_start), wave, 0.0)

@@ -1,0 +1,152 @@
+"""Find the stimuli by name and build them from texts with units."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, get_origin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench import stimuli
+from bywire.core import units
+from bywire.core.errors import ParameterError, UnknownNameError, unknown_name
+from bywire.core.parameters import ParameterSet, leaf_fields
+
+Value = str | float | Sequence[str | float]
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A kind of stimulus.
+
+    Parameters
+    ----------
+    kind
+        What bench files and the command line call it: the name of its module.
+    summary
+        One line for listings.
+    parameter_class
+        Class that validates the values.
+    function
+        ``function(t, par)``: its samples [level] at the times [s].
+    """
+
+    kind: str
+    summary: str
+    parameter_class: type[ParameterSet]
+    function: Callable[[NDArray[np.float64], Any], NDArray[np.float64]]
+
+
+@dataclass(frozen=True)
+class Stimulus:
+    """A stimulus with its parameters.
+
+    Parameters
+    ----------
+    kind
+        Name of the stimulus.
+    parameters
+        Its validated parameters, SI inside.
+    """
+
+    kind: str
+    parameters: ParameterSet
+
+    def sample(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return the samples at times [s], in the SI unit of the driven signal."""
+        return entry(self.kind).function(t, self.parameters)
+
+
+@cache
+def entries() -> Mapping[str, Entry]:
+    """Return every kind of stimulus: the modules in this folder that offer ``sample``."""
+    found: dict[str, Entry] = {}
+    for module in pkgutil.iter_modules(stimuli.__path__):
+        loaded = importlib.import_module(f"{stimuli.__name__}.{module.name}")
+        if hasattr(loaded, "sample") and hasattr(loaded, "Parameters"):
+            summary = (loaded.__doc__ or "").strip().splitlines()[0]
+            found[module.name] = Entry(module.name, summary, loaded.Parameters, loaded.sample)
+    return found
+
+
+def entry(kind: str) -> Entry:
+    """Return one kind of stimulus.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    known = entries()
+    if kind not in known:
+        raise unknown_name("stimulus", kind, known)
+    return known[kind]
+
+
+def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
+    """Build a stimulus from numbers (SI) and texts with units.
+
+    Parameters
+    ----------
+    kind
+        Name of the stimulus, for instance ``"ramp"``.
+    values
+        Its parameters by name. A table's nodes are a sequence, or one text with commas, each
+        node with its unit: ``"0 s, 0.2 s, 1 s"``.
+    level_unit
+        SI unit of the driven signal, for instance ``"A"`` or ``"Pa"``.
+
+    Raises
+    ------
+    UnknownNameError
+        When kind or a parameter's name is unknown.
+    UnitError
+        When a text is no quantity or its unit measures something else.
+    ParameterError
+        When a value is missing, out of range or contradicts another.
+
+    Examples
+    --------
+    >>> step = create("step", {"start": "0 A", "end": "350 mA", "t_step": "0.1 s"}, "A")
+    >>> step.sample(np.array([0.0, 0.1]))
+    array([0.  , 0.35])
+    """
+    cls = entry(kind).parameter_class
+    leaves = leaf_fields(cls)
+    numbers: dict[str, Any] = dict(values)
+    for name in values.keys() & leaves.keys():
+        symbol = leaves[name].unit.symbol.replace("level", level_unit)
+        is_table = get_origin(cls.model_fields[name].annotation) is tuple
+        parse = _parse_nodes if is_table else _parse_number
+        numbers[name] = parse(values[name], symbol, f"{kind}.{name}")
+    try:
+        return Stimulus(kind, cls.create(numbers))
+    except UnknownNameError as error:
+        raise UnknownNameError(f"stimulus {kind!r}: {error}") from None
+    except ParameterError as error:
+        raise ParameterError(_in_terms_of(str(error), kind, level_unit)) from None
+
+
+def _parse_number(value: Value, symbol: str, name: str) -> float:
+    if not isinstance(value, (str, int, float)):
+        raise ParameterError(f"{name} = {value!r}: one value is wanted, not several")
+    return units.parse(value, symbol, name)
+
+
+def _parse_nodes(value: Value, symbol: str, name: str) -> tuple[float, ...]:
+    nodes = value.split(",") if isinstance(value, str) else value
+    if isinstance(nodes, (int, float)):
+        nodes = (nodes,)
+    return tuple(units.parse(node, symbol, f"{name}.{k}") for k, node in enumerate(nodes))
+
+
+def _in_terms_of(message: str, kind: str, level_unit: str) -> str:
+    """Return the message with the driven signal's unit where the class says ``level``."""
+    unit = "" if level_unit == "1" else f" {level_unit}"
+    lines = message.replace(" level/s", f" {level_unit}/s").replace(" level", unit).splitlines()
+    return "\n".join(f"stimulus {kind!r}: {line.removeprefix('Parameters: ')}" for line in lines)

@@ -1,0 +1,48 @@
+"""A sine around a mean."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.stimuli.quantities import Amplitude, Level, Phase, reached
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Frequency, TimeConstant
+
+
+class Parameters(ParameterSet):
+    """Mean, amplitude, frequency and phase."""
+
+    mean: Level
+    """mean value, and the value before ``t_start``"""
+    amplitude: Amplitude
+    """amplitude: half of peak to peak"""
+    f: Frequency
+    """frequency"""
+    phase: Phase
+    """phase at ``t_start``; the signal jumps there unless it is a multiple of pi"""
+    t_start: TimeConstant
+    """instant at which the oscillation begins"""
+
+
+def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
+    r"""Return the sine.
+
+    .. math:: u = \bar u + \hat u \sin(2 \pi f (t - t_0) + \varphi), \quad t \ge t_0
+
+    Parameters
+    ----------
+    t
+        Times [s], any shape.
+    par
+        Mean, amplitude, frequency, phase and start.
+
+    Returns
+    -------
+    numpy.ndarray
+        Driven signal [level], shape of ``t``.
+    """
+    wave = np.sin(2.0 * math.pi * par.f * (t - par.t_start) + par.phase)
+    return par.mean + par.amplitude * np.where(reached(t, par.t_start), wave, 0.0)

@@ -1,0 +1,39 @@
+"""A step from one level to another."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.stimuli.quantities import Level, reached
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import TimeConstant
+
+
+class Parameters(ParameterSet):
+    """Two levels and the instant between them."""
+
+    start: Level
+    """value before the step"""
+    end: Level
+    """value from the step on"""
+    t_step: TimeConstant
+    """instant of the step"""
+
+
+def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
+    """Return the step; at ``t_step`` itself the value is ``end``.
+
+    Parameters
+    ----------
+    t
+        Times [s], any shape.
+    par
+        Levels and instant.
+
+    Returns
+    -------
+    numpy.ndarray
+        Driven signal [level], shape of ``t``.
+    """
+    return np.where(reached(t, par.t_step), par.end, par.start)

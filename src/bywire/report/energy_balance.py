@@ -1,0 +1,143 @@
+"""Figure: where the energy came from and where it went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bywire.core.errors import ParameterError
+from bywire.report import style
+from bywire.report.channel import channel
+from bywire.report.wording import amount
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BRAKE_SOURCE = "E_source"
+BRAKE_SINKS = {
+    "E_copper": "copper",
+    "E_gear": "gear and screw",
+    "E_seal": "seal friction",
+    "E_damping": "fluid damping",
+    "E_pipeline": "pipeline",
+    "E_supply": "supply",
+    "E_stop": "end stops",
+    "E_port": "reservoir port",
+    "E_stored": "stored",
+}
+"""energies of the motorcycle brake: integrals over the run, and what is stored"""
+
+COLORS = (
+    style.VERMILLION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW,
+    style.GRAY, "#8B5A2B", style.BLUE,
+)
+NEGLIGIBLE = 1e-9
+"""share of the energy turned over below which an entry is not drawn"""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One piece of a bar: what it is, its energy [J, not negative] and its color."""
+
+    label: str
+    energy: float
+    color: str
+
+
+def energy_balance(
+    recording: xr.Dataset,
+    *,
+    source: str = BRAKE_SOURCE,
+    sinks: Mapping[str, str] | None = None,
+) -> Figure:
+    """Draw two stacked bars of equal length: where energy came from and where it went.
+
+    Every entry is signed and stands on the side that its sign says: a source that takes energy
+    back is among the receivers, a gear loss below zero and an emptied store are among the givers.
+    What the books do not explain is drawn as a hatched piece.
+
+    Parameters
+    ----------
+    recording
+        Recording with energies [J]; of each the difference between end and start counts.
+    source
+        Variable with the energy that came from the source.
+    sinks
+        Label by variable of every place where energy went; by default those of the motorcycle
+        brake. Variables a recording lacks are left out.
+
+    Raises
+    ------
+    ParameterError
+        When no energy was turned over.
+    """
+    given, taken = _sides(recording, source, BRAKE_SINKS if sinks is None else sinks)
+    total = max(sum(e.energy for e in given), sum(e.energy for e in taken))
+    if not total > 0:
+        raise ParameterError("energy_balance: the recording turned over no energy")
+    given = [entry for entry in given if entry.energy > NEGLIGIBLE * total]
+    taken = [entry for entry in taken if entry.energy > NEGLIGIBLE * total]
+    figure, (axes,) = style.new_figure(2.9)
+    _stack(axes, 1.0, given, total)
+    _stack(axes, 0.0, taken, total)
+    missing = sum(e.energy for e in given) - sum(e.energy for e in taken)
+    _draw_missing(axes, missing, total)
+    axes.set_yticks([1.0, 0.0], ["came from", "went to"])
+    axes.set_ylim(-0.5, 1.5)
+    axes.set_xlim(0.0, 1.02 * total)
+    axes.tick_params(axis="y", length=0)
+    axes.grid(False, axis="y")
+    axes.spines["left"].set_visible(False)
+    axes.set_xlabel(style.axis_label("energy", "J"))
+    style.legend_above(axes, columns=3)
+    return figure
+
+
+def _sides(
+    recording: xr.Dataset, source: str, sinks: Mapping[str, str]
+) -> tuple[list[Entry], list[Entry]]:
+    """Return the givers and the receivers of energy."""
+    given: list[Entry] = []
+    taken: list[Entry] = []
+    change = _change(recording, source)
+    side = given if change > 0 else taken
+    side.append(Entry("source" if change > 0 else "back to the source", abs(change), style.BLACK))
+    for k, (variable, label) in enumerate(sinks.items()):
+        if variable not in recording.data_vars:
+            continue
+        change = _change(recording, variable)
+        side = taken if change > 0 else given
+        suffix = "" if change > 0 else " (gives)"
+        side.append(Entry(label + suffix, abs(change), COLORS[k % len(COLORS)]))
+    return given, taken
+
+
+def _change(recording: xr.Dataset, variable: str) -> float:
+    values = channel(recording, variable).values
+    return float(values[-1] - values[0])
+
+
+def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
+    left = 0.0
+    for entry in entries:
+        label = f"{entry.label}: {amount(entry.energy, 'J', 3)} ({entry.energy / total:.1%})"
+        axes.barh(
+            row, entry.energy, left=left, height=0.62, color=entry.color, edgecolor="white",
+            linewidth=0.8, label=style.plain(label),
+        )
+        left += entry.energy
+
+
+def _draw_missing(axes: Axes, missing: float, total: float) -> None:
+    """Draw what the shorter bar lacks."""
+    if abs(missing) <= 1e-6 * total:
+        return
+    axes.barh(
+        0.0 if missing > 0 else 1.0, abs(missing), left=total - abs(missing), height=0.62,
+        facecolor="white", edgecolor=style.BLACK, hatch="///", linewidth=0.8,
+        label=f"not accounted for: {amount(abs(missing), 'J', 2)}",
+    )

@@ -1,0 +1,89 @@
+"""Figures to bytes and files: the same input gives the same bytes, and no file is half written."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import secrets
+import warnings
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from bywire.core.errors import FileError
+
+PNG_DPI = 160
+"""pixels per inch of a PNG"""
+
+_METADATA: dict[str, dict[str, str | None]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
+}
+_SETTINGS = {"svg.hashsalt": "bywire", "svg.fonttype": "path"}
+
+
+def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
+    """Return a figure as a PNG or SVG file.
+
+    Parameters
+    ----------
+    figure
+        Figure to draw.
+    kind
+        ``"png"`` or ``"svg"``.
+
+    Raises
+    ------
+    FileError
+        For any other kind.
+    """
+    if kind not in _METADATA:
+        raise FileError(f"figures are written as .png or .svg, not as {kind!r}: change the ending")
+    buffer = io.BytesIO()
+    with mpl.rc_context(_SETTINGS), warnings.catch_warnings():
+        # A character that the font lacks is drawn as a box; that is no reason to fail.
+        warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata=_METADATA[kind])
+    return buffer.getvalue()
+
+
+def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:
+    """Write a figure as PNG or SVG, whichever the ending of the path says.
+
+    Raises
+    ------
+    FileError
+        When the ending is another one or the file cannot be written.
+    """
+    target = Path(path)
+    return write_bytes(target, figure_bytes(figure, target.suffix.removeprefix(".").lower()))
+
+
+def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
+    """Write a file whole or not at all; an older file stays until the new one is complete.
+
+    The folder is made where it does not exist.
+
+    Raises
+    ------
+    FileError
+        When the folder cannot be made or written to; names the file and the reason.
+    """
+    target = Path(path)
+    partial = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
+    try:
+        target.parent.mkdir(parents=True, exist_ok=True)
+        with open(partial, "xb") as stream:
+            stream.write(content)
+        os.replace(partial, target)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(
+            f"cannot write {target}: {reason}; choose a folder that you may write to"
+        ) from None
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            partial.unlink(missing_ok=True)
+    return target

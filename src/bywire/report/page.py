@@ -1,0 +1,189 @@
+"""One self-contained HTML file: no script, nothing loaded from elsewhere, all text escaped."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from html import escape
+from importlib.resources import files
+from itertools import count
+from pathlib import Path
+from typing import Literal
+
+from matplotlib.figure import Figure
+
+from bywire import __version__
+from bywire.report.files import write_bytes
+from bywire.report.inline_figure import inline_figures
+from bywire.report.table_html import table_html
+from bywire.report.tables import Table
+from bywire.report.wording import clean
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Plain text."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A figure with its caption; the page numbers it."""
+
+    figure: Figure
+    caption: str
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table, with a caption that the page numbers."""
+
+    table: Table
+    caption: str = ""
+
+
+@dataclass(frozen=True)
+class Details:
+    """Blocks that stay folded until the reader opens them."""
+
+    title: str
+    blocks: Sequence[Paragraph | FigureBlock | TableBlock]
+
+
+Block = Paragraph | FigureBlock | TableBlock | Details
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands under it."""
+
+    title: str
+    blocks: Sequence[Block]
+
+
+@dataclass(frozen=True)
+class Banner:
+    """The outcome in one line at the top: ``good``, ``bad`` or neither."""
+
+    text: str
+    verdict: Literal["good", "bad", "none"] = "none"
+
+
+def write_page(
+    path: str | os.PathLike[str],
+    title: str,
+    summary: str,
+    sections: Sequence[Section],
+    *,
+    banner: Banner | None = None,
+) -> Path:
+    """Write a report as one HTML file, whole or not at all.
+
+    Parameters
+    ----------
+    path
+        File to write; its folder is made where it does not exist.
+    title
+        Heading of the page.
+    summary
+        One line below it.
+    sections
+        Contents.
+    banner
+        Outcome, shown above the contents.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be written.
+    """
+    return write_bytes(path, page_html(title, summary, sections, banner=banner).encode("utf-8"))
+
+
+def page_html(
+    title: str, summary: str, sections: Sequence[Section], *, banner: Banner | None = None
+) -> str:
+    """Return a report as one HTML page; see :func:`write_page`."""
+    blocks = [block for section in sections for block in _flat(section.blocks)]
+    shown = [(b.figure, b.caption) for b in blocks if isinstance(b, FigureBlock)]
+    numbered = _Numbered(iter(inline_figures(shown)))
+    style = files("bywire.report").joinpath("page.css").read_text(encoding="utf-8")
+    parts = [
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{_POLICY}\n'
+        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{_text(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>",
+        f'<header>\n<h1>{_text(title)}</h1>\n<p class="summary">{_text(summary)}</p>',
+        _banner(banner) if banner is not None else "",
+        _contents(sections) if len(sections) > 2 else "",
+        "</header>\n<main>",
+        *(_section(section, k, numbered) for k, section in enumerate(sections, 1)),
+        f"</main>\n<footer>bywire {_text(__version__)}</footer>\n</body>\n</html>\n",
+    ]
+    return "\n".join(part for part in parts if part)
+
+
+# The browser itself then refuses scripts and anything from elsewhere.
+_POLICY = (
+    '<meta http-equiv="Content-Security-Policy" '
+    "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
+)
+
+
+class _Numbered:
+    """Hands out the figures in their order, and the numbers of figures and tables."""
+
+    def __init__(self, figures: Iterator[str]) -> None:
+        self.figures = figures
+        self.figure_numbers = count(1)
+        self.table_numbers = count(1)
+
+
+def _flat(blocks: Iterable[Block]) -> Iterator[Paragraph | FigureBlock | TableBlock]:
+    for block in blocks:
+        if isinstance(block, Details):
+            yield from block.blocks
+        else:
+            yield block
+
+
+def _text(text: str) -> str:
+    return escape(clean(text), quote=True)
+
+
+def _banner(banner: Banner) -> str:
+    mark = {"good": "✓ ", "bad": "✗ ", "none": ""}[banner.verdict]
+    return f'<div class="status {banner.verdict}" role="status">{mark}{_text(banner.text)}</div>'
+
+
+def _contents(sections: Sequence[Section]) -> str:
+    links = "".join(
+        f'<li><a href="#section-{k}">{_text(section.title)}</a></li>'
+        for k, section in enumerate(sections, 1)
+    )
+    return f'<nav aria-label="Contents"><ul>{links}</ul></nav>'
+
+
+def _section(section: Section, number: int, numbered: _Numbered) -> str:
+    body = "\n".join(_block(block, numbered) for block in section.blocks)
+    title = _text(section.title)
+    return f'<section id="section-{number}">\n<h2>{title}</h2>\n{body}\n</section>'
+
+
+def _block(block: Block, numbered: _Numbered) -> str:
+    if isinstance(block, Paragraph):
+        return f"<p>{_text(block.text)}</p>"
+    if isinstance(block, Details):
+        body = "\n".join(_block(inner, numbered) for inner in block.blocks)
+        return f"<details>\n<summary>{_text(block.title)}</summary>\n{body}\n</details>"
+    if isinstance(block, FigureBlock):
+        caption = f"Figure {next(numbered.figure_numbers)}. {_text(block.caption)}"
+        return (
+            f"<figure>\n{next(numbered.figures)}\n<figcaption>{caption}</figcaption>\n</figure>"
+        )
+    caption = ""
+    if block.caption:
+        number = next(numbered.table_numbers)
+        caption = f"<figcaption>Table {number}. {_text(block.caption)}</figcaption>\n"
+    return f"<figure>\n{caption}{table_html(block.table)}\n</figure>"

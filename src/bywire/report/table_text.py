@@ -1,0 +1,64 @@
+"""A table as plain text for terminals and logs."""
+
+from __future__ import annotations
+
+import textwrap
+
+from bywire.report.tables import Table
+
+GAP = "  "
+NARROWEST = 12
+"""least width of a column that is wrapped"""
+
+
+def table_text(table: Table, width: int = 100) -> str:
+    """Return a table as lines of at most ``width`` characters where its columns allow that.
+
+    The widest columns are wrapped first; no column gets narrower than 12 characters.
+
+    Parameters
+    ----------
+    table
+        What to write.
+    width
+        Characters per line.
+    """
+    headings = [column.heading for column in table.columns]
+    content = [[cell.text for cell in row] for row in table.rows]
+    widths = _widths([headings, *content], width)
+    rule = GAP.join("-" * w for w in widths)
+    body = [line for row in content for line in _lines(table, row, widths)]
+    return "\n".join([*_lines(table, headings, widths), rule, *body])
+
+
+def _widths(rows: list[list[str]], width: int) -> list[int]:
+    """Return the columns' widths: as wanted, then the widest cut back until all fit."""
+    widths = [
+        max(len(line) for row in rows for line in (row[k].splitlines() or [""]))
+        for k in range(len(rows[0]))
+    ]
+    available = width - len(GAP) * (len(widths) - 1)
+    while sum(widths) > available:
+        widest = max(range(len(widths)), key=widths.__getitem__)
+        if widths[widest] <= NARROWEST:
+            break
+        widths[widest] -= 1
+    return widths
+
+
+def _lines(table: Table, row: list[str], widths: list[int]) -> list[str]:
+    """Return the lines of one row."""
+    wrapped = [
+        [part for line in text.splitlines() or [""] for part in textwrap.wrap(line, w) or [""]]
+        for text, w in zip(row, widths, strict=True)
+    ]
+    height = max(len(parts) for parts in wrapped)
+    lines = []
+    for k in range(height):
+        parts = [parts[k] if k < len(parts) else "" for parts in wrapped]
+        aligned = [
+            part.rjust(w) if column.numeric else part.ljust(w)
+            for part, w, column in zip(parts, widths, table.columns, strict=True)
+        ]
+        lines.append(GAP.join(aligned).rstrip())
+    return lines

@@ -1,0 +1,205 @@
+"""Tables of KPIs, of reproduced statements and of parameters, ready to be written anywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from bywire.report.wording import amount, clean, unit_text
+
+Verdict = Literal["good", "bad", "none"]
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Text of a cell and whether it tells of something good or bad."""
+
+    text: str
+    verdict: Verdict = "none"
+
+
+@dataclass(frozen=True)
+class Column:
+    """Heading of a column; numbers are set to the right."""
+
+    heading: str
+    numeric: bool = False
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns and rows of equal length."""
+
+    columns: tuple[Column, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+
+
+@dataclass(frozen=True)
+class KpiRow:
+    """A key figure.
+
+    Parameters
+    ----------
+    name, value, unit
+        What it is called, its value in ``unit`` (``None`` for none) and the unit in pint's syntax.
+    definition
+        How it is computed.
+    limit
+        The requirement as text, for instance ``"<= 15 %"``; empty for none.
+    ok
+        Whether the requirement holds; ``None`` without one.
+    """
+
+    name: str
+    value: float | None
+    unit: str
+    definition: str = ""
+    limit: str = ""
+    ok: bool | None = None
+
+
+@dataclass(frozen=True)
+class ReproductionRow:
+    """A statement of a source and what we compute.
+
+    Parameters
+    ----------
+    id
+        Name of the statement.
+    stated, computed
+        Values in ``unit``; ``None`` where nothing is stated or computed.
+    unit
+        Unit in pint's syntax.
+    tolerance
+        Text, or a number in ``unit``; ``None`` for none.
+    agrees
+        ``None`` where nothing can be said.
+    note
+        What a reader should know.
+    """
+
+    id: str
+    stated: float | None
+    computed: float | None
+    unit: str
+    tolerance: float | str | None = None
+    agrees: bool | None = None
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter with its provenance.
+
+    Parameters
+    ----------
+    name, value, unit
+        Dotted name, value in the SI ``unit`` of pint's syntax; a choice or a table may be a value.
+    range
+        Admissible range as text.
+    kind
+        Provenance, for instance ``"paper"`` or ``"chosen"``.
+    where
+        Place in the source, or the reason.
+    """
+
+    name: str
+    value: object
+    unit: str = "1"
+    range: str = ""
+    kind: str = ""
+    where: str = ""
+
+
+def kpi_table(rows: Iterable[KpiRow]) -> Table:
+    """Return the table of key figures; the columns for limits only where there is one."""
+    listed = list(rows)
+    limited = any(row.limit or row.ok is not None for row in listed)
+    columns = [Column("name"), Column("value", numeric=True)]
+    columns += [Column("limit"), Column("result")] if limited else []
+    return Table(
+        (*columns, Column("definition")),
+        tuple(
+            (
+                Cell(clean(row.name)),
+                Cell(amount(row.value, row.unit)),
+                *((Cell(clean(row.limit) or "-"), _judged(row.ok, "ok", "failed")) * limited),
+                Cell(clean(row.definition)),
+            )
+            for row in listed
+        ),
+    )
+
+
+def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
+    """Return the table of statements of a source beside what we compute."""
+    return Table(
+        (
+            Column("statement"), Column("stated", numeric=True), Column("computed", numeric=True),
+            Column("tolerance", numeric=True), Column("agrees"), Column("note"),
+        ),
+        tuple(
+            (
+                Cell(clean(row.id)),
+                Cell(amount(row.stated, row.unit)),
+                Cell(amount(row.computed, row.unit)),
+                Cell(_tolerance(row)),
+                _judged(row.agrees, "yes", "no"),
+                Cell(clean(row.note)),
+            )
+            for row in rows
+        ),
+    )
+
+
+def parameter_table(rows: Iterable[ParameterRow]) -> Table:
+    """Return the table of parameters in their display units, with range and provenance."""
+    return Table(
+        (
+            Column("parameter"), Column("value", numeric=True), Column("range"),
+            Column("provenance"), Column("where"),
+        ),
+        tuple(
+            (
+                Cell(clean(row.name)),
+                Cell(_value_text(row.value, row.unit)),
+                Cell(clean(row.range)),
+                Cell(clean(row.kind)),
+                Cell(clean(row.where)),
+            )
+            for row in rows
+        ),
+    )
+
+
+def text_table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> Table:
+    """Return a table of plain text."""
+    return Table(
+        tuple(Column(clean(name)) for name in heading),
+        tuple(tuple(Cell(clean(cell)) for cell in row) for row in rows),
+    )
+
+
+def _judged(holds: bool | None, good: str, bad: str) -> Cell:
+    if holds is None:
+        return Cell("-")
+    return Cell(good, "good") if holds else Cell(bad, "bad")
+
+
+def _tolerance(row: ReproductionRow) -> str:
+    if isinstance(row.tolerance, str):
+        return clean(row.tolerance) or "-"
+    return amount(row.tolerance, row.unit)
+
+
+def _value_text(value: object, unit: str) -> str:
+    """Return a parameter's value; a choice as it is, a table number by number."""
+    if value is None or isinstance(value, (bool, str)):
+        return "-" if value is None else clean(value)
+    if isinstance(value, (int, float)):
+        return amount(float(value), unit, 6)
+    if isinstance(value, Sequence):
+        return ", ".join(_value_text(item, unit) for item in value)
+    written = unit_text(unit)
+    return clean(value) + (f" {written}" if written else "")

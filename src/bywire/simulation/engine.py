@@ -1,0 +1,86 @@
+"""Programs and kernels of models, built once per structure, and which engine serves."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cache
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.compiler import find_compiler
+from bywire.simulation.emission import Layout
+from bywire.simulation.native import Request, SingleKernel
+from bywire.simulation.program import Program, build_program
+from bywire.simulation.virtual_machine import VirtualMachine
+
+
+class Engine(Protocol):
+    """What advances a run."""
+
+    label: str
+    layout: Layout
+
+    def advance(
+        self,
+        request: Request,
+        state: NDArray[np.float64],
+        begin: int,
+        end: int,
+        rows: NDArray[np.float64],
+    ) -> None:
+        """Run frames begin..end in place."""
+        ...
+
+
+class Prepared:
+    """Programs and engines of one structure of a model, built on demand."""
+
+    def __init__(self, model: Model, par: ParameterSet) -> None:
+        self.program: Program = build_program(model, par)
+        self._engines: dict[str, Engine] = {}
+
+    def engine(self, kind: str = "auto") -> Engine:
+        """Return the engine for single runs.
+
+        Parameters
+        ----------
+        kind
+            ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled where there is a
+            compiler, else the virtual machine, with one warning.
+        """
+        if kind not in self._engines:
+            self._engines[kind] = self._build(kind)
+        return self._engines[kind]
+
+    def _build(self, kind: str) -> Engine:
+        compiler = None if kind == "virtual-machine" else find_compiler()
+        if compiler is not None:
+            return SingleKernel(self.program, compiler)
+        if kind != "virtual-machine":
+            _warn_once()
+        return VirtualMachine(self.program)
+
+
+_PREPARED: dict[tuple[object, ...], Prepared] = {}
+
+
+def prepare(model: Model, par: ParameterSet) -> Prepared:
+    """Return what is built for a model of this structure; the numbers of ``par`` do not matter."""
+    structure = tuple(sorted((k, str(v)) for k, v in par.choices().items()))
+    key = (type(model), repr(model), type(par), structure)
+    if key not in _PREPARED:
+        _PREPARED[key] = Prepared(model, par)
+    return _PREPARED[key]
+
+
+@cache
+def _warn_once() -> None:
+    warnings.warn(
+        "no C compiler: runs use the virtual machine, about 100 times slower; "
+        "install one, or the extra bywire[compiler]",
+        stacklevel=2,
+    )

@@ -1,0 +1,98 @@
+"""Compiled kernels: emitted, compiled, loaded, called through raw pointers."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.simulation.compiler import PLAIN, Compiler, compile_library
+from bywire.simulation.emission import Layout, layout_of
+from bywire.simulation.emit_single import emit_single
+from bywire.simulation.program import Program
+from bywire.simulation.schedule import Schedule
+from bywire.simulation.stages import build_stages
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a kernel works on, as contiguous arrays.
+
+    Parameters
+    ----------
+    parameters
+        Shape (np,).
+    stimulus
+        Shape (stimulus rows, nu).
+    selection
+        Indices of the outputs to record, int32.
+    """
+
+    schedule: Schedule
+    parameters: Array
+    stimulus: Array
+    selection: NDArray[np.int32]
+
+
+def plan_array(schedule: Schedule, begin: int, end: int, selected: int) -> NDArray[np.int64]:
+    """Return the kernel's plan for frames begin..end; the row of the last frame at the end."""
+    return np.array(
+        [
+            begin,
+            end,
+            int(end == schedule.frames),
+            schedule.substeps,
+            schedule.stimulus_frames,
+            schedule.record_frames,
+            -(-begin // schedule.record_frames),
+            selected,
+            *schedule.task_frames,
+        ],
+        dtype=np.int64,
+    )
+
+
+def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
+    """Return the address of a C-contiguous array."""
+    if not array.flags.c_contiguous:
+        raise ValueError("kernels take C-contiguous arrays only")
+    return ctypes.c_void_p(array.ctypes.data)
+
+
+class SingleKernel:
+    """Compiled kernel for one run."""
+
+    def __init__(self, program: Program, compiler: Compiler) -> None:
+        stages = build_stages(program)
+        self.layout: Layout = layout_of(stages)
+        self.label = f"compiled C, {compiler.label}"
+        self.library: Path = compile_library(emit_single(stages), PLAIN, compiler)
+        self._run = ctypes.CDLL(str(self.library)).bw_run
+        self._run.restype = None
+
+    def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
+        """Run frames begin..end: renews ``state`` and fills ``rows`` in place.
+
+        Parameters
+        ----------
+        state
+            State vector, see ``emission.Layout``.
+        rows
+            Shape (recorded rows of these frames, selected outputs).
+        """
+        plan = plan_array(request.schedule, begin, end, request.selection.size)
+        self._run(
+            pointer(request.parameters),
+            ctypes.c_double(request.schedule.step),
+            pointer(request.stimulus),
+            pointer(state),
+            pointer(plan),
+            pointer(request.selection),
+            pointer(rows),
+        )

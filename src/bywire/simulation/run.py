@@ -1,0 +1,187 @@
+"""One run: initial values and stimulus in, trajectory out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import SolverError
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.emission import Layout
+from bywire.simulation.engine import Engine, prepare
+from bywire.simulation.native import Request
+from bywire.simulation.schedule import Schedule, plan
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+Status = Literal["done", "interrupted", "unsettled"]
+
+_CHUNK_SECONDS = 0.1
+
+
+@dataclass(frozen=True)
+class Run:
+    """What is to be computed.
+
+    Parameters
+    ----------
+    model, par
+        The system and its parameters.
+    state, memory
+        Initial values: the model's State and Memory.
+    stimulus
+        ``stimulus(t) -> array``: rows of the model's Stimulus at the times t, shape
+        (len(t), nu).
+    duration, step, record
+        Length of the run, substep and recording interval [s].
+    """
+
+    model: Model
+    par: ParameterSet
+    state: Any
+    memory: Any
+    stimulus: Callable[[Array], Array]
+    duration: float
+    step: float = 20e-6
+    record: float = 1e-3
+
+    def schedule(self) -> Schedule:
+        """Return the integer plan of the run."""
+        periods = {task.name: task.period(self.par) for task in self.model.tasks(self.par)}
+        return plan(self.duration, self.step, periods, self.record)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """What a run gave.
+
+    Parameters
+    ----------
+    time, values
+        Shapes (rows,) and (rows, signals).
+    names
+        Signals, in the order of the columns.
+    status
+        ``done``; ``unsettled`` when some substeps hit the cap of the contact iteration;
+        ``interrupted`` when the user stopped it (rows end there).
+    unsettled, repeated
+        Substeps that hit the cap, and that took more than one pass.
+    vector
+        State vector at the end.
+    """
+
+    time: Array
+    values: Array
+    names: tuple[str, ...]
+    status: Status
+    unsettled: int
+    repeated: int
+    engine: str
+    vector: Array
+
+    def __getitem__(self, name: str) -> Array:
+        """Return one signal, shape (rows,)."""
+        return np.asarray(self.values[:, self.names.index(name)])
+
+
+def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[float]) -> Array:
+    """Return the state vector of the engine at the start of a run."""
+    vector = np.zeros(layout.total)
+    vector[layout.start["x"] : layout.start["x"] + len(state)] = state
+    vector[layout.start["m"] : layout.start["m"] + len(memory)] = memory
+    return vector
+
+
+def simulate(
+    run: Run,
+    signals: Sequence[str] | None = None,
+    engine: str = "auto",
+    progress: Progress | None = None,
+) -> Trajectory:
+    """Compute one run.
+
+    Parameters
+    ----------
+    signals
+        Outputs to record; all by default.
+    engine
+        See ``engine.Prepared.engine``.
+    progress
+        Called with the finished share, 0 to 1, now and then.
+
+    Raises
+    ------
+    StepError
+        When steps and sample times do not divide each other.
+    SolverError
+        When the trajectory leaves the numbers.
+    """
+    prepared = prepare(run.model, run.par)
+    chosen = prepared.engine(engine)
+    schedule = run.schedule()
+    names = tuple(prepared.program.outputs)
+    wanted = names if signals is None else tuple(signals)
+    times = np.arange(schedule.stimulus_rows) * (schedule.stimulus_frames * schedule.frame)
+    request = Request(
+        schedule=schedule,
+        parameters=np.array(list(run.par.leaves().values())),
+        stimulus=np.ascontiguousarray(run.stimulus(times), dtype=np.float64),
+        selection=np.array([names.index(s) for s in wanted], dtype=np.int32),
+    )
+    vector = initial_vector(chosen.layout, run.state, run.memory)
+    values = np.empty((schedule.rows, len(wanted)))
+    finished = _advance_all(chosen, request, vector, values, progress)
+    rows = schedule.rows if finished == schedule.frames else -(-finished // schedule.record_frames)
+    counters = vector[chosen.layout.start["counters"] :]
+    status: Status = "done" if finished == schedule.frames else "interrupted"
+    if status == "done" and counters[0]:
+        status = "unsettled"
+    return Trajectory(
+        time=np.arange(rows) * (schedule.record_frames * schedule.frame),
+        values=values[:rows],
+        names=wanted,
+        status=status,
+        unsettled=int(counters[0]),
+        repeated=int(counters[1]),
+        engine=chosen.label,
+        vector=vector,
+    )
+
+
+def _advance_all(
+    engine: Engine, request: Request, vector: Array, values: Array, progress: Progress | None
+) -> int:
+    """Advance in chunks that leave room for progress and interrupts; return frames done."""
+    schedule = request.schedule
+    begin, size = 0, 16 * schedule.record_frames
+    while begin < schedule.frames:
+        end = min(begin + size, schedule.frames)
+        started = time.perf_counter()
+        row = -(-begin // schedule.record_frames)
+        try:
+            engine.advance(request, vector, begin, end, values[row:])
+        except KeyboardInterrupt:
+            return begin
+        _require_finite(engine.layout, vector, end * schedule.frame)
+        if progress is not None:
+            progress(end / schedule.frames)
+        elapsed = max(time.perf_counter() - started, 1e-9)
+        factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
+        size = max(int(size * factor) // schedule.record_frames, 1) * schedule.record_frames
+        begin = end
+    return begin
+
+
+def _require_finite(layout: Layout, vector: Array, t: float) -> None:
+    x = vector[: layout.length["x"]]
+    if not np.all(np.isfinite(x)):
+        raise SolverError(
+            f"the run left the numbers before t = {t:g} s: look for a parameter far from its "
+            "usual magnitude, or take a smaller step"
+        )

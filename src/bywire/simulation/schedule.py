@@ -1,0 +1,112 @@
+"""Steps, sample times and recording intervals: how they divide each other."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bywire.core.errors import StepError
+
+_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """Integer plan of a run.
+
+    A frame is the longest interval that divides all sample times and the recording interval; it
+    is cut into ``substeps`` equal steps.
+
+    Parameters
+    ----------
+    step
+        Length of a substep [s].
+    substeps
+        Substeps per frame.
+    frames
+        Frames of the run.
+    task_frames
+        Frames per tick of each task, in the tasks' order.
+    record_frames
+        Frames per recorded row.
+    """
+
+    step: float
+    substeps: int
+    frames: int
+    task_frames: tuple[int, ...]
+    record_frames: int
+
+    @property
+    def stimulus_frames(self) -> int:
+        """Frames per row of the stimulus: those of the fastest task."""
+        return min(self.task_frames)
+
+    @property
+    def stimulus_rows(self) -> int:
+        """Rows that the stimulus needs, the end included."""
+        return self.frames // self.stimulus_frames + 1
+
+    @property
+    def rows(self) -> int:
+        """Recorded rows, start and end included."""
+        return self.frames // self.record_frames + 1
+
+    @property
+    def frame(self) -> float:
+        """Length of a frame [s]."""
+        return self.step * self.substeps
+
+    def stimulus_time(self, row: int) -> float:
+        """Return the time of a row of the stimulus [s]."""
+        return row * self.stimulus_frames * self.frame
+
+
+def plan(
+    duration: float, step: float, periods: Mapping[str, float], record: float
+) -> Schedule:
+    """Divide a run into frames.
+
+    Parameters
+    ----------
+    duration
+        Length of the run [s]; rounded up to a whole recording interval.
+    step
+        Substep [s].
+    periods
+        Sample time [s] of each task.
+    record
+        Recording interval [s].
+
+    Raises
+    ------
+    StepError
+        When the step does not divide a sample time or the recording interval.
+    """
+    if not (math.isfinite(step) and step > 0):
+        raise StepError(f"step = {step:g} s is not admissible: it must be > 0 s, usually 20 us")
+    if not (math.isfinite(duration) and duration > 0):
+        raise StepError(f"duration = {duration:g} s is not admissible: it must be > 0 s")
+    counts = {name: _whole(period, step, name) for name, period in periods.items()}
+    recorded = _whole(record, step, "recording")
+    frame = math.gcd(recorded, *counts.values())
+    rows = math.ceil(duration / record - _TOLERANCE)
+    return Schedule(
+        step=step,
+        substeps=frame,
+        frames=rows * (recorded // frame),
+        task_frames=tuple(count // frame for count in counts.values()),
+        record_frames=recorded // frame,
+    )
+
+
+def _whole(period: float, step: float, name: str) -> int:
+    count = round(period / step)
+    if count < 1 or abs(count * step - period) > _TOLERANCE * period:
+        near = period / max(count, 1)
+        raise StepError(
+            f"step = {step * 1e6:g} us does not divide the {name} interval of {period * 1e6:g} us: "
+            f"take for instance {near * 1e6:g} us"
+        )
+    return count

@@ -1,0 +1,91 @@
+"""Fallback without a compiler: CasADi's virtual machine evaluates the same functions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.simulation.emission import CAP, Layout
+from bywire.simulation.native import Request
+from bywire.simulation.program import Program
+
+Array = NDArray[np.float64]
+
+
+class VirtualMachine:
+    """The kernel's loops in Python, its functions in CasADi's virtual machine."""
+
+    label = "virtual machine (no C compiler)"
+
+    def __init__(self, program: Program) -> None:
+        n = program.sizes
+        lengths = {
+            "x": n.x, "d": n.x, "r": n.reaction, "F": n.contact, "q": n.flow, "m": n.memory,
+        }  # fmt: skip
+        starts = np.concatenate(([0], np.cumsum(list(lengths.values()))))
+        start = dict(zip([*lengths, "counters"], map(int, starts), strict=True))
+        self.layout = Layout(start, lengths)
+        self._program = program
+        self._fast = _Call(program.fast)
+        self._exact = _Call(program.exact)
+        self._ticks = [_Call(tick) for tick in program.ticks]
+        self._output = _Call(program.output)
+
+    def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
+        """Run frames begin..end: renews ``state`` and fills ``rows`` in place."""
+        schedule = request.schedule
+        p, h = request.parameters, np.array([schedule.step])
+        part = {
+            kind: state[at : at + self.layout.length.get(kind, 2)]
+            for kind, at in self.layout.start.items()
+        }
+        row = 0
+        for frame in range(begin, end + int(end == schedule.frames)):
+            u = request.stimulus[frame // schedule.stimulus_frames]
+            for task, every in zip(self._ticks, schedule.task_frames, strict=True):
+                if frame % every == 0:
+                    part["m"][:] = task(part["x"], part["m"], u, p)[0]
+            if frame % schedule.record_frames == 0:
+                o = self._output(part["x"], part["m"], p, part["r"], part["F"], part["q"])[0]
+                rows[row] = o[request.selection]
+                row += 1
+            if frame < end:
+                for _ in range(schedule.substeps):
+                    self._substep(part, p, h)
+
+    def _substep(self, part: dict[str, Array], p: Array, h: Array) -> None:
+        result = self._fast(part["x"], part["d"], part["m"], p, h)
+        if result[5][0] != 0.0:
+            guess = part["d"].copy()
+            for _ in range(CAP):
+                result = self._exact(part["x"], guess, part["m"], p, h)
+                if result[5][0] == 0.0:
+                    break
+                guess = result[1].copy()
+            else:
+                part["counters"][0] += 1.0
+            part["counters"][1] += 1.0
+        for kind, value in zip(("x", "d", "r", "F"), result, strict=False):
+            part[kind][:] = value
+        part["q"] += result[4]
+
+
+class _Call:
+    """A CasADi function through its buffers, which skip the conversion of arguments."""
+
+    def __init__(self, function: Any) -> None:
+        self._buffer, self._trigger = function.buffer()
+        self._inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
+        self._outputs = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
+        for k, array in enumerate(self._inputs):
+            self._buffer.set_arg(k, memoryview(array))
+        for k, array in enumerate(self._outputs):
+            self._buffer.set_res(k, memoryview(array))
+
+    def __call__(self, *arguments: Array) -> list[Array]:
+        for own, given in zip(self._inputs, arguments, strict=True):
+            own[:] = given
+        self._trigger()
+        return self._outputs
