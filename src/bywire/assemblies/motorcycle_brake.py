@@ -78,6 +78,7 @@ class Output(NamedTuple):
     E_stop: Annotated[float, Signal("J", "loss in the end stops")]
     E_port: Annotated[float, Signal("J", "energy out through the reservoir port")]
     E_stored: Annotated[float, Signal("J", "stored energy")]
+    W_shaft: Annotated[float, Signal("J", "work of the motor on the gear")]
     t_stuck: Annotated[float, Signal("s", "time stuck")]
 
 

@@ -37,6 +37,7 @@ class Flow(NamedTuple):
     E_pipeline: Annotated[float, Signal("J", "loss in the pipeline")]
     E_stop: Annotated[float, Signal("J", "loss in the end stops")]
     E_port: Annotated[float, Signal("J", "energy out through the reservoir port")]
+    W_shaft: Annotated[float, Signal("J", "work of the motor on the gear")]
     t_stuck: Annotated[float, Signal("s", "time stuck")]
 
 
@@ -72,6 +73,7 @@ def rates(
         ),
         E_stop=end_stop.power_loss(stop_u, forces, par.stop),
         E_port=port - brake_fluid.convected_power(makeup, x.p_mc, par.fluid),
+        W_shaft=w.torque * x.omega,
         t_stuck=ops.where(x.omega == 0, 1.0, 0.0),
     )
 

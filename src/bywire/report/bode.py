@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
+from matplotlib.ticker import LogLocator, MultipleLocator, NullFormatter
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
@@ -90,12 +90,12 @@ def bode(
         raise ParameterError("bode: no response given: give at least one")
     figure, (upper, lower) = style.new_figure(4.6, (1.0, 1.0))
     for k, response in enumerate(responses):
-        look = {"color": style.SEQUENCE[k % len(style.SEQUENCE)]}
-        line = ("o", 3.5) if response.measured else (("-", "--", "-.")[k // 7 % 3], 0.0)
+        line = "o" if response.measured else ("-", "--", "-.")[k // len(style.SEQUENCE) % 3]
         for axes, values in ((upper, response.magnitude_db), (lower, response.phase_deg)):
             axes.plot(
-                response.frequency, values, line[0], markersize=line[1], linewidth=1.3,
-                markerfacecolor="white", label=style.plain(response.label), **look,
+                response.frequency, values, line, color=style.SEQUENCE[k % len(style.SEQUENCE)],
+                markersize=3.5, linewidth=1.3, markerfacecolor="white",
+                label=style.plain(response.label),
             )
     for k, (label, frequency) in enumerate((marks or {}).items()):
         for axes in (upper, lower):
@@ -104,7 +104,11 @@ def bode(
                 linestyle=(":", "--", "-.")[k % 3], label=style.plain(label),
             )
     upper.set_xscale("log")
-    upper.margins(x=0.0)
+    upper.margins(x=0.01)
+    spread = np.log10(upper.get_xlim()[1] / upper.get_xlim()[0])
+    upper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if spread < 3 else (1.0,)))
+    upper.xaxis.set_major_formatter(lambda hertz, _: f"{hertz:g}")
+    upper.xaxis.set_minor_formatter(NullFormatter())
     upper.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     for axes in (upper, lower):
         axes.grid(True, which="minor", axis="x", color=style.PALE, linewidth=0.3)
@@ -114,7 +118,7 @@ def bode(
     upper.set_ylabel(style.plain(f"magnitude [dB{reference}]"))
     lower.set_ylabel("phase [°]")
     lower.set_xlabel(style.axis_label("frequency", "Hz"))
-    style.legend_above(upper, columns=3)
+    style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
 

@@ -94,12 +94,13 @@ def _columns(x: FloatArray, columns: int) -> IntArray:
     span = x[-1] - x[0]
     if not span > 0:
         return np.zeros(len(x), dtype=np.intp)
-    return np.minimum(((x - x[0]) / span * columns).astype(np.intp), columns - 1)
+    column: IntArray = ((x - x[0]) / span * columns).astype(np.intp)
+    return np.minimum(column, columns - 1)
 
 
 def _first_of_each(column: IntArray, key: FloatArray) -> IntArray:
     """Return the position of the smallest key in every column."""
-    order = np.lexsort((key, column))
+    order: IntArray = np.lexsort((key, column)).astype(np.intp)
     return order[np.flatnonzero(np.diff(column[order], prepend=-1))]
 
 

@@ -35,6 +35,7 @@ COLORS = (
     style.VERMILLION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW,
     style.GRAY, "#8B5A2B", style.BLUE,
 )
+SOURCE_COLOR = "#4A4A4A"
 NEGLIGIBLE = 1e-9
 """share of the energy turned over below which an entry is not drawn"""
 
@@ -93,7 +94,7 @@ def energy_balance(
     axes.grid(False, axis="y")
     axes.spines["left"].set_visible(False)
     axes.set_xlabel(style.axis_label("energy", "J"))
-    style.legend_above(axes, columns=3)
+    style.legend_above(axes)
     return figure
 
 
@@ -105,7 +106,7 @@ def _sides(
     taken: list[Entry] = []
     change = _change(recording, source)
     side = given if change > 0 else taken
-    side.append(Entry("source" if change > 0 else "back to the source", abs(change), style.BLACK))
+    side.append(Entry("source" if change > 0 else "back to the source", abs(change), SOURCE_COLOR))
     for k, (variable, label) in enumerate(sinks.items()):
         if variable not in recording.data_vars:
             continue
@@ -124,7 +125,8 @@ def _change(recording: xr.Dataset, variable: str) -> float:
 def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
     left = 0.0
     for entry in entries:
-        label = f"{entry.label}: {amount(entry.energy, 'J', 3)} ({entry.energy / total:.1%})"
+        share = f"{100 * entry.energy / total:.3g} %"
+        label = f"{entry.label}: {amount(entry.energy, 'J', 3)} ({share})"
         axes.barh(
             row, entry.energy, left=left, height=0.62, color=entry.color, edgecolor="white",
             linewidth=0.8, label=style.plain(label),

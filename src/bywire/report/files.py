@@ -21,11 +21,13 @@ _METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
 }
-_SETTINGS = {"svg.hashsalt": "bywire", "svg.fonttype": "path"}
 
 
 def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
     """Return a figure as a PNG or SVG file.
+
+    The first time, the layout of the figure is computed and then kept: computed again it would
+    move by fractions of a pixel, and the same figure would give other bytes.
 
     Parameters
     ----------
@@ -42,11 +44,20 @@ def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
     if kind not in _METADATA:
         raise FileError(f"figures are written as .png or .svg, not as {kind!r}: change the ending")
     buffer = io.BytesIO()
-    with mpl.rc_context(_SETTINGS), warnings.catch_warnings():
+    settings = mpl.rc_context({"svg.hashsalt": "bywire", "svg.fonttype": "path"})
+    with settings, warnings.catch_warnings():
         # A character that the font lacks is drawn as a box; that is no reason to fail.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
+        _settle(figure)
         figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata=_METADATA[kind])
     return buffer.getvalue()
+
+
+def _settle(figure: Figure) -> None:
+    """Compute the layout of a figure once and for all."""
+    if figure.get_layout_engine() is not None:
+        figure.draw_without_rendering()
+        figure.set_layout_engine("none")
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:

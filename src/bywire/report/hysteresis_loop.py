@@ -64,7 +64,7 @@ def hysteresis_loop(
         Line2D([], [], color=style.GRAY, linestyle="-", label="applying"),
         Line2D([], [], color=style.GRAY, linestyle="--", label="releasing"),
     ]
-    style.legend_above(axes, columns=4, handles=handles)
+    style.legend_above(axes, handles)
     axes.set_xlabel(style.channel_label(x))
     axes.set_ylabel(style.channel_label(y))
     return figure
@@ -89,17 +89,18 @@ def _draw_branch(
     axes.plot(xs[kept], ys[kept], color=color, linestyle=dash, linewidth=1.1)
     length = _length_along(xs[kept], ys[kept])
     for share in ARROWS_AT:
-        tail, tip = np.searchsorted(length, [share - 0.01, share + 0.01])
-        tip = min(tip, len(kept) - 1)
-        axes.annotate(
-            "",
-            xy=(xs[kept[tip]], ys[kept[tip]]),
-            xytext=(xs[kept[tail]], ys[kept[tail]]),
-            arrowprops={
-                "arrowstyle": "-|>", "color": color, "linewidth": 0.0, "mutation_scale": 11.0,
-                "shrinkA": 0.0, "shrinkB": 0.0,
-            },
-        )
+        ends = [share - 0.01, share + 0.01]
+        (tail_x, tip_x), (tail_y, tip_y) = (np.interp(ends, length, v[kept]) for v in (xs, ys))
+        if np.isfinite([tail_x, tail_y, tip_x, tip_y]).all():
+            axes.annotate(
+                "",
+                xy=(tip_x, tip_y),
+                xytext=(tail_x, tail_y),
+                arrowprops={
+                    "arrowstyle": "-|>", "color": color, "linewidth": 0.0,
+                    "mutation_scale": 15.0, "shrinkA": 0.0, "shrinkB": 0.0,
+                },
+            )
 
 
 def _length_along(x: FloatArray, y: FloatArray) -> FloatArray:

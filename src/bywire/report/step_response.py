@@ -46,22 +46,22 @@ def step_response(
     """
     shown = channel(recording, variable)
     figure, (axes,) = style.new_figure(3.3)
-    if limits is not None:
-        draw_limits(axes, limits, shown)
-    if set_point is not None:
-        style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
     if measured is not None:
         style.draw_channel(axes, channel(measured, variable), Role.MEASURED, ", measured")
     compared = measured is not None
     style.draw_channel(
         axes, shown, Role.SIMULATED if compared else Role.MAIN, ", simulated" if compared else ""
     )
+    if set_point is not None:
+        style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
+    if limits is not None:
+        draw_limits(axes, limits, shown)
     if limits is not None and facts is not None:
         _mark_facts(axes, shown, limits, facts)
     axes.margins(x=0.0)
     axes.set_xlabel(f"time [{style.time_scale(shown.time)[1]}]")
     axes.set_ylabel(style.channel_label(shown))
-    style.legend_above(axes, columns=3)
+    style.legend_above(axes)
     return figure
 
 
@@ -110,8 +110,9 @@ def _first_crossing(shown: Channel, limits: StepLimits, level: float) -> float:
     k = begin + int(reached[0])
     if k == 0 or shown.values[k] == shown.values[k - 1]:
         return float(shown.time[k])
-    share = (level - shown.values[k - 1]) / (shown.values[k] - shown.values[k - 1])
-    return float(shown.time[k - 1] + min(max(share, 0.0), 1.0) * (shown.time[k] - shown.time[k - 1]))
+    before, step = shown.values[k - 1], shown.values[k] - shown.values[k - 1]
+    share = min(max(float((level - before) / step), 0.0), 1.0)
+    return float(shown.time[k - 1] + share * (shown.time[k] - shown.time[k - 1]))
 
 
 def _peak(shown: Channel, limits: StepLimits) -> tuple[float, float]:

@@ -22,7 +22,7 @@ def stribeck_curve(
 ) -> Figure:
     """Draw friction torque over shaft speed, one line per pressure.
 
-    At rest the torque is set-valued: a thin line joins the two breakaway torques.
+    At rest the torque is set-valued: a vertical line joins the two breakaway torques.
 
     Parameters
     ----------
@@ -56,8 +56,7 @@ def stribeck_curve(
                 label=f"{amount(pressure, 'Pa')}, measured",
             )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    axes.margins(x=0.0)
+    axes.margins(x=0.01)
     axes.set_xlabel(style.axis_label("motor speed", "rad/s"))
     axes.set_ylabel(style.axis_label("friction torque", "N*m"))
     style.legend_above(axes)
@@ -67,10 +66,12 @@ def stribeck_curve(
 def _draw_curve(
     axes: Axes, speed: FloatArray, torque: FloatArray, color: str, label: str
 ) -> None:
-    """Draw both branches and the set of torques at rest between them."""
+    """Draw both branches and, between them, the set of torques at rest."""
     back, forth = speed < 0, speed > 0
     axes.plot(speed[forth], torque[forth], color=color, linewidth=1.4, label=label)
     axes.plot(speed[back], torque[back], color=color, linewidth=1.4)
     if bool(np.any(back)) and bool(np.any(forth)):
         rest = [float(torque[back][-1]), float(torque[forth][0])]
-        axes.plot([0.0, 0.0], rest, color=color, linewidth=0.8, linestyle=":")
+        # Shorter sets lie above longer ones, so that all are seen.
+        above = 2.0 + 0.9 / (1.0 + abs(rest[1] - rest[0]))
+        axes.plot([0.0, 0.0], rest, color=color, linewidth=1.4, zorder=above)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -30,6 +31,7 @@ YELLOW = "#F0E442"
 BLACK = "#1A1A1A"
 GRAY = "#7F7F7F"
 PALE = "#DDDDDD"
+SHADE = "#CBD8E6"
 SEQUENCE = (BLUE, VERMILLION, GREEN, PURPLE, SKY, ORANGE, BLACK)
 """colors of lines without a meaning of their own, in order"""
 
@@ -37,6 +39,9 @@ WIDTH = 7.2
 """width of a figure [inch]"""
 TEXT_SIZE = 8.5
 """size of all text in a figure [points]"""
+
+_EM_PER_CHARACTER = 0.58  # of the default font, a little more than its mean
+_EMS_BESIDE_TEXT = 4.4  # handle, its gap and the gap between columns in a legend
 
 
 class Role(Enum):
@@ -97,10 +102,10 @@ def dress(axes: Axes) -> None:
     axes.spines[["top", "right"]].set_visible(False)
     axes.spines[["left", "bottom"]].set_color(GRAY)
     axes.tick_params(labelsize=TEXT_SIZE, color=GRAY, length=3.0)
-    axes.xaxis.label.set_size(TEXT_SIZE)
-    axes.yaxis.label.set_size(TEXT_SIZE)
+    axes.xaxis.label.set_fontsize(TEXT_SIZE)
+    axes.yaxis.label.set_fontsize(TEXT_SIZE)
     for axis in (axes.xaxis, axes.yaxis):
-        axis.get_offset_text().set_size(TEXT_SIZE)
+        axis.get_offset_text().set_fontsize(TEXT_SIZE)
 
 
 def few_ticks(axes: Axes, count: int) -> None:
@@ -121,7 +126,8 @@ def axis_label(label: str, symbol: str) -> str:
     >>> axis_label("caliper pressure", "Pa"), axis_label("duty cycle", "1")
     ('caliper pressure [bar]', 'duty cycle [-]')
     """
-    return plain(f"{label} [{unit_text(display_unit(symbol)) or '-'}]")
+    gap = "" if label.endswith("\n") else " "
+    return plain(f"{label}{gap}[{unit_text(display_unit(symbol)) or '-'}]")
 
 
 def channel_label(shown: Channel) -> str:
@@ -146,17 +152,13 @@ def draw_channel(axes: Axes, shown: Channel, role: Role, suffix: str = "") -> No
     )
 
 
-def legend_above(
-    axes: Axes, columns: int = 5, handles: Sequence[Artist] | None = None
-) -> None:
-    """Put the legend above the axes, where it never hides data.
+def legend_above(axes: Axes, handles: Sequence[Artist] | None = None) -> None:
+    """Put the legend above the axes, where it never hides data, in as few rows as fit.
 
     Parameters
     ----------
     axes
         Axes to put it on.
-    columns
-        Entries per row.
     handles
         Entries; by default everything in the axes that has a label.
     """
@@ -166,7 +168,7 @@ def legend_above(
             handles=entries,
             loc="lower left",
             bbox_to_anchor=(0.0, 1.0),
-            ncols=columns,
+            ncols=_fitting_columns([str(entry.get_label()) for entry in entries]),
             fontsize=TEXT_SIZE,
             frameon=False,
             borderaxespad=0.2,
@@ -174,3 +176,14 @@ def legend_above(
             handlelength=2.2,
             columnspacing=1.4,
         )
+
+
+def _fitting_columns(labels: Sequence[str]) -> int:
+    """Return how many columns of a legend fit beside each other; it fills them one by one."""
+    lengths = list(map(len, labels))
+    for columns in range(len(labels), 1, -1):
+        longest = [float(np.max(part)) for part in np.array_split(lengths, columns)]
+        ems = sum(_EM_PER_CHARACTER * n + _EMS_BESIDE_TEXT for n in longest)
+        if ems * TEXT_SIZE / 72.0 <= WIDTH - 0.8:
+            return columns
+    return 1

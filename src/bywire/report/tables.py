@@ -200,6 +200,6 @@ def _value_text(value: object, unit: str) -> str:
     if isinstance(value, (int, float)):
         return amount(float(value), unit, 6)
     if isinstance(value, Sequence):
-        return ", ".join(_value_text(item, unit) for item in value)
+        return ", ".join(_value_text(item, unit) for item in value) or "empty"
     written = unit_text(unit)
     return clean(value) + (f" {written}" if written else "")

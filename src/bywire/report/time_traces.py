@@ -36,7 +36,7 @@ class Panel:
     Parameters
     ----------
     quantity
-        What the ordinate says, without its unit.
+        What the ordinate says, without its unit; short, for low panels.
     traces
         Lines of one unit, the judged one first; variables a recording lacks are left out.
     saturation
@@ -58,9 +58,9 @@ BRAKE_PANELS = (
         height=1.8,
     ),
     Panel("current", (Trace("i"), Trace("i_ref", Role.SET_POINT)), saturation="sat_current"),
-    Panel("motor speed", (Trace("omega"),)),
+    Panel("speed", (Trace("omega"),)),
     Panel("duty cycle", (Trace("duty"),), saturation="sat_duty"),
-    Panel("electrical power", (Trace("P_el"),)),
+    Panel("power", (Trace("P_el"),)),
 )
 """panels of the motorcycle brake"""
 
@@ -86,7 +86,8 @@ def time_traces(
     limits
         Step by which the first trace of the first panel is judged: its band and limit are drawn.
     measured
-        Recording to compare with: solid blue, ``recording`` dashed red on top.
+        Recording to compare with: solid blue, ``recording`` dashed red on top. Of every panel
+        then only the first trace and the set points are drawn.
     stuck
         Variable that is 1 while the shaft sticks.
 
@@ -143,13 +144,15 @@ def _draw_traces(
                 f"panel {panel.quantity!r}: {shown.name} is in {shown.unit}, {first.name} in "
                 f"{first.unit}; put them into two panels"
             )
-        compared = measured is not None and trace.variable in measured.data_vars
-        if measured is not None and compared and trace.role is not Role.SET_POINT:
-            style.draw_channel(axes, channel(measured, trace.variable), Role.MEASURED, ", measured")
-            style.draw_channel(axes, shown, Role.SIMULATED, ", simulated")
-        elif measured is None or trace.role is Role.SET_POINT:
+        if measured is None or trace.role is Role.SET_POINT:
             style.draw_channel(axes, shown, trace.role)
-    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol))
+        elif shown is first:
+            if trace.variable in measured.data_vars:
+                style.draw_channel(
+                    axes, channel(measured, trace.variable), Role.MEASURED, ", measured"
+                )
+            style.draw_channel(axes, shown, Role.SIMULATED, ", simulated")
+    axes.set_ylabel(style.axis_label(f"{panel.quantity}\n", first.symbol))
     return first
 
 
@@ -157,8 +160,8 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
     spans = _spans(recording, variable)
     if spans:
         axes.broken_barh(
-            spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), facecolor=style.PALE,
-            alpha=0.6, linewidth=0, zorder=0.4, label="shaft stuck" if named else None,
+            spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), facecolor=style.SHADE,
+            alpha=0.7, linewidth=0, zorder=0.4, label="shaft stuck" if named else None,
         )
 
 

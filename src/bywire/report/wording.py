@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
+import unicodedata
 
+from bywire.core.parameters import Leaf
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 
@@ -73,6 +75,18 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
     return f"{number:.{digits}g}" + (f" {written}" if written else "")
 
 
+def range_text(leaf: Leaf) -> str:
+    """Return the admissible range of a parameter in its display unit, for instance ``> 0 mm``."""
+    limits = []
+    for sign, bound, is_open in (
+        (">", leaf.low, leaf.low_open),
+        ("<", leaf.high, leaf.high_open),
+    ):
+        if math.isfinite(bound):
+            limits.append(f"{sign if is_open else sign + '='} {amount(bound, leaf.unit.symbol, 6)}")
+    return " and ".join(limits) or "any finite number"
+
+
 def duration(seconds: float) -> str:
     """Return a time span in ms or s, whichever reads better."""
     return f"{1e3 * seconds:.3g} ms" if abs(seconds) < 1.0 else f"{seconds:.4g} s"
@@ -81,4 +95,6 @@ def duration(seconds: float) -> str:
 def _clean_character(character: str) -> str:
     if character == "\n" or character.isprintable():
         return character
-    return " " if character.isspace() and character not in "\x1c\x1d\x1e\x1f" else "\N{REPLACEMENT CHARACTER}"
+    if character in "\t\r" or unicodedata.category(character) == "Zs":
+        return " "
+    return "\N{REPLACEMENT CHARACTER}"

@@ -9,6 +9,7 @@ dissipates, negative for a loop run through the other way around.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,6 +21,7 @@ from bywire.bench.kpis.kpi import Array, Undefined, defect, measure, signal
 from bywire.bench.kpis.smoothing import smoothed, treatment
 
 _OPEN = 0.05  # of the drive's range: more than this between both ends is no closed loop
+_LEFT = 0.01  # of the response's range: from here on a rest at the end is noted
 _LEVELS = 401  # levels at which the width is looked up, both extremes left out
 
 
@@ -44,7 +46,7 @@ class Loop:
         Current and pressure, for instance, shape ``(n,)`` each.
     drive_unit, response_unit
         Their SI units.
-    note
+    treatment
         How the samples were treated.
     """
 
@@ -53,7 +55,7 @@ class Loop:
     response: Array
     drive_unit: str = "A"
     response_unit: str = "Pa"
-    note: str = ""
+    treatment: str = ""
 
     @property
     def units(self) -> Mapping[str, str]:
@@ -81,13 +83,27 @@ class Loop:
         loops = _cycles(self.response)
         return "" if loops == 1 else f"{loops} loops: cut the recording to one"
 
+    @property
+    def note(self) -> str:
+        """How the samples were treated, and what response is left at the end."""
+        left = abs(float(self.response[-1] - self.response[0]))
+        parts = [self.treatment] if self.treatment else []
+        if left > _LEFT * float(np.ptp(self.response)):
+            parts.append(
+                f"the response ends {left:.3g} {self.response_unit} away from its beginning; "
+                "a straight line closes the loop"
+            )
+        return "; ".join(parts)
+
     @cached_property
     def branches(self) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
         """Drive and response of the apply branch, then of the release branch."""
         first = int(np.argmin(self.response))
         x, y = np.roll(self.drive, -first), np.roll(self.response, -first)
         top = int(np.argmax(y))
-        return (x[: top + 1], y[: top + 1]), (np.append(x[top:], x[0]), np.append(y[top:], y[0]))
+        closing = slice(0, 1 if first else 0)  # a loop that begins at its foot may stay open there
+        x_release, y_release = (np.append(s[top:], s[closing]) for s in (x, y))
+        return (x[: top + 1], y[: top + 1]), (x_release, y_release)
 
 
 def select(recording: xr.Dataset, setting: Setting) -> Loop:
@@ -113,7 +129,10 @@ def loop_width_mid(loop: Loop) -> float | Undefined:
     branch's, each interpolated between samples. Ripple makes a branch cross several times: the
     mean over the crossings keeps its effect small; `smoothed` removes it.
     """
-    return _width(loop, 0.5 * float(np.min(loop.response) + np.max(loop.response)))
+    width = _width(loop, 0.5 * float(np.min(loop.response) + np.max(loop.response)))
+    if math.isnan(width):
+        return Undefined("the release ends above mid-height")
+    return width
 
 
 @measure("drive")
@@ -121,11 +140,13 @@ def loop_width_max(loop: Loop) -> float | Undefined:
     """Width of the loop, as drive, where it is widest.
 
     The width of largest magnitude at 401 levels spread evenly inside the response's range,
-    defined at each as in `loop_width_mid`. Ripple widens it by up to its peak to peak value.
+    defined at each as in `loop_width_mid`, levels that the release does not reach
+    left out. Ripple widens it by up to its peak to peak value.
     """
     levels = np.linspace(np.min(loop.response), np.max(loop.response), _LEVELS + 2)[1:-1]
     widths = [_width(loop, float(level)) for level in levels]
-    return max(widths, key=abs)
+    reached = [width for width in widths if not math.isnan(width)]
+    return max(reached, key=abs) if reached else Undefined("the response never falls again")
 
 
 @measure("drive*response")
@@ -147,9 +168,11 @@ def _width(loop: Loop, level: float) -> float:
 
 
 def _mean_crossing(x: Array, y: Array, level: float) -> float:
-    """Return the mean drive of the crossings of a level strictly inside the branch's range."""
+    """Return the mean drive where a branch crosses a level, NaN where it does not."""
     above = y >= level
     k = np.flatnonzero(above[1:] != above[:-1])
+    if k.size == 0:
+        return math.nan
     share = (level - y[k]) / (y[k + 1] - y[k])
     return float(np.mean(x[k] + share * (x[k + 1] - x[k])))
 

@@ -1,0 +1,1 @@
+"""Virtual tests: assembly, ECU, stimulus and sensors make an experiment, whose recording is judged."""

@@ -1,0 +1,1 @@
+"""Virtual tests, one per file."""

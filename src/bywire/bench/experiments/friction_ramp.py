@@ -1,0 +1,101 @@
+"""Friction ramp: a slow current ramp up and down, with and without dither (2010, Fig. 5)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from scipy import signal
+
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import hysteresis, occupation
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate
+from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.stimuli import ramp
+from bywire.bench.stimuli.quantities import LevelRate
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Frequency, TimeConstant
+
+WITHOUT, WITH = "without-dither", "with-dither"
+
+
+class Options(ParameterSet):
+    """The ramp of eq. (17)."""
+
+    i_max: Current
+    """current demand at the turning point"""
+    slope: LevelRate
+    """slope of the demand [A/s]"""
+    f_filter: Frequency
+    """cut-off of the first-order low-pass on the measured current"""
+    smoothing: TimeConstant
+    """moving average for the loop's KPIs, one dither period; 0 for the raw signals"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the two runs, from the retracted piston; closed current loop."""
+    shape = ramp.Parameters(
+        start=0.0, end=options.i_max, slope=options.slope, t_start=0.0, t_hold=0.0, after="return"
+    )
+    waveform = par.ecu.dither.waveform if par.ecu.dither.waveform != "off" else "sine"
+    duration = 2.0 * options.i_max / options.slope
+    return tuple(
+        case_from_rest(
+            label, par, "current", 0.0, lambda t: {"i_set": ramp.sample(t, shape)}, duration,
+            {"ecu.dither.waveform": chosen},
+        )
+        for label, chosen in ((WITHOUT, "off"), (WITH, waveform))
+    )  # fmt: skip
+
+
+def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
+    """Add the measured current behind the low-pass filter, as the paper plots it."""
+    interval = float(recording["time"][1] - recording["time"][0])
+    decay = float(np.exp(-2.0 * np.pi * options.f_filter * interval))
+    raw = recording["i_meas"].values
+    filtered, _ = signal.lfilter([1.0 - decay], [1.0, -decay], raw, zi=[decay * raw[0]])
+    attrs = {"units": "A", "long_name": "measured current, filtered"}
+    return recording.assign(i_filtered=("time", filtered, attrs))
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return each loop's KPIs and their ratio."""
+    found: dict[str, Kpi] = {}
+    setting = hysteresis.Setting("i_filtered", "p_mc", smoothing=options.smoothing)
+    for label, suffix in ((WITHOUT, "undithered"), (WITH, "dithered")):
+        run = recordings[label]
+        kpis = evaluate("hysteresis", run, setting) | evaluate(
+            "occupation", run, occupation.Setting()
+        )
+        kpis["p_max"] = Kpi(
+            "p_max", float(run["p_mc"].max()), "Pa", "Largest master-cylinder pressure."
+        )
+        for name, kpi in kpis.items():
+            found[f"{name}_{suffix}"] = replace(kpi, name=f"{name}_{suffix}")
+    ratio = Kpi(
+        "loop_area_ratio",
+        found["loop_area_dithered"].value / found["loop_area_undithered"].value,
+        "1",
+        "Area of the loop with dither over that without.",
+        found["loop_area_undithered"].note,
+    )
+    return (*found.values(), ratio)
+
+
+EXPERIMENT = Experiment(
+    name="friction-ramp",
+    assembly="motorcycle-brake",
+    summary="slow current ramp to 5 A and back, without and with dither (Fig. 5, eq. 17)",
+    options=Options,
+    defaults=Options(i_max=5.0, slope=0.2, f_filter=20.0, smoothing=0.02),
+    cases=cases,
+    judge=judge,
+    figures=("hysteresis-loop", "time-traces"),
+    finish=finish,
+)

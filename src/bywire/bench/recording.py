@@ -1,0 +1,105 @@
+"""Trajectories as recordings: datasets with units, names and where they come from."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from bywire import __version__
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+from bywire.simulation.run import Run, Trajectory
+
+
+def parameter_hash(par: ParameterSet) -> str:
+    """Return a short digest of all values and choices."""
+    text = json.dumps(par.flat(), sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def record(
+    run: Run, trajectory: Trajectory, settle: float, keep: float, notes: Mapping[str, Any]
+) -> xr.Dataset:
+    """Return the recording of a run.
+
+    Parameters
+    ----------
+    settle
+        Time of the run [s] that lies before the recording's zero.
+    keep
+        How much of it is kept, at negative times.
+    notes
+        Further attributes, for instance the experiment's name.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimension ``time`` [s]; variables with ``units`` and ``long_name``.
+    """
+    time = trajectory.time - settle
+    kept = time >= -keep - 1e-9
+    signals = signals_of(run.model.Output)
+    variables = {
+        name: ("time", trajectory[name][kept], {"units": s.unit, "long_name": s.label})
+        for name, s in signals.items()
+        if name in trajectory.names
+    }
+    recording = xr.Dataset(
+        variables, coords={"time": ("time", np.round(time[kept], 12), {"units": "s"})}
+    )
+    recording["time"].attrs["long_name"] = "time"
+    warnings = watch(recording, run.par, trajectory)
+    recording.attrs = {
+        "bywire_version": __version__,
+        "model": run.model.name,
+        "parameter_hash": parameter_hash(run.par),
+        "parameters": run.par.model_dump_json(),
+        "step": run.step,
+        "engine": trajectory.engine,
+        "status": trajectory.status,
+        "unsettled_substeps": trajectory.unsettled,
+        "repeated_substeps": trajectory.repeated,
+        "warnings": "; ".join(warnings),
+        **notes,
+    }
+    return recording
+
+
+def watch(recording: xr.Dataset, par: ParameterSet, trajectory: Trajectory) -> list[str]:
+    """Return what the user should know of a recording: validity left, stops met, solver trouble."""
+    found = []
+    if trajectory.unsettled:
+        found.append(
+            f"{trajectory.unsettled} substeps hit the cap of the contact iteration: "
+            "take a smaller step"
+        )
+    if "at_stop" in recording and "F_stop" in recording:
+        far = recording["F_stop"].values > 0
+        if far.any():
+            first = float(recording["time"].values[int(np.argmax(far))])
+            found.append(f"the piston reached its end stop at t = {first:.4g} s")
+    limit = par.flat().get("pipeline.Re_max")
+    if limit is not None and "Re" in recording:
+        highest = float(recording["Re"].max())
+        if highest > limit:
+            found.append(f"Re = {highest:.0f} in the pipeline is above {limit:g}: not laminar")
+    return found
+
+
+def energy_residual(recording: xr.Dataset) -> xr.DataArray:
+    """Return energy in, less losses, less the change of stored energy [J]; 0 but for the step."""
+    losses = sum(
+        recording[name]
+        for name in recording
+        if str(name).startswith("E_") and name not in ("E_source", "E_stored")
+    )
+    start = {"time": 0}
+    balance = recording["E_source"] - losses - recording["E_stored"]
+    residual: xr.DataArray = balance - balance.isel(start)
+    residual.attrs = {"units": "J", "long_name": "residual of the energy balance"}
+    return residual

@@ -1,0 +1,38 @@
+"""Find experiments and assemblies by name."""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Mapping
+from functools import cache
+
+from bywire.bench import experiments
+from bywire.bench.experiment import Experiment
+from bywire.core.errors import unknown_name
+
+
+@cache
+def all_experiments() -> Mapping[str, Experiment]:
+    """Return every experiment: the ``EXPERIMENT`` of each module in ``experiments``."""
+    found: dict[str, Experiment] = {}
+    for module in pkgutil.iter_modules(experiments.__path__):
+        loaded = importlib.import_module(f"{experiments.__name__}.{module.name}")
+        experiment = getattr(loaded, "EXPERIMENT", None)
+        if experiment is not None:
+            found[experiment.name] = experiment
+    return found
+
+
+def find_experiment(name: str) -> Experiment:
+    """Return one experiment.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    known = all_experiments()
+    if name not in known:
+        raise unknown_name("experiment", name, known)
+    return known[name]

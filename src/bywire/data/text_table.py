@@ -1,0 +1,191 @@
+"""Text tables (CSV, TSV) as cells that know their line, so that every error can name it."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError
+
+_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_HEADER = "a first row such as 'time [s], pedal [mm]'"
+_SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells of a text table.
+
+    Parameters
+    ----------
+    path
+        Where it was read from.
+    header
+        Cells of the first row.
+    header_line
+        Its line number.
+    rows
+        Cells of the other rows, as many in each as in the header.
+    lines
+        Line number of every row.
+    separator
+        What stands between two cells.
+    """
+
+    path: Path
+    header: tuple[str, ...]
+    header_line: int
+    rows: Sequence[Sequence[str]]
+    lines: Sequence[int]
+    separator: str
+
+    def where(self, row: int, label: str) -> str:
+        """Return file, line and column of a cell, as errors name it."""
+        return f"{self.path}, line {self.lines[row]}, column {label!r}"
+
+
+def read_table(path: Path) -> Table:
+    """Return the cells of a text table; lines without any text are left out.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read, is not UTF-8, is empty, has no header, or rows of
+        different lengths.
+    """
+    text = _text(path)
+    separator = _separator(text)
+    found = _split(path, text, separator)
+    while found and not any(found[-1][1]):
+        found.pop()  # spreadsheets leave rows of bare separators at the end
+    if not found:
+        raise FileError(f"{path} is empty: it needs {_HEADER}, then one row per instant")
+    header_line, header = found[0]
+    while header and not header[-1]:
+        header.pop()
+    if all(_NUMBER.fullmatch(cell.replace(",", ".")) for cell in header):
+        raise FileError(
+            f"{path}, line {header_line}: {separator.join(header)!r} are numbers, not the names "
+            f"and units of the columns: add {_HEADER}"
+        )
+    for line, cells in found[1:]:
+        while len(cells) > len(header) and not cells[-1]:
+            cells.pop()
+        if len(cells) != len(header):
+            raise FileError(
+                f"{path}, line {line}: {len(cells)} cells, but the header has {len(header)} "
+                f"(separated by {_SEPARATORS[separator]}): complete the row; with decimal commas, "
+                "separate the columns by semicolons"
+            )
+    rows, lines = [cells for _, cells in found[1:]], [line for line, _ in found[1:]]
+    return Table(path, tuple(header), header_line, rows, lines, separator)
+
+
+def numbers(table: Table, columns: Sequence[int], labels: Sequence[str]) -> NDArray[np.float64]:
+    """Return the numbers of some columns.
+
+    One file has one decimal mark: a comma is taken as one only if no column here has a point.
+
+    Parameters
+    ----------
+    table
+        The cells.
+    columns
+        Which columns, counted from 0.
+    labels
+        What errors call them.
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape ``(row, column)``.
+
+    Raises
+    ------
+    FileError
+        When a cell is blank, no finite number, or has the other decimal mark.
+    """
+    found = np.empty((len(table.rows), len(columns)))
+    marks: dict[str, int] = {}  # decimal mark: first row that has it
+    for r, row in enumerate(table.rows):
+        for c, (index, label) in enumerate(zip(columns, labels, strict=True)):
+            cell = row[index]
+            for mark in ",.":
+                if mark in cell:
+                    marks.setdefault(mark, r)
+            if len(marks) == 2:
+                first = table.lines[min(marks.values())]
+                raise FileError(
+                    f"{table.where(r, label)}: {cell!r} mixes decimal comma and decimal point "
+                    f"(other mark first in line {first}): write all numbers with one of them, "
+                    "and none with a separator of thousands"
+                )
+            found[r, c] = _number(table, cell, r, label)
+    return found
+
+
+def _number(table: Table, cell: str, row: int, label: str) -> float:
+    where = table.where(row, label)
+    if not cell:
+        raise FileError(f"{where}: the cell is blank: fill it in or remove the row")
+    if _NUMBER.fullmatch(cell.replace(",", ".")):
+        value = float(cell.replace(",", "."))
+        if math.isfinite(value):
+            return value
+    if cell.lower().lstrip("+-") in ("nan", "na", "n/a", "inf", "infinity", "null", "none"):
+        raise FileError(f"{where}: {cell!r} is no measured value: fill it in or remove the row")
+    raise FileError(f"{where}: {cell[:40]!r} is not a number: correct it or remove the row")
+
+
+def _text(path: Path) -> str:
+    if path.exists() and not path.is_file():
+        raise FileError(f"{path} is not a file: give the path of a text table")
+    try:
+        data = path.read_bytes()
+    except OSError as error:
+        raise FileError(
+            f"{path} cannot be read ({error.strerror}): check the path and its permissions"
+        ) from None
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data[: error.start].count(b"\n") + 1
+        raise FileError(
+            f"{path}, line {line}: the byte 0x{data[error.start]:02x} is not UTF-8: save the file "
+            "as text in UTF-8 (in spreadsheets: 'CSV UTF-8')"
+        ) from None
+
+
+def _separator(text: str) -> str:
+    """Return the header's separator; what stands in quotes does not count."""
+    first = next((line for line in text.splitlines() if line.strip()), "")
+    bare = re.sub(r'"[^"]*"', "", first)
+    return next((mark for mark in _SEPARATORS if mark in bare), ",")
+
+
+def _split(path: Path, text: str, separator: str) -> list[tuple[int, list[str]]]:
+    """Return line number and stripped cells of every row that is not an empty line."""
+    reader = csv.reader(
+        io.StringIO(text, newline=""), delimiter=separator, strict=True, skipinitialspace=True
+    )
+    found: list[tuple[int, list[str]]] = []
+    line = 1
+    try:
+        for row in reader:
+            cells = [cell.strip() for cell in row]
+            if cells not in ([], [""]):
+                found.append((line, cells))
+            line = reader.line_num + 1
+    except csv.Error as error:
+        raise FileError(
+            f"{path}, line {line}: {error}: check the quotation marks from here on"
+        ) from None
+    return found
