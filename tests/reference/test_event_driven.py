@@ -97,6 +97,28 @@ def test_block_decelerates_to_rest_and_sticks(gear: Gear, sigma: int) -> None:
     assert out["mode_changes"] == 1
 
 
+def test_load_through_the_gear_reverses_within_a_step() -> None:
+    """Fast backward motion: damping exceeds the pressure's load, then not; two exponentials."""
+    plant = replace(BLOCK, gear="directional", k_damp=2e4, mu_T=0.0)
+    x0 = balanced(plant, 8.0 * BAR, -30.0)
+    out = simulate(plant, lambda k, t, s: x0["i"], 0.06, PERIOD, x0, 1e-3, "current")
+
+    _, loss, inertia, _, _ = plant.direction(-1)
+    load, damping = plant.k_g * plant.A_mc * 8.0 * BAR, plant.k_damp * plant.k_g**2
+    kink = (load - plant.T_pr) / damping  # the speed at which the torque through the gear is zero
+    rates = [(1.0 + loss) * damping / inertia, (1.0 - loss) * damping / inertia]
+    limits = [kink - load / (inertia * rate) for rate in rates]
+    times = [
+        math.log((start - limit) / (end - limit)) / rate
+        for start, end, limit, rate in zip((30.0, kink), (kink, 0.0), limits, rates, strict=True)
+    ]
+    first = limits[0] + (30.0 - limits[0]) * np.exp(-rates[0] * out["t"])
+    second = limits[1] + (kink - limits[1]) * np.exp(-rates[1] * (out["t"] - times[0]))
+    speed = np.where(out["t"] < times[0], first, np.maximum(second, 0.0))
+    assert 0.005 < times[0] < times[0] + times[1] < 0.06
+    np.testing.assert_allclose(-out["omega"], speed, atol=1e-9)
+
+
 def test_oscillator_with_coulomb_friction() -> None:
     """A closed volume is a spring: each half cycle loses 2 T_pr / stiffness, then it sticks."""
     plant = replace(BLOCK, s_mc=1e9, beta=1e18, nu=1e15, mu_T=0.0)
@@ -139,14 +161,14 @@ def test_sticks_below_breakaway_and_slips_above(gear: Gear, sigma: int) -> None:
     x0 = balanced(plant, 10.0 * BAR)
     breakaway = -excess(plant, sigma, x0["i"], x0["p_mc"]) / plant.direction(sigma)[0]
 
-    def at(factor: float) -> dict[str, np.ndarray]:
+    def at(factor: float, t_end: float) -> dict[str, np.ndarray]:
         i = x0["i"] + sigma * factor * breakaway
         duty = i * plant.R_m / plant.V_bat
         for _ in range(20):  # the battery's resistance makes the steady duty implicit
             duty = i * (plant.R_m + plant.R_bat * duty**2) / plant.V_bat
-        return simulate(plant, lambda k, t, s: duty, 10.0, PERIOD, x0, 1e-4)
+        return simulate(plant, lambda k, t, s: duty, t_end, PERIOD, x0, 1e-4)
 
-    below, above = at(0.9), at(1.001)
+    below, above = at(0.9, 10.0), at(1.001, 2.0)
     assert below["mode_changes"] == 0
     assert np.all(below["stuck"])
     assert np.ptp(below["theta"]) == 0.0
@@ -189,6 +211,15 @@ def test_jacobian_against_differences(gear: Gear, sigma: int) -> None:
             np.testing.assert_allclose(slope / scale, jacobian[:, k] / scale, atol=2e-7)
 
 
+def test_poles_of_the_linear_plant() -> None:
+    """Without friction, eq. (14) at 20 bar and 7 mm has the poles of Table 2, in Hz."""
+    plant = replace(BRAKE, T_pr=0.0, f_cfr_p=0.0)
+    y = list(balanced(plant, 20.0 * BAR).values())
+    mechanics = np.array(slip_field(plant, "current", y[0], 1, y)(y)[1])[2:5, 2:5]
+    poles = np.sort(np.abs(np.linalg.eigvals(mechanics))) / (2.0 * math.pi)
+    np.testing.assert_allclose(poles, [0.866, 9.75, 4.7e4], rtol=3e-3)
+
+
 def test_stuck_phase_against_the_matrix_exponential() -> None:
     """The closed form of the stuck, linear plant, its filters included."""
     y = [4.0, 7e-3 / BRAKE.k_g, 0.0, 20.0 * BAR, 19.9 * BAR, 18.0 * BAR, 3.0]
@@ -214,6 +245,18 @@ def test_time_of_breakaway() -> None:
     assert mode == 1
     assert t == pytest.approx(exact, rel=1e-8)
     assert state[0] == pytest.approx(needed, rel=1e-8)
+
+
+def test_breakaway_between_two_times_at_which_it_sticks() -> None:
+    """The pressure's load falls within microseconds, before the current has decayed."""
+    x0 = balanced(BRAKE, 20.0 * BAR)
+    needed = x0["i"] - excess(BRAKE, 1, x0["i"], x0["p_mc"]) / BRAKE.direction(1)[0]
+    y = list((x0 | {"i": needed * 1.08, "p_mc": 23.0 * BAR}).values())
+    t, state, mode = stick(BRAKE, "duty", 0.0, y, 1e-3)
+    assert excess(BRAKE, 1, y[0], y[3]) < -1e-3
+    assert mode == 1
+    assert 1e-6 < t < 1e-5
+    assert abs(excess(BRAKE, 1, state[0], state[3])) < 1e-11
 
 
 @pytest.mark.parametrize("current", [-10.0, 19.0])

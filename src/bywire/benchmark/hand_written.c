@@ -17,9 +17,11 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-static const double PI = 3.14159265358979323846;
-enum { CAP = 8 };           /* passes of a substep whose contacts do not settle */
-static const double FAR_DECAYED = 40.0; /* exp(-40) is far below the last digit of 1 */
+#define PI 3.14159265358979323846
+#define CAP 8            /* passes after which a substep whose contacts change is let go */
+#define FAR_DECAYED 40.0 /* exp(-40) is far below the last digit of 1 */
+#define INLINE static inline __attribute__((always_inline))
+#define BRINK 1e-9       /* share of the stroke at which a stop counts as near */
 
 /* What a run carries from call to call; all doubles, so that an array can hold it. */
 typedef struct {
@@ -39,7 +41,8 @@ typedef struct {
     double V0, V1;             /* (chamber volume)/beta + g = V0 - V1 theta */
     double brk_p, brk_n;       /* k_brk - 1 */
     double T_pr, f_p, f_n, mu; /* friction times the step */
-    double still;              /* speed beyond which the Stribeck peak has vanished */
+    double c, still;             /* speed beyond which the Stribeck peak has vanished */
+    double tau, th_rest, th_end; /* end stops: damping time, and a hair inside them as angles */
     double aa, p_gain, p_zero, i_gain, i_zero; /* anti-alias filter; sensors to shares */
     double lp_g, lp_a;         /* low-pass filter of the ECU */
     double c1, c2, c3;         /* series of the flow energy, see pipe_loss */
@@ -60,14 +63,25 @@ typedef struct {
     double from_i, constant;    /* eta_i (1 + alpha), eta_i drive */
 } Held;
 
-/* State between substeps, and sums over the substeps of a tick (midpoint values, twice). */
+/* State between substeps, and sums over the substeps of a tick: midpoint values, most of them
+ * twice or squared twice, whose constant factors wait for the end of the tick. */
 typedef struct {
     double i, th, om, pm, pd, yp, yi;
-    double di, dth, dom, dpm; /* half of the last increment: what predicts the midpoint */
-    double friction, makeup, near_stop, far_stop; /* friction times the step */
+    double di, dth, dom, dpm; /* half of the last increment: it predicts the midpoint */
+    double impulse, makeup, near_stop, far_stop; /* impulse: friction torque times h */
     double sum_i, sum_ii, sum_oo, sum_io, sum_fo, sum_pipe, sum_stop, sum_port, stuck;
     double unsettled, repeated;
 } Sim;
+
+/* Which of the stops push, as stiffnesses, and whether the chamber is held at zero pressure. */
+typedef struct {
+    bool touching, held;
+    double k_near, k_far;
+} Sides;
+
+typedef struct {
+    double om, i, dpm, dpd, impulse;
+} Pass;
 
 static inline double max2(double a, double b) { return a > b ? a : b; }
 static inline double min2(double a, double b) { return a < b ? a : b; }
@@ -95,7 +109,12 @@ static Plant prepare(const double *p, double h)
     k.f_p = h * p[P_seal_f_cfr_p];
     k.f_n = h * p[P_seal_f_cfr_n];
     k.mu = h * p[P_seal_mu_T];
+    k.c = p[P_seal_c];
     k.still = FAR_DECAYED / p[P_seal_c];
+    const double x_rest = p[P_master_cylinder_x_rest], x_end = p[P_master_cylinder_x_end];
+    k.tau = p[P_stop_tau_stop];
+    k.th_rest = (x_rest + BRINK * (x_end - x_rest)) / k_g;
+    k.th_end = (x_end - BRINK * (x_end - x_rest)) / k_g;
     const double a_aa = 2.0 * PI * p[P_anti_alias_f_aa];
     k.aa = h * a_aa / (1.0 + k.half * a_aa);
     k.p_gain = 1.0 / (p[P_pressure_sensor_p_high] - p[P_pressure_sensor_p_low]);
@@ -137,69 +156,306 @@ static inline double pipe_loss(const Plant *k, double a, double b)
     return 1.0 + s * (k->c1 + k->c3 * t) + k->c2 * (t + a * b);
 }
 
-/* Solve one substep for given contacts. The bools are constants at every call, so the ordinary
- * substep carries nothing of contacts and of the limit. */
-static inline Sim solve(const Plant *k, const Held *u, Sim s, bool touching, double k_near,
-                        double k_far, bool at_limit)
+/* Solve one substep for given sides. In the ordinary substep they are constants, and what
+ * belongs to stops and limit is not compiled into it. */
+INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
 {
-    const double *p = k->raw;
-    /* Friction at the predicted midpoint, times the step; exp comes first, its latency counts. */
-    const double speed = fabs(s.om + s.dom);
-    const double decay = speed < k->still ? exp(-p[P_seal_c] * speed) : 0.0;
-    const double p_mid = s.pm + s.dpm;
-    const double load = max2(p_mid, 0.0);
+    /* First what exp needs: from speed to speed it is the longest chain of a substep. */
+    const double speed = fabs(s->om + s->dom);
+    const double decay = speed < k->still ? exp(-k->c * speed) : 0.0;
 
-    const double drop = s.pm - s.pd;
-    const double r = 1.0 / (k->V0 - k->V1 * (s.th + s.dth));
-    const double gr = k->g * r, aar = at_limit ? 0.0 : k->a * k->a * r;
-    double S = u->ahead + aar;
-    double c = (u->behind - aar) * s.om + u->from_i * s.i + u->constant
-               - 2.0 * k->a * (at_limit ? 0.5 * s.pm : s.pm - gr * drop);
-    if (touching) {
-        const double k_g = p[P_gear_k_g], tau = p[P_stop_tau_stop];
-        const double lag = 0.5 * k->half, x = k_g * s.th;
-        const double kk = k->half * k_g * k_g * (k_near + k_far);
-        const double depth = k_far * (x - p[P_master_cylinder_x_end])
-                             + k_near * (x - p[P_master_cylinder_x_rest]);
-        S += kk * (k->half + tau);
-        c -= kk * (k->half - tau) * s.om + k->h * k_g * (depth + (k_near + k_far) * k_g * tau * s.om);
-        (void)lag;
+    const double drop = s->pm - s->pd;
+    const double r = 1.0 / (k->V0 - k->V1 * (s->th + s->dth));
+    const double spring = side.held ? 0.0 : k->a * k->a * r;
+    const double p_mean = side.held ? 0.5 * s->pm : s->pm - k->g * r * drop;
+    double S = u->ahead + spring;
+    double c = (u->behind - spring) * s->om + u->from_i * s->i + u->constant - 2.0 * k->a * p_mean;
+    if (side.touching) {
+        const double *p = k->raw, k_g = p[P_gear_k_g], stiff = side.k_near + side.k_far;
+        const double x = k_g * (s->th + k->tau * s->om);
+        const double force = side.k_near * (x - p[P_master_cylinder_x_rest])
+                             + side.k_far * (x - p[P_master_cylinder_x_end]);
+        S += k->half * k_g * k_g * stiff * (k->half + k->tau);
+        c -= k->half * k_g * (2.0 * force + k_g * stiff * (k->half - k->tau) * s->om);
     }
-    /* The friction opposes the speed that would come without it, and at most stops the shaft. */
-    const bool apply = c > 0.0;
-    const double coulomb = k->T_pr + (apply ? k->f_p : k->f_n) * load;
-    const double T = coulomb + coulomb * (apply ? k->brk_p : k->brk_n) * decay + k->mu * speed;
-    const double left = max2(fabs(c) - T, 0.0);
-    const double om = copysign(left, c) * (1.0 / S);
 
-    const double both = s.om + om, i = u->alpha * s.i + u->drive - u->gamma * both;
-    const double dpm = at_limit ? -s.pm : k->a * r * both - 2.0 * gr * drop;
-    const double dpd = k->pd_gain * (2.0 * drop + dpm);
-    const double p_share = clip(k->p_gain * p_mid + k->p_zero, 0.0, 1.0);
-    const double i_share = clip(k->i_gain * (s.i + s.di) + k->i_zero, 0.0, 1.0);
-    s.yp += k->aa * (p_share - s.yp);
-    s.yi += k->aa * (i_share - s.yi);
+    /* Friction opposes the speed that would come without it, and at most stops the shaft. */
+    const double load = max2(s->pm + s->dpm, 0.0);
+    const double coulomb = k->T_pr + (c > 0.0 ? k->f_p : k->f_n) * load;
+    const double peak = coulomb * (c > 0.0 ? k->brk_p : k->brk_n);
+    const double limit = (coulomb + k->mu * speed) + peak * decay;
 
-    s.friction = S * om - c;
-    const double two_i = s.i + i, two_a = 2.0 * s.pm + dpm, two_b = 2.0 * s.pd + dpd;
-    s.sum_i += two_i;
-    s.sum_ii += two_i * two_i;
-    s.sum_oo += both * both;
-    s.sum_io += two_i * both;
-    s.sum_fo += s.friction * both;
-    s.sum_pipe += (two_a - two_b) * (two_a - two_b) * pipe_loss(k, 0.5 * two_a, 0.5 * two_b);
-    s.stuck += both == 0.0 ? 1.0 : 0.0;
+    Pass q;
+    q.om = copysign(max2(fabs(c) - limit, 0.0), c) * (1.0 / S);
+    q.impulse = -copysign(min2(fabs(c), limit), c);
+    const double both = s->om + q.om;
+    q.i = u->alpha * s->i + u->drive - u->gamma * both;
+    q.dpm = side.held ? -s->pm : r * (k->a * both - 2.0 * k->g * drop);
+    q.dpd = k->pd_gain * (2.0 * drop + q.dpm);
+    return q;
+}
 
-    s.di = 0.5 * (i - s.i);
-    s.dom = 0.5 * (om - s.om);
-    s.dth = 0.5 * k->half * both;
-    s.dpm = 0.5 * dpm;
-    if (at_limit) /* what the reservoir adds to keep the chamber at ambient pressure */
-        s.makeup = (dpm / r - k->a * both + 2.0 * k->g * drop) / k->h;
-    s.i = i;
-    s.th += k->half * both;
-    s.om = om;
-    s.pm = at_limit ? 0.0 : s.pm + dpm;
-    s.pd += dpd;
-    return s;
+INLINE void commit(const Plant *k, Sim *s, Pass q)
+{
+    const double p_share = clip(k->p_gain * (s->pm + s->dpm) + k->p_zero, 0.0, 1.0);
+    const double i_share = clip(k->i_gain * (s->i + s->di) + k->i_zero, 0.0, 1.0);
+    s->yp += k->aa * (p_share - s->yp);
+    s->yi += k->aa * (i_share - s->yi);
+
+    const double two_i = s->i + q.i, two_om = s->om + q.om;
+    const double pm = s->pm + 0.5 * q.dpm, pd = s->pd + 0.5 * q.dpd;
+    s->sum_i += two_i;
+    s->sum_ii += two_i * two_i;
+    s->sum_oo += two_om * two_om;
+    s->sum_io += two_i * two_om;
+    s->sum_fo += q.impulse * two_om;
+    s->sum_pipe += (pm - pd) * (pm - pd) * pipe_loss(k, pm, pd);
+    s->stuck += two_om == 0.0 ? 1.0 : 0.0;
+
+    s->impulse = q.impulse;
+    s->di = 0.5 * (q.i - s->i);
+    s->dth = 0.5 * k->half * two_om;
+    s->dom = 0.5 * (q.om - s->om);
+    s->dpm = 0.5 * q.dpm;
+    s->i = q.i;
+    s->th += k->half * two_om;
+    s->om = q.om;
+    s->pm += q.dpm;
+    s->pd += q.dpd;
+}
+
+INLINE bool clear_of_stops(const Plant *k, double th)
+{
+    return th > k->th_rest && th < k->th_end;
+}
+
+static Sides touching_sides(const Plant *k, double th, double om)
+{
+    const double *p = k->raw, x = p[P_gear_k_g] * th, lag = k->tau * (p[P_gear_k_g] * om);
+    Sides side = {.touching = true};
+    side.k_near = p[P_master_cylinder_x_rest] - x - lag > 0.0 ? p[P_stop_k_stop] : 0.0;
+    side.k_far = x - p[P_master_cylinder_x_end] + lag > 0.0 ? p[P_stop_k_stop] : 0.0;
+    return side;
+}
+
+/* Book what only a substep at a stop or at the limit has: reactions and their energies. */
+static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
+{
+    const double *p = k->raw, k_g = p[P_gear_k_g], both = s->om + q.om;
+    const double x = k_g * (s->th + 0.5 * k->half * both), v = k_g * 0.5 * both;
+    const double near_depth = p[P_master_cylinder_x_rest] - x;
+    const double far_depth = x - p[P_master_cylinder_x_end];
+    s->near_stop = side.k_near * (near_depth - k->tau * v);
+    s->far_stop = side.k_far * (far_depth + k->tau * v);
+    const double elastic = p[P_stop_k_stop] * (max2(far_depth, 0.0) - max2(near_depth, 0.0));
+    s->sum_stop += (s->far_stop - s->near_stop - elastic) * v;
+    s->makeup = 0.0;
+    if (side.held) { /* what the chamber's balance lacks, the reservoir adds */
+        const double compliance = k->V0 - k->V1 * (s->th + s->dth);
+        s->makeup = (compliance * q.dpm - k->a * both + 2.0 * k->g * (s->pm - s->pd)) / k->h;
+        const double pm = s->pm + 0.5 * q.dpm;
+        s->sum_port -= s->makeup * pm * pipe_loss(k, pm, 0.0);
+    }
+}
+
+/* A substep near a stop or with the pressure about to fall below zero. The first pass knows no
+ * limit, as the ordinary substep; where it does not hold, passes with limit follow, each with
+ * the contacts at the midpoint that the one before gave. */
+static __attribute__((noinline)) Sim careful(const Plant *k, const Held *u, Sim s)
+{
+    for (int pass = 0;; pass++) {
+        Sides side = touching_sides(k, s.th + s.dth, s.om + s.dom);
+        Pass q = solve(k, u, &s, side);
+        bool settled = s.pm + q.dpm >= 0.0;
+        if (!settled && pass > 0) {
+            side.held = true;
+            q = solve(k, u, &s, side);
+            settled = true;
+        }
+        const double both = s.om + q.om;
+        const Sides after = touching_sides(k, s.th + 0.5 * k->half * both, 0.5 * both);
+        settled &= side.k_near == after.k_near && side.k_far == after.k_far;
+        if (settled || pass == CAP) {
+            s.repeated += pass > 0;
+            s.unsettled += !settled;
+            book_sides(k, &s, q, side);
+            commit(k, &s, q);
+            return s;
+        }
+        if (pass > 0) {
+            s.di = 0.5 * (q.i - s.i);
+            s.dth = 0.5 * k->half * both;
+            s.dom = 0.5 * (q.om - s.om);
+            s.dpm = 0.5 * q.dpm;
+        }
+    }
+}
+
+INLINE Sim substep(const Plant *k, const Held *u, Sim s)
+{
+    const double th = s.th + s.dth, om = s.om + s.dom;
+    if (clear_of_stops(k, th + k->tau * om)) {
+        const Pass q = solve(k, u, &s, (Sides){.touching = false, .held = false});
+        const double om_mid = 0.5 * (s.om + q.om), th_mid = s.th + k->half * om_mid;
+        if (s.pm + q.dpm >= 0.0 && clear_of_stops(k, th_mid)
+            && clear_of_stops(k, th_mid + k->tau * om_mid)) {
+            commit(k, &s, q);
+            return s;
+        }
+    }
+    return careful(k, u, s);
+}
+
+/* The ECU's tick: convert, pressure PID, dither, low-pass, current PI. */
+static void tick(const Plant *k, Saved *z, const double *u)
+{
+    const double *p = k->raw, T = p[P_ecu_T_s], codes = p[P_adc_codes];
+    double *m = z->m;
+    const double y_p = z->x[X_y_p] + p[P_adc_noise] * u[U_noise_p];
+    const double y_i = z->x[X_y_i] + p[P_adc_noise] * u[U_noise_i];
+    const double p_share = clip(floor(y_p * codes + 0.5) / codes, 0.0, 1.0);
+    const double i_share = clip(floor(y_i * codes + 0.5) / codes, 0.0, 1.0);
+    const double p_low = p[P_pressure_sensor_p_low], i_low = p[P_current_sensor_i_low];
+    const double p_meas = p_low + p_share * (p[P_pressure_sensor_p_high] - p_low) - p[P_ecu_p_atm];
+    const double i_meas = i_low + i_share * (p[P_current_sensor_i_high] - i_low);
+
+    const double p_ref = u[U_p_set];
+    const double signal = p[P_ecu_pressure_c] * p_ref - p_meas, tau_d = p[P_ecu_pressure_tau_d];
+    const double slope = (tau_d * m[M_pid_slope] + p[P_ecu_pressure_k_d] * (signal - m[M_pid_last]))
+                         / (tau_d + T);
+    const double i_wanted = p[P_ecu_pressure_k_p] * (p[P_ecu_pressure_b] * p_ref - p_meas)
+                            + m[M_pid_integral] + slope;
+    const double i_max = p[P_ecu_pressure_i_max], i_star = clip(i_wanted, -i_max, i_max);
+    m[M_pid_integral] += T * (p[P_ecu_pressure_k_i] * (p_ref - p_meas)
+                              + (i_star - i_wanted) / p[P_ecu_pressure_T_t]);
+
+    const double believed = p[P_ecu_est_par_T_pr] + p[P_ecu_est_par_f_cfr_p] * max2(p_meas, 0.0);
+    const double i_brk = p[P_ecu_est_par_k_brk_p] * believed / p[P_ecu_est_par_K_e];
+    const double i_dit = p[P_ecu_dither_gain] * i_brk * sin(2.0 * PI * m[M_dit_phase]);
+    const double phase = m[M_dit_phase] + p[P_ecu_dither_f_dit] * T;
+    m[M_dit_phase] = phase - floor(phase);
+
+    const double band = k->lp_a * (m[M_lp_s1] + k->lp_g * (i_star + i_dit - m[M_lp_s2]));
+    const double i_ref = m[M_lp_s2] + k->lp_g * band;
+    m[M_lp_s1] = 2.0 * band - m[M_lp_s1];
+    m[M_lp_s2] = 2.0 * i_ref - m[M_lp_s2];
+
+    const double error = i_ref - i_meas, D_ecu = p[P_ecu_current_D_max];
+    const double wanted = p[P_ecu_current_k_p] * error + m[M_pi_integral];
+    const double asked = clip(wanted, -D_ecu, D_ecu);
+    const double duty = clip(asked, -p[P_bridge_D_max], p[P_bridge_D_max]);
+    m[M_pi_integral] += T * (p[P_ecu_current_k_i] * error
+                             + (asked - wanted) / p[P_ecu_current_T_t]);
+
+    m[M_p_meas] = p_meas, m[M_i_meas] = i_meas, m[M_p_ref] = p_ref;
+    m[M_i_star] = i_star, m[M_i_dit] = i_dit, m[M_i_ref] = i_ref, m[M_duty] = duty;
+    m[M_sat_current] = fabs(i_star) >= i_max ? 1.0 : 0.0;
+    m[M_sat_duty] = fabs(duty) >= D_ecu ? 1.0 : 0.0;
+    m[M_pid_slope] = slope, m[M_pid_last] = signal;
+}
+
+/* Integral of the flow energy over pressure, 0 to q: beta times the energy stored per volume. */
+static double stored_density(const Plant *k, double q)
+{
+    const double z = q / k->raw[P_fluid_beta];
+    return 0.5 * q * q * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0)));
+}
+
+static void record(const Plant *k, const Saved *z, double *o)
+{
+    const double *p = k->raw, *x = z->x, *m = z->m, *e = z->e;
+    const double k_g = p[P_gear_k_g], A = p[P_master_cylinder_A_mc], K_e = p[P_motor_K_e];
+    const double i = x[X_i], om = x[X_omega], p_mc = x[X_p_mc], duty = m[M_duty];
+    const double x_mc = k_g * x[X_theta], v_mc = k_g * om, torque = K_e * i;
+    const double q = (p_mc - x[X_p_pd]) / k->K_lf, F_stop = z->far_stop - z->near_stop;
+    const double force = p_mc * A + p[P_master_cylinder_k_damp] * v_mc + F_stop;
+    const double accel = (p[P_gear_eta_g] * torque - k_g * force + z->friction) / k->M;
+    const double near = max2(p[P_master_cylinder_x_rest] - x_mc, 0.0);
+    const double far = max2(x_mc - p[P_master_cylinder_x_end], 0.0);
+    const double area = p[P_caliper_A_pd];
+    o[O_i] = i, o[O_i_ref] = m[M_i_ref], o[O_i_star] = m[M_i_star], o[O_i_dit] = m[M_i_dit];
+    o[O_i_meas] = m[M_i_meas], o[O_duty] = duty;
+    o[O_voltage] = (p[P_supply_V_bat] - p[P_supply_R_bat] * duty * i) * duty;
+    o[O_theta] = x[X_theta], o[O_omega] = om, o[O_x_mc] = x_mc;
+    o[O_p_mc] = p_mc, o[O_p_pd] = x[X_p_pd];
+    o[O_p_ref] = m[M_p_ref], o[O_p_meas] = m[M_p_meas], o[O_V_pedal] = m[M_V_pedal];
+    o[O_q] = q;
+    o[O_Re] = 4.0 / PI * fabs(q) / (p[P_pipeline_d_pl] * p[P_fluid_nu]);
+    o[O_torque] = torque, o[O_T_fr] = -z->friction, o[O_F_stop] = F_stop;
+    o[O_q_makeup] = z->makeup;
+    o[O_stuck] = om == 0.0 ? 1.0 : 0.0, o[O_at_stop] = F_stop == 0.0 ? 0.0 : 1.0;
+    o[O_sat_current] = m[M_sat_current], o[O_sat_duty] = m[M_sat_duty];
+    o[O_P_gear] = (1.0 - p[P_gear_eta_g]) * (torque - p[P_gear_J_mot] * accel) * om;
+    o[O_P_el] = p[P_supply_V_bat] * duty * i;
+    o[O_E_source] = e[E_E_source], o[O_E_supply] = e[E_E_supply], o[O_E_copper] = e[E_E_copper];
+    o[O_E_gear] = e[E_E_gear], o[O_E_seal] = e[E_E_seal], o[O_E_damping] = e[E_E_damping];
+    o[O_E_pipeline] = e[E_E_pipeline], o[O_E_stop] = e[E_E_stop], o[O_E_port] = e[E_E_port];
+    o[O_W_shaft] = e[E_W_shaft], o[O_t_stuck] = e[E_t_stuck];
+    o[O_E_stored] = 0.5 * (p[P_motor_L_m] * i * i + k->M_kin * om * om)
+                    + A * (p[P_master_cylinder_s_mc] - x_mc) / p[P_fluid_beta]
+                          * stored_density(k, p_mc)
+                    + area * area / p[P_caliper_K_pd] * stored_density(k, x[X_p_pd])
+                    + 0.5 * p[P_stop_k_stop] * (near * near + far * far);
+}
+
+/* The substeps of one tick, and the energies that they add up to. */
+static void frame(const Plant *k, Saved *z, int64_t substeps)
+{
+    const double *p = k->raw, duty = z->m[M_duty], h = k->h, k_g = p[P_gear_k_g];
+    double *x = z->x, *d = z->d, *e = z->e;
+    const Held u = hold(k, duty);
+    Sim s = {.i = x[X_i], .th = x[X_theta], .om = x[X_omega], .pm = x[X_p_mc], .pd = x[X_p_pd],
+             .yp = x[X_y_p], .yi = x[X_y_i], .di = d[X_i], .dth = d[X_theta], .dom = d[X_omega],
+             .dpm = d[X_p_mc]};
+    s.makeup = s.near_stop = s.far_stop = 0.0;
+    for (int64_t n = 0; n < substeps; n++)
+        s = substep(k, &u, s);
+
+    const double kinetic = 0.5 * (s.om * s.om - x[X_omega] * x[X_omega]); /* sum of om d(om) */
+    e[E_E_source] += 0.5 * h * p[P_supply_V_bat] * duty * s.sum_i;
+    e[E_E_supply] += 0.25 * h * p[P_supply_R_bat] * duty * duty * s.sum_ii;
+    e[E_E_copper] += 0.25 * h * p[P_motor_R_m] * s.sum_ii;
+    const double work = 0.25 * h * p[P_motor_K_e] * s.sum_io;
+    e[E_W_shaft] += work;
+    e[E_E_gear] += (1.0 - p[P_gear_eta_g]) * (work - p[P_gear_J_mot] * kinetic);
+    e[E_E_seal] -= 0.5 * s.sum_fo;
+    e[E_E_damping] += 0.25 * h * p[P_master_cylinder_k_damp] * k_g * k_g * s.sum_oo;
+    e[E_E_pipeline] += h / k->K_lf * s.sum_pipe;
+    e[E_E_stop] += h * s.sum_stop;
+    e[E_E_port] += h * s.sum_port;
+    e[E_t_stuck] += h * s.stuck;
+
+    x[X_i] = s.i, x[X_theta] = s.th, x[X_omega] = s.om, x[X_p_mc] = s.pm, x[X_p_pd] = s.pd;
+    x[X_y_p] = s.yp, x[X_y_i] = s.yi;
+    d[X_i] = s.di, d[X_theta] = s.dth, d[X_omega] = s.dom, d[X_p_mc] = s.dpm;
+    z->friction = s.impulse / h;
+    z->makeup = s.makeup, z->near_stop = s.near_stop, z->far_stop = s.far_stop;
+    z->unsettled += s.unsettled, z->repeated += s.repeated;
+}
+
+/* One run: frames ticks of substeps each, a row of all outputs per tick and one at the end.
+ * u: frames + 1 rows of stimulus. state: a Saved, renewed in place. */
+void hand_run(const double *p, double h, int64_t frames, int64_t substeps, const double *u,
+              double *state, double *rec)
+{
+    const Plant k = prepare(p, h);
+    Saved *z = (Saved *)state;
+    for (int64_t n = 0;; n++) {
+        tick(&k, z, u + n * U_COUNT);
+        record(&k, z, rec + n * O_COUNT);
+        if (n == frames)
+            return;
+        frame(&k, z, substeps);
+    }
+}
+
+/* The same for many cases on all cores. p, state and rec: one block per case; the stimulus is
+ * shared by all of them. */
+void hand_ensemble(int64_t cases, const double *p, double h, int64_t frames, int64_t substeps,
+                   const double *u, double *state, double *rec)
+{
+    const int64_t length = sizeof(Saved) / sizeof(double), block = (frames + 1) * O_COUNT;
+#pragma omp parallel for schedule(dynamic)
+    for (int64_t c = 0; c < cases; c++)
+        hand_run(p + c * P_COUNT, h, frames, substeps, u, state + c * length, rec + c * block);
 }

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
 
-_NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
+_NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _HEADER = "a first row such as 'time [s], pedal [mm]'"
 _SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
 
@@ -73,8 +73,8 @@ def read_table(path: Path) -> Table:
         header.pop()
     if all(_NUMBER.fullmatch(cell.replace(",", ".")) for cell in header):
         raise FileError(
-            f"{path}, line {header_line}: {separator.join(header)!r} are numbers, not the names "
-            f"and units of the columns: add {_HEADER}"
+            f"{path}, line {header_line}: {shortened(separator.join(header))} holds no names and "
+            f"units of columns: add {_HEADER}"
         )
     for line, cells in found[1:]:
         while len(cells) > len(header) and not cells[-1]:
@@ -92,7 +92,7 @@ def read_table(path: Path) -> Table:
 def numbers(table: Table, columns: Sequence[int], labels: Sequence[str]) -> NDArray[np.float64]:
     """Return the numbers of some columns.
 
-    One file has one decimal mark: a comma is taken as one only if no column here has a point.
+    One file has one decimal mark: a comma, where it is no separator, or a point, never both.
 
     Parameters
     ----------
@@ -113,36 +113,45 @@ def numbers(table: Table, columns: Sequence[int], labels: Sequence[str]) -> NDAr
     FileError
         When a cell is blank, no finite number, or has the other decimal mark.
     """
+    _require_one_mark(table, columns, labels)
     found = np.empty((len(table.rows), len(columns)))
-    marks: dict[str, int] = {}  # decimal mark: first row that has it
-    for r, row in enumerate(table.rows):
-        for c, (index, label) in enumerate(zip(columns, labels, strict=True)):
-            cell = row[index]
-            for mark in ",.":
-                if mark in cell:
-                    marks.setdefault(mark, r)
-            if len(marks) == 2:
-                first = table.lines[min(marks.values())]
-                raise FileError(
-                    f"{table.where(r, label)}: {cell!r} mixes decimal comma and decimal point "
-                    f"(other mark first in line {first}): write all numbers with one of them, "
-                    "and none with a separator of thousands"
-                )
-            found[r, c] = _number(table, cell, r, label)
+    for c, (index, label) in enumerate(zip(columns, labels, strict=True)):
+        found[:, c] = [_number(table, row[index], r, label) for r, row in enumerate(table.rows)]
     return found
 
 
+def _require_one_mark(table: Table, columns: Sequence[int], labels: Sequence[str]) -> None:
+    """Refuse decimal commas and points in one file: one of them may be a thousands mark."""
+    places = []
+    for mark in ",.":
+        cells = ((r, c) for r, row in enumerate(table.rows) for c, k in enumerate(columns)
+                 if mark in row[k])  # fmt: skip
+        places += [place for place in [next(cells, None)] if place is not None]
+    if len(places) == 2:
+        (first, _), (row, c) = sorted(places)
+        raise FileError(
+            f"{table.where(row, labels[c])}: {shortened(table.rows[row][columns[c]])} mixes "
+            f"decimal comma and decimal point (the other one in line {table.lines[first]}): write "
+            "all numbers with one of them, and none with a separator of thousands"
+        )
+
+
 def _number(table: Table, cell: str, row: int, label: str) -> float:
+    plain = cell if table.separator == "," else cell.replace(",", ".")
+    value = float(plain) if _NUMBER.fullmatch(plain) else math.nan
+    if math.isfinite(value):
+        return value
     where = table.where(row, label)
     if not cell:
         raise FileError(f"{where}: the cell is blank: fill it in or remove the row")
-    if _NUMBER.fullmatch(cell.replace(",", ".")):
-        value = float(cell.replace(",", "."))
-        if math.isfinite(value):
-            return value
     if cell.lower().lstrip("+-") in ("nan", "na", "n/a", "inf", "infinity", "null", "none"):
         raise FileError(f"{where}: {cell!r} is no measured value: fill it in or remove the row")
-    raise FileError(f"{where}: {cell[:40]!r} is not a number: correct it or remove the row")
+    raise FileError(f"{where}: {shortened(cell)} is not a number: correct it or remove the row")
+
+
+def shortened(text: str) -> str:
+    """Return a text of the file as an error quotes it."""
+    return repr(text if len(text) <= 60 else f"{text[:60]}...")
 
 
 def _text(path: Path) -> str:

@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -22,14 +22,10 @@ from numpy.typing import NDArray
 from bywire.core import units
 from bywire.core.errors import FileError, ParameterError, UnitError
 from bywire.core.quantities import display_unit
-from bywire.data.text_table import Table, numbers, read_table
-
-if TYPE_CHECKING:
-    import pint
+from bywire.data.text_table import Table, numbers, read_table, shortened
 
 _GAP = 10.0  # median steps: a pause must be longer to count as a gap
 _CLOCKS = ("time", "t")
-_TITLE = re.compile(r"(?P<name>.*?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]")
 _POWER = r"[A-Za-zµμΩ°%_]+(?:(?:\*\*|\^)-?[0-9])?"
 _UNIT = re.compile(rf"(?:1|(?:1/)?{_POWER}(?:[*/· ]{_POWER})*)")
 _SI = (
@@ -40,9 +36,14 @@ _SI = (
 
 @dataclass(frozen=True)
 class _Column:
+    """A column: place, header's name and unit, and the signal it becomes with its SI unit."""
+
     index: int
-    name: str
-    unit: str | None
+    label: str
+    unit: str
+    is_twice: bool
+    name: str = ""
+    symbol: str = ""
 
 
 def read_trace(
@@ -83,120 +84,116 @@ def read_trace(
     if not longest > 0:
         raise ParameterError(f"max_gap = {max_gap!r} is not admissible: it must be > 0 s")
     table = read_table(Path(path))
-    known = _columns(table)
-    clock = next((known[name] for name in _CLOCKS if name in known), None)
-    if clock is None:
-        raise _missing(table, "time", "s", known)
-    wanted = _wanted(table, known, clock, columns)
-    symbols = ["s", *wanted.values()]
-    chosen = [clock, *wanted]
-    scales = [_unit(table, c, symbol) for c, symbol in zip(chosen, symbols, strict=True)]
-    values = numbers(table, [c.index for c in chosen], [c.name for c in chosen])
+    chosen = _chosen(table, columns)
+    scales = [_unit(table, c) for c in chosen]
+    values = numbers(table, [c.index for c in chosen], [c.label for c in chosen])
     if len(values) < 2:
-        raise FileError(f"{table.path} has {len(values)} rows of numbers: two at least are needed")
-    si = [_converted(v, u, s) for v, u, s in zip(values.T, scales, symbols, strict=True)]
-    _require_increasing(table, clock, si[0])
-    _require_no_gap(table, clock, si[0], longest)
-    given = {name.strip().casefold(): name for name in columns or ()}
-    signals = {
-        given.get(c.name.casefold(), c.name): (
-            "time", v, {"units": s, "long_name": c.name},
+        raise FileError(
+            f"{table.path} has too few rows of numbers, {len(values)}: add some, two at least"
         )
-        for c, v, s in zip(chosen[1:], si[1:], symbols[1:], strict=True)
-    }  # fmt: skip
+    si = [_converted(v, u, c.symbol) for v, u, c in zip(values.T, scales, chosen, strict=True)]
+    _require_increasing(table, chosen[0], si[0])
+    _require_no_gap(table, chosen[0], si[0], longest)
+    signals = {
+        c.name: ("time", v, {"units": c.symbol, "long_name": c.label})
+        for c, v in zip(chosen[1:], si[1:], strict=True)
+    }
     time = ("time", si[0], {"units": "s", "long_name": "time"})
     return xr.Dataset(signals, coords={"time": time}, attrs={"source": table.path.name})
 
 
-def _columns(table: Table) -> dict[str, _Column]:
+def _known(table: Table) -> dict[str, _Column]:
     """Return the named columns of the header by their names in lower case."""
     found: dict[str, _Column] = {}
     for index, title in enumerate(table.header):
-        match = _TITLE.fullmatch(title)
-        name = match["name"] if match else title
-        if not name:
+        label, unit = title, ""
+        cut = max(title.rfind("["), title.rfind("("))
+        if cut >= 0 and title[-1] in "])":
+            label, unit = title[:cut].rstrip(), title[cut + 1 : -1].strip()
+        if not label:
             continue
-        if name.casefold() in found:
-            raise FileError(f"{_header(table, name)}: the name stands twice: rename one of them")
-        found[name.casefold()] = _Column(index, name, match["unit"].strip() if match else None)
+        key = label.casefold()
+        found[key] = _Column(index, label, unit, is_twice=key in found)
     return found
 
 
-def _wanted(
-    table: Table,
-    known: Mapping[str, _Column],
-    clock: _Column,
-    columns: Mapping[str, str] | None,
-) -> dict[_Column, str]:
-    """Return the columns to read beside time, and the SI unit of each."""
+def _chosen(table: Table, columns: Mapping[str, str] | None) -> list[_Column]:
+    """Return time, then the columns to read."""
+    known = _known(table)
+    clock = next((known[name] for name in _CLOCKS if name in known), None)
+    if clock is None:
+        raise _missing(table, "time", "s", known)
+    chosen = [replace(clock, name="time", symbol="s")]
     if columns is None:
-        found = {c: _si(table, c) for c in known.values() if c != clock}
-        if not found:
-            raise FileError(
-                f"{table.path}, line {table.header_line}: {' '.join(table.header)!r} names no "
-                "column beside time: add one, or separate the columns by comma, semicolon or tab"
-            )
-        return found
-    wanted: dict[_Column, str] = {}
-    for name, symbol in columns.items():
-        found_column = known.get(name.strip().casefold())
-        if found_column is None:
+        others = [c for c in known.values() if c != clock]
+        chosen += [replace(c, name=c.label, symbol=_si(_unit(table, c))) for c in others]
+    for name, symbol in (columns or {}).items():
+        found = known.get(name.strip().casefold())
+        if found is None:
             raise _missing(table, name, symbol, known)
-        wanted[found_column] = symbol
-    return wanted
+        if found != clock:
+            chosen.append(replace(found, name=name, symbol=symbol))
+    if len(chosen) == 1:
+        raise FileError(
+            f"{table.path}, line {table.header_line}: there is no column beside time: add one, "
+            "or separate the columns by comma, semicolon or tab"
+        )
+    return chosen
 
 
 def _missing(table: Table, name: str, symbol: str, known: Mapping[str, _Column]) -> FileError:
-    names = [c.name for c in known.values()]
     near = get_close_matches(name.casefold(), known, n=1, cutoff=0.5)
-    hint = f"is it {known[near[0]].name!r}? Then rename that" if near else "add it"
+    wanted = f"'{name} [{display_unit(symbol)}]'"
+    hint = f"is it {known[near[0]].label!r}? Then rename that {wanted}" if near else f"add {wanted}"
+    there = shortened(", ".join(c.label for c in known.values()))
     return FileError(
-        f"{table.path}, line {table.header_line}: no column {name!r} among {', '.join(names)!r}: "
-        f"{hint} to '{name} [{display_unit(symbol)}]'"
+        f"{table.path}, line {table.header_line}: no column {name!r} among {there}: {hint}"
     )
 
 
-def _unit(table: Table, column: _Column, symbol: str | None) -> pint.Unit:
-    """Return the unit of a column; with a symbol it must measure the same quantity."""
-    where = _header(table, column.name)
-    example = f"'{column.name} [{display_unit(symbol or '1')}]'"
+def _unit(table: Table, column: _Column) -> Any:
+    """Return the unit of a column; where it has a symbol, both must measure the same quantity."""
+    where = _header(table, column.label)
+    example = f"'{column.label} [{display_unit(column.symbol) if column.symbol else 'mm'}]'"
+    if column.is_twice:
+        raise FileError(f"{where}: the name stands twice, capitals or not: rename one of them")
     if not column.unit:
-        raise UnitError(f"{where}: it has no unit: write for instance {example}")
+        raise UnitError(f"{where}: it has no unit: write for instance {example}, or [1] for none")
     text = re.sub(r"(?<=N)(?=m\b)", "*", "1" if column.unit == "-" else column.unit)
     try:
         if not _UNIT.fullmatch(text):
             raise ValueError(text)
-        spelled = text.replace("%", "percent").replace("·", "*").replace(" ", "*")
-        unit: pint.Unit = units.registry().Unit("" if text == "1" else spelled)
+        unit = _pint(text.replace("%", "percent").replace("·", "*").replace(" ", "*"))
+        base = _base(unit)
     except Exception:
         raise UnitError(
-            f"{where}: {column.unit!r} is no known unit: write for instance {example}"
+            f"{where}: {shortened(column.unit)} is no known unit: write for instance {example}"
         ) from None
-    if symbol is not None and _base(unit) != _base(_pint(symbol)):
+    if column.symbol and base != _base(_pint(column.symbol)):
         raise UnitError(
-            f"{where}: {column.unit!r} has the wrong unit, it cannot be {symbol}: "
+            f"{where}: {column.unit!r} has the wrong unit, it cannot be {column.symbol}: "
             f"write for instance {example}"
         )
     return unit
 
 
-def _si(table: Table, column: _Column) -> str:
-    """Return the SI unit of a column's quantity."""
-    base = _base(_unit(table, column, None))
+def _si(unit: Any) -> str:
+    """Return the SI unit of a unit's quantity."""
+    base = _base(unit)
     return next((s for s in _SI if _base(_pint(s)) == base), f"{base:~C}")
 
 
-def _pint(symbol: str) -> pint.Unit:
-    unit: pint.Unit = units.registry().Unit("" if symbol == "1" else symbol)
-    return unit
+def _pint(symbol: str) -> Any:
+    """Return the registry's unit object for a symbol."""
+    return units.registry().Unit("" if symbol == "1" else symbol)
 
 
-def _base(unit: pint.Unit) -> Any:
+def _base(unit: Any) -> Any:
     """Return the base units; radians stay, so that rpm is no frequency in Hz."""
     return units.registry().Quantity(1.0, unit).to_base_units().units
 
 
-def _converted(values: NDArray[np.float64], unit: pint.Unit, symbol: str) -> NDArray[np.float64]:
+def _converted(values: NDArray[np.float64], unit: Any, symbol: str) -> NDArray[np.float64]:
     return np.asarray(units.registry().Quantity(values, unit).to(_pint(symbol)).magnitude)
 
 
@@ -204,11 +201,11 @@ def _require_increasing(table: Table, clock: _Column, t: NDArray[np.float64]) ->
     bad = np.flatnonzero(np.diff(t) <= 0)
     if bad.size:
         k = int(bad[0]) + 1
-        now, before = table.rows[k][clock.index], table.rows[k - 1][clock.index]
-        what = "is repeated" if t[k] == t[k - 1] else f"follows {before}"
+        now, before = (table.rows[r][clock.index] for r in (k, k - 1))
+        what = "is repeated" if t[k] == t[k - 1] else f"comes after {before} {clock.unit}"
         raise FileError(
-            f"{table.where(k, clock.name)}: {now} {clock.unit} {what} (line {table.lines[k - 1]}): "
-            "time must increase: sort the rows and remove repeated ones"
+            f"{table.where(k, clock.label)}: {now} {clock.unit} {what} in line "
+            f"{table.lines[k - 1]}: time must increase: sort the rows, remove repeated ones"
         )
 
 
@@ -219,12 +216,12 @@ def _require_no_gap(table: Table, clock: _Column, t: NDArray[np.float64], longes
         k = int(gaps[0])
         most = float(np.max(steps[gaps]))
         raise FileError(
-            f"{table.where(k + 1, clock.name)}: a gap of {steps[k]:.4g} s after "
+            f"{table.where(k + 1, clock.label)}: a gap of {steps[k]:.4g} s after "
             f"{table.rows[k][clock.index]} {clock.unit} ({gaps.size} in the file, the longest "
             f"{most:.4g} s; max_gap is {longest:g} s): fill it in, or, if a straight line across "
             f'it is what you want, allow it with max_gap="{1.01 * most:.3g} s"'
         )
 
 
-def _header(table: Table, name: str) -> str:
-    return f"{table.path}, line {table.header_line}, column {name!r}"
+def _header(table: Table, label: str) -> str:
+    return f"{table.path}, line {table.header_line}, column {shortened(label)}"

@@ -17,7 +17,7 @@ from matplotlib.ticker import MaxNLocator
 
 from bywire.core.quantities import display_unit
 from bywire.report.channel import Channel, FloatArray
-from bywire.report.decimation import decimate
+from bywire.report.decimation import COLUMNS, decimate
 from bywire.report.wording import clean, unit_text
 
 # Okabe and Ito, "Color universal design", 2008: told apart with any kind of color vision.
@@ -142,13 +142,21 @@ def time_scale(time: FloatArray) -> tuple[float, str]:
 
 
 def draw_channel(axes: Axes, shown: Channel, role: Role, suffix: str = "") -> None:
-    """Draw a channel over time, labeled by its name and ``suffix``."""
+    """Draw a channel over time, labeled by its name and ``suffix``.
+
+    A ripple too fast to be told apart is drawn as the band that it fills. Such a band must not
+    hide other lines: a set point then lies below them, a simulated line lets a measured one shine
+    through.
+    """
     scale, _ = time_scale(shown.time)
     time, values = decimate(scale * shown.time, shown.values)
     look = STROKES[role]
+    band = len(values) > 3 * COLUMNS and len(values) < len(shown.values)
     axes.plot(
         time, values, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
-        zorder=look.zorder, label=plain(shown.label + suffix),
+        zorder=2.6 if band and role is Role.SET_POINT else look.zorder,
+        alpha=0.6 if band and role is Role.SIMULATED else None,
+        label=plain(shown.label + suffix),
     )
 
 

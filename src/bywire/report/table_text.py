@@ -9,12 +9,14 @@ from bywire.report.tables import Table
 GAP = "  "
 NARROWEST = 12
 """least width of a column that is wrapped"""
+LONGEST_WORD = 40
+"""longest word that is never broken"""
 
 
 def table_text(table: Table, width: int = 100) -> str:
     """Return a table as lines of at most ``width`` characters where its columns allow that.
 
-    The widest columns are wrapped first; no column gets narrower than 12 characters.
+    The widest columns are wrapped first, between words.
 
     Parameters
     ----------
@@ -37,13 +39,18 @@ def _widths(rows: list[list[str]], width: int) -> list[int]:
         max(len(line) for row in rows for line in (row[k].splitlines() or [""]))
         for k in range(len(rows[0]))
     ]
+    least = [max(NARROWEST, min(LONGEST_WORD, _longest_word(rows, k))) for k in range(len(widths))]
     available = width - len(GAP) * (len(widths) - 1)
     while sum(widths) > available:
-        widest = max(range(len(widths)), key=widths.__getitem__)
-        if widths[widest] <= NARROWEST:
+        shrinkable = [k for k, w in enumerate(widths) if w > least[k]]
+        if not shrinkable:
             break
-        widths[widest] -= 1
+        widths[max(shrinkable, key=widths.__getitem__)] -= 1
     return widths
+
+
+def _longest_word(rows: list[list[str]], column: int) -> int:
+    return max((len(word) for row in rows for word in row[column].split()), default=0)
 
 
 def _lines(table: Table, row: list[str], widths: list[int]) -> list[str]:

@@ -117,7 +117,7 @@ def kpi_table(rows: Iterable[KpiRow]) -> Table:
     listed = list(rows)
     limited = any(row.limit or row.ok is not None for row in listed)
     columns = [Column("name"), Column("value", numeric=True)]
-    columns += [Column("limit"), Column("result")] if limited else []
+    columns += [Column("limit", numeric=True), Column("result")] if limited else []
     return Table(
         (*columns, Column("definition")),
         tuple(

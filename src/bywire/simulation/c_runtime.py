@@ -11,6 +11,9 @@ PRELUDE = r"""
 #include <string.h>
 #include <math.h>
 
+static inline int64_t bw_bits(double x) { int64_t i; memcpy(&i, &x, 8); return i; }
+static inline double bw_number(int64_t i) { double x; memcpy(&x, &i, 8); return x; }
+
 static inline double bw_exp(double x) {
   x = x < -708.0 ? -708.0 : x;
   x = x > 709.0 ? 709.0 : x;
@@ -25,17 +28,13 @@ static inline double bw_exp(double x) {
                  + r2 * (1.0 / 3628800.0 + r * (1.0 / 39916800.0));
   const double d = 1.0 / 479001600.0 + r * (1.0 / 6227020800.0);
   const double y = a + r4 * b + r8 * (c + r4 * d);
-  union { double f; int64_t i; } bits, scale;
-  bits.f = t;
-  scale.i = (bits.i + 1023) << 52;
-  return y * scale.f;
+  return y * bw_number((bw_bits(t) + 1023) << 52);
 }
 
 static inline double bw_turn(double x, int quarter) {
   const double magic = 6755399441055744.0;
-  union { double f; int64_t i; } bits;
-  bits.f = x * 0.63661977236758134308 + magic;
-  const double k = bits.f - magic;
+  const double t = x * 0.63661977236758134308 + magic;
+  const double k = t - magic;
   const double r = ((x - k * 1.57079632673412561417e+00) - k * 6.07710050630396597660e-11)
                  - k * 2.02226624879595063154e-21;
   const double z = r * r;
@@ -44,7 +43,7 @@ static inline double bw_turn(double x, int quarter) {
       + z * (-1.0 / 1307674368000.0)))))));
   const double c = 1.0 + z * (-0.5 + z * (1.0 / 24.0 + z * (-1.0 / 720.0 + z * (1.0 / 40320.0
       + z * (-1.0 / 3628800.0 + z * (1.0 / 479001600.0 + z * (-1.0 / 87178291200.0)))))));
-  const int64_t n = bits.i + quarter;
+  const int64_t n = bw_bits(t) + quarter;
   const double y = (n & 1) ? c : s;
   return (n & 2) ? -y : y;
 }

@@ -28,7 +28,7 @@ class Sizes:
     output: int
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Program:
     """Symbolic functions of a model with a fixed structure.
 

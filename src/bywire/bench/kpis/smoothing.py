@@ -10,13 +10,13 @@ from bywire.bench.kpis.kpi import Array
 def smoothed(t: Array, y: Array, period: float) -> Array:
     r"""Return the centered moving average over a period.
 
-    .. math:: \bar y(t) = \frac{1}{b - a} \int_a^b y \, d\tau, \quad
-              a = \max(t - T/2, t_0), \; b = \min(t + T/2, t_1)
+    .. math:: \bar y(t) = \frac{1}{T} \int_{c - T/2}^{c + T/2} y \, d\tau, \quad
+              c = \min(\max(t, t_0 + T/2), t_1 - T/2)
 
     The signal counts as straight between samples and is integrated exactly. A ripple of this
-    period vanishes. There is no delay, but an edge is smeared over half a period to both sides,
-    so that a dead time is shortened and a rise time lengthened by up to that. At both ends the
-    average runs over what there is, so up to half a period of ripple can remain there.
+    period vanishes everywhere. There is no delay, but an edge is smeared over half a period to
+    both sides: a dead time is shortened, a rise time lengthened by up to that. Within half a
+    period of either end the nearest full average holds, so a step should not lie there.
 
     Parameters
     ----------
@@ -25,7 +25,7 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
     y
         Signal, shape ``(n,)``.
     period
-        Averaging time T [s]; zero or less returns the signal itself.
+        Averaging time T [s], at most the whole record; zero or less returns the signal itself.
 
     Returns
     -------
@@ -34,9 +34,9 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
     """
     if period <= 0 or t.size < 2:
         return y
-    a = np.maximum(t - 0.5 * period, t[0])
-    b = np.minimum(t + 0.5 * period, t[-1])
-    return np.asarray((_primitive(t, y, b) - _primitive(t, y, a)) / (b - a))
+    width = min(period, float(t[-1] - t[0]))
+    a = np.clip(t - 0.5 * width, t[0], t[-1] - width)
+    return np.asarray((_primitive(t, y, a + width) - _primitive(t, y, a)) / width)
 
 
 def treatment(period: float) -> str:

@@ -1,0 +1,1 @@
+"""Measurement files to and from signals over time."""

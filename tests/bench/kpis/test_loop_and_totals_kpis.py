@@ -1,0 +1,118 @@
+"""Hysteresis, effort and occupation against closed forms; the listing of all key figures."""
+
+import math
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bywire.bench.kpis import effort, hysteresis, occupation, registry
+from bywire.bench.kpis.smoothing import smoothed
+
+LAG = 0.3
+
+
+def loop(t, i, p, smoothing=0.0):
+    recording = xr.Dataset(
+        {"i": ("time", i, {"units": "A"}), "p_mc": ("time", p, {"units": "Pa"})},
+        {"time": ("time", t)},
+    )
+    return registry.evaluate("hysteresis", recording, hysteresis.Setting(smoothing=smoothing))
+
+
+@pytest.mark.parametrize("start", [0.0, 1.0, 4.0])
+def test_ellipse(start):
+    phase = start + np.linspace(0.0, 2 * math.pi, 20_001)
+    found = loop(phase, 3 + 2 * np.cos(phase), 2e6 + 1e6 * np.cos(phase - LAG))
+    width = 2 * 2 * math.sin(LAG)
+    assert found["loop_width_mid"].value == pytest.approx(width, rel=1e-4)
+    assert found["loop_width_max"].value == pytest.approx(width, rel=1e-4)
+    assert found["loop_area"].value == pytest.approx(math.pi * 2 * 1e6 * math.sin(LAG), rel=1e-6)
+    assert found["loop_area"].unit == "A*Pa"
+
+
+def play(friction):
+    """Ramp (17) on a brake with play: a parallelogram of known widths and area."""
+    t = np.linspace(0.0, 50.0, 50_001)
+    i = np.where(t <= 25, 0.2 * t, 10 - 0.2 * t)
+    p = np.where(t <= 25, np.maximum(i - friction, 0), np.minimum(5 - friction, i + friction))
+    return t, i, 1e6 * p
+
+
+def test_play_keeps_a_rest_of_response_and_says_so():
+    t, i, p = play(0.5)
+    found = loop(t, i, p)
+    assert found["loop_width_mid"].value == pytest.approx(1.0, abs=1e-3)
+    assert found["loop_width_max"].value == pytest.approx(1.0, abs=1e-3)
+    assert found["loop_area"].value == pytest.approx(1e6 * (4.5 * 1.0 - 0.5**2 / 2), rel=1e-3)
+    assert "ends 5e+05 Pa away" in found["loop_area"].note
+
+
+def test_dither_hardly_moves_the_smoothed_loop():
+    t, i, p = play(0.5)
+    found = loop(t, i + 0.4 * np.sin(2 * np.pi * 50 * t), p, smoothing=0.02)
+    assert found["loop_width_mid"].value == pytest.approx(1.0, abs=5e-3)
+    assert found["loop_width_max"].value == pytest.approx(1.0, abs=2e-2)
+
+
+def test_what_is_no_single_loop_has_no_width():
+    t, i, p = play(0.5)
+    half = t <= 25
+    assert "the loop is open" in loop(t[half], i[half], p[half])["loop_area"].note
+    assert "constant" in loop(t, i, 0 * p)["loop_area"].note
+    twice = (np.append(x, x[1:]) for x in (i, p))
+    found = loop(np.linspace(0, 1, 2 * t.size - 1), *twice)
+    assert all(math.isnan(kpi.value) and "2 loops" in kpi.note for kpi in found.values())
+    t, i, p = play(2.0)
+    assert "above mid-height" in loop(t, i, p)["loop_width_mid"].note
+
+
+def test_effort_of_a_sine():
+    t = np.linspace(0.0, 1.0, 10_001)
+    i = -3 * np.sin(2 * math.pi * t)
+    power = 1 + 2 * t
+    recording = xr.Dataset({"i": ("time", i), "P_el": ("time", power)}, {"time": ("time", t)})
+    found = registry.evaluate("effort", recording, effort.Setting())
+    expected = {"peak_current": 3, "mean_current": 6 / math.pi, "peak_power": 3,
+                "mean_power": 2, "energy": 2}  # fmt: skip
+    assert {k: v.value for k, v in found.items()} == pytest.approx(expected, rel=1e-6)
+    recording["E_source"] = ("time", 5 + 7 * t)  # integrated within the samples: it counts
+    found = registry.evaluate("effort", recording, effort.Setting())
+    assert found["energy"].value == pytest.approx(7)
+    empty = registry.evaluate(
+        "effort", recording.drop_vars(["i", "P_el", "E_source"]), effort.Setting()
+    )
+    assert all(math.isnan(kpi.value) and "recorded" in kpi.note for kpi in empty.values())
+
+
+def test_occupation_of_modes():
+    t = np.array([0.0, 1.0, 2.0, 4.0])  # uneven: time counts, not samples
+    recording = xr.Dataset(
+        {"stuck": ("time", [1.0, 1.0, 0.0, 0.0]), "sat_duty": ("time", [0.0, 0.5, 0.0, 0.0])},
+        {"time": ("time", t)},
+    )
+    found = registry.evaluate("occupation", recording, occupation.Setting())
+    assert found["share_stuck"].value == pytest.approx(1.5 / 4)
+    assert "not recorded" in found["share_sat_current"].note
+    assert "other values than 0 and 1" in found["share_sat_duty"].note
+    recording["t_stuck"] = ("time", [0.0, 1.0, 1.2, 1.2])
+    found = registry.evaluate("occupation", recording, occupation.Setting())
+    assert found["share_stuck"].value == pytest.approx(0.3)
+
+
+def test_moving_average_of_a_period_is_exact_on_ramps_and_blind_to_ripple():
+    t = np.linspace(0.0, 1.0, 1001)
+    ramp = smoothed(t, 3 * t, 0.02)
+    np.testing.assert_allclose(ramp[10:-10], 3 * t[10:-10], atol=1e-12)
+    ripple = smoothed(t, np.sin(2 * np.pi * 50 * t), 0.02)
+    assert np.max(np.abs(ripple)) < 1e-12
+    np.testing.assert_array_equal(smoothed(t, ramp, 0.0), ramp)
+
+
+def test_every_figure_is_declared_for_listings():
+    found = registry.definitions()
+    assert set(registry.families()) == {"effort", "hysteresis", "occupation", "step_response"}
+    assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
+    for figure in found.values():
+        assert figure.definition.endswith(".")
+        assert figure.unit

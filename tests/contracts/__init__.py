@@ -1,0 +1,1 @@
+"""What every element of ``bywire.plant`` and ``bywire.control`` must keep, whoever wrote it."""

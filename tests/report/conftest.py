@@ -1,0 +1,71 @@
+"""A recording such as a hard braking gives, made without the simulation."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+
+LABELS = {
+    "p_mc": ("Pa", "master-cylinder pressure"),
+    "p_pd": ("Pa", "caliper pressure"),
+    "p_ref": ("Pa", "pressure set point"),
+    "i": ("A", "motor current"),
+    "i_ref": ("A", "current set point"),
+    "i_star": ("A", "current demand"),
+    "omega": ("rad/s", "motor speed"),
+    "duty": ("1", "duty cycle"),
+    "P_el": ("W", "electrical power from battery or source"),
+    "stuck": ("1", "shaft stuck"),
+    "sat_current": ("1", "current demand saturated"),
+    "sat_duty": ("1", "duty cycle saturated"),
+}
+SHARES = {
+    "E_source": 1.0, "E_supply": 0.04, "E_copper": 0.52, "E_gear": -0.03, "E_seal": 0.15,
+    "E_damping": 0.08, "E_pipeline": 0.06, "E_stop": 0.0, "E_port": 0.0, "E_stored": 0.18,
+}
+
+
+def pressure_step(duration: float = 1.2, sample_time: float = 1e-3) -> xr.Dataset:
+    """Return a second-order pressure step from 6 to 37 bar at 0.1 s, with a 50 Hz ripple."""
+    time = np.arange(round(duration / sample_time) + 1) * sample_time
+    since = np.clip(time - 0.1, 0.0, None)
+    damping, w = 0.55, 2.0 * np.pi * 6.0
+    damped = w * np.sqrt(1.0 - damping**2)
+    wave = np.cos(damped * since) + damping * w / damped * np.sin(damped * since)
+    ripple = np.sin(2.0 * np.pi * 50.0 * time)
+    p = 6e5 + 31e5 * (1.0 - np.exp(-damping * w * since) * wave) + 2e4 * ripple
+    i = np.clip(p / 10.1e5 + 9.6 * np.exp(-10.0 * since) * (time > 0.1), None, 9.6) + 0.3 * ripple
+    omega = np.gradient(p, sample_time) / 1e5
+    power = 0.96 * i**2
+    values = {
+        "p_mc": p, "p_pd": 0.98 * p, "p_ref": np.where(time > 0.1, 37e5, 6e5), "i": i,
+        "i_ref": 1.02 * i, "i_star": i - 0.3 * ripple, "omega": omega,
+        "duty": np.clip(0.08 * i + 0.004 * omega, -1.0, 1.0), "P_el": power,
+        "stuck": np.abs(omega) < 8.0, "sat_current": i > 9.5, "sat_duty": np.abs(omega) > 400.0,
+    }
+    energy = np.cumsum(power) * sample_time
+    energies = {name: ("J", share * energy) for name, share in SHARES.items()}
+    entries = {name: (*LABELS[name], value) for name, value in values.items()} | {
+        name: (unit, name, value) for name, (unit, value) in energies.items()
+    }
+    return xr.Dataset(
+        {
+            name: ("time", np.asarray(value, dtype=float), {"units": unit, "long_name": label})
+            for name, (unit, label, value) in entries.items()
+        },
+        coords={"time": time},
+        attrs={"bywire_version": "0.1.0", "experiment": "hard-braking", "status": "ok"},
+    )
+
+
+@pytest.fixture(scope="session")
+def recording() -> xr.Dataset:
+    """1.2 s of hard braking."""
+    return pressure_step()
+
+
+@pytest.fixture(scope="session")
+def long_recording() -> xr.Dataset:
+    """60 s at 1 kHz."""
+    return pressure_step(60.0)

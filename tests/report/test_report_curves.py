@@ -1,0 +1,104 @@
+"""Loops, friction curves, energy bars and frequency responses draw what they were given."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from bywire.core.errors import ParameterError
+from bywire.report.bode import Response, bode
+from bywire.report.energy_balance import energy_balance
+from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.stribeck_curve import stribeck_curve
+
+SPEED = np.linspace(-2.0, 2.0, 81)
+TORQUES = {p: np.sign(SPEED) * (2e-3 + 1.6e-8 * p) for p in (2e5, 20e5)}
+HERTZ = np.logspace(-2, 2, 50)
+LAG = 10.0 / (1.0 + 1j * HERTZ)
+
+
+def legend_of(axes: Axes) -> list[str]:
+    legend = axes.get_legend()
+    return [] if legend is None else [text.get_text() for text in legend.get_texts()]
+
+
+def heights(axes: Axes) -> list[np.ndarray]:
+    return [np.asarray(line.get_ydata(), dtype=float) for line in axes.lines]
+
+
+def test_loop_divides_at_the_top_of_the_demand() -> None:
+    time = np.linspace(0.0, 50.0, 501)
+    demand = np.where(time <= 25.0, 0.2 * time, 10.0 - 0.2 * time)
+    ramp = xr.Dataset(
+        {
+            "p_mc": ("time", 8e5 * demand, {"units": "Pa"}),
+            "i": ("time", demand + 0.1, {"units": "A"}),
+            "i_star": ("time", demand, {"units": "A"}),
+        },
+        coords={"time": time},
+    )
+    applying, releasing = [v for v in heights(hysteresis_loop({"ramp": ramp}).axes[0]) if len(v)]
+    assert applying[0] == pytest.approx(0.1)
+    assert applying[-1] == releasing[0] == pytest.approx(5.1)
+    with pytest.raises(ParameterError, match="at least one"):
+        hysteresis_loop({})
+
+
+def test_stribeck_curve_joins_the_breakaway_torques_at_rest() -> None:
+    axes = stribeck_curve(SPEED, TORQUES).axes[0]
+    at_rest = [line.get_ydata() for line in axes.lines if list(line.get_xdata()) == [0.0, 0.0]]
+    assert np.allclose(at_rest, [[-5.2e-3, 5.2e-3], [-34e-3, 34e-3]])
+    with pytest.raises(ParameterError, match="one per speed"):
+        stribeck_curve(SPEED, {2e5: np.zeros(3)})
+
+
+def bar_lengths(figure: Figure) -> dict[str, float]:
+    """Return the length of the bars in both rows."""
+    bars = {"went to": 0.0, "came from": 0.0}
+    for patch in figure.axes[0].patches:
+        row = "came from" if patch.get_y() > 0.5 else "went to"  # type: ignore[attr-defined]
+        bars[row] += patch.get_width()  # type: ignore[attr-defined]
+    return bars
+
+
+def test_energy_bars_balance_and_negative_losses_give(recording: xr.Dataset) -> None:
+    drawn = energy_balance(recording)
+    bars = bar_lengths(drawn)
+    assert bars["went to"] == pytest.approx(bars["came from"])
+    names = legend_of(drawn.axes[0])
+    assert any(name.startswith("gear and screw (gives)") for name in names)
+    assert not any("not accounted for" in name for name in names)
+
+
+def test_energy_that_is_missing_is_shown(recording: xr.Dataset) -> None:
+    drawn = energy_balance(recording.drop_vars("E_copper"))
+    assert any("not accounted for" in name for name in legend_of(drawn.axes[0]))
+    bars = bar_lengths(drawn)
+    assert bars["went to"] == pytest.approx(bars["came from"])
+    with pytest.raises(ParameterError, match="no energy"):
+        energy_balance(recording.isel(time=slice(0, 1)))
+
+
+def test_bode_shows_decibel_and_unwrapped_degrees() -> None:
+    lag = Response("third order", HERTZ, LAG**3)
+    assert lag.magnitude_db[0] == pytest.approx(60.0, abs=0.01)
+    assert lag.phase_deg[-1] == pytest.approx(-270.0, abs=3.0)
+    upper, lower = bode([lag], gain_unit="bar/A").axes
+    assert upper.get_ylabel() == "magnitude [dB re 1 bar/A]"
+    assert lower.get_ylabel() == "phase [°]"
+    assert legend_of(upper) == ["third order"]
+
+
+def test_bode_draws_what_exists_of_a_response() -> None:
+    partial = LAG.copy()
+    partial[:3] = np.nan
+    assert np.isfinite(Response("partial", HERTZ, partial).phase_deg).sum() == len(HERTZ) - 3
+    with pytest.raises(ParameterError, match="one per frequency"):
+        Response("short", HERTZ, LAG[:-1])
+    with pytest.raises(ParameterError, match="above 0 Hz"):
+        Response("static", np.array([0.0]), np.array([1.0 + 0j]))
+    with pytest.raises(ParameterError, match="at least one"):
+        bode([])

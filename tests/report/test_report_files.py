@@ -1,0 +1,70 @@
+"""Files are whole or absent, and the same input gives the same bytes."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+from bywire.core.errors import FileError
+from bywire.report.files import figure_bytes, save_figure, write_bytes
+from bywire.report.step_response import step_response
+
+
+@pytest.mark.parametrize("kind", ["png", "svg"])
+def test_the_same_figure_gives_the_same_bytes(recording: xr.Dataset, kind: str) -> None:
+    figure = step_response(recording)
+    first = figure_bytes(figure, kind)
+    assert figure_bytes(figure, kind) == first
+    assert figure_bytes(step_response(recording), kind) == first
+
+
+def test_order_of_formats_does_not_matter(recording: xr.Dataset) -> None:
+    figure = step_response(recording)
+    figure_bytes(figure, "png")
+    assert figure_bytes(figure, "svg") == figure_bytes(step_response(recording), "svg")
+
+
+@pytest.mark.parametrize(("name", "start"), [("a.png", b"\x89PNG"), ("a.SVG", b"<?xml")])
+def test_figures_are_written_by_their_ending(
+    recording: xr.Dataset, tmp_path: Path, name: str, start: bytes
+) -> None:
+    path = save_figure(step_response(recording), tmp_path / "made" / name)
+    assert path.read_bytes().startswith(start)
+    assert [entry.name for entry in path.parent.iterdir()] == [name]
+
+
+def test_another_ending_is_refused(recording: xr.Dataset, tmp_path: Path) -> None:
+    with pytest.raises(FileError, match=r"\.png or \.svg"):
+        save_figure(step_response(recording), tmp_path / "a.bmp")
+
+
+def test_the_old_file_stays_when_writing_fails(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_bytes(tmp_path / "report.html", b"old")
+
+    def refuse(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", refuse)
+    with pytest.raises(FileError, match="No space left on device"):
+        write_bytes(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["report.html"]
+
+
+def test_a_folder_that_cannot_be_written_to_is_named(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(FileError, match=r"cannot write .*report"):
+        write_bytes(tmp_path / "file" / "report.html", b"")
+    with pytest.raises(FileError, match="cannot write"):
+        write_bytes(tmp_path, b"")
+
+
+def test_a_written_file_has_the_usual_permissions(tmp_path: Path) -> None:
+    plain = tmp_path / "plain"
+    plain.write_bytes(b"")
+    assert write_bytes(tmp_path / "ours", b"").stat().st_mode == plain.stat().st_mode

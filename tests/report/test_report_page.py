@@ -1,0 +1,174 @@
+"""The report is one valid file that loads nothing, runs nothing and believes nobody."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bywire.core.errors import FileError
+from bywire.report.bode import Response, bode
+from bywire.report.inline_figure import inline_figures
+from bywire.report.page import (
+    Banner,
+    Details,
+    FigureBlock,
+    Paragraph,
+    Section,
+    TableBlock,
+    page_html,
+    write_page,
+)
+from bywire.report.step_response import step_response
+from bywire.report.tables import text_table
+from bywire.report.time_traces import time_traces
+
+HOSTILE = '"><script>alert(1)</script><img src=http://evil.example/x onerror=\'y\'>\x00\x1b\u202e&'
+VOID = {"meta", "img", "br", "link", "input", "hr"}
+
+
+class Checker(HTMLParser):
+    """Collects tags, attributes and text; notes tags that do not match."""
+
+    def __init__(self) -> None:
+        super().__init__(convert_charrefs=True)
+        self.open: list[str] = []
+        self.faults: list[str] = []
+        self.tags: list[tuple[str, dict[str, str | None]]] = []
+        self.text = ""
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note a tag that opens."""
+        self.tags.append((tag, dict(attrs)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        """Note a tag that closes itself."""
+        self.tags.append((tag, dict(attrs)))
+
+    def handle_endtag(self, tag: str) -> None:
+        """Compare a closing tag with the open one."""
+        if not self.open or self.open.pop() != tag:
+            self.faults.append(tag)
+
+    def handle_data(self, data: str) -> None:
+        """Collect text."""
+        self.text += data
+
+
+def parsed(html: str) -> Checker:
+    checker = Checker()
+    checker.feed(html)
+    checker.close()
+    return checker
+
+
+@pytest.fixture(scope="module")
+def page(recording: xr.Dataset) -> str:
+    hertz = np.logspace(0, 2, 30)
+    figures = [
+        FigureBlock(step_response(recording), "Pressure."),
+        FigureBlock(bode([Response("plant", hertz, 1 / (1 + 1j * hertz))]), "Plant."),
+    ]
+    inputs = Details("Inputs", [Paragraph("As given."), TableBlock(text_table(["a"], [["b"]]))])
+    return page_html(
+        "Hard braking",
+        "1.2 s at 20 μs",
+        [
+            Section("Outcome", [figures[0], TableBlock(text_table(["k"], [["v"]]), "Values.")]),
+            Section("Plant", [figures[1]]),
+            Section("Inputs", [inputs]),
+        ],
+        banner=Banner("all requirements hold", "good"),
+    )
+
+
+def test_page_is_valid(page: str) -> None:
+    checker = parsed(page)
+    assert page.startswith("<!DOCTYPE html>")
+    assert (checker.open, checker.faults) == ([], [])
+    ids = Counter(attributes["id"] for _, attributes in checker.tags if "id" in attributes)
+    assert ids.most_common(1)[0][1] == 1
+    needed = set(re.findall(r'(?:href="|url\()#([^")]+)', page))
+    assert needed <= set(ids)
+
+
+def test_page_says_what_it_was_given(page: str) -> None:
+    checker = parsed(page)
+    for text in ("Hard braking", "1.2 s at 20 μs", "✓ all requirements hold", "Figure 1. Pressure.",
+                 "Figure 2. Plant.", "Table 1. Values.", "As given."):
+        assert text in checker.text
+    tags = [tag for tag, _ in checker.tags]
+    assert tags.count("svg") == 2
+    assert tags.count("details") == 1
+    assert '<a href="#section-2">Plant</a>' in page
+
+
+def test_page_loads_nothing_and_runs_nothing(page: str) -> None:
+    checker = parsed(page)
+    assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in checker.tags}
+    for _, attributes in checker.tags:
+        for name in ("src", "href", "xlink:href", "data", "srcset"):
+            assert (attributes.get(name) or "#").startswith(("#", "data:image/png;base64,"))
+        assert not [name for name in attributes if name.startswith("on")]
+    assert "http://" not in page
+    assert "https://" not in page
+    assert "@import" not in page
+
+
+def test_hostile_text_is_only_text(recording: xr.Dataset) -> None:
+    hostile = recording.copy()
+    hostile["p_mc"].attrs = {"units": "Pa", "long_name": HOSTILE}
+    figure = FigureBlock(step_response(hostile), HOSTILE)
+    table = TableBlock(text_table([HOSTILE], [[HOSTILE]]), HOSTILE)
+    blocks = [figure, table, Paragraph(HOSTILE), Details(HOSTILE, [Paragraph(HOSTILE)])]
+    html = page_html(
+        HOSTILE, HOSTILE, [Section(HOSTILE, blocks)] * 3, banner=Banner(HOSTILE, "bad")
+    )
+    checker = parsed(html)
+    assert (checker.open, checker.faults) == ([], [])
+    assert not {"script", "img"} & {tag for tag, _ in checker.tags}
+    assert not re.search(r"[\x00-\x09\x0b-\x1f\u202e]", html)
+    assert "alert(1)" in checker.text
+
+
+def test_the_same_report_gives_the_same_bytes(recording: xr.Dataset, tmp_path: Path) -> None:
+    sections = [Section("Outcome", [FigureBlock(step_response(recording), "Pressure.")])]
+    first = write_page(tmp_path / "a.html", "t", "s", sections).read_bytes()
+    assert write_page(tmp_path / "b.html", "t", "s", sections).read_bytes() == first
+
+
+def test_a_minute_of_recording_makes_a_small_report(
+    long_recording: xr.Dataset, tmp_path: Path
+) -> None:
+    blocks = [
+        FigureBlock(time_traces(long_recording), "All."),
+        FigureBlock(time_traces(long_recording, measured=long_recording), "Compared."),
+    ]
+    path = write_page(tmp_path / "report.html", "t", "s", [Section("Over time", blocks)])
+    assert path.stat().st_size < 1_000_000
+
+
+def test_figures_beyond_the_budget_become_pixels_largest_first(
+    recording: xr.Dataset, long_recording: xr.Dataset
+) -> None:
+    ripple = step_response(long_recording, "omega", None)
+    figures = [(step_response(recording, set_point=None), "small"), (ripple, "large")]
+    vector = inline_figures(figures)
+    assert [html[:4] for html in vector] == ["<svg", "<svg"]
+    mixed = inline_figures(figures, budget=sum(map(len, vector)) - 1)
+    assert [html[:4] for html in mixed] == ["<svg", "<img"]
+    assert 'alt="large"' in mixed[1]
+    assert mixed == inline_figures(figures, budget=sum(map(len, vector)) - 1)
+
+
+def test_a_report_that_cannot_be_written_is_an_input_error(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(FileError, match="cannot write"):
+        write_page(tmp_path / "file" / "report.html", "t", "s", [])

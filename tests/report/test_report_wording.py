@@ -1,0 +1,54 @@
+"""Units and amounts as people write them."""
+
+from __future__ import annotations
+
+import pytest
+
+from bywire.report.style import axis_label
+from bywire.report.wording import amount, clean, duration, unit_text
+
+
+@pytest.mark.parametrize(
+    ("symbol", "written"),
+    [
+        ("1", ""),
+        ("kg*m**2/rad**2", "kg·m²/rad²"),
+        ("m**3/(s*Pa)", "m³/(s·Pa)"),
+        ("ohm", "Ω"),
+        ("s**-1", "s⁻¹"),
+        ("percent", "%"),
+    ],
+)
+def test_units_are_written_as_in_print(symbol: str, written: str) -> None:
+    assert unit_text(symbol) == written
+
+
+@pytest.mark.parametrize(
+    ("value", "symbol", "written"),
+    [
+        (2e6, "Pa", "20 bar"),
+        (0.0070001, "m", "7 mm"),
+        (0.0, "1", "0"),
+        (None, "A", "-"),
+        (float("nan"), "A", "not defined"),
+        (float("inf"), "s", "inf s"),
+        (12.345678, "A", "12.35 A"),
+    ],
+)
+def test_amounts_are_in_display_units(value: float | None, symbol: str, written: str) -> None:
+    assert amount(value, symbol) == written
+
+
+def test_axis_labels_name_quantity_and_unit() -> None:
+    assert axis_label("motor current", "A") == "motor current [A]"
+    assert axis_label("piston travel", "m") == "piston travel [mm]"
+    assert axis_label("cost in $", "1") == r"cost in \$ [-]"
+
+
+def test_durations_choose_their_unit() -> None:
+    assert (duration(0.0423817), duration(60.0)) == ("42.4 ms", "60 s")
+
+
+def test_text_keeps_letters_of_all_scripts_and_loses_what_steers() -> None:
+    assert clean("Δp 圧力\u00a0é\nnext") == "Δp 圧力 é\nnext"
+    assert clean("\x1b\x00\u202e\ud800") == "\N{REPLACEMENT CHARACTER}" * 4
