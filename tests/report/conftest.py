@@ -66,6 +66,23 @@ def recording() -> xr.Dataset:
 
 
 @pytest.fixture(scope="session")
+def curve() -> xr.Dataset:
+    """Dry friction over speed, rest included as -0 and +0, at 2 and 20 bar."""
+    side = np.linspace(0.0, 2.0, 41)
+    sign = np.repeat([-1.0, 1.0], side.size)
+    torque = [sign * (2e-3 + 1.6e-8 * p) for p in (2e5, 20e5)]
+    return xr.Dataset(
+        {"T_fr": (("p_mc", "omega"), torque, {"units": "N*m", "long_name": "friction torque"})},
+        coords={
+            "p_mc": ("p_mc", [2e5, 20e5], {"units": "Pa"}),
+            "omega": (
+                "omega", np.append(-side[::-1], side), {"units": "rad/s", "long_name": "speed"},
+            ),
+        },
+    )
+
+
+@pytest.fixture(scope="session")
 def long_recording() -> xr.Dataset:
     """60 s at 1 kHz."""
     return pressure_step(60.0)

@@ -8,14 +8,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import energy_balance
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.stribeck_curve import stribeck_curve
+from bywire.report.tracking import tracking
 
-SPEED = np.linspace(-2.0, 2.0, 81)
-TORQUES = {p: np.sign(SPEED) * (2e-3 + 1.6e-8 * p) for p in (2e5, 20e5)}
 HERTZ = np.logspace(-2, 2, 50)
 LAG = 10.0 / (1.0 + 1j * HERTZ)
 
@@ -47,12 +46,41 @@ def test_loop_divides_at_the_top_of_the_demand() -> None:
         hysteresis_loop({})
 
 
-def test_stribeck_curve_joins_the_breakaway_torques_at_rest() -> None:
-    axes = stribeck_curve(SPEED, TORQUES).axes[0]
-    at_rest = [line.get_ydata() for line in axes.lines if list(line.get_xdata()) == [0.0, 0.0]]
-    assert np.allclose(at_rest, [[-5.2e-3, 5.2e-3], [-34e-3, 34e-3]])
-    with pytest.raises(ParameterError, match="one per speed"):
-        stribeck_curve(SPEED, {2e5: np.zeros(3)})
+def test_loop_of_a_dithered_current_is_its_average() -> None:
+    time = np.linspace(0.0, 10.0, 10_001)
+    demand = np.where(time <= 5.0, time, 10.0 - time)
+    ripple = np.sin(2.0 * np.pi * 50.0 * time)
+    ramp = xr.Dataset(
+        {
+            "p_mc": ("time", 8e5 * demand, {"units": "Pa"}),
+            "i": ("time", demand + ripple, {"units": "A"}),
+        },
+        coords={"time": time},
+    )
+    drawn = hysteresis_loop({"dithered": ramp}, average=0.02).axes[0]
+    raw, applying, releasing, _ = heights(drawn)
+    assert raw.max() > 5.5
+    assert max(applying.max(), releasing.max()) < 5.05
+
+
+def test_stribeck_curve_is_vertical_at_rest(curve: xr.Dataset) -> None:
+    drawn = stribeck_curve(curve, measured={2e5: (np.array([1.0]), np.array([5e-3]))})
+    axes = drawn.axes[0]
+    assert legend_of(axes) == ["2 bar", "2 bar, measured", "20 bar"]
+    speed, torque = (np.asarray(v) for v in axes.lines[0].get_data())
+    assert np.allclose(torque[speed == 0], [-5.2e-3, 5.2e-3])
+    with pytest.raises(UnknownNameError, match="T_fr"):
+        stribeck_curve(curve, torque="T_f")
+    with pytest.raises(ParameterError, match="pressure and speed"):
+        stribeck_curve(curve.isel(p_mc=0))
+
+
+def test_tracking_shows_the_error(recording: xr.Dataset) -> None:
+    error = heights(tracking(recording).axes[1])[0]
+    wanted = (recording["p_ref"] - recording["p_mc"]).values / 1e5
+    assert np.allclose(error, wanted)
+    with pytest.raises(ParameterError, match="name a set point"):
+        tracking(recording, "p_mc", "i_ref")
 
 
 def bar_lengths(figure: Figure) -> dict[str, float]:

@@ -21,11 +21,10 @@ from bywire.report.step_marks import StepFacts, StepLimits
 from bywire.report.step_response import step_response
 from bywire.report.stribeck_curve import stribeck_curve
 from bywire.report.time_traces import Panel, Trace, time_traces
+from bywire.report.tracking import tracking
 
 LIMITS = StepLimits(start=0.1, before=6e5, after=37e5, overshoot=0.15)
 FACTS = StepFacts(rise_time=0.042, settling_time=0.187, overshoot=0.126)
-SPEED = np.linspace(-2.0, 2.0, 81)
-TORQUES = {p: np.sign(SPEED) * (2e-3 + 1.6e-8 * p) for p in (2e5, 20e5)}
 HERTZ = np.logspace(-2, 2, 50)
 LAG = 10.0 / (1.0 + 1j * HERTZ)
 
@@ -35,16 +34,18 @@ DRAWN: dict[str, Callable[[xr.Dataset], Figure]] = {
     "step": lambda r: step_response(r, limits=LIMITS, facts=FACTS),
     "step compared": lambda r: step_response(r, limits=LIMITS, measured=r),
     "loop": lambda r: hysteresis_loop({"with dither": r, "without": r}),
-    "stribeck": lambda r: stribeck_curve(
-        SPEED, TORQUES, measured={2e5: (SPEED[::9], TORQUES[2e5][::9])}
-    ),
-    "energy": lambda r: energy_balance(r),
+    "tracking": tracking,
+    "energy": energy_balance,
     "bode": lambda r: bode([Response("plant", HERTZ, LAG)], marks={"crossover 10 Hz": 10.0}),
 }
 
 
-@pytest.fixture(params=sorted(DRAWN))
-def figure(request: pytest.FixtureRequest, recording: xr.Dataset) -> Figure:
+@pytest.fixture(params=[*sorted(DRAWN), "stribeck"])
+def figure(
+    request: pytest.FixtureRequest, recording: xr.Dataset, curve: xr.Dataset
+) -> Figure:
+    if request.param == "stribeck":
+        return stribeck_curve(curve)
     return DRAWN[request.param](recording)
 
 
@@ -124,6 +125,12 @@ def test_a_falling_step_is_judged_downward(recording: xr.Dataset) -> None:
     assert np.allclose(drawn["overshoot limit 15 %"].get_ydata(), -37.0 - 0.15 * 31.0)
 
 
+def test_no_overshoot_is_said_but_not_marked(recording: xr.Dataset) -> None:
+    axes = step_response(recording, limits=LIMITS, facts=StepFacts(overshoot=0.0)).axes[0]
+    drawn = {str(line.get_label()): line for line in axes.lines}
+    assert len(np.asarray(drawn["overshoot: 0 %"].get_xdata())) == 0
+
+
 def test_facts_that_do_not_exist_are_not_drawn(recording: xr.Dataset) -> None:
     facts = StepFacts(rise_time=float("nan"), settling_time=None)
     axes = step_response(recording, limits=LIMITS, facts=facts).axes[0]
@@ -187,6 +194,6 @@ def test_unknown_variables_and_unselected_cases_are_explained(recording: xr.Data
 
 def test_labels_are_never_read_as_formulas(recording: xr.Dataset) -> None:
     hostile = recording.copy()
-    hostile["p_mc"].attrs = {"units": "Pa", "long_name": "cost $\\frac{ in \x1b[31m 圧力"}
+    hostile["p_mc"].attrs = {"units": "Pa", "long_name": "cost $\\frac{ in \x1b[31m 圧力\n" * 9}
     assert figure_bytes(step_response(hostile, limits=LIMITS), "svg").startswith(b"<?xml")
     assert figure_bytes(hysteresis_loop({"$\\bad{$": hostile}), "png").startswith(b"\x89PNG")

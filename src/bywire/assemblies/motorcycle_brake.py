@@ -97,6 +97,7 @@ class MotorcycleBrake:
     Output: ClassVar = Output
     frictions: ClassVar[tuple[str, ...]] = ("omega",)
     limits: ClassVar[tuple[str, ...]] = ("p_mc",)
+    usually_open: ClassVar[tuple[bool, ...]] = (True, True)
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the ECU's task, or that of an ideal source."""

@@ -1,27 +1,24 @@
-/* The motorcycle brake and its ECU, written by hand: what an engineer would write for this one
- * brake and this one time-stepping scheme, and the yardstick for bywire's compiled kernels.
+/* The motorcycle brake and its ECU, written by hand for this one brake, its default choices
+ * (peers/hand_c.py lists them) and one time-stepping scheme: the yardstick for bywire's kernels.
  *
  * Implicit midpoint with the midpoint predicted from the last increment, one dry friction
  * projected on the end-of-step speed, two end stops, and a chamber pressure that cannot fall
- * below zero. Everything but the shaft's row is eliminated on paper, see struct Held.
- *
- * It covers the default choices only: drive.mode pressure, gear.law paper, caliper.law linear,
- * no air, port.law makeup, a quantized converter, sine dither in front of the low-pass filter,
- * the sensor at the master cylinder.
+ * below zero. All rows but the shaft's are eliminated on paper, see struct Held.
  *
  * The line below is replaced by enums P_, X_, M_, U_, E_ and O_ of parameters, state, memory,
- * stimulus, energies and outputs, generated from the model (peers/hand_c.py). */
+ * stimulus, energies and outputs, generated from the model. */
 #include "hand_written_indices.h"
-
 #include <math.h>
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #define PI 3.14159265358979323846
 #define CAP 8            /* passes after which a substep whose contacts change is let go */
 #define FAR_DECAYED 40.0 /* exp(-40) is far below the last digit of 1 */
-#define INLINE static inline __attribute__((always_inline))
 #define BRINK 1e-9       /* share of the stroke at which a stop counts as near */
+/* gcc -O2 leaves the two large pieces of a substep out of line, and they take a third longer. */
+#define INLINE static inline __attribute__((always_inline))
 
 /* What a run carries from call to call; all doubles, so that an array can hold it. */
 typedef struct {
@@ -33,19 +30,22 @@ typedef struct {
 /* Factors that depend on parameters and step only. */
 typedef struct {
     const double *raw;
-    double h, half;            /* step, half of it */
-    double M, M_kin;           /* inertia of eq. (8), and the one that stores energy */
-    double a;                  /* h/2 k_g A_mc: shaft speed to chamber volume, and back */
-    double K_lf, pd_gain;      /* pipe resistance; caliper's share of a pressure difference */
-    double g;                  /* h/2 / K_lf with the caliper eliminated */
-    double V0, V1;             /* (chamber volume)/beta + g = V0 - V1 theta */
-    double brk_p, brk_n;       /* k_brk - 1 */
-    double T_pr, f_p, f_n, mu; /* friction times the step */
-    double c, still;             /* speed beyond which the Stribeck peak has vanished */
-    double tau, th_rest, th_end; /* end stops: damping time, and a hair inside them as angles */
-    double aa, p_gain, p_zero, i_gain, i_zero; /* anti-alias filter; sensors to shares */
-    double lp_g, lp_a;         /* low-pass filter of the ECU */
-    double c1, c2, c3;         /* series of the flow energy, see pipe_loss */
+    double h, half, quarter;     /* step, and parts of it */
+    double L, K_e, V_bat, R_bat; /* motor and battery */
+    double k_g, eta, J_mot, M;   /* gear; M is the inertia of eq. (8) */
+    double A, k_damp, beta, pads; /* piston, damping, bulk modulus, compliance of the caliper */
+    double a, aa, two_a;         /* h/2 k_g A_mc: shaft to chamber and back; its square, twice it */
+    double K_lf, pd_gain;        /* pipe resistance; caliper's share of a pressure difference */
+    double g, two_g;             /* h/2 / K_lf with the caliper eliminated; twice it */
+    double V0, V1;               /* (chamber volume)/beta + g = V0 - V1 theta */
+    double brk_p, brk_n;         /* k_brk - 1 */
+    double T_pr, f_p, f_n, mu;   /* friction times the step */
+    double c, still;             /* Stribeck decay, and the speed beyond which nothing is left */
+    double k_stop, x_rest, x_end, tau; /* end stops */
+    double th_mid, th_free;      /* middle of the free stroke and what is free to both sides */
+    double lag, p_gain, p_zero, i_gain, i_zero; /* anti-alias filter; sensors to shares */
+    double lp_g, lp_a;           /* low-pass filter of the ECU */
+    double c1, c2, c3;           /* series of the flow energy, see pipe_loss */
 } Plant;
 
 /* Factors that also depend on the duty cycle, which the ECU holds for a tick.
@@ -57,11 +57,7 @@ typedef struct {
  * put into the shaft's row give
  *     S om+ = c + h T_fr,  S = M + loss + a^2/P,
  *     c = (M - loss - a^2/P) om + eta_i ((1 + alpha) i + drive) - 2 a (p_mc - g (p_mc - p_pd)/P) */
-typedef struct {
-    double alpha, drive, gamma; /* the winding's row */
-    double ahead, behind;       /* M + loss, M - loss */
-    double from_i, constant;    /* eta_i (1 + alpha), eta_i drive */
-} Held;
+typedef struct { double alpha, drive, gamma, ahead, behind, from_i, constant; } Held;
 
 /* State between substeps, and sums over the substeps of a tick: midpoint values, most of them
  * twice or squared twice, whose constant factors wait for the end of the tick. */
@@ -74,83 +70,66 @@ typedef struct {
 } Sim;
 
 /* Which of the stops push, as stiffnesses, and whether the chamber is held at zero pressure. */
-typedef struct {
-    bool touching, held;
-    double k_near, k_far;
-} Sides;
+typedef struct { bool touching, held; double k_near, k_far; } Sides;
+typedef struct { double om, i, dpm, dpd, impulse; } Pass;
 
-typedef struct {
-    double om, i, dpm, dpd, impulse;
-} Pass;
-
-static inline double max2(double a, double b) { return a > b ? a : b; }
-static inline double min2(double a, double b) { return a < b ? a : b; }
-static inline double clip(double x, double low, double high) { return min2(max2(x, low), high); }
+INLINE double max2(double a, double b) { return a > b ? a : b; }
+INLINE double min2(double a, double b) { return a < b ? a : b; }
+INLINE double clip(double x, double low, double high) { return min2(max2(x, low), high); }
 
 static Plant prepare(const double *p, double h)
 {
-    Plant k = {.raw = p, .h = h, .half = 0.5 * h};
-    const double k_g = p[P_gear_k_g], A = p[P_master_cylinder_A_mc], beta = p[P_fluid_beta];
+    Plant k = {.raw = p, .h = h, .half = 0.5 * h, .quarter = 0.25 * h};
+    k.L = p[P_motor_L_m], k.K_e = p[P_motor_K_e];
+    k.V_bat = p[P_supply_V_bat], k.R_bat = p[P_supply_R_bat];
+    k.k_g = p[P_gear_k_g], k.eta = p[P_gear_eta_g], k.J_mot = p[P_gear_J_mot];
+    k.M = k.eta * k.J_mot + k.k_g * k.k_g * p[P_gear_M_mc];
+    k.A = p[P_master_cylinder_A_mc], k.k_damp = p[P_master_cylinder_k_damp];
+    k.a = k.half * k.k_g * k.A, k.aa = k.a * k.a, k.two_a = 2.0 * k.a;
     const double A_pl = PI / 4.0 * p[P_pipeline_d_pl] * p[P_pipeline_d_pl];
-    const double spring = p[P_caliper_A_pd] * p[P_caliper_A_pd] / p[P_caliper_K_pd];
-    k.M = p[P_gear_eta_g] * p[P_gear_J_mot] + k_g * k_g * p[P_gear_M_mc];
-    k.M_kin = p[P_gear_J_mot] + k_g * k_g * p[P_gear_M_mc];
-    k.a = k.half * k_g * A;
     k.K_lf = p[P_pipeline_k_lf] * p[P_fluid_nu] * p[P_fluid_rho] * PI * p[P_pipeline_L_pl]
              / (A_pl * A_pl);
+    k.pads = p[P_caliper_A_pd] * p[P_caliper_A_pd] / p[P_caliper_K_pd];
     const double conductance = k.half / k.K_lf;
-    k.pd_gain = conductance / (spring + conductance);
-    k.g = conductance * (1.0 - k.pd_gain);
-    k.V0 = A * p[P_master_cylinder_s_mc] / beta + k.g;
-    k.V1 = A * k_g / beta;
-    k.brk_p = p[P_seal_k_brk_p] - 1.0;
-    k.brk_n = p[P_seal_k_brk_n] - 1.0;
-    k.T_pr = h * p[P_seal_T_pr];
-    k.f_p = h * p[P_seal_f_cfr_p];
-    k.f_n = h * p[P_seal_f_cfr_n];
-    k.mu = h * p[P_seal_mu_T];
-    k.c = p[P_seal_c];
-    k.still = FAR_DECAYED / p[P_seal_c];
-    const double x_rest = p[P_master_cylinder_x_rest], x_end = p[P_master_cylinder_x_end];
-    k.tau = p[P_stop_tau_stop];
-    k.th_rest = (x_rest + BRINK * (x_end - x_rest)) / k_g;
-    k.th_end = (x_end - BRINK * (x_end - x_rest)) / k_g;
-    const double a_aa = 2.0 * PI * p[P_anti_alias_f_aa];
-    k.aa = h * a_aa / (1.0 + k.half * a_aa);
+    k.pd_gain = conductance / (k.pads + conductance);
+    k.g = conductance * (1.0 - k.pd_gain), k.two_g = 2.0 * k.g;
+    k.beta = p[P_fluid_beta];
+    k.V0 = k.A * p[P_master_cylinder_s_mc] / k.beta + k.g, k.V1 = k.A * k.k_g / k.beta;
+    k.brk_p = p[P_seal_k_brk_p] - 1.0, k.brk_n = p[P_seal_k_brk_n] - 1.0;
+    k.f_p = h * p[P_seal_f_cfr_p], k.f_n = h * p[P_seal_f_cfr_n];
+    k.T_pr = h * p[P_seal_T_pr], k.mu = h * p[P_seal_mu_T];
+    k.c = p[P_seal_c], k.still = FAR_DECAYED / k.c;
+    k.k_stop = p[P_stop_k_stop], k.tau = p[P_stop_tau_stop];
+    k.x_rest = p[P_master_cylinder_x_rest], k.x_end = p[P_master_cylinder_x_end];
+    k.th_mid = 0.5 * (k.x_end + k.x_rest) / k.k_g;
+    k.th_free = (0.5 - BRINK) * (k.x_end - k.x_rest) / k.k_g;
+    const double w_aa = 2.0 * PI * p[P_anti_alias_f_aa];
+    k.lag = h * w_aa / (1.0 + k.half * w_aa);
     k.p_gain = 1.0 / (p[P_pressure_sensor_p_high] - p[P_pressure_sensor_p_low]);
     k.p_zero = (p[P_fluid_p_atm] - p[P_pressure_sensor_p_low]) * k.p_gain;
     k.i_gain = 1.0 / (p[P_current_sensor_i_high] - p[P_current_sensor_i_low]);
     k.i_zero = -p[P_current_sensor_i_low] * k.i_gain;
     k.lp_g = tan(PI * p[P_ecu_filter_f_c] * p[P_ecu_T_s]);
     k.lp_a = 1.0 / (1.0 + 2.0 * p[P_ecu_filter_zeta] * k.lp_g + k.lp_g * k.lp_g);
-    k.c1 = 1.0 / (2.0 * beta);
-    k.c2 = k.c1 / (3.0 * beta);
-    k.c3 = k.c2 / (4.0 * beta);
+    k.c1 = 1.0 / (2.0 * k.beta), k.c2 = k.c1 / (3.0 * k.beta), k.c3 = k.c2 / (4.0 * k.beta);
     return k;
 }
 
 static Held hold(const Plant *k, double duty)
 {
-    const double *p = k->raw;
-    const double R = p[P_motor_R_m] + p[P_supply_R_bat] * duty * duty;
-    const double pivot = 1.0 / (p[P_motor_L_m] + k->half * R);
-    const double eta_i = k->half * p[P_gear_eta_g] * p[P_motor_K_e];
-    Held u;
-    u.alpha = (p[P_motor_L_m] - k->half * R) * pivot;
-    u.drive = k->h * p[P_supply_V_bat] * duty * pivot;
-    u.gamma = k->half * p[P_motor_K_e] * pivot;
-    const double k_g = p[P_gear_k_g];
-    const double loss = eta_i * u.gamma + k->half * k_g * k_g * p[P_master_cylinder_k_damp];
-    u.ahead = k->M + loss;
-    u.behind = k->M - loss;
-    u.from_i = eta_i * (1.0 + u.alpha);
-    u.constant = eta_i * u.drive;
+    const double R = k->raw[P_motor_R_m] + k->R_bat * duty * duty;
+    const double pivot = 1.0 / (k->L + k->half * R), eta_i = k->half * k->eta * k->K_e;
+    Held u = {.alpha = (k->L - k->half * R) * pivot, .gamma = k->half * k->K_e * pivot,
+              .drive = k->h * k->V_bat * duty * pivot};
+    const double loss = eta_i * u.gamma + k->half * k->k_g * k->k_g * k->k_damp;
+    u.ahead = k->M + loss, u.behind = k->M - loss;
+    u.from_i = eta_i * (1.0 + u.alpha), u.constant = eta_i * u.drive;
     return u;
 }
 
-/* Flow energy that the pipe turns into heat, over (a - b): with h(p) the series of
- * beta (exp(p/beta) - 1) to the fourth power, (h(a) - h(b)) / (a - b). */
-static inline double pipe_loss(const Plant *k, double a, double b)
+/* (h(a) - h(b)) / (a - b) for the energy h that a volume flow carries at a pressure p,
+ * the series of beta (exp(p/beta) - 1) to the fourth power: what the pipe turns into heat. */
+INLINE double pipe_loss(const Plant *k, double a, double b)
 {
     const double s = a + b, t = a * a + b * b;
     return 1.0 + s * (k->c1 + k->c3 * t) + k->c2 * (t + a * b);
@@ -160,23 +139,19 @@ static inline double pipe_loss(const Plant *k, double a, double b)
  * belongs to stops and limit is not compiled into it. */
 INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
 {
-    /* First what exp needs: from speed to speed it is the longest chain of a substep. */
     const double speed = fabs(s->om + s->dom);
     const double decay = speed < k->still ? exp(-k->c * speed) : 0.0;
 
-    const double drop = s->pm - s->pd;
-    const double r = 1.0 / (k->V0 - k->V1 * (s->th + s->dth));
-    const double spring = side.held ? 0.0 : k->a * k->a * r;
+    const double drop = s->pm - s->pd, r = 1.0 / (k->V0 - k->V1 * (s->th + s->dth));
+    const double spring = side.held ? 0.0 : k->aa * r;
     const double p_mean = side.held ? 0.5 * s->pm : s->pm - k->g * r * drop;
     double S = u->ahead + spring;
-    double c = (u->behind - spring) * s->om + u->from_i * s->i + u->constant - 2.0 * k->a * p_mean;
+    double c = (u->behind - spring) * s->om + u->from_i * s->i + u->constant - k->two_a * p_mean;
     if (side.touching) {
-        const double *p = k->raw, k_g = p[P_gear_k_g], stiff = side.k_near + side.k_far;
-        const double x = k_g * (s->th + k->tau * s->om);
-        const double force = side.k_near * (x - p[P_master_cylinder_x_rest])
-                             + side.k_far * (x - p[P_master_cylinder_x_end]);
-        S += k->half * k_g * k_g * stiff * (k->half + k->tau);
-        c -= k->half * k_g * (2.0 * force + k_g * stiff * (k->half - k->tau) * s->om);
+        const double stiff = side.k_near + side.k_far, x = k->k_g * (s->th + k->tau * s->om);
+        const double force = side.k_near * (x - k->x_rest) + side.k_far * (x - k->x_end);
+        S += k->half * k->k_g * k->k_g * stiff * (k->half + k->tau);
+        c -= k->half * k->k_g * (2.0 * force + k->k_g * stiff * (k->half - k->tau) * s->om);
     }
 
     /* Friction opposes the speed that would come without it, and at most stops the shaft. */
@@ -190,17 +165,23 @@ INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
     q.impulse = -copysign(min2(fabs(c), limit), c);
     const double both = s->om + q.om;
     q.i = u->alpha * s->i + u->drive - u->gamma * both;
-    q.dpm = side.held ? -s->pm : r * (k->a * both - 2.0 * k->g * drop);
+    q.dpm = side.held ? -s->pm : r * (k->a * both - k->two_g * drop);
     q.dpd = k->pd_gain * (2.0 * drop + q.dpm);
     return q;
+}
+
+INLINE void predict(const Plant *k, Sim *s, Pass q)
+{
+    s->di = 0.5 * (q.i - s->i), s->dth = k->quarter * (s->om + q.om);
+    s->dom = 0.5 * (q.om - s->om), s->dpm = 0.5 * q.dpm;
 }
 
 INLINE void commit(const Plant *k, Sim *s, Pass q)
 {
     const double p_share = clip(k->p_gain * (s->pm + s->dpm) + k->p_zero, 0.0, 1.0);
     const double i_share = clip(k->i_gain * (s->i + s->di) + k->i_zero, 0.0, 1.0);
-    s->yp += k->aa * (p_share - s->yp);
-    s->yi += k->aa * (i_share - s->yi);
+    s->yp += k->lag * (p_share - s->yp);
+    s->yi += k->lag * (i_share - s->yi);
 
     const double two_i = s->i + q.i, two_om = s->om + q.om;
     const double pm = s->pm + 0.5 * q.dpm, pd = s->pd + 0.5 * q.dpd;
@@ -212,48 +193,34 @@ INLINE void commit(const Plant *k, Sim *s, Pass q)
     s->sum_pipe += (pm - pd) * (pm - pd) * pipe_loss(k, pm, pd);
     s->stuck += two_om == 0.0 ? 1.0 : 0.0;
 
-    s->impulse = q.impulse;
-    s->di = 0.5 * (q.i - s->i);
-    s->dth = 0.5 * k->half * two_om;
-    s->dom = 0.5 * (q.om - s->om);
-    s->dpm = 0.5 * q.dpm;
-    s->i = q.i;
+    predict(k, s, q);
+    s->impulse = q.impulse, s->i = q.i;
     s->th += k->half * two_om;
-    s->om = q.om;
-    s->pm += q.dpm;
-    s->pd += q.dpd;
-}
-
-INLINE bool clear_of_stops(const Plant *k, double th)
-{
-    return th > k->th_rest && th < k->th_end;
+    s->om = q.om, s->pm += q.dpm, s->pd += q.dpd;
 }
 
 static Sides touching_sides(const Plant *k, double th, double om)
 {
-    const double *p = k->raw, x = p[P_gear_k_g] * th, lag = k->tau * (p[P_gear_k_g] * om);
-    Sides side = {.touching = true};
-    side.k_near = p[P_master_cylinder_x_rest] - x - lag > 0.0 ? p[P_stop_k_stop] : 0.0;
-    side.k_far = x - p[P_master_cylinder_x_end] + lag > 0.0 ? p[P_stop_k_stop] : 0.0;
-    return side;
+    const double x = k->k_g * th, ahead = k->tau * (k->k_g * om);
+    return (Sides){.touching = true,
+                   .k_near = k->x_rest - x - ahead > 0.0 ? k->k_stop : 0.0,
+                   .k_far = x - k->x_end + ahead > 0.0 ? k->k_stop : 0.0};
 }
 
 /* Book what only a substep at a stop or at the limit has: reactions and their energies. */
 static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
 {
-    const double *p = k->raw, k_g = p[P_gear_k_g], both = s->om + q.om;
-    const double x = k_g * (s->th + 0.5 * k->half * both), v = k_g * 0.5 * both;
-    const double near_depth = p[P_master_cylinder_x_rest] - x;
-    const double far_depth = x - p[P_master_cylinder_x_end];
-    s->near_stop = side.k_near * (near_depth - k->tau * v);
-    s->far_stop = side.k_far * (far_depth + k->tau * v);
-    const double elastic = p[P_stop_k_stop] * (max2(far_depth, 0.0) - max2(near_depth, 0.0));
+    const double both = s->om + q.om, v = k->k_g * 0.5 * both;
+    const double x = k->k_g * (s->th + k->quarter * both);
+    const double near = k->x_rest - x, far = x - k->x_end;
+    s->near_stop = side.k_near * (near - k->tau * v);
+    s->far_stop = side.k_far * (far + k->tau * v);
+    const double elastic = k->k_stop * (max2(far, 0.0) - max2(near, 0.0));
     s->sum_stop += (s->far_stop - s->near_stop - elastic) * v;
     s->makeup = 0.0;
     if (side.held) { /* what the chamber's balance lacks, the reservoir adds */
-        const double compliance = k->V0 - k->V1 * (s->th + s->dth);
-        s->makeup = (compliance * q.dpm - k->a * both + 2.0 * k->g * (s->pm - s->pd)) / k->h;
-        const double pm = s->pm + 0.5 * q.dpm;
+        const double P = k->V0 - k->V1 * (s->th + s->dth), pm = s->pm + 0.5 * q.dpm;
+        s->makeup = (P * q.dpm - k->a * both + k->two_g * (s->pm - s->pd)) / k->h;
         s->sum_port -= s->makeup * pm * pipe_loss(k, pm, 0.0);
     }
 }
@@ -261,71 +228,75 @@ static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
 /* A substep near a stop or with the pressure about to fall below zero. The first pass knows no
  * limit, as the ordinary substep; where it does not hold, passes with limit follow, each with
  * the contacts at the midpoint that the one before gave. */
-static __attribute__((noinline)) Sim careful(const Plant *k, const Held *u, Sim s)
+static void careful(const Plant *k, const Held *u, Sim *s)
 {
     for (int pass = 0;; pass++) {
-        Sides side = touching_sides(k, s.th + s.dth, s.om + s.dom);
-        Pass q = solve(k, u, &s, side);
-        bool settled = s.pm + q.dpm >= 0.0;
+        Sides side = touching_sides(k, s->th + s->dth, s->om + s->dom);
+        Pass q = solve(k, u, s, side);
+        bool settled = s->pm + q.dpm >= 0.0;
         if (!settled && pass > 0) {
-            side.held = true;
-            q = solve(k, u, &s, side);
-            settled = true;
+            side.held = settled = true;
+            q = solve(k, u, s, side);
         }
-        const double both = s.om + q.om;
-        const Sides after = touching_sides(k, s.th + 0.5 * k->half * both, 0.5 * both);
+        const double both = s->om + q.om;
+        const Sides after = touching_sides(k, s->th + k->quarter * both, 0.5 * both);
         settled &= side.k_near == after.k_near && side.k_far == after.k_far;
         if (settled || pass == CAP) {
-            s.repeated += pass > 0;
-            s.unsettled += !settled;
-            book_sides(k, &s, q, side);
-            commit(k, &s, q);
-            return s;
+            s->repeated += pass > 0;
+            s->unsettled += !settled;
+            book_sides(k, s, q, side);
+            commit(k, s, q);
+            return;
         }
-        if (pass > 0) {
-            s.di = 0.5 * (q.i - s.i);
-            s.dth = 0.5 * k->half * both;
-            s.dom = 0.5 * (q.om - s.om);
-            s.dpm = 0.5 * q.dpm;
-        }
+        if (pass > 0)
+            predict(k, s, q);
     }
 }
 
-INLINE Sim substep(const Plant *k, const Held *u, Sim s)
+INLINE bool free_of_stops(const Plant *k, double th, double om)
 {
-    const double th = s.th + s.dth, om = s.om + s.dom;
-    if (clear_of_stops(k, th + k->tau * om)) {
+    return fabs(th - k->th_mid) + k->tau * fabs(om) < k->th_free;
+}
+
+/* Ordinary substeps, away from stops and limit: at most n; return how many. They work on a copy
+ * of the state whose address nobody else has, so that the compiler may keep it in registers. */
+static int64_t advance(const Plant *k, const Held *u, Sim *state, int64_t n)
+{
+    Sim s = *state;
+    int64_t done = 0;
+    for (; done < n && free_of_stops(k, s.th + s.dth, s.om + s.dom); done++) {
         const Pass q = solve(k, u, &s, (Sides){.touching = false, .held = false});
-        const double om_mid = 0.5 * (s.om + q.om), th_mid = s.th + k->half * om_mid;
-        if (s.pm + q.dpm >= 0.0 && clear_of_stops(k, th_mid)
-            && clear_of_stops(k, th_mid + k->tau * om_mid)) {
-            commit(k, &s, q);
-            return s;
-        }
+        const double both = s.om + q.om;
+        if (s.pm + q.dpm < 0.0 || !free_of_stops(k, s.th + k->quarter * both, 0.5 * both))
+            break;
+        commit(k, &s, q);
     }
-    return careful(k, u, s);
+    if (done)
+        s.makeup = s.near_stop = s.far_stop = 0.0;
+    *state = s;
+    return done;
 }
 
 /* The ECU's tick: convert, pressure PID, dither, low-pass, current PI. */
 static void tick(const Plant *k, Saved *z, const double *u)
 {
-    const double *p = k->raw, T = p[P_ecu_T_s], codes = p[P_adc_codes];
+    const double *p = k->raw, T = p[P_ecu_T_s], codes = p[P_adc_codes], noise = p[P_adc_noise];
     double *m = z->m;
-    const double y_p = z->x[X_y_p] + p[P_adc_noise] * u[U_noise_p];
-    const double y_i = z->x[X_y_i] + p[P_adc_noise] * u[U_noise_i];
-    const double p_share = clip(floor(y_p * codes + 0.5) / codes, 0.0, 1.0);
-    const double i_share = clip(floor(y_i * codes + 0.5) / codes, 0.0, 1.0);
+    const double code_p = floor((z->x[X_y_p] + noise * u[U_noise_p]) * codes + 0.5);
+    const double code_i = floor((z->x[X_y_i] + noise * u[U_noise_i]) * codes + 0.5);
     const double p_low = p[P_pressure_sensor_p_low], i_low = p[P_current_sensor_i_low];
-    const double p_meas = p_low + p_share * (p[P_pressure_sensor_p_high] - p_low) - p[P_ecu_p_atm];
-    const double i_meas = i_low + i_share * (p[P_current_sensor_i_high] - i_low);
+    const double p_span = p[P_pressure_sensor_p_high] - p_low;
+    const double i_span = p[P_current_sensor_i_high] - i_low;
+    const double p_meas = p_low + clip(code_p / codes, 0.0, 1.0) * p_span - p[P_ecu_p_atm];
+    const double i_meas = i_low + clip(code_i / codes, 0.0, 1.0) * i_span;
 
-    const double p_ref = u[U_p_set];
+    const double p_ref = u[U_p_set], i_max = p[P_ecu_pressure_i_max];
     const double signal = p[P_ecu_pressure_c] * p_ref - p_meas, tau_d = p[P_ecu_pressure_tau_d];
     const double slope = (tau_d * m[M_pid_slope] + p[P_ecu_pressure_k_d] * (signal - m[M_pid_last]))
                          / (tau_d + T);
     const double i_wanted = p[P_ecu_pressure_k_p] * (p[P_ecu_pressure_b] * p_ref - p_meas)
                             + m[M_pid_integral] + slope;
-    const double i_max = p[P_ecu_pressure_i_max], i_star = clip(i_wanted, -i_max, i_max);
+    const double i_star = clip(i_wanted, -i_max, i_max);
     m[M_pid_integral] += T * (p[P_ecu_pressure_k_i] * (p_ref - p_meas)
                               + (i_star - i_wanted) / p[P_ecu_pressure_T_t]);
 
@@ -343,87 +314,76 @@ static void tick(const Plant *k, Saved *z, const double *u)
     const double error = i_ref - i_meas, D_ecu = p[P_ecu_current_D_max];
     const double wanted = p[P_ecu_current_k_p] * error + m[M_pi_integral];
     const double asked = clip(wanted, -D_ecu, D_ecu);
-    const double duty = clip(asked, -p[P_bridge_D_max], p[P_bridge_D_max]);
-    m[M_pi_integral] += T * (p[P_ecu_current_k_i] * error
-                             + (asked - wanted) / p[P_ecu_current_T_t]);
+    m[M_duty] = clip(asked, -p[P_bridge_D_max], p[P_bridge_D_max]);
+    m[M_pi_integral] += T * (p[P_ecu_current_k_i] * error + (asked - wanted) / p[P_ecu_current_T_t]);
 
-    m[M_p_meas] = p_meas, m[M_i_meas] = i_meas, m[M_p_ref] = p_ref;
-    m[M_i_star] = i_star, m[M_i_dit] = i_dit, m[M_i_ref] = i_ref, m[M_duty] = duty;
-    m[M_sat_current] = fabs(i_star) >= i_max ? 1.0 : 0.0;
-    m[M_sat_duty] = fabs(duty) >= D_ecu ? 1.0 : 0.0;
-    m[M_pid_slope] = slope, m[M_pid_last] = signal;
+    m[M_p_meas] = p_meas, m[M_i_meas] = i_meas, m[M_pid_slope] = slope, m[M_pid_last] = signal;
+    m[M_p_ref] = p_ref, m[M_i_star] = i_star, m[M_i_dit] = i_dit, m[M_i_ref] = i_ref;
+    m[M_sat_current] = fabs(i_star) >= i_max;
+    m[M_sat_duty] = fabs(m[M_duty]) >= D_ecu;
 }
 
 /* Integral of the flow energy over pressure, 0 to q: beta times the energy stored per volume. */
-static double stored_density(const Plant *k, double q)
+static double density(const Plant *k, double q)
 {
-    const double z = q / k->raw[P_fluid_beta];
+    const double z = q / k->beta;
     return 0.5 * q * q * (1.0 + z / 3.0 * (1.0 + z / 4.0 * (1.0 + z / 5.0)));
 }
 
 static void record(const Plant *k, const Saved *z, double *o)
 {
     const double *p = k->raw, *x = z->x, *m = z->m, *e = z->e;
-    const double k_g = p[P_gear_k_g], A = p[P_master_cylinder_A_mc], K_e = p[P_motor_K_e];
-    const double i = x[X_i], om = x[X_omega], p_mc = x[X_p_mc], duty = m[M_duty];
-    const double x_mc = k_g * x[X_theta], v_mc = k_g * om, torque = K_e * i;
-    const double q = (p_mc - x[X_p_pd]) / k->K_lf, F_stop = z->far_stop - z->near_stop;
-    const double force = p_mc * A + p[P_master_cylinder_k_damp] * v_mc + F_stop;
-    const double accel = (p[P_gear_eta_g] * torque - k_g * force + z->friction) / k->M;
-    const double near = max2(p[P_master_cylinder_x_rest] - x_mc, 0.0);
-    const double far = max2(x_mc - p[P_master_cylinder_x_end], 0.0);
-    const double area = p[P_caliper_A_pd];
+    const double i = x[X_i], om = x[X_omega], p_mc = x[X_p_mc], p_pd = x[X_p_pd];
+    const double x_mc = k->k_g * x[X_theta], torque = k->K_e * i, duty = m[M_duty];
+    const double q = (p_mc - p_pd) / k->K_lf, F_stop = z->far_stop - z->near_stop;
+    const double load = k->k_g * (p_mc * k->A + k->k_damp * k->k_g * om + F_stop);
+    const double accel = (k->eta * torque - load + z->friction) / k->M;
+    const double near = max2(k->x_rest - x_mc, 0.0), far = max2(x_mc - k->x_end, 0.0);
+    const double chamber = k->A * (p[P_master_cylinder_s_mc] - x_mc) / k->beta;
+    const double J = k->J_mot + k->k_g * k->k_g * p[P_gear_M_mc];
     o[O_i] = i, o[O_i_ref] = m[M_i_ref], o[O_i_star] = m[M_i_star], o[O_i_dit] = m[M_i_dit];
-    o[O_i_meas] = m[M_i_meas], o[O_duty] = duty;
-    o[O_voltage] = (p[P_supply_V_bat] - p[P_supply_R_bat] * duty * i) * duty;
-    o[O_theta] = x[X_theta], o[O_omega] = om, o[O_x_mc] = x_mc;
-    o[O_p_mc] = p_mc, o[O_p_pd] = x[X_p_pd];
-    o[O_p_ref] = m[M_p_ref], o[O_p_meas] = m[M_p_meas], o[O_V_pedal] = m[M_V_pedal];
-    o[O_q] = q;
+    o[O_i_meas] = m[M_i_meas], o[O_duty] = duty, o[O_voltage] = (k->V_bat - k->R_bat * duty * i) * duty;
+    o[O_theta] = x[X_theta], o[O_omega] = om, o[O_x_mc] = x_mc, o[O_torque] = torque;
+    o[O_p_mc] = p_mc, o[O_p_pd] = p_pd, o[O_p_ref] = m[M_p_ref], o[O_p_meas] = m[M_p_meas];
+    o[O_V_pedal] = m[M_V_pedal], o[O_q] = q, o[O_q_makeup] = z->makeup;
     o[O_Re] = 4.0 / PI * fabs(q) / (p[P_pipeline_d_pl] * p[P_fluid_nu]);
-    o[O_torque] = torque, o[O_T_fr] = -z->friction, o[O_F_stop] = F_stop;
-    o[O_q_makeup] = z->makeup;
-    o[O_stuck] = om == 0.0 ? 1.0 : 0.0, o[O_at_stop] = F_stop == 0.0 ? 0.0 : 1.0;
-    o[O_sat_current] = m[M_sat_current], o[O_sat_duty] = m[M_sat_duty];
-    o[O_P_gear] = (1.0 - p[P_gear_eta_g]) * (torque - p[P_gear_J_mot] * accel) * om;
-    o[O_P_el] = p[P_supply_V_bat] * duty * i;
+    o[O_T_fr] = -z->friction, o[O_F_stop] = F_stop, o[O_at_stop] = F_stop != 0.0;
+    o[O_stuck] = om == 0.0, o[O_sat_current] = m[M_sat_current], o[O_sat_duty] = m[M_sat_duty];
+    o[O_P_gear] = (1.0 - k->eta) * (torque - k->J_mot * accel) * om;
+    o[O_P_el] = k->V_bat * duty * i;
     o[O_E_source] = e[E_E_source], o[O_E_supply] = e[E_E_supply], o[O_E_copper] = e[E_E_copper];
     o[O_E_gear] = e[E_E_gear], o[O_E_seal] = e[E_E_seal], o[O_E_damping] = e[E_E_damping];
     o[O_E_pipeline] = e[E_E_pipeline], o[O_E_stop] = e[E_E_stop], o[O_E_port] = e[E_E_port];
     o[O_W_shaft] = e[E_W_shaft], o[O_t_stuck] = e[E_t_stuck];
-    o[O_E_stored] = 0.5 * (p[P_motor_L_m] * i * i + k->M_kin * om * om)
-                    + A * (p[P_master_cylinder_s_mc] - x_mc) / p[P_fluid_beta]
-                          * stored_density(k, p_mc)
-                    + area * area / p[P_caliper_K_pd] * stored_density(k, x[X_p_pd])
-                    + 0.5 * p[P_stop_k_stop] * (near * near + far * far);
+    o[O_E_stored] = 0.5 * (k->L * i * i + J * om * om + k->k_stop * (near * near + far * far))
+                    + chamber * density(k, p_mc) + k->pads * density(k, p_pd);
 }
 
 /* The substeps of one tick, and the energies that they add up to. */
 static void frame(const Plant *k, Saved *z, int64_t substeps)
 {
-    const double *p = k->raw, duty = z->m[M_duty], h = k->h, k_g = p[P_gear_k_g];
+    const double duty = z->m[M_duty], h = k->h;
     double *x = z->x, *d = z->d, *e = z->e;
     const Held u = hold(k, duty);
     Sim s = {.i = x[X_i], .th = x[X_theta], .om = x[X_omega], .pm = x[X_p_mc], .pd = x[X_p_pd],
              .yp = x[X_y_p], .yi = x[X_y_i], .di = d[X_i], .dth = d[X_theta], .dom = d[X_omega],
              .dpm = d[X_p_mc]};
-    s.makeup = s.near_stop = s.far_stop = 0.0;
-    for (int64_t n = 0; n < substeps; n++)
-        s = substep(k, &u, s);
+    for (int64_t n = 0; n < substeps; n++) {
+        n += advance(k, &u, &s, substeps - n);
+        if (n < substeps)
+            careful(k, &u, &s);
+    }
 
     const double kinetic = 0.5 * (s.om * s.om - x[X_omega] * x[X_omega]); /* sum of om d(om) */
-    e[E_E_source] += 0.5 * h * p[P_supply_V_bat] * duty * s.sum_i;
-    e[E_E_supply] += 0.25 * h * p[P_supply_R_bat] * duty * duty * s.sum_ii;
-    e[E_E_copper] += 0.25 * h * p[P_motor_R_m] * s.sum_ii;
-    const double work = 0.25 * h * p[P_motor_K_e] * s.sum_io;
-    e[E_W_shaft] += work;
-    e[E_E_gear] += (1.0 - p[P_gear_eta_g]) * (work - p[P_gear_J_mot] * kinetic);
+    const double work = 0.25 * h * k->K_e * s.sum_io;
+    e[E_E_source] += 0.5 * h * k->V_bat * duty * s.sum_i;
+    e[E_E_supply] += 0.25 * h * k->R_bat * duty * duty * s.sum_ii;
+    e[E_E_copper] += 0.25 * h * k->raw[P_motor_R_m] * s.sum_ii;
+    e[E_E_gear] += (1.0 - k->eta) * (work - k->J_mot * kinetic), e[E_W_shaft] += work;
     e[E_E_seal] -= 0.5 * s.sum_fo;
-    e[E_E_damping] += 0.25 * h * p[P_master_cylinder_k_damp] * k_g * k_g * s.sum_oo;
+    e[E_E_damping] += 0.25 * h * k->k_damp * k->k_g * k->k_g * s.sum_oo;
     e[E_E_pipeline] += h / k->K_lf * s.sum_pipe;
-    e[E_E_stop] += h * s.sum_stop;
-    e[E_E_port] += h * s.sum_port;
-    e[E_t_stuck] += h * s.stuck;
+    e[E_E_stop] += h * s.sum_stop, e[E_E_port] += h * s.sum_port, e[E_t_stuck] += h * s.stuck;
 
     x[X_i] = s.i, x[X_theta] = s.th, x[X_omega] = s.om, x[X_p_mc] = s.pm, x[X_p_pd] = s.pd;
     x[X_y_p] = s.yp, x[X_y_i] = s.yi;
@@ -433,29 +393,40 @@ static void frame(const Plant *k, Saved *z, int64_t substeps)
     z->unsettled += s.unsettled, z->repeated += s.repeated;
 }
 
-/* One run: frames ticks of substeps each, a row of all outputs per tick and one at the end.
- * u: frames + 1 rows of stimulus. state: a Saved, renewed in place. */
-void hand_run(const double *p, double h, int64_t frames, int64_t substeps, const double *u,
-              double *state, double *rec)
+static void simulate(const double *p, double h, int64_t frames, int64_t substeps, const double *u,
+                     double *state, int64_t width, const int32_t *selected, double *rec)
 {
     const Plant k = prepare(p, h);
     Saved *z = (Saved *)state;
+    double all[O_COUNT];
     for (int64_t n = 0;; n++) {
         tick(&k, z, u + n * U_COUNT);
-        record(&k, z, rec + n * O_COUNT);
+        record(&k, z, all);
+        for (int64_t j = 0; j < width; j++)
+            rec[n * width + j] = all[selected ? selected[j] : j];
         if (n == frames)
             return;
         frame(&k, z, substeps);
     }
 }
 
-/* The same for many cases on all cores. p, state and rec: one block per case; the stimulus is
- * shared by all of them. */
-void hand_ensemble(int64_t cases, const double *p, double h, int64_t frames, int64_t substeps,
-                   const double *u, double *state, double *rec)
+/* One run: frames ticks of substeps each, a row of all outputs per tick and one at the end.
+ * u: frames + 1 rows of stimulus. state: a Saved, renewed in place. */
+void hand_run(const double *p, double h, int64_t frames, int64_t substeps, const double *u,
+              double *state, double *rec)
 {
-    const int64_t length = sizeof(Saved) / sizeof(double), block = (frames + 1) * O_COUNT;
+    simulate(p, h, frames, substeps, u, state, O_COUNT, NULL, rec);
+}
+
+/* The same for many cases on all cores, with one block of p, state and rec per case, a stimulus
+ * shared by all, and the outputs that are selected, width of them. */
+void hand_ensemble(int64_t cases, const double *p, double h, int64_t frames, int64_t substeps,
+                   const double *u, double *state, int64_t width, const int32_t *selected,
+                   double *rec)
+{
+    const int64_t length = sizeof(Saved) / sizeof(double), block = (frames + 1) * width;
 #pragma omp parallel for schedule(dynamic)
     for (int64_t c = 0; c < cases; c++)
-        hand_run(p + c * P_COUNT, h, frames, substeps, u, state + c * length, rec + c * block);
+        simulate(p + c * P_COUNT, h, frames, substeps, u, state + c * length, width, selected,
+                 rec + c * block);
 }

@@ -88,6 +88,14 @@ class Model(Protocol):
         """States that cannot fall below zero; rarely at zero for long (see ``scheme``)."""
         ...
 
+    @property
+    def usually_open(self) -> tuple[bool, ...]:
+        """Per contact group, whether it rarely touches, as end stops do.
+
+        Speed only: an open group costs nothing but its check, a touching one the exact pass.
+        """
+        ...
+
     def tasks(self, par: Any) -> tuple[Task, ...]:
         """Return the controllers, in the order in which they run when due together."""
         ...

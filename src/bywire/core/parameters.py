@@ -8,6 +8,7 @@ equations (``gear.law = "directional"``); it takes part in what is compiled, nev
 from __future__ import annotations
 
 import math
+import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Self, TypeVar, cast
@@ -146,7 +147,7 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, str]:
 
 def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
     low, high, low_open, high_open = -math.inf, math.inf, False, False
-    for note in info.metadata:
+    for note in (*info.metadata, *_node_notes(info.annotation)):
         if isinstance(note, Gt):
             low, low_open = float(cast(float, note.gt)), True
         elif isinstance(note, Ge):
@@ -156,6 +157,13 @@ def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
         elif isinstance(note, Le):
             high = float(cast(float, note.le))
     return Leaf(dotted, unit, low, high, low_open, high_open, info.description or "")
+
+
+def _node_notes(annotation: Any) -> Iterator[Any]:
+    """Yield the constraints on the nodes of a table, ``tuple[Annotated[float, ...], ...]``."""
+    for node in typing.get_args(annotation)[:1]:
+        for note in getattr(node, "__metadata__", ()):
+            yield from note.metadata if isinstance(note, FieldInfo) else (note,)
 
 
 def _walk(node: ParameterSet, prefix: str) -> Iterator[tuple[str, Any]]:
@@ -204,8 +212,9 @@ def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
     value = detail["input"]
     if detail["type"] == "missing":
         return f"{cls.__name__}: {name} is missing: give it a value"
-    leaf = leaf_fields(cls).get(name)
-    if leaf is not None:
+    leaves = leaf_fields(cls)
+    leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
+    if leaf is not None and detail["type"] != "value_error":
         unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
         return f"{name} = {value}{unit} is not admissible: it must be {leaf.range_text}"
     message = str(detail["msg"]).removeprefix("Value error, ")

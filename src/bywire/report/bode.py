@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -34,7 +35,7 @@ class Response:
 
     label: str
     frequency: FloatArray
-    value: NDArray[np.complex128]
+    value: NDArray[np.complexfloating[Any, Any]]
     measured: bool = False
 
     def __post_init__(self) -> None:

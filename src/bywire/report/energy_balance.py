@@ -128,8 +128,8 @@ def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
         share = f"{100 * entry.energy / total:.3g} %"
         label = f"{entry.label}: {amount(entry.energy, 'J', 3)} ({share})"
         axes.barh(
-            row, entry.energy, left=left, height=0.62, color=entry.color, edgecolor="white",
-            linewidth=0.8, label=style.plain(label),
+            row, entry.energy, left=left, height=0.62, color=entry.color, linewidth=0,
+            label=style.plain(label),
         )
         left += entry.energy
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
+from bywire.bench.kpis.smoothing import smoothed
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import Channel, FloatArray, channel
@@ -17,8 +19,6 @@ from bywire.report.decimation import kept_samples
 
 if TYPE_CHECKING:
     import xarray as xr
-
-Dash = str | tuple[int, tuple[int, int]]
 
 ARROWS_AT = (0.35, 0.75)
 """where along a branch its arrows sit, as shares of its drawn length"""
@@ -30,6 +30,7 @@ def hysteresis_loop(
     pressure: str = "p_mc",
     current: str = "i",
     demand: str = "i_star",
+    average: float = 0.0,
 ) -> Figure:
     """Draw current over pressure, applying solid and releasing dashed, one color per recording.
 
@@ -38,10 +39,13 @@ def hysteresis_loop(
     recordings
         Recordings of a ramp up and down again, by the label that the legend shows.
     pressure, current
-        Variables. A current with dither is best low-passed first: the ripple hides the loop.
+        Variables.
     demand
         Variable whose maximum divides applying from releasing; where a recording lacks it, the
         current does.
+    average
+        Averaging time [s] of the loop, usually one dither period; the ripple around it is then
+        drawn pale. 0 draws the raw signals.
 
     Raises
     ------
@@ -56,6 +60,10 @@ def hysteresis_loop(
         x, y = channel(recording, pressure), channel(recording, current)
         by = channel(recording, demand) if demand in recording.data_vars else y
         turn = _turn(by.values)
+        if average > 0:
+            kept = np.union1d(kept_samples(x.time, x.values), kept_samples(x.time, y.values))
+            axes.plot(x.values[kept], y.values[kept], color=color, linewidth=0.4, alpha=0.25)
+            x, y = (replace(v, values=smoothed(v.time, v.values, average)) for v in (x, y))
         _draw_branch(axes, x, y, slice(0, turn + 1), color, "-")
         _draw_branch(axes, x, y, slice(turn, None), color, (0, (4, 2)))
         axes.plot([], [], color=color, label=style.plain(label))
@@ -79,7 +87,7 @@ def _turn(values: FloatArray) -> int:
 
 
 def _draw_branch(
-    axes: Axes, x: Channel, y: Channel, branch: slice, color: str, dash: Dash
+    axes: Axes, x: Channel, y: Channel, branch: slice, color: str, dash: style.Dash
 ) -> None:
     """Draw one branch, thinned over time so that the extremes of both variables stay."""
     time, xs, ys = x.time[branch], x.values[branch], y.values[branch]

@@ -79,9 +79,10 @@ def _mark_facts(axes: Axes, shown: Channel, limits: StepLimits, facts: StepFacts
         time, peak = _peak(shown, limits)
         label = f"overshoot: {100 * facts.overshoot:.3g} %"
         marker = "v" if limits.after > limits.before else "^"
+        point = ([scale * time], [peak]) if facts.overshoot > 0 else ([], [])
         axes.plot(
-            [scale * time], [peak], marker, color=style.VERMILLION, markersize=5.5, zorder=4,
-            linestyle="none", label=label,
+            *point, marker, color=style.VERMILLION, markersize=5.5, zorder=4, linestyle="none",
+            label=label,
         )
     if _given(facts.settling_time):
         settled = scale * (limits.start + facts.settling_time)

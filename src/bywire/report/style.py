@@ -44,6 +44,10 @@ _EM_PER_CHARACTER = 0.58  # of the default font, a little more than its mean
 _EMS_BESIDE_TEXT = 4.4  # handle, its gap and the gap between columns in a legend
 
 
+Dash = str | tuple[float, tuple[float, ...]]
+"""a line style of matplotlib"""
+
+
 class Role(Enum):
     """What a line means; the same meaning looks the same in every figure."""
 
@@ -60,14 +64,14 @@ class Stroke:
     """Color, line style, width [points] and drawing order of a line."""
 
     color: str
-    linestyle: str
+    linestyle: Dash
     linewidth: float
     zorder: float
 
 
 STROKES = {
     Role.MAIN: Stroke(BLUE, "-", 1.2, 3.0),
-    Role.SECOND: Stroke(ORANGE, "-", 1.1, 2.8),
+    Role.SECOND: Stroke(ORANGE, (0, (1.5, 1.5)), 1.3, 3.1),
     Role.SET_POINT: Stroke(BLACK, "--", 1.0, 3.2),
     Role.MEASURED: Stroke(BLUE, "-", 1.4, 2.9),
     Role.SIMULATED: Stroke(VERMILLION, "--", 1.3, 3.1),
@@ -113,21 +117,39 @@ def few_ticks(axes: Axes, count: int) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]))
 
 
-def plain(text: object) -> str:
-    """Return text that matplotlib draws as it stands: no formulas, no control characters."""
-    return clean(text).replace("$", r"\$")
+def plain(text: object, longest: int = 70) -> str:
+    """Return one line that matplotlib draws as it stands: no formulas, no control characters.
+
+    Parameters
+    ----------
+    text
+        What a user or a recording says.
+    longest
+        Characters that have room; longer text is cut.
+    """
+    line = clean(text).replace("\n", " ")
+    short = line if len(line) <= longest else line[: longest - 1] + "…"
+    return short.replace("$", r"\$")
 
 
-def axis_label(label: str, symbol: str) -> str:
+def axis_label(label: str, symbol: str, gap: str = " ") -> str:
     """Return the label of an axis in the display unit of an SI unit.
+
+    Parameters
+    ----------
+    label
+        Quantity.
+    symbol
+        Its SI unit.
+    gap
+        What stands between quantity and unit; a line break in low panels.
 
     Examples
     --------
     >>> axis_label("caliper pressure", "Pa"), axis_label("duty cycle", "1")
     ('caliper pressure [bar]', 'duty cycle [-]')
     """
-    gap = "" if label.endswith("\n") else " "
-    return plain(f"{label}{gap}[{unit_text(display_unit(symbol)) or '-'}]")
+    return f"{plain(label, 40)}{gap}[{plain(unit_text(display_unit(symbol)), 20) or '-'}]"
 
 
 def channel_label(shown: Channel) -> str:

@@ -110,7 +110,7 @@ def time_traces(
         _shade_stuck(axes, recording, stuck, named=axes is rows[0])
         _mark_saturation(axes, panel, recording)
         axes.margins(x=0.0)
-        style.few_ticks(axes, 4 if panel.height < 1.5 else 6)
+        style.few_ticks(axes, 5 if panel.height < 1.5 else 7)
         style.legend_above(axes)
     _, unit = style.time_scale(first.time)
     rows[-1].set_xlabel(f"time [{unit}]")
@@ -152,7 +152,7 @@ def _draw_traces(
                     axes, channel(measured, trace.variable), Role.MEASURED, ", measured"
                 )
             style.draw_channel(axes, shown, Role.SIMULATED, ", simulated")
-    axes.set_ylabel(style.axis_label(f"{panel.quantity}\n", first.symbol))
+    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
     return first
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import casadi as ca
 
+from bywire.simulation.linear_form import Form
 from bywire.simulation.symbols import depends
 
 Entries = dict[tuple[int, int], Any]
@@ -29,36 +30,54 @@ class Reduced:
     ----------
     kept
         Indices of the kept rows, in the order of ``matrix``.
-    matrix, rhs
-        Schur complement and its right-hand side, shapes (m, m) and (m,).
+    matrix
+        Schur complement, shape (m, m).
+    right
+        Right-hand sides of all rows as they stand after the elimination.
+    x, changing
+        The states that the forms are linear in; symbols that change from substep to substep.
     """
 
     kept: tuple[int, ...]
     matrix: Any
-    rhs: Any
     steps: tuple[Step, ...]
-    right: dict[int, Any]
+    right: dict[int, Form]
+    x: Any
+    changing: Any
+
+    def start(self, row: int) -> Any:
+        """Return the kept row's right-hand side plus ``matrix`` times the kept states."""
+        form = self.right[self.kept[row]]
+        for column, index in enumerate(self.kept):
+            unit = Form({index: ca.SX(1)}, ca.SX(0))
+            form = form.plus(self.matrix[row, column], unit, self.x, self.changing)
+        return form.value(self.x)
 
     def back_substitute(self, solution: dict[int, Any]) -> dict[int, Any]:
         """Return all unknowns, given those of the kept rows."""
         known = dict(solution)
         for step in reversed(self.steps):
-            value = self.right[step.pivot]
+            value = self.right[step.pivot].times(step.reciprocal, self.x, self.changing)
+            total = value.value(self.x)
             for column, entry in step.row.items():
-                value = value - entry * known[column]
-            known[step.pivot] = value * step.reciprocal
+                total = total - (entry * step.reciprocal) * known[column]
+            known[step.pivot] = total
         return known
 
 
-def eliminate(A: Any, r: Any, keep: tuple[int, ...], changing: Any) -> Reduced:
+def eliminate(
+    A: Any, right: dict[int, Form], keep: tuple[int, ...], x: Any, changing: Any
+) -> Reduced:
     """Eliminate all rows but the kept ones, on the diagonal, least fill first.
 
     Parameters
     ----------
-    A, r
-        Matrix and right-hand side, shapes (n, n) and (n,).
+    A, right
+        Matrix, shape (n, n), and right-hand sides by row.
     keep
         Rows that stay.
+    x
+        The states.
     changing
         Symbols that change from substep to substep: among pivots of equal fill, one that does
         not depend on them comes first, for then its reciprocal is hoisted.
@@ -67,20 +86,19 @@ def eliminate(A: Any, r: Any, keep: tuple[int, ...], changing: Any) -> Reduced:
     entries: Entries = {
         (i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])
     }
-    right = {i: r[i] for i in range(n)}
+    right = dict(right)
     left = [i for i in range(n) if i not in keep]
     steps = []
     while left:
         pivot = min(left, key=lambda i: _price(entries, i, changing))
         left.remove(pivot)
-        steps.append(_pivot(entries, right, pivot))
+        steps.append(_pivot(entries, right, pivot, x, changing))
     m = len(keep)
     S = ca.SX.zeros(m, m)
     for a, i in enumerate(keep):
         for b, j in enumerate(keep):
             S[a, b] = entries.get((i, j), 0)
-    rhs = ca.vertcat(*(right[i] for i in keep)) if keep else ca.SX(0, 1)
-    return Reduced(keep, S, rhs, tuple(steps), right)
+    return Reduced(keep, S, tuple(steps), right, x, changing)
 
 
 def _present(entry: Any) -> bool:
@@ -93,7 +111,9 @@ def _price(entries: Entries, pivot: int, changing: Any) -> tuple[int, bool, int]
     return rows * columns, depends(entries[pivot, pivot], changing), pivot
 
 
-def _pivot(entries: Entries, right: dict[int, Any], pivot: int) -> Step:
+def _pivot(
+    entries: Entries, right: dict[int, Form], pivot: int, x: Any, changing: Any
+) -> Step:
     reciprocal = 1.0 / entries.pop((pivot, pivot))
     row = {j: e for (i, j), e in entries.items() if i == pivot}
     column = {i: e for (i, j), e in entries.items() if j == pivot}
@@ -102,7 +122,7 @@ def _pivot(entries: Entries, right: dict[int, Any], pivot: int) -> Step:
     for i, below in column.items():
         del entries[i, pivot]
         factor = below * reciprocal
-        right[i] = right[i] - factor * right[pivot]
+        right[i] = right[i].plus(-factor, right[pivot], x, changing)
         for j, entry in row.items():
             entries[i, j] = entries.get((i, j), ca.SX(0)) - factor * entry
     return Step(pivot, reciprocal, row)

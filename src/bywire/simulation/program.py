@@ -39,7 +39,7 @@ class Program:
     ticks
         One ``(x, m, u, p) -> m`` per task.
     output
-        ``(x, m, p, reaction, contact, flow) -> o``.
+        ``(x, m, p, reaction, contact, flow, h) -> o``; ``flow`` is the sum of the rates.
     """
 
     model: Model
@@ -128,6 +128,6 @@ def _output(model: Model, par: ParameterSet, s: Symbols, shape: Pass) -> Any:
         par,
         scalars(contact),
         scalars(reaction),
-        symbol_tuple(model.Flow, flow),
+        symbol_tuple(model.Flow, s.h * flow),
     )
-    return ca.Function("output", [s.x, s.m, s.p, reaction, contact, flow], [column(out)])
+    return ca.Function("output", [s.x, s.m, s.p, reaction, contact, flow, s.h], [column(out)])

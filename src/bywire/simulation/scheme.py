@@ -17,6 +17,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.contacts import active_set
 from bywire.simulation.elimination import Reduced, eliminate
+from bywire.simulation.linear_form import Form, forms
 from bywire.simulation.set_valued import Projection, project_exact, project_fast
 from bywire.simulation.symbols import SX, column, nonlinear, scalars, symbol_tuple
 
@@ -47,9 +48,9 @@ class Pass:
     contact
         Contact forces at the midpoint.
     flow
-        Increments of the integrals.
+        Rates of the integrals at the midpoint.
     flag
-        1 where the pass must be repeated: a contact set changed, a limit was crossed, or the
+        Positive where the pass must be repeated: a contact set changed, a limit was crossed, or the
         projection of the frictions failed.
     """
 
@@ -65,9 +66,18 @@ class Pass:
 class _Linearized:
     """The model's smooth part and its derivatives, evaluated where the substep needs them."""
 
-    f: Any
+    rows: list[Form]
     J: Any
     nonlinear: list[bool]
+
+
+@dataclass(frozen=True)
+class _ContactSets:
+    """Block-diagonal stiffness, numbers of the active subsets, overlap that was left out."""
+
+    stiffness: Any
+    numbers: list[Any]
+    touching: Any
 
 
 def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass:
@@ -86,24 +96,31 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         checks them. True: the repeated pass, with limits and every combination of signs.
     """
     y = s.x + 0.5 * s.d
-    K, index = _contact_sets(model, par, y)
+    changing = ca.vertcat(s.x, s.d)
+    before = _contact_sets(model, par, _gaps(model, par, y, y), exact)
+    K = before.stiffness
     at_y = K @ _gaps(model, par, y, y)
     linear = _linearize(model, par, s, y, K)
     bounds = _bounds(model, par, s, y, at_y)
     mass = column(model.mass(symbol_tuple(model.State, y), par))
     A = ca.diag(mass) - 0.5 * s.h * linear.J
-    changed = [k for k, flag in enumerate(linear.nonlinear) if flag]
-    r = s.h * linear.f
-    if changed:
-        r = r - 0.5 * s.h * (linear.J[:, changed] @ s.d[changed])
+    right = {
+        i: row.times(s.h, s.x, changing) for i, row in enumerate(linear.rows)
+    }
+    for j, curved in enumerate(linear.nonlinear):
+        if curved:
+            for i in range(s.x.shape[0]):
+                correction = 0.5 * s.h * linear.J[i, j] * s.d[j]
+                right[i] = Form(right[i].coefficients, right[i].rest - correction)
     kept = _set_valued_states(model, exact)
-    reduced = eliminate(A, r, kept, ca.vertcat(s.x, s.d))
+    reduced = eliminate(A, right, kept, s.x, changing)
     projection, reaction = _project(model, s, reduced, bounds, exact)
     d = _increments(s, reduced, projection)
     x = column([projection.w[kept.index(k)] if k in kept else s.x[k] + d[k]
                 for k in range(s.x.shape[0])])
     middle = s.x + 0.5 * d
-    contact = K @ _gaps(model, par, middle, y)
+    overlap = _gaps(model, par, middle, y)
+    contact = K @ overlap
     flow = model.powers(
         symbol_tuple(model.State, middle),
         symbol_tuple(model.State, d / s.h),
@@ -112,28 +129,46 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         scalars(contact),
         scalars(reaction),
     )
-    _, index_after = _contact_sets(model, par, middle)
-    flag = ca.logic_or(projection.failed, _differ(index, index_after))
+    after = _contact_sets(model, par, _gaps(model, par, middle, middle), exact)
+    # A sum and no logical or: compilers do not vectorize selections between truth values.
+    flag = ca.if_else(projection.failed, 1, 0) + _distance(before, after)
     if not exact:
         for name in model.limits:
-            flag = ca.logic_or(flag, x[model.State._fields.index(name)] < 0)
-    return Pass(x, d, reaction, contact, s.h * column(flow), flag)
+            flag = flag + ca.fmax(-x[model.State._fields.index(name)], 0)
+    return Pass(x, d, reaction, contact, column(flow), flag)
 
 
-def _contact_sets(model: Model, par: ParameterSet, y: Any) -> tuple[Any, list[Any]]:
-    """Return the block-diagonal stiffness of all groups and the numbers of the active subsets."""
-    state = symbol_tuple(model.State, y)
-    blocks, numbers = [], []
-    for C, d in zip(model.compliance(par), model.gap(state, state, par), strict=True):
-        chosen = active_set(SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))), column(d))
+def _contact_sets(model: Model, par: ParameterSet, d: Any, exact: bool) -> _ContactSets:
+    """Choose the active subsets of all groups; the fast pass takes rare contacts as open."""
+    blocks, numbers, touching, at = [], [], SX(0), 0
+    for C, rare in zip(model.compliance(par), model.usually_open, strict=True):
+        n = len(C)
+        group = d[at : at + n]
+        at += n
+        if rare and not exact:
+            blocks.append(SX(n, n))
+            for k in range(n):
+                touching = touching + ca.fmax(group[k], 0)
+            continue
+        rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
+        chosen = active_set(rows, group)
         blocks.append(chosen.stiffness)
         numbers.append(chosen.index)
-    return (ca.diagcat(*blocks) if blocks else SX(0, 0)), numbers
+    return _ContactSets(ca.diagcat(*blocks) if blocks else SX(0, 0), numbers, touching)
 
 
 def _gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
-    groups = model.gap(symbol_tuple(model.State, x), symbol_tuple(model.State, xe), par)
-    return column([d for group in groups for d in group])
+    """Return all overlaps as affine functions of x whose coefficients can be hoisted."""
+    n = x.shape[0]
+    state, fixed = SX.sym("x_", n), SX.sym("xe_", n)
+    groups = model.gap(symbol_tuple(model.State, state), symbol_tuple(model.State, fixed), par)
+    gap = column([d for group in groups for d in group])
+    if any(nonlinear(gap, state)):
+        raise SolverError(f"{model.name}: the overlaps of contacts must be affine in the state")
+    slope = ca.jacobian(gap, state)
+    rest = ca.substitute(gap, state, SX.zeros(n))
+    rest, slope = ca.substitute([rest, slope], [fixed], [xe])
+    return slope @ x + rest
 
 
 def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
@@ -143,16 +178,24 @@ def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _
     state, fixed = symbol_tuple(model.State, x), symbol_tuple(model.State, xe)
     memory = symbol_tuple(model.Memory, s.m)
     f = column(model.balance(state, fixed, memory, par, scalars(force)))
-    gap = _gaps(model, par, x, xe)
-    if any(nonlinear(gap, x)):
-        raise SolverError(f"{model.name}: the overlaps of contacts must be affine in the state")
-    curved = nonlinear(f, ca.vertcat(x, force))[:n]
-    gap_x = ca.jacobian(gap, x)
-    J = ca.jacobian(f, x) + ca.jacobian(f, force) @ K @ gap_x
+    variables = ca.vertcat(x, force)
+    curved = nonlinear(f, variables)[:n]
+    bent = [any(nonlinear(f[i], variables)) for i in range(n)]
+    pressed = K @ _gaps(model, par, x, y)
     at = column([y[k] if curved[k] else s.x[k] for k in range(n)])
-    new_force = K @ ca.substitute(gap, ca.vertcat(x, xe), ca.vertcat(at, y))
-    f, J = ca.substitute([f, J], [x, xe, force], [at, y, new_force])
-    return _Linearized(f, J, curved)
+    pressed = ca.densify(pressed)
+    with_contact = ca.substitute(f, force, pressed)
+    J = ca.jacobian(f, x) + ca.jacobian(f, force) @ ca.jacobian(pressed, x)
+    J = ca.substitute(J, force, pressed)
+    changing = ca.vertcat(x, xe, s.x, s.d)
+    rows = [
+        Form(
+            {j: ca.substitute(c, xe, y) for j, c in row.coefficients.items()},
+            ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(at, y)),
+        )
+        for row in forms(with_contact, J, x, changing, bent)
+    ]
+    return _Linearized(rows, ca.substitute(J, ca.vertcat(x, xe), ca.vertcat(at, y)), curved)
 
 
 def _bounds(model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any) -> list[Any]:
@@ -175,8 +218,7 @@ def _project(
     pairs = bounds + (limits if exact else [])
     low = s.h * column([p[0] for p in pairs])
     high = s.h * column([p[1] for p in pairs])
-    start = s.x[list(reduced.kept)] if reduced.kept else SX(0, 1)
-    c = reduced.rhs + reduced.matrix @ start
+    c = column([reduced.start(row) for row in range(len(reduced.kept))])
     projection = (project_exact if exact else project_fast)(reduced.matrix, c, low, high)
     reaction = (reduced.matrix @ projection.w - c) / s.h
     if not exact:
@@ -190,8 +232,9 @@ def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> Any:
     return column([every[k] for k in range(s.x.shape[0])])
 
 
-def _differ(before: list[Any], after: list[Any]) -> Any:
-    different = SX(0)
-    for a, b in zip(before, after, strict=True):
-        different = ca.logic_or(different, a != b)
-    return different
+def _distance(before: _ContactSets, after: _ContactSets) -> Any:
+    """Return 0 where all contact sets are the same and as assumed, else something positive."""
+    total = before.touching + after.touching
+    for a, b in zip(before.numbers, after.numbers, strict=True):
+        total = total + (a - b) ** 2
+    return total

@@ -102,11 +102,11 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         fast=dict(zip(parts, add(program.fast, "xdmph"), strict=True)),
         exact=dict(zip(parts, add(program.exact, "xdmph"), strict=True)),
         ticks=[add(tick, "xmup")[0] for tick in program.ticks],
-        output=add(program.output, "xmprFq")[0],
+        output=add(program.output, "xmprFqh")[0],
         fast_t=dict(zip(parts, tangent(program.fast, "xdmph"), strict=True)),
         exact_t=dict(zip(parts, tangent(program.exact, "xdmph"), strict=True)),
         ticks_t=[tangent(tick, "xmup")[0] for tick in program.ticks],
-        output_t=tangent(program.output, "xmprFq")[0],
+        output_t=tangent(program.output, "xmprFqh")[0],
     )
 
 

@@ -48,7 +48,7 @@ class VirtualMachine:
                 if frame % every == 0:
                     part["m"][:] = task(part["x"], part["m"], u, p)[0]
             if frame % schedule.record_frames == 0:
-                o = self._output(part["x"], part["m"], p, part["r"], part["F"], part["q"])[0]
+                o = self._output(part["x"], part["m"], p, part["r"], part["F"], part["q"], h)[0]
                 rows[row] = o[request.selection]
                 row += 1
             if frame < end:
