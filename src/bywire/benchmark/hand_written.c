@@ -10,8 +10,8 @@
 #include "hand_written_indices.h"
 #include <math.h>
 #include <stdbool.h>
-#include <stddef.h>
 #include <stdint.h>
+#include <string.h>
 
 #define PI 3.14159265358979323846
 #define CAP 8            /* passes after which a substep whose contacts change is let go */
@@ -20,32 +20,22 @@
 /* gcc -O2 leaves the two large pieces of a substep out of line, and they take a third longer. */
 #define INLINE static inline __attribute__((always_inline))
 
-/* What a run carries from call to call; all doubles, so that an array can hold it. */
-typedef struct {
-    double x[X_COUNT], d[X_COUNT]; /* state, half of the last increment */
-    double m[M_COUNT], e[E_COUNT]; /* ECU memory, energies */
-    double friction, makeup, near_stop, far_stop, unsettled, repeated;
-} Saved;
-
 /* Factors that depend on parameters and step only. */
 typedef struct {
     const double *raw;
-    double h, half, quarter;     /* step, and parts of it */
-    double L, K_e, V_bat, R_bat; /* motor and battery */
-    double k_g, eta, J_mot, M;   /* gear; M is the inertia of eq. (8) */
+    double h, half, quarter;          /* step, and parts of it */
+    double L, R_m, K_e, V_bat, R_bat; /* motor and battery */
+    double k_g, eta, J_mot, M, J; /* gear; inertia of eq. (8), and the one that stores energy */
     double A, k_damp, beta, pads; /* piston, damping, bulk modulus, compliance of the caliper */
-    double a, aa, two_a;         /* h/2 k_g A_mc: shaft to chamber and back; its square, twice it */
-    double K_lf, pd_gain;        /* pipe resistance; caliper's share of a pressure difference */
-    double g, two_g;             /* h/2 / K_lf with the caliper eliminated; twice it */
-    double V0, V1;               /* (chamber volume)/beta + g = V0 - V1 theta */
-    double brk_p, brk_n;         /* k_brk - 1 */
-    double T_pr, f_p, f_n, mu;   /* friction times the step */
-    double c, still;             /* Stribeck decay, and the speed beyond which nothing is left */
-    double k_stop, x_rest, x_end, tau; /* end stops */
-    double th_mid, th_free;      /* middle of the free stroke and what is free to both sides */
+    double a, aa, two_a;          /* h/2 k_g A: shaft to chamber and back; its square, twice it */
+    double K_lf, pd_gain;         /* pipe resistance; caliper's share of a pressure difference */
+    double g, two_g;              /* h/2 / K_lf with the caliper eliminated; twice it */
+    double V0, V1;                /* (chamber volume)/beta + g = V0 - V1 theta */
+    double T_pr, f_p, f_n, mu, brk_p, brk_n; /* friction times the step; k_brk - 1 */
+    double c, still;              /* Stribeck decay, and the speed beyond which nothing is left */
+    double k_stop, x_rest, x_end, tau, th_mid, th_free; /* end stops; free angles between them */
     double lag, p_gain, p_zero, i_gain, i_zero; /* anti-alias filter; sensors to shares */
-    double lp_g, lp_a;           /* low-pass filter of the ECU */
-    double c1, c2, c3;           /* series of the flow energy, see pipe_loss */
+    double lp_g, lp_a, c1, c2, c3; /* low-pass filter of the ECU; series in pipe_loss */
 } Plant;
 
 /* Factors that also depend on the duty cycle, which the ECU holds for a tick.
@@ -61,13 +51,17 @@ typedef struct { double alpha, drive, gamma, ahead, behind, from_i, constant; } 
 
 /* State between substeps, and sums over the substeps of a tick: midpoint values, most of them
  * twice or squared twice, whose constant factors wait for the end of the tick. */
+typedef struct { double i, ii, oo, io, fo, pipe, stop, port, stuck; } Sums;
 typedef struct {
     double i, th, om, pm, pd, yp, yi;
     double di, dth, dom, dpm; /* half of the last increment: it predicts the midpoint */
     double impulse, makeup, near_stop, far_stop; /* impulse: friction torque times h */
-    double sum_i, sum_ii, sum_oo, sum_io, sum_fo, sum_pipe, sum_stop, sum_port, stuck;
-    double unsettled, repeated;
+    double unsettled, repeated; /* substeps that hit the cap, and that took several passes */
+    Sums sum;
 } Sim;
+
+/* What a run carries from tick to tick: plant, ECU memory, energies. */
+typedef struct { Sim s; double m[M_COUNT], e[E_COUNT]; } Saved;
 
 /* Which of the stops push, as stiffnesses, and whether the chamber is held at zero pressure. */
 typedef struct { bool touching, held; double k_near, k_far; } Sides;
@@ -80,20 +74,18 @@ INLINE double clip(double x, double low, double high) { return min2(max2(x, low)
 static Plant prepare(const double *p, double h)
 {
     Plant k = {.raw = p, .h = h, .half = 0.5 * h, .quarter = 0.25 * h};
-    k.L = p[P_motor_L_m], k.K_e = p[P_motor_K_e];
-    k.V_bat = p[P_supply_V_bat], k.R_bat = p[P_supply_R_bat];
+    k.L = p[P_motor_L_m], k.R_m = p[P_motor_R_m], k.K_e = p[P_motor_K_e];
+    k.V_bat = p[P_supply_V_bat], k.R_bat = p[P_supply_R_bat], k.beta = p[P_fluid_beta];
     k.k_g = p[P_gear_k_g], k.eta = p[P_gear_eta_g], k.J_mot = p[P_gear_J_mot];
-    k.M = k.eta * k.J_mot + k.k_g * k.k_g * p[P_gear_M_mc];
+    k.J = k.J_mot + k.k_g * k.k_g * p[P_gear_M_mc], k.M = k.J - (1.0 - k.eta) * k.J_mot;
     k.A = p[P_master_cylinder_A_mc], k.k_damp = p[P_master_cylinder_k_damp];
     k.a = k.half * k.k_g * k.A, k.aa = k.a * k.a, k.two_a = 2.0 * k.a;
     const double A_pl = PI / 4.0 * p[P_pipeline_d_pl] * p[P_pipeline_d_pl];
     k.K_lf = p[P_pipeline_k_lf] * p[P_fluid_nu] * p[P_fluid_rho] * PI * p[P_pipeline_L_pl]
              / (A_pl * A_pl);
     k.pads = p[P_caliper_A_pd] * p[P_caliper_A_pd] / p[P_caliper_K_pd];
-    const double conductance = k.half / k.K_lf;
-    k.pd_gain = conductance / (k.pads + conductance);
-    k.g = conductance * (1.0 - k.pd_gain), k.two_g = 2.0 * k.g;
-    k.beta = p[P_fluid_beta];
+    const double G = k.half / k.K_lf;
+    k.pd_gain = G / (k.pads + G), k.g = G * (1.0 - k.pd_gain), k.two_g = 2.0 * k.g;
     k.V0 = k.A * p[P_master_cylinder_s_mc] / k.beta + k.g, k.V1 = k.A * k.k_g / k.beta;
     k.brk_p = p[P_seal_k_brk_p] - 1.0, k.brk_n = p[P_seal_k_brk_n] - 1.0;
     k.f_p = h * p[P_seal_f_cfr_p], k.f_n = h * p[P_seal_f_cfr_n];
@@ -117,7 +109,7 @@ static Plant prepare(const double *p, double h)
 
 static Held hold(const Plant *k, double duty)
 {
-    const double R = k->raw[P_motor_R_m] + k->R_bat * duty * duty;
+    const double R = k->R_m + k->R_bat * duty * duty;
     const double pivot = 1.0 / (k->L + k->half * R), eta_i = k->half * k->eta * k->K_e;
     Held u = {.alpha = (k->L - k->half * R) * pivot, .gamma = k->half * k->K_e * pivot,
               .drive = k->h * k->V_bat * duty * pivot};
@@ -141,7 +133,6 @@ INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
 {
     const double speed = fabs(s->om + s->dom);
     const double decay = speed < k->still ? exp(-k->c * speed) : 0.0;
-
     const double drop = s->pm - s->pd, r = 1.0 / (k->V0 - k->V1 * (s->th + s->dth));
     const double spring = side.held ? 0.0 : k->aa * r;
     const double p_mean = side.held ? 0.5 * s->pm : s->pm - k->g * r * drop;
@@ -153,7 +144,6 @@ INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
         S += k->half * k->k_g * k->k_g * stiff * (k->half + k->tau);
         c -= k->half * k->k_g * (2.0 * force + k->k_g * stiff * (k->half - k->tau) * s->om);
     }
-
     /* Friction opposes the speed that would come without it, and at most stops the shaft. */
     const double load = max2(s->pm + s->dpm, 0.0);
     const double coulomb = k->T_pr + (c > 0.0 ? k->f_p : k->f_n) * load;
@@ -180,19 +170,13 @@ INLINE void commit(const Plant *k, Sim *s, Pass q)
 {
     const double p_share = clip(k->p_gain * (s->pm + s->dpm) + k->p_zero, 0.0, 1.0);
     const double i_share = clip(k->i_gain * (s->i + s->di) + k->i_zero, 0.0, 1.0);
-    s->yp += k->lag * (p_share - s->yp);
-    s->yi += k->lag * (i_share - s->yi);
-
+    s->yp += k->lag * (p_share - s->yp), s->yi += k->lag * (i_share - s->yi);
     const double two_i = s->i + q.i, two_om = s->om + q.om;
     const double pm = s->pm + 0.5 * q.dpm, pd = s->pd + 0.5 * q.dpd;
-    s->sum_i += two_i;
-    s->sum_ii += two_i * two_i;
-    s->sum_oo += two_om * two_om;
-    s->sum_io += two_i * two_om;
-    s->sum_fo += q.impulse * two_om;
-    s->sum_pipe += (pm - pd) * (pm - pd) * pipe_loss(k, pm, pd);
-    s->stuck += two_om == 0.0 ? 1.0 : 0.0;
-
+    s->sum.i += two_i, s->sum.ii += two_i * two_i, s->sum.io += two_i * two_om;
+    s->sum.oo += two_om * two_om, s->sum.fo += q.impulse * two_om;
+    s->sum.pipe += (pm - pd) * (pm - pd) * pipe_loss(k, pm, pd);
+    s->sum.stuck += two_om == 0.0 ? 1.0 : 0.0;
     predict(k, s, q);
     s->impulse = q.impulse, s->i = q.i;
     s->th += k->half * two_om;
@@ -202,8 +186,7 @@ INLINE void commit(const Plant *k, Sim *s, Pass q)
 static Sides touching_sides(const Plant *k, double th, double om)
 {
     const double x = k->k_g * th, ahead = k->tau * (k->k_g * om);
-    return (Sides){.touching = true,
-                   .k_near = k->x_rest - x - ahead > 0.0 ? k->k_stop : 0.0,
+    return (Sides){.touching = true, .k_near = k->x_rest - x - ahead > 0.0 ? k->k_stop : 0.0,
                    .k_far = x - k->x_end + ahead > 0.0 ? k->k_stop : 0.0};
 }
 
@@ -216,13 +199,12 @@ static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
     s->near_stop = side.k_near * (near - k->tau * v);
     s->far_stop = side.k_far * (far + k->tau * v);
     const double elastic = k->k_stop * (max2(far, 0.0) - max2(near, 0.0));
-    s->sum_stop += (s->far_stop - s->near_stop - elastic) * v;
-    s->makeup = 0.0;
-    if (side.held) { /* what the chamber's balance lacks, the reservoir adds */
-        const double P = k->V0 - k->V1 * (s->th + s->dth), pm = s->pm + 0.5 * q.dpm;
-        s->makeup = (P * q.dpm - k->a * both + k->two_g * (s->pm - s->pd)) / k->h;
-        s->sum_port -= s->makeup * pm * pipe_loss(k, pm, 0.0);
-    }
+    s->sum.stop += (s->far_stop - s->near_stop - elastic) * v;
+    /* What the chamber's balance lacks, the reservoir adds. */
+    const double P = k->V0 - k->V1 * (s->th + s->dth), pm = s->pm + 0.5 * q.dpm;
+    const double lack = P * q.dpm - k->a * both + k->two_g * (s->pm - s->pd);
+    s->makeup = side.held ? lack / k->h : 0.0;
+    s->sum.port -= s->makeup * pm * pipe_loss(k, pm, 0.0);
 }
 
 /* A substep near a stop or with the pressure about to fall below zero. The first pass knows no
@@ -242,8 +224,7 @@ static void careful(const Plant *k, const Held *u, Sim *s)
         const Sides after = touching_sides(k, s->th + k->quarter * both, 0.5 * both);
         settled &= side.k_near == after.k_near && side.k_far == after.k_far;
         if (settled || pass == CAP) {
-            s->repeated += pass > 0;
-            s->unsettled += !settled;
+            s->repeated += pass > 0, s->unsettled += !settled;
             book_sides(k, s, q, side);
             commit(k, s, q);
             return;
@@ -254,9 +235,7 @@ static void careful(const Plant *k, const Held *u, Sim *s)
 }
 
 INLINE bool free_of_stops(const Plant *k, double th, double om)
-{
-    return fabs(th - k->th_mid) + k->tau * fabs(om) < k->th_free;
-}
+{ return fabs(th - k->th_mid) + k->tau * fabs(om) < k->th_free; }
 
 /* Ordinary substeps, away from stops and limit: at most n; return how many. They work on a copy
  * of the state whose address nobody else has, so that the compiler may keep it in registers. */
@@ -282,14 +261,12 @@ static void tick(const Plant *k, Saved *z, const double *u)
 {
     const double *p = k->raw, T = p[P_ecu_T_s], codes = p[P_adc_codes], noise = p[P_adc_noise];
     double *m = z->m;
-    const double code_p = floor((z->x[X_y_p] + noise * u[U_noise_p]) * codes + 0.5);
-    const double code_i = floor((z->x[X_y_i] + noise * u[U_noise_i]) * codes + 0.5);
-    const double p_low = p[P_pressure_sensor_p_low], i_low = p[P_current_sensor_i_low];
-    const double p_span = p[P_pressure_sensor_p_high] - p_low;
-    const double i_span = p[P_current_sensor_i_high] - i_low;
+    const double code_p = floor((z->s.yp + noise * u[U_noise_p]) * codes + 0.5);
+    const double code_i = floor((z->s.yi + noise * u[U_noise_i]) * codes + 0.5);
+    const double p_low = p[P_pressure_sensor_p_low], p_span = p[P_pressure_sensor_p_high] - p_low;
+    const double i_low = p[P_current_sensor_i_low], i_span = p[P_current_sensor_i_high] - i_low;
     const double p_meas = p_low + clip(code_p / codes, 0.0, 1.0) * p_span - p[P_ecu_p_atm];
     const double i_meas = i_low + clip(code_i / codes, 0.0, 1.0) * i_span;
-
     const double p_ref = u[U_p_set], i_max = p[P_ecu_pressure_i_max];
     const double signal = p[P_ecu_pressure_c] * p_ref - p_meas, tau_d = p[P_ecu_pressure_tau_d];
     const double slope = (tau_d * m[M_pid_slope] + p[P_ecu_pressure_k_d] * (signal - m[M_pid_last]))
@@ -297,30 +274,27 @@ static void tick(const Plant *k, Saved *z, const double *u)
     const double i_wanted = p[P_ecu_pressure_k_p] * (p[P_ecu_pressure_b] * p_ref - p_meas)
                             + m[M_pid_integral] + slope;
     const double i_star = clip(i_wanted, -i_max, i_max);
-    m[M_pid_integral] += T * (p[P_ecu_pressure_k_i] * (p_ref - p_meas)
-                              + (i_star - i_wanted) / p[P_ecu_pressure_T_t]);
+    const double growth = (i_star - i_wanted) / p[P_ecu_pressure_T_t];
+    m[M_pid_integral] += T * (p[P_ecu_pressure_k_i] * (p_ref - p_meas) + growth);
 
     const double believed = p[P_ecu_est_par_T_pr] + p[P_ecu_est_par_f_cfr_p] * max2(p_meas, 0.0);
     const double i_brk = p[P_ecu_est_par_k_brk_p] * believed / p[P_ecu_est_par_K_e];
     const double i_dit = p[P_ecu_dither_gain] * i_brk * sin(2.0 * PI * m[M_dit_phase]);
     const double phase = m[M_dit_phase] + p[P_ecu_dither_f_dit] * T;
     m[M_dit_phase] = phase - floor(phase);
-
     const double band = k->lp_a * (m[M_lp_s1] + k->lp_g * (i_star + i_dit - m[M_lp_s2]));
     const double i_ref = m[M_lp_s2] + k->lp_g * band;
-    m[M_lp_s1] = 2.0 * band - m[M_lp_s1];
-    m[M_lp_s2] = 2.0 * i_ref - m[M_lp_s2];
+    m[M_lp_s1] = 2.0 * band - m[M_lp_s1], m[M_lp_s2] = 2.0 * i_ref - m[M_lp_s2];
 
     const double error = i_ref - i_meas, D_ecu = p[P_ecu_current_D_max];
     const double wanted = p[P_ecu_current_k_p] * error + m[M_pi_integral];
     const double asked = clip(wanted, -D_ecu, D_ecu);
     m[M_duty] = clip(asked, -p[P_bridge_D_max], p[P_bridge_D_max]);
-    m[M_pi_integral] += T * (p[P_ecu_current_k_i] * error + (asked - wanted) / p[P_ecu_current_T_t]);
-
+    const double unwind = (asked - wanted) / p[P_ecu_current_T_t];
+    m[M_pi_integral] += T * (p[P_ecu_current_k_i] * error + unwind);
     m[M_p_meas] = p_meas, m[M_i_meas] = i_meas, m[M_pid_slope] = slope, m[M_pid_last] = signal;
     m[M_p_ref] = p_ref, m[M_i_star] = i_star, m[M_i_dit] = i_dit, m[M_i_ref] = i_ref;
-    m[M_sat_current] = fabs(i_star) >= i_max;
-    m[M_sat_duty] = fabs(m[M_duty]) >= D_ecu;
+    m[M_sat_current] = fabs(i_star) >= i_max, m[M_sat_duty] = fabs(m[M_duty]) >= D_ecu;
 }
 
 /* Integral of the flow energy over pressure, 0 to q: beta times the energy stored per volume. */
@@ -332,101 +306,94 @@ static double density(const Plant *k, double q)
 
 static void record(const Plant *k, const Saved *z, double *o)
 {
-    const double *p = k->raw, *x = z->x, *m = z->m, *e = z->e;
-    const double i = x[X_i], om = x[X_omega], p_mc = x[X_p_mc], p_pd = x[X_p_pd];
-    const double x_mc = k->k_g * x[X_theta], torque = k->K_e * i, duty = m[M_duty];
-    const double q = (p_mc - p_pd) / k->K_lf, F_stop = z->far_stop - z->near_stop;
+    const double *p = k->raw, *m = z->m, *e = z->e, friction = z->s.impulse / k->h;
+    const double i = z->s.i, om = z->s.om, p_mc = z->s.pm, p_pd = z->s.pd, duty = m[M_duty];
+    const double x_mc = k->k_g * z->s.th, torque = k->K_e * i;
+    const double q = (p_mc - p_pd) / k->K_lf, F_stop = z->s.far_stop - z->s.near_stop;
     const double load = k->k_g * (p_mc * k->A + k->k_damp * k->k_g * om + F_stop);
-    const double accel = (k->eta * torque - load + z->friction) / k->M;
+    const double accel = (k->eta * torque - load + friction) / k->M;
     const double near = max2(k->x_rest - x_mc, 0.0), far = max2(x_mc - k->x_end, 0.0);
     const double chamber = k->A * (p[P_master_cylinder_s_mc] - x_mc) / k->beta;
-    const double J = k->J_mot + k->k_g * k->k_g * p[P_gear_M_mc];
     o[O_i] = i, o[O_i_ref] = m[M_i_ref], o[O_i_star] = m[M_i_star], o[O_i_dit] = m[M_i_dit];
-    o[O_i_meas] = m[M_i_meas], o[O_duty] = duty, o[O_voltage] = (k->V_bat - k->R_bat * duty * i) * duty;
-    o[O_theta] = x[X_theta], o[O_omega] = om, o[O_x_mc] = x_mc, o[O_torque] = torque;
-    o[O_p_mc] = p_mc, o[O_p_pd] = p_pd, o[O_p_ref] = m[M_p_ref], o[O_p_meas] = m[M_p_meas];
-    o[O_V_pedal] = m[M_V_pedal], o[O_q] = q, o[O_q_makeup] = z->makeup;
-    o[O_Re] = 4.0 / PI * fabs(q) / (p[P_pipeline_d_pl] * p[P_fluid_nu]);
-    o[O_T_fr] = -z->friction, o[O_F_stop] = F_stop, o[O_at_stop] = F_stop != 0.0;
-    o[O_stuck] = om == 0.0, o[O_sat_current] = m[M_sat_current], o[O_sat_duty] = m[M_sat_duty];
+    o[O_i_meas] = m[M_i_meas], o[O_duty] = duty, o[O_P_el] = k->V_bat * duty * i;
+    o[O_voltage] = (k->V_bat - k->R_bat * duty * i) * duty;
     o[O_P_gear] = (1.0 - k->eta) * (torque - k->J_mot * accel) * om;
-    o[O_P_el] = k->V_bat * duty * i;
+    o[O_theta] = z->s.th, o[O_omega] = om, o[O_x_mc] = x_mc, o[O_torque] = torque;
+    o[O_p_mc] = p_mc, o[O_p_pd] = p_pd, o[O_p_ref] = m[M_p_ref], o[O_p_meas] = m[M_p_meas];
+    o[O_V_pedal] = m[M_V_pedal], o[O_q] = q, o[O_q_makeup] = z->s.makeup;
+    o[O_Re] = 4.0 / PI * fabs(q) / (p[P_pipeline_d_pl] * p[P_fluid_nu]);
+    o[O_T_fr] = -friction, o[O_F_stop] = F_stop, o[O_at_stop] = F_stop != 0.0;
+    o[O_stuck] = om == 0.0, o[O_sat_current] = m[M_sat_current], o[O_sat_duty] = m[M_sat_duty];
     o[O_E_source] = e[E_E_source], o[O_E_supply] = e[E_E_supply], o[O_E_copper] = e[E_E_copper];
     o[O_E_gear] = e[E_E_gear], o[O_E_seal] = e[E_E_seal], o[O_E_damping] = e[E_E_damping];
     o[O_E_pipeline] = e[E_E_pipeline], o[O_E_stop] = e[E_E_stop], o[O_E_port] = e[E_E_port];
     o[O_W_shaft] = e[E_W_shaft], o[O_t_stuck] = e[E_t_stuck];
-    o[O_E_stored] = 0.5 * (k->L * i * i + J * om * om + k->k_stop * (near * near + far * far))
+    o[O_E_stored] = 0.5 * (k->L * i * i + k->J * om * om + k->k_stop * (near * near + far * far))
                     + chamber * density(k, p_mc) + k->pads * density(k, p_pd);
 }
 
 /* The substeps of one tick, and the energies that they add up to. */
-static void frame(const Plant *k, Saved *z, int64_t substeps)
+static void frame(const Plant *k, Saved *z, int64_t steps)
 {
-    const double duty = z->m[M_duty], h = k->h;
-    double *x = z->x, *d = z->d, *e = z->e;
+    const double duty = z->m[M_duty], h = k->h, om_start = z->s.om;
     const Held u = hold(k, duty);
-    Sim s = {.i = x[X_i], .th = x[X_theta], .om = x[X_omega], .pm = x[X_p_mc], .pd = x[X_p_pd],
-             .yp = x[X_y_p], .yi = x[X_y_i], .di = d[X_i], .dth = d[X_theta], .dom = d[X_omega],
-             .dpm = d[X_p_mc]};
-    for (int64_t n = 0; n < substeps; n++) {
-        n += advance(k, &u, &s, substeps - n);
-        if (n < substeps)
-            careful(k, &u, &s);
+    z->s.sum = (Sums){0};
+    for (int64_t n = 0; n < steps; n++) {
+        n += advance(k, &u, &z->s, steps - n);
+        if (n < steps)
+            careful(k, &u, &z->s);
     }
-
-    const double kinetic = 0.5 * (s.om * s.om - x[X_omega] * x[X_omega]); /* sum of om d(om) */
-    const double work = 0.25 * h * k->K_e * s.sum_io;
-    e[E_E_source] += 0.5 * h * k->V_bat * duty * s.sum_i;
-    e[E_E_supply] += 0.25 * h * k->R_bat * duty * duty * s.sum_ii;
-    e[E_E_copper] += 0.25 * h * k->raw[P_motor_R_m] * s.sum_ii;
+    const Sums sum = z->s.sum;
+    const double kinetic = 0.5 * (z->s.om * z->s.om - om_start * om_start); /* sum of om d(om) */
+    const double work = 0.25 * h * k->K_e * sum.io;
+    double *e = z->e;
+    e[E_E_source] += 0.5 * h * k->V_bat * duty * sum.i;
+    e[E_E_supply] += 0.25 * h * k->R_bat * duty * duty * sum.ii;
+    e[E_E_copper] += 0.25 * h * k->R_m * sum.ii;
     e[E_E_gear] += (1.0 - k->eta) * (work - k->J_mot * kinetic), e[E_W_shaft] += work;
-    e[E_E_seal] -= 0.5 * s.sum_fo;
-    e[E_E_damping] += 0.25 * h * k->k_damp * k->k_g * k->k_g * s.sum_oo;
-    e[E_E_pipeline] += h / k->K_lf * s.sum_pipe;
-    e[E_E_stop] += h * s.sum_stop, e[E_E_port] += h * s.sum_port, e[E_t_stuck] += h * s.stuck;
-
-    x[X_i] = s.i, x[X_theta] = s.th, x[X_omega] = s.om, x[X_p_mc] = s.pm, x[X_p_pd] = s.pd;
-    x[X_y_p] = s.yp, x[X_y_i] = s.yi;
-    d[X_i] = s.di, d[X_theta] = s.dth, d[X_omega] = s.dom, d[X_p_mc] = s.dpm;
-    z->friction = s.impulse / h;
-    z->makeup = s.makeup, z->near_stop = s.near_stop, z->far_stop = s.far_stop;
-    z->unsettled += s.unsettled, z->repeated += s.repeated;
+    e[E_E_damping] += 0.25 * h * k->k_damp * k->k_g * k->k_g * sum.oo;
+    e[E_E_seal] -= 0.5 * sum.fo, e[E_E_pipeline] += h / k->K_lf * sum.pipe;
+    e[E_E_stop] += h * sum.stop, e[E_E_port] += h * sum.port, e[E_t_stuck] += h * sum.stuck;
 }
 
-static void simulate(const double *p, double h, int64_t frames, int64_t substeps, const double *u,
+static void simulate(const double *p, double h, int64_t frames, int64_t steps, const double *u,
                      double *state, int64_t width, const int32_t *selected, double *rec)
 {
     const Plant k = prepare(p, h);
-    Saved *z = (Saved *)state;
-    double all[O_COUNT];
-    for (int64_t n = 0;; n++) {
-        tick(&k, z, u + n * U_COUNT);
-        record(&k, z, all);
+    const double *x = state;
+    Saved z = {.s = {.i = x[X_i], .th = x[X_theta], .om = x[X_omega], .pm = x[X_p_mc],
+                     .pd = x[X_p_pd], .yp = x[X_y_p], .yi = x[X_y_i]}};
+    memcpy(z.m, state + X_COUNT, sizeof z.m);
+    for (int64_t n = 0; n <= frames; n++) {
+        double all[O_COUNT];
+        tick(&k, &z, u + n * U_COUNT);
+        record(&k, &z, all);
         for (int64_t j = 0; j < width; j++)
-            rec[n * width + j] = all[selected ? selected[j] : j];
-        if (n == frames)
-            return;
-        frame(&k, z, substeps);
+            *rec++ = all[selected ? selected[j] : j];
+        if (n < frames)
+            frame(&k, &z, steps);
     }
+    state[X_COUNT + M_COUNT] = z.s.unsettled, state[X_COUNT + M_COUNT + 1] = z.s.repeated;
 }
 
-/* One run: frames ticks of substeps each, a row of all outputs per tick and one at the end.
- * u: frames + 1 rows of stimulus. state: a Saved, renewed in place. */
-void hand_run(const double *p, double h, int64_t frames, int64_t substeps, const double *u,
+/* One run: frames ticks of steps substeps each, and a row of all outputs per tick and at the end.
+ * u: frames + 1 rows of stimulus; state: the model's State and Memory at the start, then room for
+ * the numbers of substeps that did not settle and that took more than one pass. */
+void hand_run(const double *p, double h, int64_t frames, int64_t steps, const double *u,
               double *state, double *rec)
 {
-    simulate(p, h, frames, substeps, u, state, O_COUNT, NULL, rec);
+    simulate(p, h, frames, steps, u, state, O_COUNT, NULL, rec);
 }
 
 /* The same for many cases on all cores, with one block of p, state and rec per case, a stimulus
- * shared by all, and the outputs that are selected, width of them. */
-void hand_ensemble(int64_t cases, const double *p, double h, int64_t frames, int64_t substeps,
+ * shared by all, and only the selected outputs, width of them. */
+void hand_ensemble(int64_t cases, const double *p, double h, int64_t frames, int64_t steps,
                    const double *u, double *state, int64_t width, const int32_t *selected,
                    double *rec)
 {
-    const int64_t length = sizeof(Saved) / sizeof(double), block = (frames + 1) * width;
+    const int64_t length = X_COUNT + M_COUNT + 2, block = (frames + 1) * width;
 #pragma omp parallel for schedule(dynamic)
     for (int64_t c = 0; c < cases; c++)
-        simulate(p + c * P_COUNT, h, frames, substeps, u, state + c * length, width, selected,
+        simulate(p + c * P_COUNT, h, frames, steps, u, state + c * length, width, selected,
                  rec + c * block);
 }

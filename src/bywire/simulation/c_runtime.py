@@ -1,16 +1,32 @@
-"""C text that every kernel starts with: inline elementary functions that lanes can vectorize."""
+"""C text that kernels start with: elementary functions, from the library or inline for lanes."""
 
 from __future__ import annotations
 
-# exp: x = k ln2 + r, |r| <= ln2/2, Taylor to r^13 (error below 1 ulp), scaled by the exponent
-# bits. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
-# sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, good to |x| = 1e5;
-# minimax-free Taylor on |r| <= pi/4 to r^17.
-PRELUDE = r"""
+_INCLUDES = r"""
 #include <stdint.h>
 #include <string.h>
 #include <math.h>
+"""
 
+# One lane: the library's functions are faster than any inline polynomial.
+SCALAR = (
+    _INCLUDES
+    + r"""
+#define bw_exp exp
+#define bw_sin sin
+#define bw_cos cos
+#define bw_log log
+"""
+)
+
+# Lanes: inline, branch-free, so that loops over lanes vectorize.
+# exp: x = k ln2 + r, |r| <= ln2/2, Taylor to r^13 (error below 1 ulp), scaled by the exponent
+# bits. The rounding constant 1.5 * 2^52 leaves k in the low bits of the sum.
+# sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, good to |x| = 1e5;
+# Taylor on |r| <= pi/4 to r^17.
+LANES = (
+    _INCLUDES
+    + r"""
 static inline int64_t bw_bits(double x) { int64_t i; memcpy(&i, &x, 8); return i; }
 static inline double bw_number(int64_t i) { double x; memcpy(&x, &i, 8); return x; }
 
@@ -52,3 +68,4 @@ static inline double bw_sin(double x) { return bw_turn(x, 0); }
 static inline double bw_cos(double x) { return bw_turn(x, 1); }
 static inline double bw_log(double x) { return log(x); }
 """
+)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bywire.simulation.c_runtime import PRELUDE
+from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
     STATE,
     Layout,
@@ -125,7 +125,7 @@ def emit_lanes(stages: Stages, lanes: int) -> str:
         )
     outputs = block(stages.output)
     outputs += [f"o[{j}] = w{j};" for j in range(len(stages.output))]
-    return f"""{PRELUDE}{exact_pass(stages)}
+    return f"""{LANES}{exact_pass(stages)}
 #define L {lanes}
 
 static __attribute__((noinline)) void substep_pass(const double *restrict p, double h,

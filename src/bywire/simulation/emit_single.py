@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.simulation.c_runtime import PRELUDE
+from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     STATE,
     Layout,
@@ -61,7 +61,7 @@ def emit_single(stages: Stages) -> str:
         ticks.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
     outputs += [f"o[{j}] = {result(graph, n, name)};" for j, n in enumerate(stages.output)]
-    return f"""{PRELUDE}{exact_pass(stages)}
+    return f"""{SCALAR}{exact_pass(stages)}
 {SIGNATURE} {{
   {PLAN}
   double failures = state[{layout.start["counters"]}], repeats = state[{layout.start["counters"] + 1}];

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,7 +35,6 @@ CHOICES = {
     "drive.mode": "pressure",
 }
 _INCLUDE = '#include "hand_written_indices.h"\n'
-_REACTIONS = 4  # friction, makeup flow, forces of the two stops
 _COUNTERS = 2  # unsettled and repeated substeps
 
 
@@ -80,32 +79,30 @@ class Call:
 
     Parameters
     ----------
-    values
-        Outputs, shape (cases, rows, signals); filled by each call.
+    names, values
+        Outputs, values of shape (cases, rows, signals); filled by each call.
     state
-        State vectors at the end, shape (cases, length); filled by each call.
+        State and Memory at the start, then counters; shape (cases, length); filled by each call.
     substeps
         Substeps of all cases together.
     """
 
+    names: tuple[str, ...]
     values: Array
     state: Array
     substeps: int
-    _start: Array
-    _inputs: tuple[Array, ...]  # kept alive: the arguments are bare addresses
-    _function: Any
-    _arguments: tuple[Any, ...]
+    _inputs: tuple[NDArray[Any], ...]  # kept alive: the arguments are bare addresses
+    _call: Callable[[], None]
 
     def __call__(self) -> float:
         """Compute once and return the seconds that it took."""
-        self.state[:] = self._start
         begin = time.perf_counter()
-        self._function(*self._arguments)
+        self._call()
         return time.perf_counter() - begin
 
-    def signal(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> Array:
         """Return one output, shape (cases, rows)."""
-        return self.values[:, :, OUTPUTS.index(name)]
+        return np.asarray(self.values[:, :, self.names.index(name)])
 
     @property
     def unsettled(self) -> int:
@@ -126,13 +123,13 @@ class HandWritten:
     par
         Any parameter set of the structure that it covers.
     flags
-        ``PLAIN`` for single runs (with the flags of bywire's own kernels, so that the
-        comparison is of code and not of compiler settings), ``THREADS`` for ensembles.
+        ``PLAIN`` for single runs, ``THREADS`` for ensembles; both on top of the flags that all
+        kernels of bywire get, so that code is compared and not compiler settings.
 
     Raises
     ------
     CompilerError
-        Without a C compiler, or when it has no OpenMP and ``THREADS`` is asked for.
+        Without a C compiler, or without its OpenMP when ``THREADS`` asks for it.
     """
 
     def __init__(self, par: Par, flags: tuple[str, ...] = PLAIN) -> None:
@@ -145,43 +142,67 @@ class HandWritten:
         self._run.restype = self._ensemble.restype = None
 
     def single(self, run: Run) -> Call:
-        """Prepare one run; its recording interval must be the ECU's sample time."""
-        return self._prepare(run, [run.par], single=True)
+        """Prepare one run, all outputs recorded."""
+        shared, state, values = _arrays(run, [run.par], OUTPUTS)
+        arguments = (*_arguments(run, shared), pointer(state), pointer(values))
+        return Call(OUTPUTS, values, state, _substeps(run), shared, lambda: self._run(*arguments))
 
-    def ensemble(self, run: Run, cases: Sequence[Par]) -> Call:
-        """Prepare one run per parameter set, all with the initial values and stimulus of ``run``."""
-        return self._prepare(run, cases, single=False)
+    def ensemble(self, run: Run, cases: Sequence[Par], signals: Sequence[str]) -> Call:
+        """Prepare one run per parameter set, with the initial values and the stimulus of ``run``.
 
-    def _prepare(self, run: Run, cases: Sequence[Any], single: bool) -> Call:
-        schedule = run.schedule()
-        if (*schedule.task_frames, schedule.record_frames) != (1, 1):
-            raise ValueError("the hand-written C records once per ECU tick: record = ecu.T_s")
-        n, rows = len(cases), schedule.rows
-        parameters = np.array([list(par.leaves().values()) for par in cases])
-        rates = np.ascontiguousarray(run.stimulus(np.arange(rows) * schedule.frame))
-        start = np.tile(_initial(run), (n, 1))
-        state, values = start.copy(), np.empty((n, rows, len(OUTPUTS)))
-        common = (
-            pointer(parameters),
-            ctypes.c_double(schedule.step),
-            ctypes.c_int64(schedule.frames),
-            ctypes.c_int64(schedule.substeps),
-            pointer(rates),
+        Parameters
+        ----------
+        run
+            Its own parameters count only as structure.
+        cases
+            Parameter sets.
+        signals
+            Outputs to record.
+        """
+        shared, state, values = _arrays(run, cases, signals)
+        selected = np.array([OUTPUTS.index(s) for s in signals], dtype=np.int32)
+        arguments = (
+            ctypes.c_int64(len(cases)),
+            *_arguments(run, shared),
             pointer(state),
+            ctypes.c_int64(selected.size),
+            pointer(selected),
             pointer(values),
         )
+        kept = (*shared, selected)
+        count = len(cases) * _substeps(run)
         return Call(
-            values=values,
-            state=state,
-            substeps=n * schedule.frames * schedule.substeps,
-            _start=start,
-            _inputs=(parameters, rates),
-            _function=self._run if single else self._ensemble,
-            _arguments=common if single else (ctypes.c_int64(n), *common),
+            tuple(signals), values, state, count, kept, lambda: self._ensemble(*arguments)
         )
 
 
-def _initial(run: Run) -> Array:
-    """Return the state vector of the C file at the start: state, increments, memory, the rest."""
-    rest = len(Flow._fields) + _REACTIONS + _COUNTERS
-    return np.concatenate([run.state, np.zeros(len(State._fields)), run.memory, np.zeros(rest)])
+def _arrays(
+    run: Run, cases: Sequence[Any], signals: Sequence[str]
+) -> tuple[tuple[Array, Array], Array, Array]:
+    """Return parameters and stimulus, the states at the start, and room for the outputs."""
+    schedule = run.schedule()
+    if (*schedule.task_frames, schedule.record_frames) != (1, 1):
+        raise ValueError("the hand-written C records once per ECU tick: record = ecu.T_s")
+    parameters = np.array([list(par.leaves().values()) for par in cases])
+    times = np.arange(schedule.rows) * schedule.frame
+    stimulus = np.ascontiguousarray(run.stimulus(times), dtype=np.float64)
+    state = np.tile([*run.state, *run.memory, *[0.0] * _COUNTERS], (len(cases), 1))
+    values = np.empty((len(cases), schedule.rows, len(signals)))
+    return (parameters, stimulus), state, values
+
+
+def _arguments(run: Run, shared: tuple[Array, Array]) -> tuple[Any, ...]:
+    parameters, stimulus = shared
+    schedule = run.schedule()
+    return (
+        pointer(parameters),
+        ctypes.c_double(schedule.step),
+        ctypes.c_int64(schedule.frames),
+        ctypes.c_int64(schedule.substeps),
+        pointer(stimulus),
+    )
+
+
+def _substeps(run: Run) -> int:
+    schedule = run.schedule()
+    return schedule.frames * schedule.substeps

@@ -1,0 +1,261 @@
+"""Kernel of a run with exact forward sensitivities: the value once, its tangents in lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bywire.simulation.c_runtime import LANES
+from bywire.simulation.emission import (
+    CAP,
+    STATE,
+    Layout,
+    exact_pass,
+    indented,
+    layout_of,
+    leaf_namer,
+    result,
+    statements,
+)
+from bywire.simulation.expressions import needed
+from bywire.simulation.graph import Node
+from bywire.simulation.stages import SEEDS, Stages
+
+SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const double *restrict u,
+    double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
+    double *restrict rec, const double *restrict seeds, double *restrict tangents,
+    double *restrict rec_t)"""
+
+PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
+  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
+
+
+class _Tangents:
+    """Sorted statements of every stage: values first, then what differs between lanes."""
+
+    def __init__(self, stages: Stages) -> None:
+        self.stages, self.graph, self.level = stages, stages.graph, stages.level()
+        self.lane = stages.varies(SEEDS)
+        self.layout: Layout = layout_of(stages)
+        self.value_roots = [n for kind in (*STATE, "flag") for n in stages.fast[kind]]
+        self.tangent_roots = [n for kind in STATE for n in stages.fast_t[kind]]
+        ticks = [n for task in (*stages.ticks, *stages.ticks_t) for n in task]
+        self.pass_roots = self.value_roots + self.tangent_roots
+        every_root = self.pass_roots + ticks + stages.output + stages.output_t
+        order = needed(self.graph, every_root, lambda _: False)
+        self.once = [n for n in order if self.level[n] == 0]
+        framed = needed(self.graph, self.pass_roots, lambda n: self.level[n] == 0)
+        self.framed = [n for n in framed if self.level[n] == 1]
+        hoisted = [n for n in (*self.once, *self.framed) if self.lane[n]]
+        self.slot = {node: k for k, node in enumerate(hoisted)}
+
+    def name(self, node: Node) -> str:
+        """Return the text of a value or a tangent."""
+        return leaf_namer(self.graph, self.leaf, self._operation)(node)
+
+    def _operation(self, node: Node) -> str:
+        return f"C[{self.slot[node]} * L + l]" if node in self.slot else f"v{node}"
+
+    def leaf(self, kind: str, index: int) -> str:
+        """Return the text of an input."""
+        if kind == "sp":
+            return f"seeds[{index} * L + l]"
+        if kind in SEEDS:
+            return f"T[{self.layout.start[kind[1:]] + index} * L + l]"
+        if kind == "h":
+            return "h"
+        return {"p": f"p[{index}]", "u": f"uk[{index}]"}.get(kind, f"{kind}{index}")
+
+    def lines(self, order: Sequence[Node], lane: bool) -> list[str]:
+        """Return the statements of the nodes that differ between lanes, or of those that do not."""
+        chosen = [n for n in order if self.lane[n] == lane]
+        stored = [n for n in chosen if n in self.slot]
+        local = [n for n in chosen if n not in self.slot]
+        if not stored:
+            return statements(self.graph, local, self.name, "const double ")
+        lines = []
+        for node in chosen:
+            declare = "" if node in self.slot else "const double "
+            lines += statements(self.graph, [node], self.name, declare)
+        return lines
+
+    def results(self, roots: Sequence[Node], prefix: str) -> list[str]:
+        """Return the declarations of results under names of their own."""
+        return [
+            f"const double {prefix}{k} = {result(self.graph, n, self.name)};"
+            for k, n in enumerate(roots)
+        ]
+
+    def block(self, roots: Sequence[Node], below: int) -> list[Node]:
+        """Return what must be computed for results, apart from what is hoisted already."""
+        return needed(self.graph, roots, lambda n: self.level[n] < below)
+
+
+def emit_tangents(stages: Stages, lanes: int) -> str:
+    """Return the C source of the kernel with ``lanes`` directions."""
+    t = _Tangents(stages)
+    layout = t.layout
+    start, length = layout.start, layout.length
+    declared = [(f"{kind}{k}", start[kind] + k) for kind in length for k in range(length[kind])]
+    loads = [f"double {name} = state[{at}];" for name, at in declared]
+    stores = [f"state[{at}] = {name};" for name, at in declared]
+    substep = t.block(t.pass_roots, 2)
+    before = start["m"]  # tangents that a substep renews
+    commits = [f"{name} {'+=' if name[0] == 'q' else '='} s{k};" for k, (name, _) in
+               enumerate(declared[:before])]
+    new_t = [
+        f"T[{k} * L + l] {'+=' if k >= start['q'] else '='} t{k};" for k in range(before)
+    ]
+    return f"""{LANES}{exact_pass(stages)}
+#define L {lanes}
+
+{_exact_tangents(stages)}
+{SIGNATURE} {{
+  {PLAN}
+  double failures = state[{start["counters"]}], repeats = state[{start["counters"] + 1}];
+  double *restrict T = tangents;
+  double C[{max(len(t.slot), 1)} * L] __attribute__((aligned(64)));
+  {indented(loads, 2)}
+  {indented(t.lines(t.once, False), 2)}
+  #pragma omp simd
+  for (int l = 0; l < L; ++l) {{
+    {indented(t.lines(t.once, True), 4)}
+  }}
+  for (int64_t f = begin; f < end + last; ++f) {{
+    const double *restrict uk = u + (f / stim) * {_stimuli(stages)};
+    (void)uk;
+    {indented(_ticks(t), 4)}
+    if (f % every == 0) {{
+      {indented(_record(t), 6)}
+    }}
+    if (f == end) break;
+    {indented(t.lines(t.framed, False), 4)}
+    #pragma omp simd
+    for (int l = 0; l < L; ++l) {{
+      {indented(t.lines(t.framed, True), 6)}
+    }}
+    for (int64_t s = 0; s < substeps; ++s) {{
+      {indented(t.lines(substep, False), 6)}
+      {indented(t.results(t.value_roots, "s"), 6)}
+      if (__builtin_expect(s{len(t.value_roots) - 1} != 0.0, 0)) {{
+        {indented(_repeat(layout, len(t.value_roots)), 8)}
+        continue;
+      }}
+      #pragma omp simd
+      for (int l = 0; l < L; ++l) {{
+        {indented(t.lines(substep, True), 8)}
+        {indented(t.results(t.tangent_roots, "t"), 8)}
+        {indented(new_t, 8)}
+      }}
+      {indented(commits, 6)}
+    }}
+  }}
+  {indented(stores, 2)}
+  state[{start["counters"]}] = failures;
+  state[{start["counters"] + 1}] = repeats;
+}}
+"""
+
+
+def _stimuli(stages: Stages) -> int:
+    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == "u")
+
+
+def _ticks(t: _Tangents) -> list[str]:
+    texts, m = [], t.layout.start["m"]
+    for k, (roots, roots_t) in enumerate(zip(t.stages.ticks, t.stages.ticks_t, strict=True)):
+        order = t.block([*roots, *roots_t], 1)
+        order = [n for n in order if n not in t.slot]
+        values = t.lines(order, False) + t.results(roots, "w")
+        inner = t.lines(order, True) + t.results(roots_t, "t")
+        inner += [f"T[{m + j} * L + l] = t{j};" for j in range(len(roots_t))]
+        texts.append(f"""if (f % plan[{8 + k}] == 0) {{
+      {indented(values, 6)}
+      for (int l = 0; l < L; ++l) {{
+        {indented(inner, 8)}
+      }}
+      {indented([f"m{j} = w{j};" for j in range(len(roots))], 6)}
+    }}""")
+    return texts
+
+
+def _record(t: _Tangents) -> list[str]:
+    roots, roots_t = t.stages.output, t.stages.output_t
+    order = t.block([*roots, *roots_t], 1)
+    order = [n for n in order if n not in t.slot]
+    values = t.lines(order, False) + t.results(roots, "w")
+    values += [f"double o[{max(len(roots), 1)}], o_t[{max(len(roots), 1)} * L];"]
+    values += [f"o[{j}] = w{j};" for j in range(len(roots))]
+    inner = t.lines(order, True) + t.results(roots_t, "t")
+    inner += [f"o_t[{j} * L + l] = t{j};" for j in range(len(roots_t))]
+    return [
+        *values,
+        "for (int l = 0; l < L; ++l) {",
+        *(f"  {line}" for line in inner),
+        "}",
+        "const int64_t at = (f / every - row0) * chosen;",
+        "for (int64_t j = 0; j < chosen; ++j) {",
+        "  rec[at + j] = o[selection[j]];",
+        "  memcpy(rec_t + (at + j) * L, o_t + selection[j] * L, L * sizeof(double));",
+        "}",
+    ]
+
+
+def _exact_tangents(stages: Stages) -> str:
+    """Return the C functions of the rare pass with tangents, and of its repetition."""
+    graph = stages.graph
+    lane = stages.varies(SEEDS)
+    roots = [node for kind in STATE for node in stages.exact_t[kind]]
+    order = needed(graph, roots, lambda _: False)
+    sizes = [len(stages.exact[kind]) for kind in STATE]
+    nx = sizes[0]
+    kinds = {"sx": "sx", "sd": "sd", "sm": "sm", "sp": "sp"}
+
+    def leaf(kind: str, index: int) -> str:
+        if kind in SEEDS:
+            return f"{kinds[kind]}[{index} * L + l]"
+        return "h" if kind == "h" else f"{kind}[{index}]"
+
+    name = leaf_namer(graph, leaf, lambda node: f"v{node}")
+    values = statements(graph, [n for n in order if not lane[n]], name, "const double ")
+    inner = statements(graph, [n for n in order if lane[n]], name, "const double ")
+    inner += [f"o[{k} * L + l] = {result(graph, n, name)};" for k, n in enumerate(roots)]
+    return f"""static __attribute__((noinline, cold)) void exact_tangents(const double *p, double h,
+    const double *m, const double *x, const double *d, const double *sp, const double *sm,
+    const double *sx, const double *sd, double *o) {{
+  {indented(values, 2)}
+  for (int l = 0; l < L; ++l) {{
+    {indented(inner, 4)}
+  }}
+}}
+
+static __attribute__((noinline, cold)) int settle_tangents(const double *p, double h,
+    const double *m, const double *x, double *d, double *o, const double *sp, double *T,
+    double *o_t) {{
+  double sd[{nx} * L];
+  memcpy(sd, T + {nx} * L, sizeof(sd));
+  for (int pass = 0; pass < {CAP}; ++pass) {{
+    exact_pass(p, h, m, x, d, o);
+    exact_tangents(p, h, m, x, d, sp, T + {sum(sizes)} * L, T, sd, o_t);
+    if (o[{sum(sizes)}] == 0.0) return 0;
+    memcpy(d, o + {nx}, {nx} * sizeof(double));
+    memcpy(sd, o_t + {nx} * L, sizeof(sd));
+  }}
+  return 1;
+}}
+"""
+
+
+def _repeat(layout: Layout, size: int) -> list[str]:
+    nx, nm, q, m = (layout.length["x"], layout.length["m"], layout.start["q"], layout.start["m"])
+    names = [f"{kind}{k}" for kind in STATE for k in range(layout.length[kind])]
+    return [
+        f"double o[{size}], o_t[{size} * L];",
+        f"const double xs[] = {{{', '.join(f'x{k}' for k in range(nx))}}};",
+        f"const double ms[] = {{{', '.join(f'm{k}' for k in range(nm)) or '0.0'}}};",
+        f"double ds[] = {{{', '.join(f'd{k}' for k in range(nx))}}};",
+        "failures += settle_tangents(p, h, ms, xs, ds, o, seeds, T, o_t);",
+        "repeats += 1.0;",
+        *(f"{name} {'+=' if k >= q else '='} o[{k}];" for k, name in enumerate(names)),
+        f"for (int k = 0; k < {q} * L; ++k) T[k] = o_t[k];",
+        f"for (int k = {q} * L; k < {m} * L; ++k) T[k] += o_t[k];",
+    ]
