@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.bench.kpis import step_response
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.model import Model
@@ -80,6 +81,8 @@ class Experiment:
         Kinds of figures that show it, names of the report layer.
     finish
         ``finish(recording, options)``: adds derived signals to a recording, in place of it.
+    step
+        ``step(options)``: what a step response is judged by, for KPIs and figures.
     static
         ``static(par, options)``: recordings of a static characteristic, without any run.
     driven_unit
@@ -96,6 +99,7 @@ class Experiment:
     judge: Callable[[Recordings, Any], tuple[Kpi, ...]]
     figures: tuple[str, ...]
     finish: Callable[[xr.Dataset, Any], xr.Dataset] | None = None
+    step: Callable[[Any], step_response.Setting] | None = None
     static: Callable[[Any, Any], dict[str, xr.Dataset]] | None = None
     driven_unit: Callable[[Any], str] | None = None
 

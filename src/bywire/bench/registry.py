@@ -32,6 +32,12 @@ def find_experiment(name: str) -> Experiment:
     UnknownNameError
         With the nearest known names.
     """
+    module = name.replace("-", "_")
+    if module in {found.name for found in pkgutil.iter_modules(experiments.__path__)}:
+        # Only this one: loading them all would cost every start of the command line.
+        found = importlib.import_module(f"{experiments.__name__}.{module}").EXPERIMENT
+        if found.name == name:
+            return found  # type: ignore[no-any-return]
     known = all_experiments()
     if name not in known:
         raise unknown_name("experiment", name, known)

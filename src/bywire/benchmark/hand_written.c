@@ -56,7 +56,7 @@ typedef struct {
     double i, th, om, pm, pd, yp, yi;
     double di, dth, dom, dpm; /* half of the last increment: it predicts the midpoint */
     double impulse, makeup, near_stop, far_stop; /* impulse: friction torque times h */
-    double unsettled, repeated; /* substeps that hit the cap, and that took several passes */
+    double unsettled, careful; /* numbers of substeps */
     Sums sum;
 } Sim;
 
@@ -207,35 +207,34 @@ static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
     s->sum.port -= s->makeup * pm * pipe_loss(k, pm, 0.0);
 }
 
-/* A substep near a stop or with the pressure about to fall below zero. The first pass knows no
- * limit, as the ordinary substep; where it does not hold, passes with limit follow, each with
- * the contacts at the midpoint that the one before gave. */
+/* A substep near a stop or with the pressure about to fall below zero: pass after pass, each with
+ * the contacts at the midpoint that the one before gave, until they stay the same. */
 static void careful(const Plant *k, const Held *u, Sim *s)
 {
-    for (int pass = 0;; pass++) {
+    for (int pass = 1;; pass++) {
         Sides side = touching_sides(k, s->th + s->dth, s->om + s->dom);
         Pass q = solve(k, u, s, side);
-        bool settled = s->pm + q.dpm >= 0.0;
-        if (!settled && pass > 0) {
-            side.held = settled = true;
+        if (s->pm + q.dpm < 0.0) {
+            side.held = true;
             q = solve(k, u, s, side);
         }
         const double both = s->om + q.om;
         const Sides after = touching_sides(k, s->th + k->quarter * both, 0.5 * both);
-        settled &= side.k_near == after.k_near && side.k_far == after.k_far;
+        const bool settled = side.k_near == after.k_near && side.k_far == after.k_far;
         if (settled || pass == CAP) {
-            s->repeated += pass > 0, s->unsettled += !settled;
+            s->careful += 1.0, s->unsettled += !settled;
             book_sides(k, s, q, side);
             commit(k, s, q);
             return;
         }
-        if (pass > 0)
-            predict(k, s, q);
+        predict(k, s, q);
     }
 }
 
 INLINE bool free_of_stops(const Plant *k, double th, double om)
-{ return fabs(th - k->th_mid) + k->tau * fabs(om) < k->th_free; }
+{
+    return fabs(th - k->th_mid) + k->tau * fabs(om) < k->th_free;
+}
 
 /* Ordinary substeps, away from stops and limit: at most n; return how many. They work on a copy
  * of the state whose address nobody else has, so that the compiler may keep it in registers. */
@@ -373,12 +372,12 @@ static void simulate(const double *p, double h, int64_t frames, int64_t steps, c
         if (n < frames)
             frame(&k, &z, steps);
     }
-    state[X_COUNT + M_COUNT] = z.s.unsettled, state[X_COUNT + M_COUNT + 1] = z.s.repeated;
+    state[X_COUNT + M_COUNT] = z.s.unsettled, state[X_COUNT + M_COUNT + 1] = z.s.careful;
 }
 
 /* One run: frames ticks of steps substeps each, and a row of all outputs per tick and at the end.
  * u: frames + 1 rows of stimulus; state: the model's State and Memory at the start, then room for
- * the numbers of substeps that did not settle and that took more than one pass. */
+ * the numbers of substeps that did not settle and that were near a stop or the limit. */
 void hand_run(const double *p, double h, int64_t frames, int64_t steps, const double *u,
               double *state, double *rec)
 {

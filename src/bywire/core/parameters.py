@@ -11,6 +11,8 @@ import math
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cache
+from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
 
 from annotated_types import Ge, Gt, Le, Lt
@@ -117,7 +119,8 @@ class ParameterSet(BaseModel):
         return cast(Self, _rebuilt(self, "", values))
 
 
-def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, Leaf]:
+@cache
+def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, Leaf]:
     """Return the description of every number of a parameter class, by dotted name."""
     found: dict[str, Leaf] = {}
     for name, info in cls.model_fields.items():
@@ -129,10 +132,11 @@ def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, Leaf]:
         unit = next((m for m in info.metadata if isinstance(m, Unit)), None)
         if unit is not None:
             found[dotted] = _leaf(dotted, unit, info)
-    return found
+    return MappingProxyType(found)
 
 
-def choice_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, str]:
+@cache
+def choice_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
     """Return the description of every structural choice of a class, by dotted name."""
     found: dict[str, str] = {}
     for name, info in cls.model_fields.items():
@@ -142,7 +146,7 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> dict[str, str]:
             found |= choice_fields(inner, f"{dotted}.")
         elif not any(isinstance(m, Unit) for m in info.metadata):
             found[dotted] = info.description or ""
-    return found
+    return MappingProxyType(found)
 
 
 def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
@@ -194,9 +198,9 @@ def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Para
 
 
 def _require_known(cls: type[ParameterSet], name: str) -> None:
-    known = leaf_fields(cls).keys() | choice_fields(cls).keys()
-    if name not in known:
-        raise unknown_name("parameter", name, known)
+    leaves, choices = leaf_fields(cls), choice_fields(cls)
+    if name not in leaves and name not in choices:
+        raise unknown_name("parameter", name, leaves.keys() | choices.keys())
 
 
 def _validated(cls: type[T], tree: Mapping[str, Any]) -> T:

@@ -37,10 +37,15 @@ def cases(
     )  # fmt: skip
 
 
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the motor current."""
+    return step_response.Setting("i", 0.0, 0.0, options.i_step)
+
+
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the step's KPIs of the motor current."""
     run = recordings["run"]
-    found = evaluate("step_response", run, step_response.Setting("i", 0.0, 0.0, options.i_step))
+    found = evaluate("step_response", run, step(options))
     found |= evaluate("effort", run, effort.Setting())
     return tuple(found.values())
 
@@ -54,4 +59,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     figures=("step-response", "time-traces"),
+    step=step,
 )

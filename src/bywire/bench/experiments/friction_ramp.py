@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import xarray as xr
-from scipy import signal
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -56,6 +55,8 @@ def cases(
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
     """Add the measured current behind the low-pass filter, as the paper plots it."""
+    from scipy import signal  # slow to load, and only this experiment needs it
+
     interval = float(recording["time"][1] - recording["time"][0])
     decay = float(np.exp(-2.0 * np.pi * options.f_filter * interval))
     raw = recording["i_meas"].values

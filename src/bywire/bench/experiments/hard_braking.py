@@ -41,13 +41,17 @@ def cases(
     )  # fmt: skip
 
 
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the pressure."""
+    return step_response.Setting(
+        "p_mc", 0.0, options.p_from, options.p_to, smoothing=options.smoothing
+    )
+
+
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the step's, the effort's and the occupation's KPIs, of the pressure p_mc."""
     run = recordings["run"]
-    setting = step_response.Setting(
-        "p_mc", 0.0, options.p_from, options.p_to, smoothing=options.smoothing
-    )
-    found = evaluate("step_response", run, setting)
+    found = evaluate("step_response", run, step(options))
     found |= evaluate("effort", run, effort.Setting())
     found |= evaluate("occupation", run, occupation.Setting())
     return tuple(found.values())
@@ -62,4 +66,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     figures=("step-response", "time-traces", "energy-balance"),
+    step=step,
 )

@@ -7,8 +7,6 @@ from collections.abc import Mapping
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from scipy import optimize
-from scipy.interpolate import PchipInterpolator
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -87,6 +85,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
     """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] where it has one."""
     if not options.trace:
+        from scipy.interpolate import PchipInterpolator
+
         times = np.arange(0.0, _TIMES[-1], 1e-2)
         travel = PchipInterpolator(_TIMES, np.array(_TRAVELS) * 1e-3)(times)
         ride = xr.Dataset({"pedal": ("time", travel)}, coords={"time": times})
@@ -108,6 +108,8 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
 
 
 def _lag(t: NDArray[np.float64], demand: NDArray[np.float64], p: NDArray[np.float64]) -> float:
+    from scipy import optimize  # slow to load, and only this experiment needs it
+
     if np.ptp(demand) == 0.0:
         return float("nan")
 

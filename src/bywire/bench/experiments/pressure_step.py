@@ -43,10 +43,15 @@ def cases(
     )  # fmt: skip
 
 
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the pressure; its levels are those of the response."""
+    return step_response.Setting("p_mc", 0.0, smoothing=options.smoothing)
+
+
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the step's KPIs, and the static gain."""
     run = recordings["run"]
-    setting = step_response.Setting("p_mc", 0.0, smoothing=options.smoothing)
+    setting = step(options)
     found = evaluate("step_response", run, setting)
     found |= evaluate("effort", run, effort.Setting())
     found |= evaluate("occupation", run, occupation.Setting())
@@ -70,4 +75,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     figures=("step-response", "time-traces"),
+    step=step,
 )

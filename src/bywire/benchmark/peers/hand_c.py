@@ -12,7 +12,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.assemblies.motorcycle_brake import Flow, Memory, Output, Par, State, Stimulus
+from bywire.assemblies.motorcycle_brake import Output
+from bywire.assemblies.motorcycle_ecu import Memory, Stimulus
+from bywire.assemblies.motorcycle_energy import Flow
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters as Par
+from bywire.assemblies.motorcycle_plant import State
 from bywire.core.errors import CompilerError
 from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
 from bywire.simulation.native import pointer
@@ -35,7 +39,7 @@ CHOICES = {
     "drive.mode": "pressure",
 }
 _INCLUDE = '#include "hand_written_indices.h"\n'
-_COUNTERS = 2  # unsettled and repeated substeps
+_COUNTERS = 2  # substeps that did not settle, and that were near a stop or the limit
 
 
 def indices(par: Par) -> str:
@@ -110,8 +114,8 @@ class Call:
         return int(self.state[:, -2].sum())
 
     @property
-    def repeated(self) -> int:
-        """Substeps that took more than one pass."""
+    def careful(self) -> int:
+        """Substeps near a stop or at the limit of the pressure."""
         return int(self.state[:, -1].sum())
 
 
@@ -171,9 +175,7 @@ class HandWritten:
         )
         kept = (*shared, selected)
         count = len(cases) * _substeps(run)
-        return Call(
-            tuple(signals), values, state, count, kept, lambda: self._ensemble(*arguments)
-        )
+        return Call(tuple(signals), values, state, count, kept, lambda: self._ensemble(*arguments))
 
 
 def _arrays(
@@ -183,8 +185,8 @@ def _arrays(
     schedule = run.schedule()
     if (*schedule.task_frames, schedule.record_frames) != (1, 1):
         raise ValueError("the hand-written C records once per ECU tick: record = ecu.T_s")
-    parameters = np.array([list(par.leaves().values()) for par in cases])
-    times = np.arange(schedule.rows) * schedule.frame
+    parameters = np.array([list(par.leaves().values()) for par in cases], dtype=np.float64)
+    times = np.arange(schedule.rows, dtype=np.float64) * schedule.frame
     stimulus = np.ascontiguousarray(run.stimulus(times), dtype=np.float64)
     state = np.tile([*run.state, *run.memory, *[0.0] * _COUNTERS], (len(cases), 1))
     values = np.empty((len(cases), schedule.rows, len(signals)))

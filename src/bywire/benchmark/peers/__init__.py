@@ -1,0 +1,1 @@
+"""Comparison partners of the speed benchmark: one file per tool that a user would pick instead."""

@@ -1,0 +1,1 @@
+"""Command line: argument parsing, messages, exit statuses; everything else lies below."""

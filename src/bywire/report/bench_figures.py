@@ -1,0 +1,103 @@
+"""Which figures show an experiment: the kinds that experiments name, made from their results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from matplotlib.figure import Figure
+
+from bywire.bench.bench import Result
+from bywire.report.energy_balance import energy_balance
+from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.step_marks import StepFacts, StepLimits
+from bywire.report.step_response import step_response
+from bywire.report.stribeck_curve import stribeck_curve
+from bywire.report.time_traces import time_traces
+from bywire.report.tracking import tracking
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A figure with a name for its file and a caption."""
+
+    name: str
+    figure: Figure
+    caption: str
+
+
+def bench_figures(result: Result) -> list[Shown]:
+    """Return the figures of a result, in the order in which its experiment names them."""
+    shown: list[Shown] = []
+    for kind in result.bench.definition.figures:
+        shown += _KINDS[kind](result)
+    return shown
+
+
+def _step_response(result: Result) -> list[Shown]:
+    definition = result.bench.definition
+    if definition.step is None:
+        return []
+    setting = definition.step(result.bench.chosen_options)
+    recording = result.recordings["run"]
+    kpis = {kpi.name: kpi.value for kpi in result.kpis}
+    limits, facts = None, None
+    if setting.start is not None and setting.end is not None and setting.start != setting.end:
+        limits = StepLimits(setting.t_step, setting.start, setting.end)
+        facts = StepFacts(
+            rise_time=kpis.get("rise_time"),
+            settling_time=kpis.get("settling_time"),
+            overshoot=kpis["overshoot"] / 100.0 if "overshoot" in kpis else None,
+        )
+    demand = {"p_mc": "p_ref", "i": "i_ref"}[setting.signal] if limits is not None else None
+    figure = step_response(recording, setting.signal, demand, limits=limits, facts=facts)
+    return [Shown("step-response", figure, "Step response with its 2 % band.")]
+
+
+def _time_traces(result: Result) -> list[Shown]:
+    return [
+        Shown(
+            f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
+            time_traces(recording),
+            f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck.",
+        )
+        for label, recording in result.recordings.items()
+        if "time" in recording.dims
+    ]
+
+
+def _energy_balance(result: Result) -> list[Shown]:
+    return [
+        Shown(
+            f"energy-balance-{label}" if len(result.recordings) > 1 else "energy-balance",
+            energy_balance(recording),
+            "Where the energy came from and where it went.",
+        )
+        for label, recording in result.recordings.items()
+    ]
+
+
+def _hysteresis_loop(result: Result) -> list[Shown]:
+    average = float(result.bench.chosen_options.flat().get("smoothing", 0.0))
+    figure = hysteresis_loop(result.recordings, current="i_filtered", average=average)
+    return [Shown("hysteresis-loop", figure, "Current over pressure, up and down again.")]
+
+
+def _stribeck_curve(result: Result) -> list[Shown]:
+    figure = stribeck_curve(result.recordings["curve"])
+    return [Shown("stribeck-curve", figure, "Friction torque over motor speed.")]
+
+
+def _tracking(result: Result) -> list[Shown]:
+    figure = tracking(result.recordings["run"])
+    return [Shown("tracking", figure, "Pressure and its set point from the pedal.")]
+
+
+_KINDS: dict[str, Callable[[Result], list[Shown]]] = {
+    "step-response": _step_response,
+    "time-traces": _time_traces,
+    "energy-balance": _energy_balance,
+    "hysteresis-loop": _hysteresis_loop,
+    "stribeck-curve": _stribeck_curve,
+    "tracking": _tracking,
+}
