@@ -113,9 +113,7 @@ def _demand(m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
 def _shaped(m: Memory, par: MotorcycleParameters) -> Memory:
     """Return the memory with dither added and the low-pass filter run."""
     ecu = par.ecu
-    dit, wave = dither.output(
-        dither.State(m.dit_phase), m.p_meas, ecu.T_s, ecu.dither, ecu.est_par
-    )
+    dit, wave = dither.output(dither.State(m.dit_phase), m.p_meas, ecu.T_s, ecu.dither, ecu.est_par)
     filter_first = ecu.filter.place == "before-dither"
     low, filtered = low_pass_2.output(
         low_pass_2.State(m.lp_s1, m.lp_s2),

@@ -68,9 +68,7 @@ def rates(
         E_gear=gear,
         E_seal=seal,
         E_damping=master_cylinder.power_loss(cylinder_input(x, w.q, par), par.master_cylinder),
-        E_pipeline=pipeline.power_loss(
-            pipeline.Input(x.p_mc, x.p_pd), par.pipeline, par.fluid
-        ),
+        E_pipeline=pipeline.power_loss(pipeline.Input(x.p_mc, x.p_pd), par.pipeline, par.fluid),
         E_stop=end_stop.power_loss(stop_u, forces, par.stop),
         E_port=port - brake_fluid.convected_power(makeup, x.p_mc, par.fluid),
         W_shaft=w.torque * x.omega,

@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import model_validator
 
 from bywire.control import current_pi, dither, low_pass_2, pedal_map, pressure_pid
+from bywire.control.dither import Believed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure
 from bywire.plant import (
@@ -56,7 +57,7 @@ class EcuParameters(ParameterSet):
     current: current_pi.Parameters
     filter: low_pass_2.Parameters
     dither: dither.Parameters
-    est_par: dither.Believed
+    est_par: Believed
     p_atm: Pressure
     """ambient pressure that the ECU takes off the absolute reading"""
     pedal_map: pedal_map.Parameters

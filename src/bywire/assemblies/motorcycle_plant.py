@@ -84,9 +84,7 @@ def stop_input(x: State, par: Par) -> end_stop.Input:
     """Return the end stops' input."""
     piston = ball_screw_gear.output(ball_screw_gear.State(x.theta, x.omega), par.gear)
     cylinder = par.master_cylinder
-    return end_stop.Input(
-        x=piston.x, v=piston.v, x_rest=cylinder.x_rest, x_end=cylinder.x_end
-    )
+    return end_stop.Input(x=piston.x, v=piston.v, x_rest=cylinder.x_rest, x_end=cylinder.x_end)
 
 
 def port_conductance(xe: State, par: Par) -> float:

@@ -42,9 +42,7 @@ def travel_at(p: float, par: Par) -> float:
 
 
 def _travel_slope(x: float, p: float, par: Par) -> float:
-    volume = master_cylinder.volume(
-        master_cylinder.Input(x=x, v=0.0, q=0.0), par.master_cylinder
-    )
+    volume = master_cylinder.volume(master_cylinder.Input(x=x, v=0.0, q=0.0), par.master_cylinder)
     chamber = brake_fluid.compliance(brake_fluid.Chamber(V=volume, p=p), par.fluid)
     pads = caliper.mass(caliper.State(p), par.caliper, par.fluid)
     return (chamber + pads) / par.master_cylinder.A_mc

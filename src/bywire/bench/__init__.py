@@ -1,1 +1,1 @@
-"""Virtual tests: assembly, ECU, stimulus and sensors make an experiment, whose recording is judged."""
+"""Virtual tests: an assembly, its ECU, a stimulus and sensors make an experiment that is judged."""

@@ -52,6 +52,8 @@ def case_from_rest(
     )
 
 
-def step_at_zero(name: str, before: float, after: float) -> Callable[[NDArray[np.float64]], Signals]:
+def step_at_zero(
+    name: str, before: float, after: float
+) -> Callable[[NDArray[np.float64]], Signals]:
     """Return the stimulus that steps one signal at t = 0."""
     return lambda t: {name: np.where(t < -1e-9, before, after)}

@@ -11,9 +11,9 @@ from bywire.cli.progress import progress_bar
 
 def execute(source: str, out: Path | None, as_text: bool) -> None:
     """Reproduce a source; a known disagreement is no error."""
+    from bywire.report.table_text import table_text
     from bywire.reproduction.registry import find_source
     from bywire.reproduction.results import as_json, as_table, write
-    from bywire.report.table_text import table_text
 
     chosen = find_source(source)
     with progress_bar() as progress:

@@ -1,1 +1,1 @@
-"""Foundations that know no brake: quantities, operations, parameters, signals, the model protocol."""
+"""Foundations that know no brake: quantities, operations, parameters, signals, model protocol."""

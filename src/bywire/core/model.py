@@ -105,7 +105,7 @@ class Model(Protocol):
         ...
 
     def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
-        """Return the smooth right-hand side of the mass form, a State; without frictions and limits."""
+        """Return the smooth right-hand side, a State; without frictions and limits."""
         ...
 
     def bounds(

@@ -8,11 +8,12 @@ on floats, NumPy arrays, CasADi symbols and any object that brings its own opera
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-_FLOATS = {
+_FLOATS: dict[str, Callable[..., Any]] = {
     "exp": math.exp,
     "log": math.log,
     "sqrt": math.sqrt,

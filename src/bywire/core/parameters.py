@@ -22,7 +22,6 @@ from pydantic.fields import FieldInfo
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.quantities import Unit
 
-
 T = TypeVar("T", bound="ParameterSet")
 
 
@@ -222,4 +221,5 @@ def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
         unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
         return f"{name} = {value}{unit} is not admissible: it must be {leaf.range_text}"
     message = str(detail["msg"]).removeprefix("Value error, ")
-    return f"{name or cls.__name__}: {message}" + ("" if isinstance(value, dict) else f", got {value!r}")
+    given = "" if isinstance(value, dict) else f", got {value!r}"
+    return f"{name or cls.__name__}: {message}{given}"

@@ -63,4 +63,4 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
 
 def zeros(tuple_type: type[T]) -> T:
     """Return a signal tuple whose every field is 0.0."""
-    return tuple_type(*(0.0 for _ in tuple_type._fields))  # type: ignore[attr-defined]
+    return tuple_type(*(0.0 for _ in tuple_type._fields))  # type: ignore[attr-defined,arg-type]

@@ -37,7 +37,9 @@ _COMMON: dict[str, tuple[float, str]] = {
 }
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
 # Names, products, quotients and small powers; nothing that would make pint compute.
-_UNIT = re.compile(r"[A-Za-zµΩ%°]+(?:(?:\*\*|\^)-?\d)?(?:\s*[*/·]?\s*\(?[A-Za-zµΩ%°]+(?:(?:\*\*|\^)-?\d)?\)?)*")
+_UNIT = re.compile(
+    r"[A-Za-zµΩ%°]+(?:(?:\*\*|\^)-?\d)?(?:\s*[*/·]?\s*\(?[A-Za-zµΩ%°]+(?:(?:\*\*|\^)-?\d)?\)?)*"
+)
 _MEANT = {"Nm": "N*m", "Nms": "N*m*s", "degC": "degC"}
 _ROTARY = re.compile(r"rpm|rev|turn|cycle|rad|deg")
 
@@ -77,10 +79,7 @@ def parse(value: str | float, symbol: str, name: str) -> float:
     """
     if isinstance(value, bool):
         raise UnitError(f"{name} = {value}: a number is wanted{_in_unit(symbol)}")
-    if isinstance(value, (int, float)):
-        number = float(value)
-    else:
-        number = _number(value, symbol, name)
+    number = float(value) if isinstance(value, (int, float)) else _number(value, symbol, name)
     if not math.isfinite(number):
         raise UnitError(f"{name} = {value!r} is not finite{_in_unit(symbol)}")
     return number

@@ -54,7 +54,8 @@ def find_compiler() -> Compiler | None:
             return _labelled((path,))
     if wanted:
         raise CompilerError(
-            f"BYWIRE_CC = {wanted!r} names no program: unset it, or set it to a C compiler or 'none'"
+            f"BYWIRE_CC = {wanted!r} names no program: "
+            "unset it, or set it to a C compiler or 'none'"
         )
     if importlib.util.find_spec("ziglang") is not None:
         return _labelled((sys.executable, "-m", "ziglang", "cc"))
@@ -108,9 +109,7 @@ def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> 
 def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: Path) -> None:
     command = [*compiler.command, *_COMMON, *flags, str(source), "-o", str(target), "-lm"]
     try:
-        done = subprocess.run(
-            command, capture_output=True, text=True, timeout=TIMEOUT, check=False
-        )
+        done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise CompilerError(f"{compiler.label} did not run: {error}") from None
     if done.returncode != 0:

@@ -46,7 +46,9 @@ def active_set(C: Any, d: Any) -> ActiveSet:
         pressed = d[0] > 0
         return ActiveSet(ca.if_else(pressed, 1.0 / C, 0), ca.if_else(pressed, 1, 0))
     cases = []
-    for number, subset in enumerate(s for size in range(n + 1) for s in combinations(range(n), size)):
+    for number, subset in enumerate(
+        s for size in range(n + 1) for s in combinations(range(n), size)
+    ):
         K = _embedded_inverse(C, subset)
         F = K @ d
         outside = C @ F - d

@@ -83,9 +83,7 @@ def eliminate(
         not depend on them comes first, for then its reciprocal is hoisted.
     """
     n = A.shape[0]
-    entries: Entries = {
-        (i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])
-    }
+    entries: Entries = {(i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])}
     right = dict(right)
     left = [i for i in range(n) if i not in keep]
     steps = []
@@ -111,9 +109,7 @@ def _price(entries: Entries, pivot: int, changing: Any) -> tuple[int, bool, int]
     return rows * columns, depends(entries[pivot, pivot], changing), pivot
 
 
-def _pivot(
-    entries: Entries, right: dict[int, Form], pivot: int, x: Any, changing: Any
-) -> Step:
+def _pivot(entries: Entries, right: dict[int, Form], pivot: int, x: Any, changing: Any) -> Step:
     reciprocal = 1.0 / entries.pop((pivot, pivot))
     row = {j: e for (i, j), e in entries.items() if i == pivot}
     column = {i: e for (i, j), e in entries.items() if j == pivot}

@@ -6,7 +6,6 @@ from collections.abc import Callable
 
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
-    STATE,
     Layout,
     exact_pass,
     indented,
@@ -17,7 +16,7 @@ from bywire.simulation.emission import (
 )
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Node
-from bywire.simulation.stages import Stages
+from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """void bw_run_lanes(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
@@ -113,8 +112,9 @@ def emit_lanes(stages: Stages, lanes: int) -> str:
     def block(roots: list[Node]) -> list[str]:
         order = needed(graph, roots, lambda n: level[n] == 0)
         lines = statements(graph, order, frame, "const double ")
-        return lines + [f"const double w{j} = {result(graph, n, frame)};"
-                        for j, n in enumerate(roots)]
+        return lines + [
+            f"const double w{j} = {result(graph, n, frame)};" for j, n in enumerate(roots)
+        ]
 
     ticks = []
     for k, roots in enumerate(stages.ticks):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
-    STATE,
     Layout,
     exact_pass,
     indented,
@@ -14,7 +13,7 @@ from bywire.simulation.emission import (
     statements,
 )
 from bywire.simulation.expressions import needed
-from bywire.simulation.stages import Stages
+from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
@@ -61,10 +60,11 @@ def emit_single(stages: Stages) -> str:
         ticks.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
     outputs += [f"o[{j}] = {result(graph, n, name)};" for j, n in enumerate(stages.output)]
+    counters = layout.start["counters"]
     return f"""{SCALAR}{exact_pass(stages)}
 {SIGNATURE} {{
   {PLAN}
-  double failures = state[{layout.start["counters"]}], repeats = state[{layout.start["counters"] + 1}];
+  double failures = state[{counters}], repeats = state[{counters + 1}];
   {indented(_loads(layout), 2)}
   {indented(block(hoisted), 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
@@ -89,8 +89,8 @@ def emit_single(stages: Stages) -> str:
     }}
   }}
   {indented(_stores(layout), 2)}
-  state[{layout.start["counters"]}] = failures;
-  state[{layout.start["counters"] + 1}] = repeats;
+  state[{counters}] = failures;
+  state[{counters + 1}] = repeats;
 }}
 """
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
     CAP,
-    STATE,
     Layout,
     exact_pass,
     indented,
@@ -18,7 +17,7 @@ from bywire.simulation.emission import (
 )
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Node
-from bywire.simulation.stages import SEEDS, Stages
+from bywire.simulation.stages import SEEDS, STATE, Stages
 
 SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
@@ -100,11 +99,11 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
     stores = [f"state[{at}] = {name};" for name, at in declared]
     substep = t.block(t.pass_roots, 2)
     before = start["m"]  # tangents that a substep renews
-    commits = [f"{name} {'+=' if name[0] == 'q' else '='} s{k};" for k, (name, _) in
-               enumerate(declared[:before])]
-    new_t = [
-        f"T[{k} * L + l] {'+=' if k >= start['q'] else '='} t{k};" for k in range(before)
+    commits = [
+        f"{name} {'+=' if name[0] == 'q' else '='} s{k};"
+        for k, (name, _) in enumerate(declared[:before])
     ]
+    new_t = [f"T[{k} * L + l] {'+=' if k >= start['q'] else '='} t{k};" for k in range(before)]
     return f"""{LANES}{exact_pass(stages)}
 #define L {lanes}
 

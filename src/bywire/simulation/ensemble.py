@@ -138,8 +138,7 @@ def simulate_ensemble(
         return _one_by_one(run, parameters, tuple(signals))
     kernel = _lane_kernel(prepared.program, compiler, LANES)
     schedule = run.schedule()
-    times = np.arange(schedule.stimulus_rows) * (schedule.stimulus_frames * schedule.frame)
-    stimulus = np.ascontiguousarray(run.stimulus(times), dtype=np.float64)
+    stimulus = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     selection = np.array([names.index(s) for s in signals], dtype=np.int32)
     count = len(parameters)
     matrix = np.array([list(par.leaves().values()) for par in parameters])
@@ -166,9 +165,8 @@ def simulate_ensemble(
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         list(pool.map(group, range(0, count, kernel.lanes)))
-    time = np.arange(schedule.rows) * (schedule.record_frames * schedule.frame)
     return Ensemble(
-        time, values, tuple(signals), counters[:, 0], counters[:, 1], kernel.label
+        schedule.record_times, values, tuple(signals), counters[:, 0], counters[:, 1], kernel.label
     )
 
 
@@ -193,14 +191,13 @@ def _require_alike(run: Run, parameters: Sequence[ParameterSet]) -> None:
             )
 
 
-def _one_by_one(
-    run: Run, parameters: Sequence[ParameterSet], signals: tuple[str, ...]
-) -> Ensemble:
+def _one_by_one(run: Run, parameters: Sequence[ParameterSet], signals: tuple[str, ...]) -> Ensemble:
     """Serve without a compiler: the cases one after the other."""
     runs: list[Trajectory] = []
     for par in parameters:
-        single = Run(run.model, par, run.state, run.memory, run.stimulus, run.duration, run.step,
-                     run.record)
+        single = Run(
+            run.model, par, run.state, run.memory, run.stimulus, run.duration, run.step, run.record
+        )
         runs.append(simulate(single, signals))
     return Ensemble(
         runs[0].time,

@@ -72,9 +72,7 @@ class Graph:
         # repr keeps 0.0 and -0.0 apart: dict keys would not.
         return self._intern(Operation("const", (repr(float(value)),)))
 
-    def add_function(
-        self, function: Any, inputs: Sequence[Sequence[Node]]
-    ) -> list[list[Node]]:
+    def add_function(self, function: Any, inputs: Sequence[Sequence[Node]]) -> list[list[Node]]:
         """Add a CasADi SX function.
 
         Parameters
@@ -160,7 +158,7 @@ class Graph:
 
     def _inv(self, a: Node) -> Node | None:
         operation = self.nodes[a]
-        return operation.args[0] if operation.op == "inv" else None
+        return int(operation.args[0]) if operation.op == "inv" else None
 
     def _sq(self, a: Node) -> Node:
         return self.apply("mul", a, a)
@@ -227,7 +225,7 @@ class Graph:
     def _neg(self, a: Node) -> Node | None:
         operation = self.nodes[a]
         if operation.op == "neg":
-            return operation.args[0]
+            return int(operation.args[0])
         if operation.op == "sub":
             return self.apply("sub", operation.args[1], operation.args[0])
         return None

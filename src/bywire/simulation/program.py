@@ -104,8 +104,16 @@ def build_program(model: Model, par: ParameterSet) -> Program:
             ca.Function(
                 f"tick_{k}",
                 [s.x, s.m, u, p],
-                [column(task.tick(symbol_tuple(model.State, s.x), symbol_tuple(model.Memory, s.m),
-                                  symbol_tuple(model.Stimulus, u), symbolic))],
+                [
+                    column(
+                        task.tick(
+                            symbol_tuple(model.State, s.x),
+                            symbol_tuple(model.Memory, s.m),
+                            symbol_tuple(model.Stimulus, u),
+                            symbolic,
+                        )
+                    )
+                ],
             )
             for k, task in enumerate(tasks)
         ),

@@ -127,11 +127,10 @@ def simulate(
     schedule = run.schedule()
     names = tuple(prepared.program.outputs)
     wanted = names if signals is None else tuple(signals)
-    times = np.arange(schedule.stimulus_rows) * (schedule.stimulus_frames * schedule.frame)
     request = Request(
         schedule=schedule,
         parameters=np.array(list(run.par.leaves().values())),
-        stimulus=np.ascontiguousarray(run.stimulus(times), dtype=np.float64),
+        stimulus=np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64),
         selection=np.array([names.index(s) for s in wanted], dtype=np.int32),
     )
     vector = initial_vector(chosen.layout, run.state, run.memory)
@@ -143,7 +142,7 @@ def simulate(
     if status == "done" and counters[0]:
         status = "unsettled"
     return Trajectory(
-        time=np.arange(rows) * (schedule.record_frames * schedule.frame),
+        time=schedule.record_times[:rows],
         values=values[:rows],
         names=wanted,
         status=status,

@@ -6,6 +6,9 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bywire.core.errors import StepError
 
 _TOLERANCE = 1e-9
@@ -58,14 +61,19 @@ class Schedule:
         """Length of a frame [s]."""
         return self.step * self.substeps
 
-    def stimulus_time(self, row: int) -> float:
-        """Return the time of a row of the stimulus [s]."""
-        return row * self.stimulus_frames * self.frame
+    @property
+    def stimulus_times(self) -> NDArray[np.float64]:
+        """Times of the stimulus' rows [s]."""
+        interval = self.stimulus_frames * self.frame
+        return np.arange(self.stimulus_rows, dtype=np.float64) * interval
+
+    @property
+    def record_times(self) -> NDArray[np.float64]:
+        """Times of the recorded rows [s]."""
+        return np.arange(self.rows, dtype=np.float64) * (self.record_frames * self.frame)
 
 
-def plan(
-    duration: float, step: float, periods: Mapping[str, float], record: float
-) -> Schedule:
+def plan(duration: float, step: float, periods: Mapping[str, float], record: float) -> Schedule:
     """Divide a run into frames.
 
     Parameters

@@ -104,9 +104,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     bounds = _bounds(model, par, s, y, at_y)
     mass = column(model.mass(symbol_tuple(model.State, y), par))
     A = ca.diag(mass) - 0.5 * s.h * linear.J
-    right = {
-        i: row.times(s.h, s.x, changing) for i, row in enumerate(linear.rows)
-    }
+    right = {i: row.times(s.h, s.x, changing) for i, row in enumerate(linear.rows)}
     for j, curved in enumerate(linear.nonlinear):
         if curved:
             for i in range(s.x.shape[0]):
@@ -116,8 +114,9 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     reduced = eliminate(A, right, kept, s.x, changing)
     projection, reaction = _project(model, s, reduced, bounds, exact)
     d = _increments(s, reduced, projection)
-    x = column([projection.w[kept.index(k)] if k in kept else s.x[k] + d[k]
-                for k in range(s.x.shape[0])])
+    x = column(
+        [projection.w[kept.index(k)] if k in kept else s.x[k] + d[k] for k in range(s.x.shape[0])]
+    )
     middle = s.x + 0.5 * d
     overlap = _gaps(model, par, middle, y)
     contact = K @ overlap

@@ -102,12 +102,9 @@ def simulate_with_sensitivities(
     compiler = find_compiler()
     if compiler is None:
         raise CompilerError("sensitivities need a C compiler: install the extra bywire[compiler]")
-    kernel = _tangent_kernel(
-        prepared.program, tuple(names.index(p) for p in parameters), compiler
-    )
+    kernel = _tangent_kernel(prepared.program, tuple(names.index(p) for p in parameters), compiler)
     schedule = run.schedule()
-    times = np.arange(schedule.stimulus_rows) * (schedule.stimulus_frames * schedule.frame)
-    stimulus = np.ascontiguousarray(run.stimulus(times), dtype=np.float64)
+    stimulus = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
     outputs = tuple(prepared.program.outputs)
     selection = np.array([outputs.index(s) for s in signals], dtype=np.int32)
     plan = plan_array(schedule, 0, schedule.frames, selection.size)
@@ -129,7 +126,7 @@ def simulate_with_sensitivities(
         derivatives[:, :, first : first + here] = rec_t[:, :, :here]
     counters = vector[kernel.layout.start["counters"] :]
     trajectory = Trajectory(
-        time=np.arange(schedule.rows) * (schedule.record_frames * schedule.frame),
+        time=schedule.record_times,
         values=values,
         names=tuple(signals),
         status="unsettled" if counters[0] else "done",

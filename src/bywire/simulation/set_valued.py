@@ -62,13 +62,13 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
     m = c.shape[0]
     if m == 0:
         return Projection(ca.SX(0, 1), ca.SX(0))
-    best_misfit, best = None, ca.SX.zeros(m)
+    best = ca.SX.zeros(m)
+    best_misfit = _misfit(S, c, low, high, best)
     for signs in product((0, 1, -1), repeat=m):
+        if not any(signs):
+            continue
         w = _with_signs(S, c, low, high, signs)
         misfit = _misfit(S, c, low, high, w)
-        if best_misfit is None:
-            best_misfit, best = misfit, w
-            continue
         better = misfit < best_misfit
         best = ca.if_else(better, w, best)
         best_misfit = ca.fmin(misfit, best_misfit)

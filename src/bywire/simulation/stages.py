@@ -79,7 +79,9 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction, "F": n.contact,
         "q": n.flow, "p": n.parameters, "h": 1,
     }  # fmt: skip
-    leaves = {kind: [graph.leaf(kind, k) for k in range(length)] for kind, length in lengths.items()}
+    leaves = {
+        kind: [graph.leaf(kind, k) for k in range(length)] for kind, length in lengths.items()
+    }
 
     def add(function: Any, kinds: str) -> list[list[Node]]:
         return graph.add_function(function, [leaves[k] for k in kinds])

@@ -45,5 +45,3 @@ def choose(cases: Sequence[tuple[Any, Any]]) -> Any:
         best = ca.if_else(better, value, best)
         best_score = ca.fmax(score, best_score)
     return best
-
-

@@ -80,9 +80,9 @@ class _Call:
         self._inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
         self._outputs = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
         for k, array in enumerate(self._inputs):
-            self._buffer.set_arg(k, memoryview(array))
+            self._buffer.set_arg(k, memoryview(array.data))
         for k, array in enumerate(self._outputs):
-            self._buffer.set_res(k, memoryview(array))
+            self._buffer.set_res(k, memoryview(array.data))
 
     def __call__(self, *arguments: Array) -> list[Array]:
         for own, given in zip(self._inputs, arguments, strict=True):

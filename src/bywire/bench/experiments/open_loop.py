@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import Field
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current
@@ -15,8 +17,6 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
-from typing import Annotated
-from pydantic import Field
 
 
 class Options(ParameterSet):

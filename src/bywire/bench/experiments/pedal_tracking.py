@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_parameters import DriveMode, MotorcycleParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.kpi import Kpi
@@ -46,16 +46,15 @@ def cases(
     """Return the one run; it starts at rest at the first sample's pressure."""
     ride = _ride(par, options)
     t = ride["time"].values - float(ride["time"][0])
-    signal, mode = ("p_set", "pressure") if "pressure" in ride else ("pedal_force", "pedal")
+    mode: DriveMode = "pressure" if "pressure" in ride else "pedal"
+    signal = "p_set" if mode == "pressure" else "pedal_force"
     values = ride["pressure" if "pressure" in ride else "force"].values
 
     def stimulus(at: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
         return {signal: np.interp(at, t, values)}
 
     start = float(values[0]) if mode == "pressure" else _set_point(float(values[0]), par)
-    return (
-        case_from_rest("run", par, mode, start, stimulus, float(t[-1]), settle=1.0, keep=0.0),
-    )
+    return (case_from_rest("run", par, mode, start, stimulus, float(t[-1]), settle=1.0, keep=0.0),)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -39,14 +39,14 @@ def cases(
     par: MotorcycleParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
     """Return the one run."""
-    timing = {"settle": options.settle, "keep": min(options.settle, 0.1)}
+    keep = min(options.settle, 0.1)
     if options.how == "current-off":
         # Without dither: an ECU that has switched its current off does not shake the piston.
         return (
             case_from_rest(
                 "run", par, "current-direct", options.p_from,
                 step_at_zero("i_set", holding_current(options.p_from, par), 0.0),
-                options.duration, {"ecu.dither.waveform": "off"}, **timing,
+                options.duration, {"ecu.dither.waveform": "off"}, settle=options.settle, keep=keep,
             ),
         )  # fmt: skip
     ramp = max(options.t_ramp, 1e-9)
@@ -54,7 +54,7 @@ def cases(
         case_from_rest(
             "run", par, "pressure", options.p_from,
             lambda t: {"p_set": options.p_from * np.clip(1.0 - t / ramp, 0.0, 1.0)},
-            options.duration, **timing,
+            options.duration, settle=options.settle, keep=keep,
         ),
     )  # fmt: skip
 

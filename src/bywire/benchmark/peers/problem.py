@@ -3,7 +3,8 @@
 Plant and sensors in continuous time, the ECU's duty cycle held between its ticks. The peers
 integrate smooth differential equations only, so that the dry friction is regularized for them,
 and the stops become one-sided springs; all else is the model's own equations. The limit of the
-chamber pressure at zero is left out: hard braking never meets it.
+chamber pressure at zero is left out: hard braking never meets it. The states are divided by their
+nominal magnitudes, so that one absolute tolerance serves all of them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from bywire.assemblies.motorcycle_ecu import Memory, Readings, Stimulus
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_plant import State
 from bywire.core import ops
-from bywire.core.signals import zeros
+from bywire.core.signals import signals_of, zeros
 from bywire.plant import current_sensor, pressure_sensor
 from bywire.simulation.run import Run, simulate
 
@@ -32,7 +33,7 @@ Demand = Callable[[Array], Array]
 Advance = Callable[[Array, float], Array]
 
 DURATION = 1.2
-P_MC = State._fields.index("p_mc")
+SCALE = np.array([signal.nominal for signal in signals_of(State).values()])
 
 
 class Solution(NamedTuple):
@@ -89,13 +90,13 @@ def error(solution: Solution, exact: Solution) -> float:
     return float(np.abs(solution.p_mc - exact.p_mc[: solution.p_mc.size]).max()) / 1e5
 
 
-def rates(x: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
-    """Return dx/dt of the regularized plant, for floats, symbols or traced arrays.
+def rates(z: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
+    """Return dz/dt of the regularized plant, for floats, symbols or traced arrays.
 
     Parameters
     ----------
-    x
-        State.
+    z
+        Scaled state, x = SCALE * z.
     duty
         Duty cycle.
     par
@@ -104,6 +105,7 @@ def rates(x: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
         Speed over which the friction changes its sign, as tanh(omega / width) [rad/s].
     """
     model = MotorcycleBrake()
+    x = State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
     memory = zeros(Memory)._replace(duty=duty)
     contact = tuple(
         ops.fmax(gap / compliance, 0.0)
@@ -116,7 +118,7 @@ def rates(x: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
     grip = ops.where(x.omega > 0, low, -high) * tanh(x.omega / width)
     driven = smooth._replace(omega=smooth.omega + grip)
     mass = model.mass(x, par)
-    return tuple(f / m for f, m in zip(driven, mass, strict=True))
+    return tuple(f / (m * float(s)) for f, m, s in zip(driven, mass, SCALE, strict=True))
 
 
 def tanh(z: Any) -> Any:
@@ -133,38 +135,37 @@ def march(
     Parameters
     ----------
     advance
-        ``advance(x, duty) -> x``: integrates over one sample time.
+        ``advance(z, duty) -> z``: integrates the scaled state over one sample time.
     """
     ticks = round(duration / par.ecu.T_s)
     times = np.arange(ticks + 1, dtype=np.float64) * par.ecu.T_s
     demand = stimulus(times)
-    x, m = np.array(rest(par)), zeros(Memory)
+    z, m = np.array(rest(par)) / SCALE, zeros(Memory)
     p_mc, seconds = np.empty(ticks + 1), 0.0
     for k, row in enumerate(demand.tolist()):
-        state = State(*x.tolist())
+        state = State(*(SCALE * z).tolist())
         p_mc[k] = state.p_mc
         m = motorcycle_ecu.tick(Readings(state.y_p, state.y_i), m, Stimulus(*row), par)
         if k < ticks:
             begin = time.perf_counter()
-            x = advance(x, m.duty)
+            z = advance(z, m.duty)
             seconds += time.perf_counter() - begin
     return Solution(times, p_mc, seconds)
 
 
 @dataclass(frozen=True)
 class Symbols:
-    """The regularized plant as CasADi expressions: state, duty cycle, dx/dt."""
+    """The regularized plant as CasADi expressions: scaled state, duty cycle, dz/dt."""
 
-    x: Any
+    z: Any
     duty: Any
     rate: Any
 
 
 def symbols(par: MotorcycleParameters, width: float) -> Symbols:
     """Return the regularized plant for the parameters' values as constants."""
-    x, duty = ca.SX.sym("x", len(State._fields)), ca.SX.sym("duty")
-    state = State(*(x[k] for k in range(x.shape[0])))
-    return Symbols(x, duty, ca.vertcat(*rates(state, duty, par, width)))
+    z, duty = ca.SX.sym("z", len(State._fields)), ca.SX.sym("duty")
+    return Symbols(z, duty, ca.vertcat(*rates(z, duty, par, width)))
 
 
 class Buffered:
