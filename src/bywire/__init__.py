@@ -1,5 +1,73 @@
-"""bywire: a virtual test bench for brake-by-wire actuators."""
+"""bywire: a virtual test bench for brake-by-wire actuators.
+
+Everything below is loaded on first use, so that ``import bywire`` costs nothing.
+
+>>> import bywire
+>>> bench = bywire.Bench("hard-braking", "dardanelli2010", overrides={"motor.R_m": "0.4 ohm"})
+>>> bench.par.motor.R_m
+0.4
+"""
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from bywire.bench.bench import Bench, Result, run
+    from bywire.bench.bench_file import load
+    from bywire.catalog.registry import parameters
+    from bywire.core.errors import BywireError
+    from bywire.data.netcdf import read_recording, write_recording
+    from bywire.simulation.ensemble import Ensemble, simulate_ensemble
+    from bywire.simulation.run import Run, Trajectory, simulate
+    from bywire.simulation.sensitivity import Sensitivity, simulate_with_sensitivities
+
+_HOMES = {
+    "Bench": "bench.bench",
+    "BywireError": "core.errors",
+    "Ensemble": "simulation.ensemble",
+    "Result": "bench.bench",
+    "Run": "simulation.run",
+    "Sensitivity": "simulation.sensitivity",
+    "Trajectory": "simulation.run",
+    "load": "bench.bench_file",
+    "parameters": "catalog.registry",
+    "read_recording": "data.netcdf",
+    "run": "bench.bench",
+    "simulate": "simulation.run",
+    "simulate_ensemble": "simulation.ensemble",
+    "simulate_with_sensitivities": "simulation.sensitivity",
+    "write_recording": "data.netcdf",
+}
+
+__all__ = [
+    "Bench",
+    "BywireError",
+    "Ensemble",
+    "Result",
+    "Run",
+    "Sensitivity",
+    "Trajectory",
+    "load",
+    "parameters",
+    "read_recording",
+    "run",
+    "simulate",
+    "simulate_ensemble",
+    "simulate_with_sensitivities",
+    "write_recording",
+]
+
+
+def __getattr__(name: str) -> Any:
+    home = _HOMES.get(name)
+    if home is None:
+        raise AttributeError(f"module 'bywire' has no attribute {name!r}")
+    return getattr(import_module(f"bywire.{home}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted([*__all__, "__version__"])

@@ -69,3 +69,14 @@ def entry(name: str) -> Entry:
     if name not in known:
         raise unknown_name("parameter set", name, known)
     return known[name]
+
+
+def parameters(name: str) -> ParameterSet:
+    """Return the parameters of a set of the catalog, validated.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    return entry(name).parameters()

@@ -1,0 +1,115 @@
+"""Set up and run bywire with Python alone: ``python3 tasks.py demo`` or ``python3 tasks.py test``.
+
+Everything goes into the folder .venv beside this file; the system's Python is left alone. The
+recipes of ``test`` are exactly those of continuous integration.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import subprocess
+import sys
+import venv
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent
+VENV = ROOT / ".venv"
+BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
+PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
+LOCKS = {"demo": ["requirements.lock"], "test": ["requirements-dev.lock"]}
+
+CHECKS = {
+    "format and lint": ["ruff", "check", "."],
+    "types": ["mypy"],
+    "layers": ["lint-imports"],
+    "tests": ["pytest", "-n", "auto", "--dist", "worksteal", "-q"],
+}
+
+
+def main() -> int:
+    """Run one recipe and return its exit status."""
+    if sys.version_info < (3, 11):
+        print(f"bywire needs Python 3.11 or newer, this is {sys.version.split()[0]}")
+        return 2
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("recipe", choices=["demo", "test", "lock"])
+    recipe = parser.parse_args().recipe
+    if recipe == "lock":
+        return lock()
+    install(recipe)
+    return demo() if recipe == "demo" else test()
+
+
+def demo() -> int:
+    """Run the hard-braking bench and leave its report in results/hard_braking."""
+    out = Path("results") / "hard_braking"
+    return run("bywire", "run", "benches/hard_braking.toml", "--out", str(out))
+
+
+def test() -> int:
+    """Run all checks, the quick ones first; stop at the first that fails."""
+    for title, command in CHECKS.items():
+        print(f"== {title}", flush=True)
+        status = run(*command)
+        if status:
+            return status
+    return 0
+
+
+def lock() -> int:
+    """Write the lock files anew from pyproject.toml."""
+    install("test")
+    common = ["uv", "pip", "compile", "pyproject.toml", "--universal", "--python-version", "3.11",
+              "--generate-hashes", "--no-header", "--quiet", "--no-emit-index-url",
+              "--no-annotate", "--extra", "compiler", "--extra", "build"]  # fmt: skip
+    return run(*common, "-o", "requirements.lock") or run(
+        *common, "--extra", "dev", "-o", "requirements-dev.lock"
+    )
+
+
+def install(recipe: str) -> None:
+    """Make the virtual environment, unless it holds just what the lock files say."""
+    if not PYTHON.exists():
+        print(f"making {VENV.name}", flush=True)
+        try:
+            venv.create(VENV, with_pip=True)
+        except subprocess.CalledProcessError:
+            raise SystemExit(
+                "this Python cannot make virtual environments: install its venv module "
+                "(on Debian and Ubuntu the package python3-venv)"
+            ) from None
+    stamp = VENV / "installed"
+    done = stamp.read_text().split() if stamp.exists() else []
+    for name in LOCKS[recipe]:
+        digest = hashlib.sha256((ROOT / name).read_bytes()).hexdigest()
+        if digest in done:
+            continue
+        print(f"installing {name}", flush=True)
+        pip("install", "--require-hashes", "-r", name)
+        pip("install", "--no-deps", "--no-build-isolation", "-e", ".")
+        done.append(digest)
+        stamp.write_text("\n".join(done))
+
+
+def pip(*arguments: str) -> None:
+    """Run pip in the virtual environment, quietly."""
+    command = [str(PYTHON), "-m", "pip", "--quiet", "--disable-pip-version-check", *arguments]
+    if subprocess.run(command, cwd=ROOT, check=False).returncode:
+        raise SystemExit("pip failed, see above; the network or a package mirror may be down")
+
+
+def run(program: str, *arguments: str) -> int:
+    """Run a program of the virtual environment and return its exit status."""
+    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ.get('PATH', '')}"}
+    try:
+        return subprocess.run(
+            [str(BIN / program), *arguments], cwd=ROOT, env=environment, check=False
+        ).returncode
+    except KeyboardInterrupt:
+        return 130
+
+
+if __name__ == "__main__":
+    sys.exit(main())

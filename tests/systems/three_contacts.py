@@ -1,0 +1,232 @@
+"""The heart of a wedge brake: two screws and a wedge, three coupled contacts, three frictions.
+
+Two controllers, at 1 and 5 kHz, write the same memory. Screw angles are taken as travels, so
+that all states are positions and velocities.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, NamedTuple
+
+from bywire.core import ops
+from bywire.core.model import Bounds, Matrix, Task
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    Damping,
+    Duration,
+    Force,
+    Gain,
+    Length,
+    Mass,
+    Stiffness,
+    TimeConstant,
+)
+from bywire.core.signals import Signal
+
+Travel = Annotated[float, Signal("m", "travel", 1e-4)]
+Velocity = Annotated[float, Signal("m/s", "velocity", 0.02)]
+Push = Annotated[float, Signal("N", "force", 1000.0)]
+Count = Annotated[float, Signal("1", "count")]
+
+
+class Parameters(ParameterSet):
+    """Screws, wedge, contacts, frictions, controllers."""
+
+    M_S: Mass
+    """inertia of a motor as seen at its screw"""
+    M_W: Mass
+    K_CAL: Stiffness
+    """stiffness of the calliper as the wedge sees it"""
+    K_S: Stiffness
+    K_W: Stiffness
+    K_C: Stiffness
+    g: Length
+    """free-play between a screw and the wedge"""
+    g_12: Length
+    tau: TimeConstant
+    F_S0: Force
+    """friction of an unloaded screw"""
+    loss: Gain
+    """growth of a screw's friction with its axial force"""
+    F_W0: Force
+    mu: Gain
+    """growth of the wedge's friction with the forces on its interfaces"""
+    k_p: Stiffness
+    k_d: Damping
+    F_max: Force
+    preload: Length
+    T_slow: Duration
+    T_fast: Duration
+
+
+class State(NamedTuple):
+    """Travels and velocities of screw 1, screw 2 and the wedge."""
+
+    X_1: Travel
+    V_1: Velocity
+    X_2: Travel
+    V_2: Velocity
+    x: Travel
+    v: Velocity
+
+
+class Memory(NamedTuple):
+    """Reference of the slow task, forces of the fast one, and who ran when."""
+
+    reference: Travel
+    force_1: Push
+    force_2: Push
+    slow_ticks: Count
+    fast_ticks: Count
+    slow_seen: Count
+
+
+class Stimulus(NamedTuple):
+    """Demanded travel."""
+
+    demand: Travel
+
+
+class Flow(NamedTuple):
+    """Energies."""
+
+    E_source: Annotated[float, Signal("J", "work of the motors")]
+    E_friction: Annotated[float, Signal("J", "friction loss")]
+
+
+class Output(NamedTuple):
+    """Recorded signals."""
+
+    X_1: Travel
+    V_1: Velocity
+    X_2: Travel
+    V_2: Velocity
+    x: Travel
+    v: Velocity
+    f_1: Push
+    f_2: Push
+    f_12: Push
+    friction_1: Push
+    friction_2: Push
+    friction_w: Push
+    reference: Travel
+    force_1: Push
+    force_2: Push
+    slow_ticks: Count
+    fast_ticks: Count
+    slow_seen: Count
+    E_source: Annotated[float, Signal("J", "work of the motors")]
+    E_friction: Annotated[float, Signal("J", "friction loss")]
+
+
+PARAMETERS = Parameters(
+    M_S=1184.0, M_W=0.6, K_CAL=4e6, K_S=6e7, K_W=4e7, K_C=2e9, g=20e-6, g_12=30e-6, tau=15e-6,
+    F_S0=250.0, loss=0.54, F_W0=20.0, mu=0.036, k_p=4.2e7, k_d=3.6e5, F_max=6300.0,
+    preload=42e-6, T_slow=1e-3, T_fast=2e-4,
+)  # fmt: skip
+AT_REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+IDLE = Memory(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+
+def stiffer(factor: float) -> Parameters:
+    """Return the parameters with all contacts stiffer by a factor."""
+    p = PARAMETERS
+    return p.replace({"K_S": p.K_S * factor, "K_W": p.K_W * factor, "K_C": p.K_C * factor})
+
+
+def _slow(x: State, m: Memory, u: Stimulus, par: Parameters) -> Memory:
+    return m._replace(reference=u.demand, slow_ticks=m.slow_ticks + 1.0)
+
+
+def _fast(x: State, m: Memory, u: Stimulus, par: Parameters) -> Memory:
+    def drive(at: float, X: float, V: float) -> float:
+        return ops.clip(par.k_p * (at - X) - par.k_d * V, -par.F_max, par.F_max)
+
+    return m._replace(
+        force_1=drive(m.reference - par.preload, x.X_1, x.V_1),
+        force_2=drive(m.reference + par.preload, x.X_2, x.V_2),
+        fast_ticks=m.fast_ticks + 1.0,
+        slow_seen=m.slow_ticks,
+    )
+
+
+class ThreeContacts:
+    """The model."""
+
+    name: ClassVar[str] = "three-contacts"
+    State: ClassVar = State
+    Memory: ClassVar = Memory
+    Stimulus: ClassVar = Stimulus
+    Flow: ClassVar = Flow
+    Output: ClassVar = Output
+    frictions: ClassVar[tuple[str, ...]] = ("V_1", "V_2", "v")
+    limits: ClassVar[tuple[str, ...]] = ()
+    usually_open: ClassVar[tuple[bool, ...]] = (False,)
+
+    def tasks(self, par: Parameters) -> tuple[Task, ...]:
+        """Return both controllers; the slow one runs first where both are due."""
+        return (
+            Task("slow", lambda p: float(p.T_slow), _slow),
+            Task("fast", lambda p: float(p.T_fast), _fast),
+        )
+
+    def mass(self, xe: State, par: Parameters) -> State:
+        """Return the masses."""
+        return State(1.0, par.M_S, 1.0, par.M_S, 1.0, par.M_W)
+
+    def balance(
+        self, x: State, xe: State, m: Memory, par: Parameters, contact: tuple[float, ...]
+    ) -> State:
+        """Return velocities and forces."""
+        f_1, f_2, f_12 = contact
+        return State(
+            x.V_1, m.force_1 + f_1 - f_12, x.V_2, m.force_2 + f_12 - f_2, x.v,
+            f_2 - f_1 - par.K_CAL * x.x,
+        )  # fmt: skip
+
+    def bounds(
+        self, x: State, xe: State, m: Memory, par: Parameters, contact: tuple[float, ...]
+    ) -> tuple[Bounds, ...]:
+        """Return the friction bounds, which grow with the contact forces."""
+        f_1, f_2, f_12 = contact
+        screw_1 = par.F_S0 + par.loss * ops.fabs(f_1 - f_12)
+        screw_2 = par.F_S0 + par.loss * ops.fabs(f_12 - f_2)
+        wedge = par.F_W0 + par.mu * (f_1 + f_2)
+        return ((-screw_1, screw_1), (-screw_2, screw_2), (-wedge, wedge))
+
+    def compliance(self, par: Parameters) -> tuple[Matrix, ...]:
+        """Return the compliances of the three contacts, coupled by the screws."""
+        s, w = 1.0 / par.K_S, 1.0 / par.K_W
+        tips = 2.0 * s + 1.0 / par.K_C
+        return (((s + w, 0.0, -s), (0.0, s + w, -s), (-s, -s, tips)),)
+
+    def gap(self, x: State, xe: State, par: Parameters) -> tuple[tuple[float, ...], ...]:
+        """Return the damped overlaps."""
+        X_1, X_2 = x.X_1 + par.tau * x.V_1, x.X_2 + par.tau * x.V_2
+        wedge = x.x + par.tau * x.v
+        return ((wedge - X_1 - par.g, X_2 - wedge - par.g, X_1 - X_2 - par.g_12),)
+
+    def powers(
+        self,
+        x: State,
+        rate: State,
+        m: Memory,
+        par: Parameters,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> Flow:
+        """Return the motors' power and the friction losses."""
+        friction = reaction[0] * x.V_1 + reaction[1] * x.V_2 + reaction[2] * x.v
+        return Flow(m.force_1 * x.V_1 + m.force_2 * x.V_2, -friction)
+
+    def output(
+        self,
+        x: State,
+        m: Memory,
+        par: Parameters,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Flow,
+    ) -> Any:
+        """Return what is recorded."""
+        return Output(*x, *contact, *reaction, *m, *flow)
