@@ -6,7 +6,11 @@ that all states are positions and velocities.
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, ClassVar, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bywire.core import ops
 from bywire.core.model import Bounds, Matrix, Task
@@ -22,6 +26,7 @@ from bywire.core.quantities import (
     TimeConstant,
 )
 from bywire.core.signals import Signal
+from bywire.simulation.run import Run
 
 Travel = Annotated[float, Signal("m", "travel", 1e-4)]
 Velocity = Annotated[float, Signal("m/s", "velocity", 0.02)]
@@ -54,7 +59,6 @@ class Parameters(ParameterSet):
     k_p: Stiffness
     k_d: Damping
     F_max: Force
-    preload: Length
     T_slow: Duration
     T_fast: Duration
 
@@ -71,9 +75,10 @@ class State(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Reference of the slow task, forces of the fast one, and who ran when."""
+    """References of the slow task, forces of the fast one, and who ran when."""
 
-    reference: Travel
+    reference_1: Travel
+    reference_2: Travel
     force_1: Push
     force_2: Push
     slow_ticks: Count
@@ -82,9 +87,10 @@ class Memory(NamedTuple):
 
 
 class Stimulus(NamedTuple):
-    """Demanded travel."""
+    """Demanded travels of both screws."""
 
-    demand: Travel
+    demand_1: Travel
+    demand_2: Travel
 
 
 class Flow(NamedTuple):
@@ -109,7 +115,8 @@ class Output(NamedTuple):
     friction_1: Push
     friction_2: Push
     friction_w: Push
-    reference: Travel
+    reference_1: Travel
+    reference_2: Travel
     force_1: Push
     force_2: Push
     slow_ticks: Count
@@ -122,20 +129,15 @@ class Output(NamedTuple):
 PARAMETERS = Parameters(
     M_S=1184.0, M_W=0.6, K_CAL=4e6, K_S=6e7, K_W=4e7, K_C=2e9, g=20e-6, g_12=30e-6, tau=15e-6,
     F_S0=250.0, loss=0.54, F_W0=20.0, mu=0.036, k_p=4.2e7, k_d=3.6e5, F_max=6300.0,
-    preload=42e-6, T_slow=1e-3, T_fast=2e-4,
+    T_slow=1e-3, T_fast=2e-4,
 )  # fmt: skip
 AT_REST = State(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-IDLE = Memory(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-def stiffer(factor: float) -> Parameters:
-    """Return the parameters with all contacts stiffer by a factor."""
-    p = PARAMETERS
-    return p.replace({"K_S": p.K_S * factor, "K_W": p.K_W * factor, "K_C": p.K_C * factor})
+IDLE = Memory(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
 
 def _slow(x: State, m: Memory, u: Stimulus, par: Parameters) -> Memory:
-    return m._replace(reference=u.demand, slow_ticks=m.slow_ticks + 1.0)
+    references = {"reference_1": u.demand_1, "reference_2": u.demand_2}
+    return m._replace(**references, slow_ticks=m.slow_ticks + 1.0)
 
 
 def _fast(x: State, m: Memory, u: Stimulus, par: Parameters) -> Memory:
@@ -143,8 +145,8 @@ def _fast(x: State, m: Memory, u: Stimulus, par: Parameters) -> Memory:
         return ops.clip(par.k_p * (at - X) - par.k_d * V, -par.F_max, par.F_max)
 
     return m._replace(
-        force_1=drive(m.reference - par.preload, x.X_1, x.V_1),
-        force_2=drive(m.reference + par.preload, x.X_2, x.V_2),
+        force_1=drive(m.reference_1, x.X_1, x.V_1),
+        force_2=drive(m.reference_2, x.X_2, x.V_2),
         fast_ticks=m.fast_ticks + 1.0,
         slow_seen=m.slow_ticks,
     )
@@ -230,3 +232,19 @@ class ThreeContacts:
     ) -> Any:
         """Return what is recorded."""
         return Output(*x, *contact, *reaction, *m, *flow)
+
+
+def wiggled(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return demands that move the wedge to and fro while the preload comes, goes and turns."""
+    common = 80e-6 * np.sin(2.0 * math.pi * 24.0 * t)
+    apart = 60e-6 * np.sin(2.0 * math.pi * 14.0 * t)
+    return np.stack([common - apart, common + apart], axis=1)
+
+
+def heart(
+    duration: float, step: float = 20e-6, record: float = 1e-4, stiffer: float = 1.0, **changes: float
+) -> Run:
+    """Return a run from rest, with contacts stiffer by a factor and other changed parameters."""
+    stiff = {name: getattr(PARAMETERS, name) * stiffer for name in ("K_S", "K_W", "K_C")}
+    par = PARAMETERS.replace(stiff | changes)
+    return Run(ThreeContacts(), par, AT_REST, IDLE, wiggled, duration, step, record)

@@ -11,6 +11,9 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bywire.core import ops
 from bywire.core.model import Bounds, Matrix, Task
 from bywire.core.parameters import ParameterSet
@@ -26,6 +29,7 @@ from bywire.core.quantities import (
     TimeConstant,
 )
 from bywire.core.signals import Signal
+from bywire.simulation.run import Run
 
 
 class Parameters(ParameterSet):
@@ -200,3 +204,20 @@ def _stored(x: State, par: Parameters) -> float:
     depth = ops.fmax(x.x_2 - par.x_wall, 0.0)
     kinetic = 0.5 * (par.m_1 * x.v_1 * x.v_1 + par.m_2 * x.v_2 * x.v_2)
     return kinetic + spring + rail + 0.5 * par.k_wall * depth * depth
+
+
+def shaken(t: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a force that drives mass 2 against the wall and off it, with rests in between."""
+    return (80.0 * np.sin(2.0 * math.pi * 60.0 * t) + 25.0)[:, None]
+
+
+def rig(
+    duration: float,
+    step: float = 20e-6,
+    record: float = 1e-4,
+    rare: bool = False,
+    **changes: float,
+) -> Run:
+    """Return a run of the shaken rig from rest, with other parameters where they are named."""
+    par = PARAMETERS.replace(changes)
+    return Run(TwoMass(rare), par, AT_REST, IDLE, shaken, duration, step, record)

@@ -35,7 +35,7 @@ class Flow(NamedTuple):
     E_seal: Annotated[float, Signal("J", "loss of the seals' friction")]
     E_damping: Annotated[float, Signal("J", "loss of the fluid's damping")]
     E_pipeline: Annotated[float, Signal("J", "loss in the pipeline")]
-    E_stop: Annotated[float, Signal("J", "loss in the end stops")]
+    W_stop: Annotated[float, Signal("J", "work on the end stops")]
     E_port: Annotated[float, Signal("J", "energy out through the reservoir port")]
     W_shaft: Annotated[float, Signal("J", "work of the motor on the gear")]
     t_stuck: Annotated[float, Signal("s", "time stuck")]
@@ -56,7 +56,6 @@ def rates(
     shaft = ball_screw_gear.State(x.theta, x.omega)
     gear = gear + ball_screw_gear.transmission_loss(shaft, w.torque, rate.omega, par.gear)
     supply = battery_supply.Input(i_dc=w.i_dc)
-    stop_u, forces = stop_input(x, par), end_stop.Forces(*contact)
     port_u = reservoir_port.Input(w.x_mc, x.p_mc)
     port = reservoir_port.power_loss(port_u, par.port, par.fluid)
     ideal = par.drive.mode in ("voltage-source", "current-source")
@@ -69,7 +68,7 @@ def rates(
         E_seal=seal,
         E_damping=master_cylinder.power_loss(cylinder_input(x, w.q, par), par.master_cylinder),
         E_pipeline=pipeline.power_loss(pipeline.Input(x.p_mc, x.p_pd), par.pipeline, par.fluid),
-        E_stop=end_stop.power_loss(stop_u, forces, par.stop),
+        W_stop=end_stop.load(end_stop.Forces(*contact)) * w.v_mc,
         E_port=port - brake_fluid.convected_power(makeup, x.p_mc, par.fluid),
         W_shaft=w.torque * x.omega,
         t_stuck=ops.where(x.omega == 0, 1.0, 0.0),

@@ -7,7 +7,7 @@ from typing import Annotated, NamedTuple
 from bywire.assemblies.motorcycle_ecu import Memory
 from bywire.assemblies.motorcycle_energy import Flow, stored
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_plant import State, Wires, wires
+from bywire.assemblies.motorcycle_plant import State, Wires, stop_input, wires
 from bywire.core import ops
 from bywire.core.signals import Signal
 from bywire.plant import ball_screw_gear, end_stop, seal_friction
@@ -52,7 +52,7 @@ class Output(NamedTuple):
     E_seal: Annotated[float, Signal("J", "loss of the seals' friction")]
     E_damping: Annotated[float, Signal("J", "loss of the fluid's damping")]
     E_pipeline: Annotated[float, Signal("J", "loss in the pipeline")]
-    E_stop: Annotated[float, Signal("J", "loss in the end stops")]
+    E_stop: Annotated[float, Signal("J", "loss in the end stops, for runs that start free of them")]
     E_port: Annotated[float, Signal("J", "energy out through the reservoir port")]
     E_stored: Annotated[float, Signal("J", "stored energy")]
     W_shaft: Annotated[float, Signal("J", "work of the motor on the gear")]
@@ -89,7 +89,8 @@ def instant(
     direct = {name: getattr(m, name) for name in Memory._fields if name in Output._fields}
     return Output(
         **direct,
-        **flow._asdict(),
+        **{name: value for name, value in flow._asdict().items() if name != "W_stop"},
+        E_stop=flow.W_stop - end_stop.energy(stop_input(x, par), par.stop),
         i=w.current,
         voltage=w.voltage,
         theta=x.theta,

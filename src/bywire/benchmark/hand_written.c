@@ -198,8 +198,7 @@ static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
     const double near = k->x_rest - x, far = x - k->x_end;
     s->near_stop = side.k_near * (near - k->tau * v);
     s->far_stop = side.k_far * (far + k->tau * v);
-    const double elastic = k->k_stop * (max2(far, 0.0) - max2(near, 0.0));
-    s->sum.stop += (s->far_stop - s->near_stop - elastic) * v;
+    s->sum.stop += (s->far_stop - s->near_stop) * v;
     /* What the chamber's balance lacks, the reservoir adds. */
     const double P = k->V0 - k->V1 * (s->th + s->dth), pm = s->pm + 0.5 * q.dpm;
     const double lack = P * q.dpm - k->a * both + k->two_g * (s->pm - s->pd);
@@ -325,7 +324,8 @@ static void record(const Plant *k, const Saved *z, double *o)
     o[O_stuck] = om == 0.0, o[O_sat_current] = m[M_sat_current], o[O_sat_duty] = m[M_sat_duty];
     o[O_E_source] = e[E_E_source], o[O_E_supply] = e[E_E_supply], o[O_E_copper] = e[E_E_copper];
     o[O_E_gear] = e[E_E_gear], o[O_E_seal] = e[E_E_seal], o[O_E_damping] = e[E_E_damping];
-    o[O_E_pipeline] = e[E_E_pipeline], o[O_E_stop] = e[E_E_stop], o[O_E_port] = e[E_E_port];
+    o[O_E_pipeline] = e[E_E_pipeline], o[O_E_port] = e[E_E_port];
+    o[O_E_stop] = e[E_W_stop] - 0.5 * k->k_stop * (near * near + far * far);
     o[O_W_shaft] = e[E_W_shaft], o[O_t_stuck] = e[E_t_stuck];
     o[O_E_stored] = 0.5 * (k->L * i * i + k->J * om * om + k->k_stop * (near * near + far * far))
                     + chamber * density(k, p_mc) + k->pads * density(k, p_pd);
@@ -352,7 +352,7 @@ static void frame(const Plant *k, Saved *z, int64_t steps)
     e[E_E_gear] += (1.0 - k->eta) * (work - k->J_mot * kinetic), e[E_W_shaft] += work;
     e[E_E_damping] += 0.25 * h * k->k_damp * k->k_g * k->k_g * sum.oo;
     e[E_E_seal] -= 0.5 * sum.fo, e[E_E_pipeline] += h / k->K_lf * sum.pipe;
-    e[E_E_stop] += h * sum.stop, e[E_E_port] += h * sum.port, e[E_t_stuck] += h * sum.stuck;
+    e[E_W_stop] += h * sum.stop, e[E_E_port] += h * sum.port, e[E_t_stuck] += h * sum.stuck;
 }
 
 static void simulate(const double *p, double h, int64_t frames, int64_t steps, const double *u,

@@ -48,6 +48,19 @@ def exp(x: float) -> float:
     return _apply("exp", x)  # type: ignore[no-any-return]
 
 
+DECAYED = 40.0
+"""where ``decay`` ends: its value there, 4e-18, no longer shows beside 1"""
+
+
+def decay(x: float) -> float:
+    """Return e to the power of -x for a pure number x >= 0, and exactly 0 beyond x = 40.
+
+    For terms that are added to something of the order of one: far out on a Stribeck curve, kernels
+    then skip the exponential.
+    """
+    return where(x < DECAYED, exp(-x), 0.0)
+
+
 def log(x: float) -> float:
     """Return the natural logarithm of x; x is a pure number > 0."""
     return _apply("log", x)  # type: ignore[no-any-return]

@@ -8,9 +8,11 @@ equations (``gear.law = "directional"``); it takes part in what is compiled, nev
 from __future__ import annotations
 
 import math
+import re
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from difflib import get_close_matches
 from functools import cache
 from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
@@ -206,20 +208,43 @@ def _validated(cls: type[T], tree: Mapping[str, Any]) -> T:
     try:
         return cls.model_validate(tree)
     except ValidationError as error:
-        lines = [_explain(cls, dict(detail)) for detail in error.errors()]
+        found: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
+        places = {detail["loc"][:-1] for detail in found}
+        # A table with a wrong node also counts as too short: the node alone is worth a line.
+        lines = [_explain(cls, d) for d in found if not (_is_length(d) and d["loc"] in places)]
         raise ParameterError("\n".join(lines)) from None
 
 
 def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
     name = ".".join(str(part) for part in detail["loc"])
-    value = detail["input"]
-    if detail["type"] == "missing":
+    value, kind = detail["input"], detail["type"]
+    if kind == "missing":
         return f"{cls.__name__}: {name} is missing: give it a value"
+    if kind == "literal_error":
+        return _unknown_choice(name, value, detail["ctx"]["expected"])
     leaves = leaf_fields(cls)
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
-    if leaf is not None and detail["type"] != "value_error":
+    if leaf is not None and kind != "value_error" and not _is_length(detail):
         unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
-        return f"{name} = {value}{unit} is not admissible: it must be {leaf.range_text}"
-    message = str(detail["msg"]).removeprefix("Value error, ")
+        wanted = "a whole number, " if kind.startswith("int") else ""
+        return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}"
+    message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
     given = "" if isinstance(value, dict) else f", got {value!r}"
     return f"{name or cls.__name__}: {message}{given}"
+
+
+_PLAIN_WORDS = {
+    "bool_parsing": "it must be true or false",
+    "bool_type": "it must be true or false",
+    "string_type": "it must be a text",
+}
+
+
+def _is_length(detail: Mapping[str, Any]) -> bool:
+    return detail["type"] in ("too_short", "too_long")
+
+
+def _unknown_choice(name: str, value: Any, expected: str) -> str:
+    near = get_close_matches(str(value), re.findall(r"'([^']*)'", expected), n=1, cutoff=0.5)
+    hint = f": did you mean {near[0]!r}?" if near else ""
+    return f"{name}: it must be {expected}, got {value!r}{hint}"

@@ -7,7 +7,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from bywire.core.errors import UnitError
+from bywire.core.errors import ParameterError, UnitError
 from bywire.core.quantities import display_unit
 
 if TYPE_CHECKING:
@@ -36,12 +36,14 @@ _COMMON: dict[str, tuple[float, str]] = {
     "": (1.0, "1"),
 }
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?)\s*", re.DOTALL)
-# Names, products, quotients and small powers; nothing that would make pint compute.
-_UNIT = re.compile(
-    r"[A-Za-zµΩ%°]+(?:(?:\*\*|\^)-?\d)?(?:\s*[*/·]?\s*\(?[A-Za-zµΩ%°]+(?:(?:\*\*|\^)-?\d)?\)?)*"
-)
-_MEANT = {"Nm": "N*m", "Nms": "N*m*s", "degC": "degC"}
-_ROTARY = re.compile(r"rpm|rev|turn|cycle|rad|deg")
+# Names, products, quotients and small powers; nothing that would make pint compute. A separator
+# between two names is required: without one, a long word could be split in a billion ways.
+_POWER = r"[A-Za-zµμΩ%°]+(?:(?:\*\*|\^)-?\d|[²³])?"
+_FACTOR = rf"(?:{_POWER}|\({_POWER}(?:\s*[*·]\s*{_POWER})*\))"
+_UNIT = re.compile(rf"(?:1?\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*")
+_MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
+_LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
+_RATES = ("Hz", "rad/s")  # pint takes rad as a pure number and would turn 60 rpm into 6.28 Hz
 
 
 @cache
@@ -49,7 +51,8 @@ def registry() -> pint.UnitRegistry[Any]:
     """Return the one registry of units; loading pint takes a moment, so only on demand."""
     import pint
 
-    known: pint.UnitRegistry[Any] = pint.UnitRegistry(cache_folder=":auto:")
+    # No cache folder: pint's is a pickle that an interrupted or parallel process leaves damaged.
+    known: pint.UnitRegistry[Any] = pint.UnitRegistry()
     known.define("percent = 0.01 = %")
     return known
 
@@ -71,37 +74,47 @@ def parse(value: str | float, symbol: str, name: str) -> float:
     UnitError
         When the text is no quantity, or its unit measures something else. Texts are not
         evaluated: a number and a product of unit names, nothing more.
+    ParameterError
+        When the number is not finite.
 
     Examples
     --------
     >>> parse("9 mm", "m", "pipeline.d_pl")
     0.009
     """
-    if isinstance(value, bool):
-        raise UnitError(f"{name} = {value}: a number is wanted{_in_unit(symbol)}")
-    number = float(value) if isinstance(value, (int, float)) else _number(value, symbol, name)
+    if isinstance(value, bool) or not isinstance(value, (str, int, float)):
+        raise UnitError(
+            f"{name} = {_quoted(value)}: one number is wanted, "
+            f"for instance {example(symbol)!r}"
+        )
+    try:
+        number = _number(value, symbol, name) if isinstance(value, str) else float(value)
+    except OverflowError:  # a whole number of 309 digits or more
+        number = math.inf
     if not math.isfinite(number):
-        raise UnitError(f"{name} = {value!r} is not finite{_in_unit(symbol)}")
+        raise ParameterError(
+            f"{name} = {_quoted(value)} is not admissible: "
+            f"it must be any finite number{_in_unit(symbol)}"
+        )
     return number
 
 
 def _number(text: str, symbol: str, name: str) -> float:
-    match = _NUMBER.fullmatch(text)
+    match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None or (match[2] and not _UNIT.fullmatch(match[2])):
         raise UnitError(
-            f"{name} = {text!r} is not a quantity: write for instance {example(symbol)!r}"
+            f"{name} = {_quoted(text)} is not a quantity: write for instance {example(symbol)!r}"
         )
-    size, unit = float(match[1]), _MEANT.get(match[2], match[2])
+    size, unit = float(match[1]), match[2]
     common = _COMMON.get(unit)
     if common is not None and common[1] == symbol:
         return _rounded(size * common[0])
     import pint
 
     try:
-        if symbol == "Hz" and _ROTARY.search(unit):
-            # pint takes rad as a pure number and would turn 60 rpm into 6.28 Hz.
-            raise pint.DimensionalityError(unit, "Hz")
-        quantity = registry().Quantity(size, unit.replace("%", "percent"))
+        quantity = registry().Quantity(size, _as_pint(unit))
+        if symbol in _RATES and _base(quantity) != _base(registry().Quantity(1.0, symbol)):
+            raise pint.DimensionalityError(unit, symbol)
         return _rounded(float(quantity.to("" if symbol == "1" else symbol).magnitude))
     except pint.DimensionalityError:
         raise UnitError(
@@ -113,6 +126,24 @@ def _number(text: str, symbol: str, name: str) -> float:
             f"{name} = {text!r}: the unit {unit!r} is not known; "
             f"write for instance {example(symbol)!r}"
         ) from None
+
+
+def _base(quantity: Any) -> Any:
+    """Return the base units of a quantity, radians among them."""
+    return quantity.to_base_units().units
+
+
+def _as_pint(unit: str) -> str:
+    """Return a unit as pint reads it."""
+    spelled = unit.replace("%", "percent").replace("·", "*")
+    spelled = f"1{spelled}" if spelled.startswith("/") else spelled
+    return _MOMENT.sub(lambda m: "*m*s" if m[1] else "*m", spelled)
+
+
+def _quoted(value: object) -> str:
+    shown = value if isinstance(value, str) else str(value)
+    shortened = shown if len(shown) <= 60 else f"{shown[:60]}..."
+    return repr(shortened) if isinstance(value, str) else shortened
 
 
 def _rounded(number: float) -> float:

@@ -101,8 +101,10 @@ def flow_energy(
     Flow work plus the compression energy that the fluid takes along. The series is off by
     z^4/120 of the value, below 1e-11 up to 50 bar.
     """
-    z = p / par.beta
-    return p * (1.0 + z / 2.0 * (1.0 + z / 3.0 * (1.0 + z / 4.0)))
+    c1 = 1.0 / (2.0 * par.beta)
+    c2 = c1 / (3.0 * par.beta)
+    c3 = c2 / (4.0 * par.beta)
+    return p * (1.0 + p * (c1 + p * (c2 + p * c3)))
 
 
 def flow_energy_integral(

@@ -67,11 +67,15 @@ def output(u: Input, par: Parameters) -> Output:
     Dardanelli, Alli, Savaresi (2010), eq. (16).
     """
     speed = ops.fabs(u.omega)
-    decay = ops.exp(-par.c * speed)
+    decay = ops.decay(par.c * speed)
     p = ops.fmax(u.p, 0.0)
-    T_p = (par.T_pr + par.f_cfr_p * p) * (1.0 + (par.k_brk_p - 1.0) * decay) + par.mu_T * speed
-    T_n = (par.T_pr + par.f_cfr_n * p) * (1.0 + (par.k_brk_n - 1.0) * decay) + par.mu_T * speed
-    return Output(T_p=T_p, T_n=T_n)
+    T_cf_p = par.T_pr + par.f_cfr_p * p
+    T_cf_n = par.T_pr + par.f_cfr_n * p
+    viscous = par.mu_T * speed
+    return Output(
+        T_p=T_cf_p + viscous + (par.k_brk_p - 1.0) * T_cf_p * decay,
+        T_n=T_cf_n + viscous + (par.k_brk_n - 1.0) * T_cf_n * decay,
+    )
 
 
 def power_loss(u: Input, par: Parameters) -> Power:

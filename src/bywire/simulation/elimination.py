@@ -45,12 +45,12 @@ class Reduced:
     x: Any
     changing: Any
 
-    def start(self, row: int) -> Any:
-        """Return the kept row's right-hand side plus ``matrix`` times the kept states."""
+    def start(self, row: int, matrix: Any) -> Any:
+        """Return the kept row's right-hand side plus a matrix times the kept states."""
         form = self.right[self.kept[row]]
         for column, index in enumerate(self.kept):
             unit = Form({index: ca.SX(1)}, ca.SX(0))
-            form = form.plus(self.matrix[row, column], unit, self.x, self.changing)
+            form = form.plus(matrix[row, column], unit, self.x, self.changing)
         return form.value(self.x)
 
     def back_substitute(self, solution: dict[int, Any]) -> dict[int, Any]:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from bywire.simulation.expressions import condition, needed, text
+from bywire.simulation.expressions import OWN, condition, needed, text
 from bywire.simulation.graph import Graph, Node
 from bywire.simulation.stages import STATE, Stages
 
@@ -28,6 +29,16 @@ class Layout:
     def total(self) -> int:
         """Length of the state vector."""
         return self.start["counters"] + 2
+
+
+def unread(stages: Stages) -> frozenset[str]:
+    """Return the half increments that no stage reads: they need not be kept."""
+    graph = stages.graph
+    used = {a for node in range(len(graph.nodes)) for a in graph.arguments(node)}
+    used |= {node for kind in STATE for node in (*stages.fast[kind], *stages.exact[kind])}
+    return frozenset(
+        f"d{k}" for k in range(len(stages.fast["d"])) if graph.leaf("d", k) not in used
+    )
 
 
 def layout_of(stages: Stages) -> Layout:
@@ -62,13 +73,35 @@ def leaf_namer(graph: Graph, leaf: Callable[[str, int], str], other: Namer) -> N
     return name
 
 
-def statements(graph: Graph, order: Iterable[Node], name: Namer, declare: str) -> list[str]:
+def statements(graph: Graph, order: Sequence[Node], name: Namer, declare: str) -> list[str]:
     """Return one declaration per operation; truth values are written where they are used."""
-    lines = []
-    for node in order:
-        if not graph.is_boolean(node):
-            lines.append(f"{declare}{name(node)} = {text(graph, node, name)};")
-    return lines
+    return [
+        f"{declare}{name(node)} = {text(graph, node, name)};"
+        for node in order
+        if not graph.is_boolean(node)
+    ]
+
+
+def branching_statements(
+    graph: Graph, order: Sequence[Node], name: Namer, declare: str
+) -> list[str]:
+    """Return declarations in which costly functions stand inside the only branch that needs them.
+
+    For scalar code: where the condition fails, the processor skips the function.
+    """
+    uses = Counter(a for node in order for a in graph.arguments(node))
+    inside = {
+        graph.nodes[node].args[1]
+        for node in order
+        if graph.nodes[node].op == "if_else_zero"
+        and graph.nodes[graph.nodes[node].args[1]].op in OWN
+        and uses[graph.nodes[node].args[1]] == 1
+    }
+
+    def inlined(node: Node) -> str:
+        return f"({text(graph, node, inlined)})" if node in inside else name(node)
+
+    return statements(graph, [n for n in order if n not in inside], inlined, declare)
 
 
 def result(graph: Graph, node: Node, name: Namer) -> str:

@@ -5,14 +5,17 @@ from __future__ import annotations
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     Layout,
+    Namer,
+    branching_statements,
     exact_pass,
     indented,
     layout_of,
     leaf_namer,
     result,
-    statements,
+    unread,
 )
 from bywire.simulation.expressions import needed
+from bywire.simulation.graph import Node
 from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,
@@ -39,18 +42,29 @@ def emit_single(stages: Stages) -> str:
         return "h" if kind == "h" else f"{kind}{index}"
 
     name = leaf_namer(graph, leaf, lambda node: f"v{node}")
-    pass_roots = [node for kind in (*STATE, "flag") for node in stages.fast[kind]]
+    skipped = unread(stages)
+    results = {
+        f"{kind}{k}": node
+        for kind in ("x", "d", "r", "F")
+        for k, node in enumerate(stages.fast[kind])
+        if f"{kind}{k}" not in skipped
+    }
+    products = stages.quadrature.products
+    pass_roots = [*results.values(), *products, stages.fast["flag"][0]]
+    coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
     tick_roots = [node for task in stages.ticks for node in task]
-    every_root = pass_roots + tick_roots + stages.output
+    every_root = pass_roots + coefficients + tick_roots + stages.output
     once = needed(graph, every_root, lambda _: False)
     hoisted = [node for node in once if level[node] == 0]
     framed = [
-        node for node in needed(graph, pass_roots, lambda n: level[n] == 0) if level[node] == 1
+        node
+        for node in needed(graph, pass_roots + coefficients, lambda n: level[n] == 0)
+        if level[node] == 1
     ]
     substep = needed(graph, pass_roots, lambda n: level[n] < 2)
 
     def block(order: list[int]) -> list[str]:
-        return statements(graph, order, name, "const double ")
+        return branching_statements(graph, order, name, "const double ")
 
     ticks = []
     for k, roots in enumerate(stages.ticks):
@@ -79,14 +93,16 @@ def emit_single(stages: Stages) -> str:
     }}
     if (f == end) break;
     {indented(block(framed), 4)}
+    double {", ".join(f"s{k} = 0.0" for k in range(len(products) + 1))};
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(block(substep), 6)}
       if (__builtin_expect({result(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
-        {indented(_repeat(layout, len(pass_roots)), 8)}
+        {indented(_repeat(layout), 8)}
       }} else {{
-        {indented(_commit(stages, layout, name), 8)}
+        {indented(_commit(results, products, name), 8)}
       }}
     }}
+    {indented(_integrals(stages, name), 4)}
   }}
   {indented(_stores(layout), 2)}
   state[{counters}] = failures;
@@ -115,22 +131,25 @@ def _stores(layout: Layout) -> list[str]:
     return [f"state[{at}] = {name};" for name, at in _entries(layout)]
 
 
-def _commit(stages: Stages, layout: Layout, name: object) -> list[str]:
-    graph = stages.graph
-    lines, after = [], []
-    for kind in STATE:
-        for k, node in enumerate(stages.fast[kind]):
-            value = result(graph, node, name)  # type: ignore[arg-type]
-            if kind == "q":
-                after.append(f"q{k} += {value};")
-            else:
-                lines.append(f"const double {kind}{k}_ = {value};")
-                after.append(f"{kind}{k} = {kind}{k}_;")
-    return lines + after
+def _commit(results: dict[str, Node], products: list[Node], name: Namer) -> list[str]:
+    new = [f"const double {target}_ = {name(node)};" for target, node in results.items()]
+    sums = [f"s{k} += {name(node)};" for k, node in enumerate(products)]
+    count = f"s{len(products)} += 1.0;"
+    return [*new, *sums, count, *(f"{target} = {target}_;" for target in results)]
 
 
-def _repeat(layout: Layout, size: int) -> list[str]:
+def _integrals(stages: Stages, name: Namer) -> list[str]:
+    """Return the statements that turn a frame's sums into integrals."""
+    lines, count = [], len(stages.quadrature.products)
+    for j, pairs in enumerate(stages.quadrature.combinations):
+        terms = [f"{name(c)} * s{count if k is None else k}" for c, k in pairs]
+        lines.append(f"q{j} += {' + '.join(terms)};")
+    return lines
+
+
+def _repeat(layout: Layout) -> list[str]:
     nx, nm = layout.length["x"], layout.length["m"]
+    size = layout.start["m"] + 1
     xs = ", ".join(f"x{k}" for k in range(nx))
     ds = ", ".join(f"d{k}" for k in range(nx))
     ms = ", ".join(f"m{k}" for k in range(nm)) or "0.0"

@@ -7,12 +7,14 @@ becomes a times a reciprocal that others can share, and paired selections become
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
 
 import casadi as ca
+
+from bywire.simulation.signs import ANYTHING, Interval, interval_of
 
 Node = int
 BOOLEAN = frozenset({"lt", "le", "eq", "ne", "not", "and", "or"})
@@ -58,9 +60,22 @@ _FOLD: dict[str, Callable[..., float]] = {
 
 @dataclass
 class Graph:
-    """A growing set of nodes; equal operations on equal arguments are the same node."""
+    """A growing set of nodes; equal operations on equal arguments are the same node.
 
+    Parameters
+    ----------
+    ranges
+        What is known of leaves, by kind and index; limits that a value cannot cross vanish.
+    fixed_leaves
+        Kinds of leaves that change rarely: values of these alone are gathered, a + (b + x)
+        becoming (a + b) + x, so that they are computed rarely too.
+    """
+
+    ranges: Mapping[tuple[str, int], Interval] = field(default_factory=dict)
+    fixed_leaves: frozenset[str] = frozenset()
     nodes: list[Operation] = field(default_factory=list)
+    _intervals: list[Interval] = field(default_factory=list)
+    _fixed: list[bool] = field(default_factory=list)
     _known: dict[Operation, Node] = field(default_factory=dict)
 
     def leaf(self, kind: str, index: int) -> Node:
@@ -134,8 +149,22 @@ class Graph:
         if known is None:
             known = len(self.nodes)
             self.nodes.append(operation)
+            self._intervals.append(self._interval(operation))
+            self._fixed.append(
+                operation.args[0] in self.fixed_leaves
+                if operation.op == "leaf"
+                else all(self._fixed[a] for a in self.arguments(known))
+            )
             self._known[operation] = known
         return known
+
+    def _interval(self, operation: Operation) -> Interval:
+        if operation.op == "leaf":
+            return self.ranges.get(operation.args, ANYTHING)
+        if operation.op == "const":
+            value = float(operation.args[0])
+            return Interval(value, value)
+        return interval_of(operation.op, [self._intervals[a] for a in operation.args])
 
     def _value(self, node: Node) -> float | None:
         operation = self.nodes[node]
@@ -188,7 +217,18 @@ class Graph:
             return self.apply("sub", a, self.nodes[b].args[0])
         if self.nodes[a].op == "neg":
             return self.apply("sub", b, self.nodes[a].args[0])
-        return self._paired_selection(a, b)
+        return self._paired_selection(a, b) or self._gathered("add", a, b)
+
+    def _gathered(self, op: str, a: Node, b: Node) -> Node | None:
+        """Turn a + (b + x) into (a + b) + x where a and b are fixed and x is not; likewise a b x."""
+        for fixed, other in ((a, b), (b, a)):
+            inner = self.nodes[other]
+            if not self._fixed[fixed] or self._fixed[other] or inner.op != op:
+                continue
+            for first, second in (inner.args, inner.args[::-1]):
+                if self._fixed[first]:
+                    return self.apply(op, self.apply(op, fixed, first), second)
+        return None
 
     def _paired_selection(self, a: Node, b: Node) -> Node | None:
         """Turn (c ? x : 0) + (!c ? y : 0) into c ? x : y."""
@@ -209,6 +249,13 @@ class Graph:
             return self.apply("neg", b)
         if self.nodes[b].op == "neg":
             return self.apply("add", a, self.nodes[b].args[0])
+        if self._fixed[b] and self.nodes[a].op in ("add", "sub") and not self._fixed[a]:
+            inner = self.nodes[a]
+            first, second = inner.args
+            if self._fixed[first]:
+                return self.apply(inner.op, self.apply("sub", first, b), second)
+            if self._fixed[second] and inner.op == "add":
+                return self.apply("add", self.apply("sub", second, b), first)
         return None
 
     def _mul(self, a: Node, b: Node) -> Node | None:
@@ -220,6 +267,20 @@ class Graph:
                 return other
             if value == -1.0:
                 return self.apply("neg", other)
+        return self._gathered("mul", a, b) or self._distributed(a, b)
+
+    def _distributed(self, a: Node, b: Node) -> Node | None:
+        """Turn a (b + x) into a b + a x where a and b are fixed and x is not.
+
+        As many operations, but chains of such factors collapse into one product and one sum.
+        """
+        for factor, other in ((a, b), (b, a)):
+            inner = self.nodes[other]
+            if not self._fixed[factor] or self._fixed[other] or inner.op not in ("add", "sub"):
+                continue
+            if self._fixed[inner.args[0]] != self._fixed[inner.args[1]]:
+                parts = (self.apply("mul", factor, x) for x in inner.args)
+                return self.apply(inner.op, *parts)
         return None
 
     def _neg(self, a: Node) -> Node | None:
@@ -230,5 +291,24 @@ class Graph:
             return self.apply("sub", operation.args[1], operation.args[0])
         return None
 
+    def _fmax(self, a: Node, b: Node) -> Node | None:
+        first, second = self._intervals[a], self._intervals[b]
+        return a if first.low >= second.high else b if second.low >= first.high else None
+
+    def _fmin(self, a: Node, b: Node) -> Node | None:
+        first, second = self._intervals[a], self._intervals[b]
+        return a if first.high <= second.low else b if second.high <= first.low else None
+
+    def _fabs(self, a: Node) -> Node | None:
+        return a if self._intervals[a].positive else None
+
     def _if_else_zero(self, c: Node, a: Node) -> Node | None:
-        return self.constant(0.0) if self._value(a) == 0.0 else None
+        if self._value(a) == 0.0:
+            return self.constant(0.0)
+        operation = self.nodes[a]
+        if operation.op == "mul":
+            # c ? k exp(x) : 0 is k (c ? exp(x) : 0): the selection can be shared, and branched on.
+            for factor, costly in (operation.args, operation.args[::-1]):
+                if self.nodes[costly].op == "exp":
+                    return self.apply("mul", factor, self.apply("if_else_zero", c, costly))
+        return None

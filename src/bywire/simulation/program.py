@@ -8,7 +8,7 @@ from typing import Any
 import casadi as ca
 
 from bywire.core.model import Model
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
 from bywire.simulation.scheme import Pass, Symbols, build_pass
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
@@ -34,6 +34,8 @@ class Program:
 
     Parameters
     ----------
+    parameter_ranges
+        Names in the order of the parameter vector, each with its admissible range.
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, contact, flow, flag)``, see ``scheme.Pass``.
     ticks
@@ -43,13 +45,17 @@ class Program:
     """
 
     model: Model
-    parameter_names: tuple[str, ...]
-    task_names: tuple[str, ...]
+    parameter_ranges: dict[str, tuple[float, float]]
     sizes: Sizes
     fast: Any
     exact: Any
     ticks: tuple[Any, ...]
     output: Any
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names in the order of the parameter vector."""
+        return tuple(self.parameter_ranges)
 
     @property
     def outputs(self) -> dict[str, Signal]:
@@ -86,8 +92,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
     u = SX.sym("u", len(model.Stimulus._fields))
     return Program(
         model=model,
-        parameter_names=names,
-        task_names=tuple(t.name for t in tasks),
+        parameter_ranges=_ranges(par, names),
         sizes=Sizes(
             x=x.shape[0],
             memory=s.m.shape[0],
@@ -119,6 +124,15 @@ def build_program(model: Model, par: ParameterSet) -> Program:
         ),
         output=output,
     )
+
+
+def _ranges(par: ParameterSet, names: tuple[str, ...]) -> dict[str, tuple[float, float]]:
+    fields = leaf_fields(type(par))
+    found = {}
+    for name in names:
+        leaf = fields.get(name) or fields[name.rpartition(".")[0]]  # a node of a table
+        found[name] = (leaf.low, leaf.high)
+    return found
 
 
 def _pass_function(name: str, s: Symbols, result: Pass) -> Any:

@@ -26,7 +26,11 @@ NEVER = 1e30  # bound of a one-sided limit's reaction
 
 @dataclass(frozen=True)
 class Symbols:
-    """Arguments of a substep: state, predicted increment, memory, parameters, step."""
+    """Arguments of a substep: state, predicted half increment, memory, parameters, step.
+
+    Half of what the state gains over the substep is what the equations use everywhere: x + d is
+    the midpoint.
+    """
 
     x: Any
     d: Any
@@ -42,7 +46,7 @@ class Pass:
     Parameters
     ----------
     x, d
-        State at the end and the increment, shape (nx,) each.
+        State at the end and half the increment, shape (nx,) each.
     reaction
         Forces of the frictions, then of the limits.
     contact
@@ -73,11 +77,11 @@ class _Linearized:
 
 @dataclass(frozen=True)
 class _ContactSets:
-    """Block-diagonal stiffness, numbers of the active subsets, overlap that was left out."""
+    """Block-diagonal stiffness, numbers of the active subsets, overlaps that were left out."""
 
     stiffness: Any
     numbers: list[Any]
-    touching: Any
+    overlaps: list[Any]
 
 
 def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass:
@@ -95,7 +99,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         False: the pass of nearly every substep, which leaves one-sided limits alone and only
         checks them. True: the repeated pass, with limits and every combination of signs.
     """
-    y = s.x + 0.5 * s.d
+    y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
     before = _contact_sets(model, par, _gaps(model, par, y, y), exact)
     K = before.stiffness
@@ -103,57 +107,58 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     linear = _linearize(model, par, s, y, K)
     bounds = _bounds(model, par, s, y, at_y)
     mass = column(model.mass(symbol_tuple(model.State, y), par))
-    A = ca.diag(mass) - 0.5 * s.h * linear.J
-    right = {i: row.times(s.h, s.x, changing) for i, row in enumerate(linear.rows)}
+    A = ca.diag(2.0 / s.h * mass) - linear.J
+    right = dict(enumerate(linear.rows))
     for j, curved in enumerate(linear.nonlinear):
         if curved:
             for i in range(s.x.shape[0]):
-                correction = 0.5 * s.h * linear.J[i, j] * s.d[j]
-                right[i] = Form(right[i].coefficients, right[i].rest - correction)
+                rest = right[i].rest - linear.J[i, j] * s.d[j]
+                right[i] = Form(right[i].coefficients, rest)
     kept = _set_valued_states(model, exact)
     reduced = eliminate(A, right, kept, s.x, changing)
     projection, reaction = _project(model, s, reduced, bounds, exact)
     d = _increments(s, reduced, projection)
+    middle = s.x + d
     x = column(
-        [projection.w[kept.index(k)] if k in kept else s.x[k] + d[k] for k in range(s.x.shape[0])]
+        [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
     )
-    middle = s.x + 0.5 * d
     overlap = _gaps(model, par, middle, y)
     contact = K @ overlap
     flow = model.powers(
         symbol_tuple(model.State, middle),
-        symbol_tuple(model.State, d / s.h),
+        symbol_tuple(model.State, 2.0 / s.h * d),
         symbol_tuple(model.Memory, s.m),
         par,
         scalars(contact),
         scalars(reaction),
     )
     after = _contact_sets(model, par, _gaps(model, par, middle, middle), exact)
-    # A sum and no logical or: compilers do not vectorize selections between truth values.
-    flag = ca.if_else(projection.failed, 1, 0) + _distance(before, after)
+    doubts = [*_differences(before, after), ca.if_else(projection.failed, 1, 0)]
     if not exact:
-        for name in model.limits:
-            flag = flag + ca.fmax(-x[model.State._fields.index(name)], 0)
+        doubts += [-x[model.State._fields.index(name)] for name in model.limits]
+    # A maximum and no logical or: compilers do not vectorize selections between truth values.
+    flag = SX(0)
+    for doubt in doubts:
+        flag = ca.fmax(flag, doubt)
     return Pass(x, d, reaction, contact, column(flow), flag)
 
 
 def _contact_sets(model: Model, par: ParameterSet, d: Any, exact: bool) -> _ContactSets:
     """Choose the active subsets of all groups; the fast pass takes rare contacts as open."""
-    blocks, numbers, touching, at = [], [], SX(0), 0
+    blocks, numbers, overlaps, at = [], [], [], 0
     for C, rare in zip(model.compliance(par), model.usually_open, strict=True):
         n = len(C)
         group = d[at : at + n]
         at += n
         if rare and not exact:
             blocks.append(SX(n, n))
-            for k in range(n):
-                touching = touching + ca.fmax(group[k], 0)
+            overlaps += [group[k] for k in range(n)]
             continue
         rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
         chosen = active_set(rows, group)
         blocks.append(chosen.stiffness)
         numbers.append(chosen.index)
-    return _ContactSets(ca.diagcat(*blocks) if blocks else SX(0, 0), numbers, touching)
+    return _ContactSets(ca.diagcat(*blocks) if blocks else SX(0, 0), numbers, overlaps)
 
 
 def _gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
@@ -215,25 +220,24 @@ def _project(
     """Return end-of-step values of the set-valued states, and all reactions."""
     limits = [(SX(0), SX(NEVER)) for _ in model.limits]
     pairs = bounds + (limits if exact else [])
-    low = s.h * column([p[0] for p in pairs])
-    high = s.h * column([p[1] for p in pairs])
-    c = column([reduced.start(row) for row in range(len(reduced.kept))])
-    projection = (project_exact if exact else project_fast)(reduced.matrix, c, low, high)
-    reaction = (reduced.matrix @ projection.w - c) / s.h
+    low, high = column([p[0] for p in pairs]), column([p[1] for p in pairs])
+    # The unknowns are d = (w - x) / 2, so that S d = c + force is (S/2) w = c + (S/2) x + force.
+    half = 0.5 * reduced.matrix
+    c = column([reduced.start(row, half) for row in range(len(reduced.kept))])
+    projection = (project_exact if exact else project_fast)(half, c, low, high)
+    reaction = half @ projection.w - c
     if not exact:
         reaction = ca.vertcat(reaction, SX.zeros(len(model.limits)))
     return projection, reaction
 
 
 def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> Any:
-    known = {k: projection.w[a] - s.x[k] for a, k in enumerate(reduced.kept)}
+    known = {k: 0.5 * (projection.w[a] - s.x[k]) for a, k in enumerate(reduced.kept)}
     every = reduced.back_substitute(known)
     return column([every[k] for k in range(s.x.shape[0])])
 
 
-def _distance(before: _ContactSets, after: _ContactSets) -> Any:
-    """Return 0 where all contact sets are the same and as assumed, else something positive."""
-    total = before.touching + after.touching
-    for a, b in zip(before.numbers, after.numbers, strict=True):
-        total = total + (a - b) ** 2
-    return total
+def _differences(before: _ContactSets, after: _ContactSets) -> list[Any]:
+    """Return numbers of which one is positive where a contact set is not as it was assumed."""
+    changed = [(a - b) ** 2 for a, b in zip(before.numbers, after.numbers, strict=True)]
+    return [*before.overlaps, *after.overlaps, *changed]

@@ -1,6 +1,6 @@
 """Set-valued forces on a few coupled velocities: the projection of a substep.
 
-Given ``S w = c + h lambda`` with ``lambda_k = lo_k`` where w_k > 0, ``hi_k`` where w_k < 0 and
+Given ``S w = c + lambda`` with ``lambda_k = lo_k`` where w_k > 0, ``hi_k`` where w_k < 0 and
 anything in [lo_k, hi_k] where w_k = 0, find the end-of-step velocities w.
 """
 
@@ -40,7 +40,7 @@ def project_fast(S: Any, c: Any, low: Any, high: Any) -> Projection:
     S, c
         Matrix and right-hand side, shapes (m, m) and (m,).
     low, high
-        Bounds times the substep, shape (m,).
+        Bounds, shape (m,).
     """
     m = c.shape[0]
     if m == 0:

@@ -8,8 +8,12 @@ from typing import Any
 
 import casadi as ca
 
+from bywire.simulation.balance import balanced
+from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph, Node
 from bywire.simulation.program import Program
+from bywire.simulation.quadrature import Levels, Quadrature, factored
+from bywire.simulation.signs import NOT_NEGATIVE, Interval
 
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
 LEVEL = {"p": 0, "h": 0, "sp": 0, "m": 1, "sm": 1}
@@ -29,6 +33,8 @@ class Stages:
         Nodes of the memory after each task.
     output
         Nodes of the recorded signals.
+    quadrature
+        How the integrals of the fast pass follow from running sums.
     fast_t, exact_t, ticks_t, output_t
         Tangents of the same along one direction; empty lists without sensitivities.
     """
@@ -38,20 +44,15 @@ class Stages:
     exact: dict[str, list[Node]]
     ticks: list[list[Node]]
     output: list[Node]
+    quadrature: Quadrature
     fast_t: dict[str, list[Node]]
     exact_t: dict[str, list[Node]]
     ticks_t: list[list[Node]]
     output_t: list[Node]
 
-    def level(self) -> list[int]:
+    def level(self) -> Levels:
         """Return for every node how often it must be computed, as in ``LEVEL``."""
-        levels: list[int] = []
-        for node, operation in enumerate(self.graph.nodes):
-            if operation.op == "leaf":
-                levels.append(LEVEL.get(operation.args[0], 2))
-            else:
-                levels.append(max((levels[a] for a in self.graph.arguments(node)), default=0))
-        return levels
+        return Levels(self.graph, LEVEL)
 
     def varies(self, kinds: frozenset[str]) -> list[bool]:
         """Return for every node whether it depends on a leaf of one of the kinds."""
@@ -74,7 +75,10 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
     directions
         Indices of the parameters that tangents are taken along; empty for none.
     """
-    graph, n = Graph(), program.sizes
+    n = program.sizes
+    ranges = {("p", k): Interval(*r) for k, r in enumerate(program.parameter_ranges.values())}
+    fixed = frozenset(kind for kind, level in LEVEL.items() if level < 2)
+    graph = Graph({**ranges, ("h", 0): NOT_NEGATIVE}, fixed)
     lengths = {
         "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction, "F": n.contact,
         "q": n.flow, "p": n.parameters, "h": 1,
@@ -99,9 +103,15 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         return graph.add_function(seeded, inputs)
 
     parts = ("x", "d", "r", "F", "q", "flag")
+    fast = dict(zip(parts, add(program.fast, "xdmph"), strict=True))
+    level = Levels(graph, LEVEL)
+    substep = frozenset(needed(graph, _all_but(fast, "q"), lambda _: False))
+    quadrature = factored(graph, fast["q"], substep, level)
+    fast, quadrature = _balanced(graph, fast, quadrature, level)
     return Stages(
         graph=graph,
-        fast=dict(zip(parts, add(program.fast, "xdmph"), strict=True)),
+        fast=fast,
+        quadrature=quadrature,
         exact=dict(zip(parts, add(program.exact, "xdmph"), strict=True)),
         ticks=[add(tick, "xmup")[0] for tick in program.ticks],
         output=add(program.output, "xmprFqh")[0],
@@ -110,6 +120,21 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         ticks_t=[tangent(tick, "xmup")[0] for tick in program.ticks],
         output_t=tangent(program.output, "xmprFqh")[0],
     )
+
+
+def _all_but(results: dict[str, list[Node]], left_out: str) -> list[Node]:
+    return [node for kind, nodes in results.items() if kind != left_out for node in nodes]
+
+
+def _balanced(
+    graph: Graph, fast: dict[str, list[Node]], quadrature: Quadrature, level: Levels
+) -> tuple[dict[str, list[Node]], Quadrature]:
+    """Return the fast pass with its sums and products in a quicker order."""
+    kinds = [(kind, len(nodes)) for kind, nodes in fast.items() if kind != "q"]
+    roots = [*_all_but(fast, "q"), *quadrature.products]
+    new = iter(balanced(graph, roots, level))
+    renewed = {kind: [next(new) for _ in range(count)] for kind, count in kinds}
+    return {**fast, **renewed}, Quadrature(list(new), quadrature.combinations)
 
 
 def _with_tangents(function: Any, kinds: str, directions: Sequence[int]) -> Any:

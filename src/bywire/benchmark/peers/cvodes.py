@@ -15,8 +15,8 @@ from bywire.benchmark.peers.problem import (
     symbols,
 )
 
-WIDTH = 0.01
-TOLERANCE = 1e-6
+WIDTH = 3e-4
+TOLERANCE = 1e-7
 
 
 def available() -> bool:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.assemblies.motorcycle_brake import Output
+from bywire.assemblies.motorcycle_output import Output
 from bywire.assemblies.motorcycle_ecu import Memory, Stimulus
 from bywire.assemblies.motorcycle_energy import Flow
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters as Par

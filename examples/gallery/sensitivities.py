@@ -1,0 +1,72 @@
+"""Which parameters move the pressure, and when.
+
+The kernel computes exact derivatives of a whole run, here of the pressure in hard braking, with
+respect to any number of parameters. Times one per cent of the parameter they are bars.
+
+While the pressure rises, caliper, pads, motor constant, gear and piston matter most, friction
+little: dither does its work. At the end the controller's integral has removed all of it, but for
+one: the ECU takes a fixed ambient pressure off the sensor's absolute reading, so that one per
+cent of ambient pressure stays as 0.01 bar, in the other direction. The pipeline's four
+parameters act through one resistance: no test of this kind can tell them apart.
+"""
+
+from argparse import ArgumentParser
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import bywire
+from bywire.bench.bench import as_run
+
+parser = ArgumentParser(description="Show which parameters move the pressure.")
+parser.add_argument("--out", type=Path, help="folder for the figure")
+out = parser.parse_args().out
+
+BAR, PERCENT = 1e5, 0.01
+# A quantized reading has the derivative zero: the loop would be cut. So an ideal converter here.
+bench = bywire.Bench("hard-braking", "dardanelli2010", overrides={"adc.law": "ideal"})
+case = bench.cases()[0]
+run = as_run(case, bench.step)
+values = run.par.leaves()
+names = [
+    name
+    for name in values
+    if name.split(".")[0] in ("supply", "motor", "gear", "seal", "master_cylinder", "caliper")
+] + ["fluid.beta", "fluid.nu", "fluid.rho", "fluid.p_atm", "pipeline.L_pl", "pipeline.k_lf"]
+
+found = bywire.simulate_with_sensitivities(run, names, ["p_mc"])
+time = found.trajectory.time - case.settle
+rise, end = (time > 0.0) & (time < 0.2), time > 1.1
+moves = {name: found.of("p_mc", name) * values[name] * PERCENT / BAR for name in names}
+peak = {name: np.max(np.abs(moves[name][rise])) for name in names}
+left = {name: np.mean(moves[name][end]) for name in names}
+ranked = sorted(names, key=peak.__getitem__, reverse=True)
+for name in ranked[:12]:
+    print(f"{name:24s} {peak[name]:6.3f} bar in the rise, {left[name]:+7.4f} bar at the end")
+
+# The same by differences, for one parameter: two more runs.
+up, down = (
+    bywire.simulate(replace(run, par=run.par.replace({"motor.K_e": values["motor.K_e"] * factor})))
+    for factor in (1.001, 0.999)
+)
+difference = (up["p_mc"] - down["p_mc"]) / 0.002 * PERCENT / BAR
+
+if out:
+    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
+    axes = figure.subplots()
+    axes.barh(ranked[11::-1], [peak[name] for name in ranked[11::-1]], label="largest, in the rise")
+    axes.plot([abs(left[name]) for name in ranked[11::-1]], ranked[11::-1], "k.", label="left over")
+    axes.set(xlabel="change of the pressure per 1 % [bar]")
+    axes.legend()
+    out.mkdir(parents=True, exist_ok=True)
+    figure.savefig(out / "sensitivities.png", dpi=150)
+
+assert ranked[0] == "caliper.A_pd"
+assert max(peak[name] for name in names if name.startswith("seal.")) < 0.25 * peak[ranked[0]]
+assert np.max(np.abs(difference - moves["motor.K_e"])[rise]) < 0.1 * peak["motor.K_e"]
+assert all(abs(left[name]) < 0.003 for name in names if name != "fluid.p_atm")
+assert abs(left["fluid.p_atm"] + 0.01 * values["fluid.p_atm"] / BAR) < 0.001
+same = [moves[name] for name in ("fluid.nu", "fluid.rho", "pipeline.L_pl", "pipeline.k_lf")]
+assert np.allclose(same, same[0], atol=1e-9)

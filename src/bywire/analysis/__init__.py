@@ -1,0 +1,1 @@
+"""Linear models, frequency responses, margins, hysteresis: what recordings and models tell."""

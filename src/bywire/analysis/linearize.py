@@ -1,0 +1,142 @@
+"""Exact linear models of any model of the protocol: Jacobians by algorithmic differentiation."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Literal, NamedTuple, cast
+
+import numpy as np
+
+from bywire.analysis.linear_model import LinearModel
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of, zeros
+
+Friction = Literal["removed", "sliding"]
+
+
+def linearize(
+    model: Model,
+    par: ParameterSet,
+    state: NamedTuple,
+    memory: NamedTuple,
+    *,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    friction: Friction = "removed",
+) -> LinearModel:
+    r"""Return the Jacobians of a model's smooth part at an operating point.
+
+    .. math:: m_k(x) \dot x_k = f_k(x, u) \;\Rightarrow\;
+        A_{kj} = \partial (f_k / m_k) / \partial x_j
+
+    Valid for small motions between the contacts and off the one-sided limits. Dry friction is
+    set-valued and has no derivative at rest.
+
+    Parameters
+    ----------
+    model, par
+        The system and its parameters.
+    state, memory
+        Operating point: the model's State, and the Memory that the tasks hold.
+    inputs
+        Fields of Memory that drive the continuous part, for instance ``("i_source",)``.
+    outputs
+        Fields of State or of Output.
+    friction
+        ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
+        force of the sliding direction with its slope; every friction's velocity must be nonzero.
+
+    Raises
+    ------
+    UnknownNameError
+        When an input or output is unknown.
+    ParameterError
+        When a contact is closed, or a friction at rest with ``friction="sliding"``.
+
+    Notes
+    -----
+    The Jacobian is exact: ``x`` and the value-only ``xe`` of the protocol are the same here.
+    """
+    import casadi as ca
+
+    _require_known("input", inputs, model.Memory._fields)
+    _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
+    _require_open(model, par, state)
+    x = ca.SX.sym("x", len(state))
+    u = ca.SX.sym("u", len(inputs))
+    held = memory._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
+    made = cast(Any, model.State)(*ca.vertsplit(x))
+    rate, y = _smooth(model, par, made, held, outputs, state, friction)
+    parts = [ca.jacobian(rate, x), ca.jacobian(rate, u), ca.jacobian(y, x), ca.jacobian(y, u)]
+    point = [getattr(memory, name) for name in inputs]
+    A, B, C, D, at = (
+        np.array(part, dtype=float)
+        for part in ca.Function("jacobians", [x, u], [*parts, rate])(list(state), point)
+    )
+    state_signals, memory_signals = signals_of(model.State), signals_of(model.Memory)
+    known = signals_of(model.Output) | state_signals
+    return LinearModel(
+        model.name, A, B, C, D,
+        tuple(model.State._fields), tuple(inputs), tuple(outputs),
+        tuple(state_signals[name].unit for name in model.State._fields),
+        tuple(memory_signals[name].unit for name in inputs),
+        tuple(known[name].unit for name in outputs),
+        at[:, 0],
+    )  # fmt: skip
+
+
+def _smooth(
+    model: Model,
+    par: ParameterSet,
+    x: Any,
+    held: Any,
+    outputs: Sequence[str],
+    state: NamedTuple,
+    friction: Friction,
+) -> tuple[Any, Any]:
+    """Return rates and outputs as symbols."""
+    import casadi as ca
+
+    groups = model.gap(state, state, par)
+    contact = (0.0,) * sum(len(group) for group in groups)
+    force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
+    reaction = [0.0] * (len(model.frictions) + len(model.limits))
+    if friction == "sliding":
+        bounds = model.bounds(x, x, held, par, contact)
+        for k, (name, (low, high)) in enumerate(zip(model.frictions, bounds, strict=True)):
+            reaction[k] = low if _direction(name, state) > 0 else high
+            force[name] = force[name] + reaction[k]
+    mass = model.mass(x, par)
+    rate = ca.vertcat(*(force[name] / getattr(mass, name) for name in x._fields))
+    flow = zeros(cast(Any, model.Flow))
+    out = model.output(x, held, par, contact, tuple(reaction), flow)
+    y = [getattr(x if name in x._fields else out, name) for name in outputs]
+    return rate, ca.vertcat(*y)
+
+
+def _direction(name: str, state: NamedTuple) -> float:
+    speed = float(getattr(state, name))
+    if speed == 0.0:
+        raise ParameterError(
+            f"{name} = 0: friction at rest has no slope; give a sliding speed, or use "
+            "friction='removed'"
+        )
+    return speed
+
+
+def _require_open(model: Model, par: ParameterSet, state: NamedTuple) -> None:
+    gaps = [float(d) for group in model.gap(state, state, par) for d in group]
+    closed = [str(k) for k, d in enumerate(gaps) if d > 1e-12]
+    if closed:
+        raise ParameterError(
+            f"{model.name}: contact {', '.join(closed)} is closed at the operating point: choose "
+            "a point between the stops"
+        )
+
+
+def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise unknown_name(kind, name, known)

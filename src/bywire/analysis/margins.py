@@ -1,0 +1,91 @@
+"""Bandwidth, crossover and phase margin of frequency responses."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+Array = NDArray[np.float64]
+Response = Callable[[Array], NDArray[np.complex128]]
+
+_POINTS = 4000  # of the grid that brackets the crossings, per call
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Stability margin of an open loop.
+
+    Parameters
+    ----------
+    crossover
+        Highest frequency at which the loop gain is 1 [Hz]; NaN where it never is.
+    phase
+        Phase margin there [degree]; NaN likewise.
+    """
+
+    crossover: float
+    phase: float
+
+
+def bandwidth(response: Response, band: tuple[float, float], drop: float = math.sqrt(0.5)) -> float:
+    """Return the lowest frequency [Hz] at which a response has fallen to a share of its start.
+
+    Parameters
+    ----------
+    response
+        ``response(frequencies [Hz]) -> complex``.
+    band
+        Frequencies to look at [Hz]; the response at the lower one counts as 1.
+    drop
+        The share: -3 dB by default.
+
+    Returns
+    -------
+    float
+        NaN where the response stays above it.
+    """
+    level = drop * float(np.abs(response(np.array([band[0]])))[0])
+
+    def excess(f: float) -> float:
+        return float(np.abs(response(np.array([f])))[0]) - level
+
+    grid = np.geomspace(*band, _POINTS)
+    below = np.flatnonzero(np.abs(response(grid)) < level)
+    if below.size == 0:
+        return math.nan
+    return float(brentq(excess, grid[below[0] - 1], grid[below[0]]))
+
+
+def margin(loop: Response, band: tuple[float, float]) -> Margin:
+    """Return crossover and phase margin of an open loop (negative feedback not counted).
+
+    The phase is followed without jumps from the band's lower end, where it counts as the value
+    between -360 and 0 degree: a loop with integral action begins near -90.
+
+    Parameters
+    ----------
+    loop
+        ``loop(frequencies [Hz]) -> complex``.
+    band
+        Frequencies to look at [Hz].
+    """
+    grid = np.geomspace(*band, _POINTS)
+    values = loop(grid)
+    falls = np.flatnonzero((np.abs(values[:-1]) >= 1.0) & (np.abs(values[1:]) < 1.0))
+    if falls.size == 0:
+        return Margin(math.nan, math.nan)
+    k = int(falls[-1])
+
+    def excess(f: float) -> float:
+        return float(np.abs(loop(np.array([f])))[0]) - 1.0
+
+    crossover = float(brentq(excess, grid[k], grid[k + 1]))
+    path = np.append(values[: k + 1], loop(np.array([crossover])))
+    phase = np.degrees(np.unwrap(np.angle(path)))
+    turns = 360.0 * math.ceil(phase[0] / 360.0)
+    return Margin(crossover, 180.0 + float(phase[-1] - turns))

@@ -1,0 +1,54 @@
+"""Staircases of stick and slip in recordings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Jumps:
+    """Phases of slip between two of stick that raised the pressure.
+
+    Parameters
+    ----------
+    times
+        When each began [s], shape (n,).
+    rises
+        By how much each raised the pressure [Pa], shape (n,).
+    levels
+        Pressures at which each ended [Pa], shape (n,).
+    """
+
+    times: Array
+    rises: Array
+    levels: Array
+
+
+def jumps(recording: xr.Dataset, least: float = 0.1e5) -> Jumps:
+    """Return the jumps of a recording.
+
+    Parameters
+    ----------
+    recording
+        Recording with ``p_mc`` and the mode ``stuck``.
+    least
+        Smallest rise that counts [Pa]: creeping in small steps, as where a converter's
+        resolution moves the current, is no jump.
+    """
+    time, p = recording["time"].values, recording["p_mc"].values
+    stuck = recording["stuck"].values > 0.5
+    begins = np.flatnonzero(stuck[:-1] & ~stuck[1:])
+    ends = np.flatnonzero(~stuck[:-1] & stuck[1:]) + 1
+    found = []
+    for begin in begins:
+        after = ends[ends > begin]
+        if after.size and p[after[0]] - p[begin] >= least:
+            found.append((time[begin], p[after[0]] - p[begin], p[after[0]]))
+    table = np.array(found).reshape(-1, 3)
+    return Jumps(table[:, 0], table[:, 1], table[:, 2])

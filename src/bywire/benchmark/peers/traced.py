@@ -1,0 +1,70 @@
+"""Arrays of JAX that the model's equations accept.
+
+``core.ops`` calls NumPy for what it does not know, and NumPy cannot work on values that JAX is
+tracing; an object with ``_bywire_op`` brings its own functions.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import jax.numpy as jnp
+
+_NAMES = {"fabs": "abs", "fmax": "maximum", "fmin": "minimum"}
+
+
+class Traced:
+    """A traced scalar with the arithmetic, the comparisons and the functions of the equations."""
+
+    def __init__(self, value: Any) -> None:
+        self.value = value
+
+    def _bywire_op(self, name: str, *args: Any) -> Traced:
+        return Traced(getattr(jnp, _NAMES.get(name, name))(*(_bare(a) for a in args)))
+
+    def __add__(self, other: Any) -> Traced:
+        """Return the sum."""
+        return Traced(self.value + _bare(other))
+
+    def __sub__(self, other: Any) -> Traced:
+        """Return the difference."""
+        return Traced(self.value - _bare(other))
+
+    def __rsub__(self, other: Any) -> Traced:
+        """Return the difference, the other way round."""
+        return Traced(_bare(other) - self.value)
+
+    def __mul__(self, other: Any) -> Traced:
+        """Return the product."""
+        return Traced(self.value * _bare(other))
+
+    def __truediv__(self, other: Any) -> Traced:
+        """Return the quotient."""
+        return Traced(self.value / _bare(other))
+
+    def __rtruediv__(self, other: Any) -> Traced:
+        """Return the quotient, the other way round."""
+        return Traced(_bare(other) / self.value)
+
+    def __neg__(self) -> Traced:
+        """Return the negative."""
+        return Traced(-self.value)
+
+    def __lt__(self, other: Any) -> Traced:
+        """Return whether it is smaller."""
+        return Traced(self.value < _bare(other))
+
+    def __gt__(self, other: Any) -> Traced:
+        """Return whether it is larger."""
+        return Traced(self.value > _bare(other))
+
+    def __ge__(self, other: Any) -> Traced:
+        """Return whether it is larger or equal."""
+        return Traced(self.value >= _bare(other))
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+
+def _bare(x: Any) -> Any:
+    return x.value if isinstance(x, Traced) else x

@@ -1,0 +1,124 @@
+"""Integrals of powers: few running sums in the substep, combined once a frame.
+
+A rate such as the copper loss R i^2 is a coefficient that does not change within a frame times a
+product that does. The substep sums the products (i^2, i omega, omega^2, ...), which several rates
+share; the frame's end multiplies the sums.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from bywire.simulation.graph import Graph, Node
+
+Terms = dict[Node | None, Node]  # product (None: the number one) -> coefficient
+_MOST = 4  # terms that multiplying out may give; beyond, the product stays as it is
+
+
+@dataclass(frozen=True)
+class Quadrature:
+    """Sums and how the integrals follow from them.
+
+    Parameters
+    ----------
+    products
+        Nodes that every substep adds up.
+    combinations
+        Per integral, pairs of a coefficient and the index of its product; None as index
+        stands for the number of substeps.
+    """
+
+    products: list[Node]
+    combinations: list[list[tuple[Node, int | None]]]
+
+
+def factored(
+    graph: Graph, rates: Sequence[Node], computed: Collection[Node], level: Levels
+) -> Quadrature:
+    """Split rates into coefficients and products.
+
+    Parameters
+    ----------
+    rates
+        Nodes of the rates.
+    computed
+        Nodes that the substep computes anyhow: such a sum is not multiplied out.
+    level
+        Tells how often a node changes, see ``stages.LEVEL``.
+    """
+    expansion = _Expansion(graph, computed, level)
+    products: list[Node] = []
+    combinations = []
+    for rate in rates:
+        pairs: list[tuple[Node, int | None]] = []
+        for product, coefficient in expansion.terms(rate).items():
+            if product is not None and product not in products:
+                products.append(product)
+            pairs.append((coefficient, None if product is None else products.index(product)))
+        combinations.append(pairs)
+    return Quadrature(products, combinations)
+
+
+class Levels:
+    """How often the nodes of a growing graph change."""
+
+    def __init__(self, graph: Graph, of_leaf: dict[str, int]) -> None:
+        self._graph, self._of_leaf = graph, of_leaf
+        self._known: list[int] = []
+
+    def __getitem__(self, node: Node) -> int:
+        while len(self._known) <= node:
+            new = len(self._known)
+            operation = self._graph.nodes[new]
+            if operation.op == "leaf":
+                self._known.append(self._of_leaf.get(operation.args[0], 2))
+            else:
+                arguments = self._graph.arguments(new)
+                self._known.append(max((self._known[a] for a in arguments), default=0))
+        return self._known[node]
+
+
+class _Expansion:
+    """Rates as sums of coefficient times product."""
+
+    def __init__(self, graph: Graph, computed: Collection[Node], level: Levels) -> None:
+        self._graph, self._computed, self._level = graph, computed, level
+        self._one = graph.constant(1.0)
+
+    def terms(self, node: Node) -> Terms:
+        """Return the terms of a node."""
+        if self._level[node] < 2:
+            return {None: node}
+        operation = self._graph.nodes[node]
+        if operation.op == "neg":
+            return self._scaled(self.terms(operation.args[0]), self._graph.constant(-1.0))
+        if operation.op in ("add", "sub") and node not in self._computed:
+            a, b = (self.terms(x) for x in operation.args)
+            if operation.op == "sub":
+                b = self._scaled(b, self._graph.constant(-1.0))
+            return self._sum(a, b)
+        if operation.op == "mul":
+            a, b = (self.terms(x) for x in operation.args)
+            if len(a) * len(b) <= _MOST:
+                return self._product(a, b)
+        return {node: self._one}
+
+    def _scaled(self, terms: Terms, factor: Node) -> Terms:
+        return {p: self._graph.apply("mul", c, factor) for p, c in terms.items()}
+
+    def _sum(self, a: Terms, b: Terms) -> Terms:
+        total = dict(a)
+        for product, c in b.items():
+            total[product] = (
+                self._graph.apply("add", total[product], c) if product in total else c
+            )
+        return total
+
+    def _product(self, a: Terms, b: Terms) -> Terms:
+        total: Terms = {}
+        for pa, ca in a.items():
+            for pb, cb in b.items():
+                product = pa if pb is None else pb if pa is None else self._graph.apply("mul", pa, pb)
+                total = self._sum(total, {product: self._graph.apply("mul", ca, cb)})
+        return total

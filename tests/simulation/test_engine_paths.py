@@ -1,0 +1,162 @@
+"""Compiled C, virtual machine, lanes, tangents and plain floats compute the same runs.
+
+Plain floats are an independent implementation of the scheme (``reference.plain_stepping``): what
+agrees with them is right in the algebra of elimination, hoisting and emission.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bywire.bench.bench import Bench, as_run
+from bywire.core.signals import signals_of
+from bywire.simulation.compiler import find_compiler
+from bywire.simulation.engine import prepare
+from bywire.simulation.ensemble import LaneKernel, simulate_ensemble
+from bywire.simulation.run import Run, Trajectory, initial_vector, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+from reference import plain_stepping
+from systems.three_contacts import heart
+from systems.two_mass import rig
+
+Array = NDArray[np.float64]
+AGREEMENT = 1e-9  # of the largest value of a signal in the run
+
+
+@dataclass(frozen=True)
+class Path:
+    """A run, the signals whose signs are its modes, and parameters to vary and differentiate."""
+
+    run: Run
+    modes: tuple[str, ...]
+    varied: str
+
+
+def _braking() -> Run:
+    bench = Bench(
+        "hard-braking",
+        "dardanelli2010",
+        overrides={"adc.law": "ideal"},
+        options={"settle": 0.02, "duration": 0.08},
+        record=1e-4,
+    )
+    return as_run(bench.cases()[0], bench.step, bench.record)
+
+
+PATHS = {
+    "two-mass": Path(rig(0.06, record=20e-6), ("v_1", "v_2", "F_wall"), "F_c1"),
+    "three-contacts": Path(
+        heart(0.06, 40e-6, 40e-6), ("V_1", "V_2", "v", "f_1", "f_2", "f_12"), "F_S0"
+    ),
+    "braking": Path(_braking(), ("omega", "sat_current"), "seal.T_pr"),
+}
+
+
+@pytest.fixture(params=PATHS, scope="module")
+def path(request: pytest.FixtureRequest) -> Path:
+    return PATHS[request.param]
+
+
+@pytest.fixture(scope="module")
+def compiled(path: Path) -> Trajectory:
+    result = simulate(path.run, engine="compiled")
+    assert result.status == "done"
+    return result
+
+
+def assert_same(path: Path, compiled: Trajectory, values: Array) -> None:
+    """Every signal agrees, and every mode changes in the same substep."""
+    nominal = np.array([s.nominal for s in signals_of(path.run.model.Output).values()])
+    scale = np.maximum(np.abs(compiled.values).max(axis=0), 1e-6 * nominal)
+    assert values is not compiled.values
+    worst = (np.abs(values - compiled.values) / scale).max(axis=0)
+    assert worst.max() < AGREEMENT, f"{compiled.names[worst.argmax()]}: {worst.max():g}"
+    columns = [compiled.names.index(name) for name in path.modes]
+    np.testing.assert_array_equal(np.sign(values[:, columns]), np.sign(compiled.values[:, columns]))
+
+
+def test_modes_change_often(path: Path, compiled: Trajectory) -> None:
+    """Otherwise the agreements below would say little."""
+    modes = np.sign(np.array([compiled[name] for name in path.modes]))
+    changes = np.count_nonzero(np.any(np.diff(modes, axis=1) != 0, axis=0))
+    assert changes >= 4
+    assert len({tuple(column) for column in modes.T}) >= min(2 ** len(path.modes), 12)
+
+
+def test_virtual_machine(path: Path, compiled: Trajectory) -> None:
+    other = simulate(path.run, engine="virtual-machine")
+    assert other.engine != compiled.engine
+    assert (other.repeated, other.unsettled) == (compiled.repeated, compiled.unsettled)
+    assert_same(path, compiled, other.values)
+
+
+def test_plain_floats(path: Path, compiled: Trajectory) -> None:
+    run = path.run
+    values, end = plain_stepping.simulate(
+        run.model, run.par, (run.state, run.memory), run.stimulus, run.duration, run.step,
+        run.record,
+    )  # fmt: skip
+    assert (end.repeated, end.unsettled) == (compiled.repeated, compiled.unsettled)
+    assert_same(path, compiled, values)
+
+
+def test_one_lane(path: Path, compiled: Trajectory) -> None:
+    run, compiler = path.run, find_compiler()
+    assert compiler is not None
+    kernel = LaneKernel(prepare(run.model, run.par).program, compiler, 1)
+    schedule = run.schedule()
+    times = np.arange(schedule.stimulus_rows) * (schedule.stimulus_frames * schedule.frame)
+    rows = np.empty((1, *compiled.values.shape))
+    kernel.run(
+        schedule,
+        np.array(list(run.par.leaves().values()))[:, None],
+        np.ascontiguousarray(run.stimulus(times)),
+        initial_vector(kernel.layout, run.state, run.memory)[:, None].copy(),
+        np.arange(len(compiled.names), dtype=np.int32),
+        rows,
+    )
+    assert_same(path, compiled, rows[0])
+
+
+def test_thirty_two_lanes(path: Path, compiled: Trajectory) -> None:
+    """Cases that differ in a parameter: each equals its own single run."""
+    run, base = path.run, path.run.par.leaves()[path.varied]
+    cases = [run.par.replace({path.varied: base * (1.0 + 0.02 * k)}) for k in range(32)]
+    ensemble = simulate_ensemble(run, cases, compiled.names)
+    assert_same(path, compiled, ensemble.values[0])
+    for k in (7, 31):
+        own = Run(run.model, cases[k], run.state, run.memory, run.stimulus, run.duration, run.step,
+                  run.record)  # fmt: skip
+        single = simulate(own)
+        assert_same(path, single, ensemble.values[k])
+        assert np.abs(single.values - compiled.values).max() > 0.0
+        assert (ensemble.unsettled[k], ensemble.repeated[k]) == (single.unsettled, single.repeated)
+
+
+def test_tangent_kernel_computes_the_same_run(path: Path, compiled: Trajectory) -> None:
+    result = simulate_with_sensitivities(path.run, [path.varied], compiled.names)
+    assert_same(path, compiled, result.trajectory.values)
+    assert np.all(np.isfinite(result.derivatives))
+    assert np.abs(result.derivatives).max() > 0.0
+
+
+def test_rarely_touched_is_about_speed_only() -> None:
+    """A contact that is declared rare takes the exact pass and gives the same numbers."""
+    often, rare = rig(0.06, record=20e-6), rig(0.06, record=20e-6, rare=True)
+    first, second = simulate(often), simulate(rare)
+    assert second.repeated > first.repeated
+    assert first["F_wall"].max() > 100.0
+    np.testing.assert_allclose(second.values, first.values, rtol=1e-9, atol=1e-12)
+
+
+def test_tasks_share_one_memory() -> None:
+    """Tasks due together run in their order, each renews its own part, none loses a tick."""
+    result = simulate(heart(0.02, record=2e-4))
+    instant = np.arange(result.time.size)
+    np.testing.assert_array_equal(result["fast_ticks"], instant + 1)
+    np.testing.assert_array_equal(result["slow_ticks"], instant // 5 + 1)
+    np.testing.assert_array_equal(result["slow_seen"], result["slow_ticks"])
