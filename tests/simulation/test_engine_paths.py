@@ -6,7 +6,7 @@ agrees with them is right in the algebra of elimination, hoisting and emission.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench, as_run
 from bywire.core.signals import signals_of
-from bywire.simulation.compiler import find_compiler
-from bywire.simulation.engine import prepare
-from bywire.simulation.ensemble import LaneKernel, simulate_ensemble
-from bywire.simulation.run import Run, Trajectory, initial_vector, simulate
+from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from reference import plain_stepping
 from systems.three_contacts import heart
@@ -42,9 +40,9 @@ def _braking() -> Run:
         "dardanelli2010",
         overrides={"adc.law": "ideal"},
         options={"settle": 0.02, "duration": 0.08},
-        record=1e-4,
+        record=2e-4,
     )
-    return as_run(bench.cases()[0], bench.step, bench.record)
+    return as_run(bench.cases()[0], 40e-6, bench.record)
 
 
 PATHS = {
@@ -104,34 +102,15 @@ def test_plain_floats(path: Path, compiled: Trajectory) -> None:
     assert_same(path, compiled, values)
 
 
-def test_one_lane(path: Path, compiled: Trajectory) -> None:
-    run, compiler = path.run, find_compiler()
-    assert compiler is not None
-    kernel = LaneKernel(prepare(run.model, run.par).program, compiler, 1)
-    schedule = run.schedule()
-    times = np.arange(schedule.stimulus_rows) * (schedule.stimulus_frames * schedule.frame)
-    rows = np.empty((1, *compiled.values.shape))
-    kernel.run(
-        schedule,
-        np.array(list(run.par.leaves().values()))[:, None],
-        np.ascontiguousarray(run.stimulus(times)),
-        initial_vector(kernel.layout, run.state, run.memory)[:, None].copy(),
-        np.arange(len(compiled.names), dtype=np.int32),
-        rows,
-    )
-    assert_same(path, compiled, rows[0])
-
-
-def test_thirty_two_lanes(path: Path, compiled: Trajectory) -> None:
-    """Cases that differ in a parameter: each equals its own single run."""
+@pytest.mark.parametrize("count", [1, 32])
+def test_lanes(path: Path, compiled: Trajectory, count: int) -> None:
+    """Cases that differ in a parameter, side by side: each equals its own single run."""
     run, base = path.run, path.run.par.leaves()[path.varied]
-    cases = [run.par.replace({path.varied: base * (1.0 + 0.02 * k)}) for k in range(32)]
-    ensemble = simulate_ensemble(run, cases, compiled.names)
+    values = base * (1.0 + 0.02 * np.arange(count))
+    ensemble = simulate_ensemble(run, {path.varied: values}, compiled.names)
     assert_same(path, compiled, ensemble.values[0])
-    for k in (7, 31):
-        own = Run(run.model, cases[k], run.state, run.memory, run.stimulus, run.duration, run.step,
-                  run.record)  # fmt: skip
-        single = simulate(own)
+    for k in {count // 2, count - 1} - {0}:
+        single = simulate(replace(run, par=run.par.replace({path.varied: float(values[k])})))
         assert_same(path, single, ensemble.values[k])
         assert np.abs(single.values - compiled.values).max() > 0.0
         assert (ensemble.unsettled[k], ensemble.repeated[k]) == (single.unsettled, single.repeated)

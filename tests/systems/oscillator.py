@@ -1,21 +1,23 @@
-"""A harmonic oscillator without friction or contact: the smallest model, with a closed form."""
+"""An oscillator, harmonic or with Coulomb friction: the smallest models, with closed forms."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
 from bywire.core.model import Bounds, Matrix, Task
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Mass, Stiffness
+from bywire.core.quantities import Duration, Force, Mass, Stiffness
 from bywire.core.signals import Signal
 
 
 class Parameters(ParameterSet):
-    """Mass and spring; the one task does nothing every T_s."""
+    """Mass, spring, friction; the one task counts every T_s."""
 
     m: Mass
     k: Stiffness
+    F_c: Force
     T_s: Duration
 
 
@@ -53,12 +55,15 @@ class Output(NamedTuple):
     ticks: Annotated[float, Signal("1", "ticks")]
 
 
-PARAMETERS = Parameters(m=0.5, k=2e4, T_s=1e-3)
+PARAMETERS = Parameters(m=0.5, k=2e4, F_c=120.0, T_s=1e-3)
 START = State(0.1, 3.0)
 
 
+@dataclass(frozen=True)
 class Oscillator:
-    """The model."""
+    """The model, with or without friction."""
+
+    rubs: bool = False
 
     name: ClassVar[str] = "oscillator"
     State: ClassVar = State
@@ -66,9 +71,13 @@ class Oscillator:
     Stimulus: ClassVar = Stimulus
     Flow: ClassVar = Flow
     Output: ClassVar = Output
-    frictions: ClassVar[tuple[str, ...]] = ()
     limits: ClassVar[tuple[str, ...]] = ()
     usually_open: ClassVar[tuple[bool, ...]] = ()
+
+    @property
+    def frictions(self) -> tuple[str, ...]:
+        """Return the velocity if it rubs."""
+        return ("v",) if self.rubs else ()
 
     def tasks(self, par: Parameters) -> tuple[Task, ...]:
         """Return the counter."""
@@ -87,8 +96,8 @@ class Oscillator:
     def bounds(
         self, x: State, xe: State, m: Memory, par: Parameters, contact: tuple[float, ...]
     ) -> tuple[Bounds, ...]:
-        """Return none."""
-        return ()
+        """Return those of Coulomb friction."""
+        return ((-par.F_c, par.F_c),) if self.rubs else ()
 
     def compliance(self, par: Parameters) -> tuple[Matrix, ...]:
         """Return none."""
@@ -133,3 +142,21 @@ def closed_form(t: float, par: Parameters = PARAMETERS) -> tuple[float, float, f
     # Kinetic energy is half the total less half of m d(x v)/dt: the integral is closed.
     action = 0.5 * total * t + 0.25 * par.m * (x * v - START.x * START.v)
     return x, v, action
+
+
+def rubbing(t: float, x_0: float, par: Parameters = PARAMETERS) -> tuple[float, float]:
+    """Return position and velocity at a time [s] after a release at rest from x_0 > 0, rubbing.
+
+    Each half cycle is harmonic about a center off by F_c / k; the swing loses twice that, and ends
+    where the spring cannot overcome the friction.
+    """
+    rate, off = math.sqrt(par.k / par.m), par.F_c / par.k
+    phase, swing, side = rate * t, x_0, 1.0
+    while swing > off:
+        if phase < math.pi:
+            x = off + (swing - off) * math.cos(phase)
+            return side * x, -side * rate * (swing - off) * math.sin(phase)
+        phase, swing, side = phase - math.pi, swing - 2.0 * off, -side
+        if swing < 0.0:
+            swing, side = -swing, -side
+    return side * swing, 0.0

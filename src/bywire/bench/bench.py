@@ -12,14 +12,16 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, Experiment
+from bywire.bench.extent import check_extent, check_seed, checked_interval, checked_step
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record
 from bywire.bench.registry import find_experiment
-from bywire.bench.requirements import Verdict, check_syntax, judge
+from bywire.bench.requirements import Verdict, check, judge
 from bywire.bench.stimuli import registry as stimuli
+from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.values import parsed
 from bywire.catalog.registry import entry
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.run import Run, simulate
 
@@ -38,7 +40,7 @@ class Bench:
         Name of a parameter set of the catalog.
     overrides, options
         Other parameters and options of the experiment, by dotted name: SI numbers, or texts with
-        units such as ``"0.35 ohm"``.
+        units such as ``"0.35 ohm"``. Durations below may be written so as well.
     stimulus
         ``{"kind": ..., **parameters}`` for experiments that take a stimulus.
     step
@@ -70,6 +72,14 @@ class Bench:
     name: str = ""
 
     def __post_init__(self) -> None:
+        for key in ("experiment", "parameters", "name"):
+            if not isinstance(getattr(self, key), str):
+                raise ParameterError(f"{key} = {quoted(getattr(self, key))}: a text is wanted")
+        for key in ("overrides", "options", "stimulus", "requirements"):
+            object.__setattr__(self, key, dict(getattr(self, key)))  # ours alone from now on
+        object.__setattr__(self, "step", checked_step(self.step))
+        object.__setattr__(self, "record", checked_interval(self.record))
+        check_seed(self.seed)
         chosen, found = find_experiment(self.experiment), entry(self.parameters)
         if chosen.assembly != found.assembly:
             raise ParameterError(
@@ -81,8 +91,17 @@ class Bench:
                 f"experiment {chosen.name!r} brings its own stimulus: leave out [stimulus], or "
                 "use experiment 'open-loop'"
             )
-        check_syntax(self.requirements)
-        _ = self.par, self.chosen_options
+        self._check_names()
+        _ = self.par, self.chosen_options, self.chosen_stimulus
+        check(self.requirements, chosen.kpis)
+
+    def _check_names(self) -> None:
+        """Refuse options that stand among the parameters, the likeliest mistake of all."""
+        options = self.definition.defaults.flat().keys()
+        parameters = entry(self.parameters).values.keys()
+        for name in self.overrides:
+            if name in options and name not in parameters:
+                raise unknown_name("parameter", name, [f"options.{name}"])
 
     @property
     def definition(self) -> Experiment:
@@ -102,19 +121,35 @@ class Bench:
         values = parsed(definition.options, self.options, f"option of {definition.name}")
         return definition.defaults.replace(values)
 
+    @cached_property
+    def chosen_stimulus(self) -> Stimulus | None:
+        """Validated stimulus; None where none is given."""
+        driven_unit = self.definition.driven_unit
+        if not self.stimulus or driven_unit is None:
+            return None
+        values = dict(self.stimulus)
+        kind = values.pop("kind", None)
+        if not isinstance(kind, str):
+            raise ParameterError(f"[stimulus] needs a kind: {', '.join(sorted(stimuli.entries()))}")
+        return stimuli.create(kind, values, driven_unit(self.chosen_options))
+
     def cases(self) -> tuple[Case, ...]:
-        """Return the runs that the experiment consists of."""
-        definition, stimulus = self.definition, None
-        if self.stimulus and definition.driven_unit is not None:
-            values = dict(self.stimulus)
-            kind = values.pop("kind", None)
-            if not isinstance(kind, str):
+        """Return the runs that the experiment consists of.
+
+        Raises
+        ------
+        ParameterError
+            When all of them set a parameter that the bench sets otherwise.
+        """
+        found = self.definition.cases(self.par, self.chosen_options, self.chosen_stimulus)
+        wanted, made = self.par.flat(), [case.par.flat() for case in found]
+        for name in self.overrides:
+            if made and all(values[name] != wanted[name] for values in made):
                 raise ParameterError(
-                    f"[stimulus] needs a kind: {', '.join(sorted(stimuli.entries()))}"
+                    f"{name} = {wanted[name]!r} would have no effect: experiment "
+                    f"{self.experiment!r} sets it to {made[0][name]!r}; leave it out"
                 )
-            unit = definition.driven_unit(self.chosen_options)
-            stimulus = stimuli.create(kind, values, unit)
-        return definition.cases(self.par, self.chosen_options, stimulus)
+        return found
 
 
 @dataclass(frozen=True)
@@ -168,11 +203,17 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     if definition.static is not None:
         recordings |= definition.static(bench.par, options)
     for number, case in enumerate(bench.cases()):
-        recording = _recorded(bench, case, number, progress, engine)
+        try:
+            recording = _recorded(bench, case, number, progress, engine)
+        except KeyboardInterrupt:  # outside the engine, which keeps what it has
+            return Result(bench, recordings, (), (), "interrupted")
+        interrupted = recording.attrs["status"] == "interrupted"
+        if interrupted and recording.sizes["time"] < 2:
+            return Result(bench, recordings, (), (), "interrupted")
         if definition.finish is not None:
             recording = definition.finish(recording, options)
         recordings[case.label] = recording
-        if recording.attrs["status"] == "interrupted":
+        if interrupted:
             return Result(bench, recordings, (), (), "interrupted")
     kpis = definition.judge(recordings, options)
     verdicts = judge(bench.requirements, kpis)
@@ -184,6 +225,7 @@ def _recorded(
     bench: Bench, case: Case, number: int, progress: Progress | None, engine: str
 ) -> xr.Dataset:
     made = as_run(case, bench.step, bench.record, (bench.seed, number))
+    check_extent(case, made)
     report = None if progress is None else (lambda share: progress(case.label, share))
     trajectory = simulate(made, engine=engine, progress=report)
     notes = {

@@ -2,18 +2,27 @@
 
 from __future__ import annotations
 
+import contextlib
+import re
 import tomllib
 from collections.abc import Mapping
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.core import units
-from bywire.core.errors import FileError, InputError, ParameterError, unknown_name
+from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
 
 _SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 _KEYS = ("experiment", "parameters", "assembly", "name")
-_SIMULATION = {"step": "s", "record": "s", "seed": ""}
+_SIMULATION = ("step", "record", "seed")
+LARGEST = 1_000_000
+"""size of a bench file in bytes; a larger one is refused before it is parsed"""
+
+# The time to read a dotted key grows with the square of its parts, so long ones are not read.
+_KEY_PARTS = 16
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_KEY_PARTS}}}")
 
 
 def load(path: str | Path) -> Bench:
@@ -45,35 +54,23 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         ``experiment``, ``parameters``, or the dotted name of a parameter.
     """
     file = Path(path)
+    content = _parsed(file)
     try:
-        text = file.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not UTF-8 text"
-        raise FileError(f"cannot read bench file {file}: {reason}") from None
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise FileError(f"{file} is not valid TOML: {error}") from None
-    try:
-        return from_mapping(_changed(content, changes), file.parent, file.stem)
+        _require_shape(content)
+        return from_mapping(_changed(content, changes), file.parent, _printable(file.stem))
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
 
 
 def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     """Return the bench of a bench file's content; relative paths start at ``folder``."""
-    for key in content:
-        if key not in (*_KEYS, *_SECTIONS):
-            raise unknown_name("key", key, (*_KEYS, *_SECTIONS))
-    for section in _SECTIONS:
-        if not isinstance(content.get(section, {}), Mapping):
-            raise ParameterError(f"[{section}] must be a section with key = value lines")
+    _require_shape(content)
     for key in ("experiment", "parameters"):
-        if not isinstance(content.get(key), str):
+        if key not in content:
             raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")
     options = flattened(content.get("options", {}))
-    if options.get("trace"):
-        options["trace"] = str(folder / str(options["trace"]))
+    if options.get("trace") and isinstance(options["trace"], str):
+        options["trace"] = str(folder / options["trace"])
     bench = Bench(
         experiment=content["experiment"],
         parameters=content["parameters"],
@@ -87,7 +84,7 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     assembly = content.get("assembly", bench.definition.assembly)
     if assembly != bench.definition.assembly:
         raise ParameterError(
-            f"assembly = {assembly!r}, but experiment {bench.experiment!r} tests a "
+            f"assembly = {quoted(assembly)}, but experiment {bench.experiment!r} tests a "
             f"{bench.definition.assembly}"
         )
     return bench
@@ -104,19 +101,77 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def _parsed(file: Path) -> dict[str, Any]:
+    text = _text(file)
+    try:
+        return tomllib.loads(text)
+    except RecursionError:
+        raise FileError(f"{file} is not a bench file: it is nested far too deeply") from None
+    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
+        raise FileError(f"{file} is not valid TOML: {error}") from None
+
+
+def _text(file: Path) -> str:
+    """Return the text of a bench file; a mark of the byte order is let pass."""
+    try:
+        with file.open("rb") as stream:
+            data = stream.read(LARGEST + 1)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        hint = _nearest(file) if isinstance(error, FileNotFoundError) else "check the path"
+        raise FileError(f"cannot read bench file {file}: {reason}: {hint}") from None
+    if len(data) > LARGEST:
+        raise FileError(
+            f"{file} has more than {LARGEST // 1000} kB: that is no bench file; "
+            "measured traces go into a file of their own (options.trace)"
+        )
+    try:
+        text = data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        raise FileError(
+            f"cannot read bench file {file}: it is not UTF-8 text: give a TOML file"
+        ) from None
+    if _LONG_KEY.search(text):
+        raise FileError(f"{file} holds a dotted key of more than {_KEY_PARTS} parts: shorten it")
+    return text
+
+
+def _nearest(file: Path) -> str:
+    """Return what to do about a file that is not there."""
+    with contextlib.suppress(OSError):
+        there = [path.name for path in file.parent.glob("*.toml")]
+        near = get_close_matches(file.name, there, n=1, cutoff=0.5)
+        if near:
+            return f"did you mean {file.with_name(near[0])}?"
+    return "check the path"
+
+
+def _printable(name: str) -> str:
+    """Return the name of a file without the bytes that are no text."""
+    return name.encode("utf-8", "replace").decode("utf-8")
+
+
+def _require_shape(content: Mapping[str, Any]) -> None:
+    """Refuse unknown keys, and texts and sections that are something else."""
+    for key in content:
+        if key not in (*_KEYS, *_SECTIONS):
+            raise unknown_name("key", key, (*_KEYS, *_SECTIONS))
+    for section in _SECTIONS:
+        if not isinstance(content.get(section, {}), Mapping):
+            raise ParameterError(f"[{section}] must be a section with key = value lines")
+    for key in _KEYS:
+        if not isinstance(content.get(key, ""), str):
+            raise ParameterError(f"{key} = {quoted(content[key])}: write it in quotation marks")
+
+
 def _simulation(section: Mapping[str, Any]) -> dict[str, Any]:
-    found: dict[str, Any] = {}
-    for key, value in section.items():
+    for key in section:
         if key not in _SIMULATION:
             raise unknown_name("key in [simulation]", key, _SIMULATION)
-        if key == "seed":
-            if isinstance(value, str) and value.isdecimal():
-                value = int(value)
-            if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-                raise ParameterError(f"simulation.seed = {value!r}: a whole number >= 0 is wanted")
-            found[key] = value
-        else:
-            found[key] = units.parse(value, "s", f"simulation.{key}")
+    found = dict(section)
+    seed = found.get("seed")
+    if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
+        found["seed"] = int(seed)  # as --set gives it
     return found
 
 
@@ -124,8 +179,13 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
     changed = {k: dict(v) if isinstance(v, Mapping) else v for k, v in content.items()}
     for name, value in changes.items():
         section, _, key = name.partition(".")
+        near = get_close_matches(section, _SECTIONS, n=1, cutoff=0.8)
         if section in _SECTIONS and key:
             changed.setdefault(section, {})[key] = value
+        elif near and key:
+            raise unknown_name("section", section, _SECTIONS)
+        elif name in _SECTIONS:
+            raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
         elif name in _KEYS:
             changed[name] = value
         else:

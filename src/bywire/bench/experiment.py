@@ -77,6 +77,8 @@ class Experiment:
         characteristic. ``stimulus`` is that of the bench file, where the experiment takes one.
     judge
         ``judge(recordings, options)``: its KPIs.
+    kpis
+        Unit of each of these by name, so that requirements are checked before anything runs.
     figures
         Kinds of figures that show it, names of the report layer.
     finish
@@ -97,6 +99,7 @@ class Experiment:
     defaults: ParameterSet
     cases: Callable[[Any, Any, Stimulus | None], tuple[Case, ...]]
     judge: Callable[[Recordings, Any], tuple[Kpi, ...]]
+    kpis: Mapping[str, str]
     figures: tuple[str, ...]
     finish: Callable[[xr.Dataset, Any], xr.Dataset] | None = None
     step: Callable[[Any], step_response.Setting] | None = None

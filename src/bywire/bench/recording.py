@@ -72,7 +72,9 @@ def record(
 
 def watch(recording: xr.Dataset, par: ParameterSet, trajectory: Trajectory) -> list[str]:
     """Return what the user should know of a recording: validity left, stops met, solver trouble."""
-    found = []
+    found: list[str] = []
+    if not recording.sizes["time"]:  # interrupted before the first row
+        return found
     if trajectory.unsettled:
         found.append(
             f"{trajectory.unsettled} substeps hit the cap of the contact iteration: "

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import math
 import operator
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core import units
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 
+# Longer signs first, as "<=" begins with "<".
 _COMPARE: dict[str, Callable[[float, float], bool]] = {
     "<=": operator.le,
     ">=": operator.ge,
     "<": operator.lt,
     ">": operator.gt,
 }
-_TEXT = re.compile(r"\s*(<=|>=|<|>)\s*(.+)")
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,15 @@ class Verdict:
     note: str
 
 
-def check_syntax(requirements: Mapping[str, str]) -> None:
-    """Raise a ParameterError unless every requirement can be read."""
-    for name, text in requirements.items():
-        _parts(name, text)
+def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
+    """Refuse requirements that cannot be judged.
 
-
-def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict, ...]:
-    """Compare KPIs with their limits.
+    Parameters
+    ----------
+    requirements
+        Texts by KPI name.
+    kpis
+        Unit of every KPI of the experiment by name.
 
     Raises
     ------
@@ -65,31 +66,39 @@ def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict
     UnitError
         When a limit's unit measures something else than the KPI.
     """
+    for name, text in requirements.items():
+        if name not in kpis:
+            raise unknown_name("KPI in [requirements]", name, kpis)
+        _bound(name, text, kpis[name])
+
+
+def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict, ...]:
+    """Compare KPIs with their limits, which :func:`check` has admitted."""
     by_name = {kpi.name: kpi for kpi in kpis}
     verdicts = []
     for name, text in requirements.items():
-        if name not in by_name:
-            raise unknown_name("KPI in [requirements]", name, by_name)
         kpi = by_name[name]
-        compare, limit = _parts(name, text)
-        bound = _limit(limit, kpi)
+        compare, bound = _bound(name, text, kpi.unit)
         met = not math.isnan(kpi.value) and _COMPARE[compare](kpi.value, bound)
         verdicts.append(Verdict(name, text, kpi.value, kpi.unit, met, kpi.note))
     return tuple(verdicts)
 
 
-def _parts(name: str, text: str) -> tuple[str, str]:
-    match = _TEXT.fullmatch(text) if isinstance(text, str) else None
-    if match is None:
+def _bound(name: str, text: Any, unit: str) -> tuple[str, float]:
+    """Return the comparison and the limit in the KPI's unit."""
+    example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
+    written = text.strip() if isinstance(text, str) else ""
+    compare = next((sign for sign in _COMPARE if written.startswith(sign)), "")
+    if not compare:
         raise ParameterError(
-            f"requirement {name} = {text!r} cannot be read: write for instance '<= 15 %'"
+            f"requirement {name} = {quoted(text)} cannot be read: write for instance {example!r}"
         )
-    return match.group(1), match.group(2)
-
-
-def _limit(text: str, kpi: Kpi) -> float:
-    label = f"requirement {kpi.name}"
-    if kpi.unit != "%":
-        return units.parse(text, kpi.unit, label)
-    # A percentage is written as one, or as a plain share of one.
-    return 100.0 * units.parse(text, "1", label)
+    limit = written.removeprefix(compare)
+    if unit != "%":
+        return compare, units.parse(limit, unit, f"requirement {name}")
+    if not limit.endswith("%"):  # 15 would be a share of 1500 %, which nobody means
+        raise UnitError(
+            f"requirement {name} = {quoted(text)} is no limit in percent: "
+            f"write for instance {example!r}"
+        )
+    return compare, 100.0 * units.parse(limit, "1", f"requirement {name}")

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, get_origin
 
 from bywire.core import units
-from bywire.core.errors import UnitError, unknown_name
+from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 
 
@@ -28,12 +28,15 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
         With the nearest known names.
     UnitError
         When a text is no quantity or its unit measures something else.
+    ParameterError
+        When several values stand where one is wanted, or a number is not finite.
     """
     leaves, choices = leaf_fields(cls), choice_fields(cls)
     found: dict[str, Any] = {}
     for name, value in values.items():
         if name in leaves:
-            found[name] = _number(cls, name, value, leaves[name].unit.symbol)
+            read = nodes if _is_table(cls, name) else number
+            found[name] = read(value, leaves[name].unit.symbol, name)
         elif name in choices:
             found[name] = value
         else:
@@ -41,16 +44,29 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
     return found
 
 
-def _number(cls: type[ParameterSet], name: str, value: Any, symbol: str) -> Any:
-    symbol = "A/s" if symbol == "level/s" else symbol
-    if not _is_table(cls, name):
-        if not isinstance(value, (str, int, float)):
-            raise UnitError(f"{name} = {value!r}: one value is wanted")
-        return units.parse(value, symbol, name)
-    nodes = value.split(",") if isinstance(value, str) else value
-    if isinstance(nodes, (int, float)):
-        nodes = (nodes,)
-    return tuple(units.parse(node, symbol, f"{name}.{k}") for k, node in enumerate(nodes))
+def number(value: Any, symbol: str, name: str) -> float:
+    """Return one value in an SI unit; see :func:`bywire.core.units.parse`."""
+    if isinstance(value, (Mapping, Sequence)) and not isinstance(value, str):
+        raise ParameterError(f"{name} = {quoted(value)}: one value is wanted, not several")
+    return units.parse(value, symbol, name)
+
+
+def nodes(value: Any, symbol: str, name: str) -> tuple[float, ...]:
+    """Return the nodes of a table: of a sequence, or of one text with commas, each with its unit.
+
+    Examples
+    --------
+    >>> nodes("0 s, 200 ms", "s", "times")
+    (0.0, 0.2)
+    """
+    if isinstance(value, str):
+        value = [text.strip() for text in value.split(",")]
+    several = isinstance(value, Sequence)
+    found = value if several else (value,)
+    return tuple(
+        units.parse(node, symbol, f"{name}.{k}" if several else name)
+        for k, node in enumerate(found)
+    )
 
 
 def _is_table(cls: type[ParameterSet], name: str) -> bool:

@@ -363,8 +363,8 @@ static void simulate(const double *p, double h, int64_t frames, int64_t steps, c
     Saved z = {.s = {.i = x[X_i], .th = x[X_theta], .om = x[X_omega], .pm = x[X_p_mc],
                      .pd = x[X_p_pd], .yp = x[X_y_p], .yi = x[X_y_i]}};
     memcpy(z.m, state + X_COUNT, sizeof z.m);
+    double all[O_COUNT] = {0};
     for (int64_t n = 0; n <= frames; n++) {
-        double all[O_COUNT];
         tick(&k, &z, u + n * U_COUNT);
         record(&k, &z, all);
         for (int64_t j = 0; j < width; j++)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+from bywire.cli import output
 from bywire.cli.progress import progress_bar
 
 
@@ -14,4 +15,4 @@ def execute(as_text: bool) -> None:
 
     with progress_bar() as progress:
         found = measure(progress)
-    print(json.dumps(as_json(found)) if as_text else table_text(as_table(found)))
+    output.result(json.dumps(as_json(found)) if as_text else table_text(as_table(found)))

@@ -8,6 +8,7 @@ from bywire.bench.kpis.registry import definitions
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
 from bywire.catalog.registry import entries
+from bywire.cli.output import result
 
 
 def execute(as_text: bool) -> None:
@@ -20,11 +21,12 @@ def execute(as_text: bool) -> None:
         "kpis": {m.name: m.definition for m in definitions().values()},
     }
     if as_text:
-        print(json.dumps(found))
+        result(json.dumps(found))
         return
+    lines: list[str] = []
     for title, content in found.items():
-        print(title.replace("_", " "))
+        lines.append(title.replace("_", " "))
         pairs = content.items() if isinstance(content, dict) else ((name, "") for name in content)
-        for name, summary in pairs:
-            print(f"  {name:<24}{summary}".rstrip())
-        print()
+        lines += [f"  {name:<24}{summary}".rstrip() for name, summary in pairs]
+        lines.append("")
+    result("\n".join(lines))

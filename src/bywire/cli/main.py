@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import sys
+import traceback
 from importlib import import_module
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
+from bywire.cli.output import flush, message, open_streams, result
 from bywire.core.errors import BywireError, ParameterError
 
 INTERRUPTED = 130
+FAILED = 3
 
 app = typer.Typer(
     name="bywire",
@@ -29,14 +31,18 @@ OutFolder = Annotated[
 
 
 # Each command loads what it needs when it runs, so that `bywire --help` stays quick.
-def _command(name: str) -> Any:
-    return import_module(f"bywire.cli.{name}").execute
+def _execute(name: str, *arguments: Any) -> Any:
+    try:
+        return import_module(f"bywire.cli.{name}").execute(*arguments)
+    except KeyboardInterrupt:  # typer would exit without a word
+        message("interrupted")
+        raise typer.Exit(INTERRUPTED) from None
 
 
 @app.command("list")
 def list_command(json: JsonFlag = False) -> None:
     """Show assemblies, parameter sets, experiments, stimuli and KPIs."""
-    _command("list_command")(json)
+    _execute("list_command", json)
 
 
 @app.command()
@@ -50,7 +56,7 @@ def run(
     json: JsonFlag = False,
 ) -> None:
     """Run a bench file; exit status 1 when a requirement is not met."""
-    raise typer.Exit(_command("run_command")(bench, _changes(set_ or []), out, json))
+    raise typer.Exit(_execute("run_command", bench, _changes(set_ or []), out, json))
 
 
 @app.command()
@@ -60,13 +66,13 @@ def reproduce(
     json: JsonFlag = False,
 ) -> None:
     """Make a paper's tables and figures: stated, computed, agrees or not."""
-    _command("reproduce_command")(source, out, json)
+    _execute("reproduce_command", source, out, json)
 
 
 @app.command()
 def benchmark(json: JsonFlag = False) -> None:
     """Measure speed against hand-written C and what users would pick instead."""
-    _command("benchmark_command")(json)
+    _execute("benchmark_command", json)
 
 
 @app.callback(invoke_without_command=True)
@@ -76,30 +82,47 @@ def _root(
     if version:
         from bywire import __version__
 
-        print(__version__)
+        result(__version__)
         raise typer.Exit
 
 
 def _changes(texts: list[str]) -> dict[str, str]:
-    changes = {}
+    changes: dict[str, str] = {}
     for text in texts:
-        key, equals, value = text.partition("=")
-        if not equals or not key.strip():
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not key or not value:
             raise ParameterError(f"--set {text}: write KEY=VALUE, for instance motor.R_m=0.4ohm")
-        changes[key.strip()] = value.strip()
+        if key in changes:
+            raise ParameterError(f"--set {text}: {key} is set twice: leave one of them out")
+        changes[key] = value
     return changes
 
 
 def main() -> None:
     """Run the command line; errors meant for the user become one message and an exit status."""
+    open_streams()
+    status = _status()
+    flush()
+    raise SystemExit(status)
+
+
+def _status() -> int | str | None:
     try:
         app()
+    except SystemExit as done:
+        return done.code
     except BywireError as error:
-        print(f"bywire: error: {error}", file=sys.stderr)
-        raise SystemExit(error.exit_status) from None
+        message(f"error: {error}")
+        return error.exit_status
     except KeyboardInterrupt:
-        print("bywire: interrupted", file=sys.stderr)
-        raise SystemExit(INTERRUPTED) from None
-    except BrokenPipeError:
-        sys.stderr.close()
-        raise SystemExit(0) from None
+        message("interrupted")
+        return INTERRUPTED
+    except OSError as error:
+        message(f"error: {error}")
+        return FAILED
+    except Exception:
+        # Python's own status for this, 1, would read as a requirement that is not met.
+        traceback.print_exc()
+        message("error: this is a defect of bywire; please report it with the lines above")
+        return FAILED
+    return 0

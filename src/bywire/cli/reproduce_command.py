@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-import sys
 from pathlib import Path
 
+from bywire.cli import output
 from bywire.cli.progress import progress_bar
 
 
@@ -20,5 +20,5 @@ def execute(source: str, out: Path | None, as_text: bool) -> None:
         found = chosen.reproduce(progress)
     if out is not None:
         files = write(found, out)
-        print(f"report: {files[0]}", file=sys.stderr)
-    print(json.dumps(as_json(found)) if as_text else table_text(as_table(found)))
+        output.message(f"report: {files[0]}")
+    output.result(json.dumps(as_json(found)) if as_text else table_text(as_table(found)))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
-import sys
 import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
-from bywire.bench.bench import run
+from bywire.bench.bench import Result, run
 from bywire.bench.bench_file import read
+from bywire.cli import output
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import FileError
 
@@ -18,40 +18,56 @@ _STATUS = {"passed": 0, "failed": 1, "interrupted": 130}
 
 def execute(path: Path, changes: Mapping[str, str], out: Path | None, as_text: bool) -> int:
     """Run a bench file and return the exit status."""
-    from bywire.report.bench_results import as_json, kpi_rows
-    from bywire.report.table_text import table_text
-    from bywire.report.tables import kpi_table
-
     bench = read(path, changes)
     if out is not None:
         _require_folder(out)
-    with warnings.catch_warnings(record=True) as caught, progress_bar() as progress:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        result = run(bench, progress)
-    for text in [*(str(w.message) for w in caught), *result.warnings]:
-        print(f"bywire: warning: {text}", file=sys.stderr)
-    files = []
-    if out is not None:
-        from bywire.report.bench_report import write_result
-
-        files = write_result(result, out)
-    if as_text:
-        print(json.dumps(as_json(result, files)))
-    elif result.kpis:
-        print(table_text(kpi_table(kpi_rows(result))))
-    for verdict in result.verdicts:
-        if not verdict.met:
-            because = f" ({verdict.note})" if verdict.note else ""
-            print(
-                f"bywire: requirement not met: {verdict.kpi} {verdict.limit}{because}",
-                file=sys.stderr,
-            )
+        with progress_bar() as progress:
+            result = run(bench, progress)
+        files, trouble = _written(result, out)
+    for text in dict.fromkeys([*(str(w.message) for w in caught), *result.warnings]):
+        output.message(f"warning: {text}")
+    _show(result, files, as_text)
+    if trouble is not None:
+        raise trouble
     if result.status == "interrupted":
         kept = f"; what was finished is in {out}" if out is not None else ""
-        print(f"bywire: interrupted{kept}", file=sys.stderr)
+        output.message(f"interrupted{kept}")
     elif out is not None:
-        print(f"report: {out / 'report.html'}", file=sys.stderr)
+        output.message(f"report: {out / 'report.html'}")
     return _STATUS[result.status]
+
+
+def _written(result: Result, out: Path | None) -> tuple[list[Path], FileError | None]:
+    """Write the results where wanted; a full disk must not cost the numbers too."""
+    if out is None:
+        return [], None
+    from bywire.report.bench_report import write_result
+
+    try:
+        return write_result(result, out), None
+    except FileError as error:
+        return [], error
+
+
+def _show(result: Result, files: list[Path], as_text: bool) -> None:
+    from bywire.report.bench_results import as_json, kpi_rows
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import kpi_table
+    from bywire.report.wording import amount
+
+    if as_text:
+        output.result(json.dumps(as_json(result, files)))
+    elif result.kpis:
+        output.result(table_text(kpi_table(kpi_rows(result))))
+    for verdict in result.verdicts:
+        if not verdict.met:
+            note = f" ({verdict.note})" if verdict.note else ""
+            found = amount(verdict.value, verdict.unit)
+            output.message(
+                f"requirement not met: {verdict.kpi} is {found}, wanted {verdict.limit}{note}"
+            )
 
 
 def _require_folder(out: Path) -> None:
@@ -62,8 +78,8 @@ def _require_folder(out: Path) -> None:
         out.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=out):
             pass
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write to the output folder {out}: {error.strerror or error}; "
-            "name another one with --out"
+            f"cannot write to the output folder {out}: {reason}; name another one with --out"
         ) from None

@@ -19,6 +19,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import get_close_matches
 
+_SHOWN = 60  # characters of a value in a message
+
 
 class BywireError(Exception):
     """Base of all errors raised on purpose; its text is meant for the user."""
@@ -79,7 +81,26 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownNameError
     candidates = sorted(known)
     close = get_close_matches(name, candidates, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
-    return UnknownNameError(f"unknown {kind} {name!r}: {hint}")
+    return UnknownNameError(f"unknown {kind} {quoted(name)}: {hint}")
+
+
+def quoted(value: object) -> str:
+    """Return a value as an error quotes it: on one line, and cut off where it is long.
+
+    Examples
+    --------
+    >>> quoted("9 mm"), quoted([1, 2])
+    ("'9 mm'", '[1, 2]')
+    """
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return "a number of 300 digits or more"  # Python refuses to write the longest ones
+    if isinstance(value, str):
+        return repr(value if len(value) <= _SHOWN else f"{value[:_SHOWN]}...")
+    try:
+        text = repr(value)
+    except (ValueError, RecursionError):  # such a number inside, or lists a thousand levels deep
+        return f"a {type(value).__name__}"
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
 def _listing(candidates: list[str]) -> str:

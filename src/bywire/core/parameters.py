@@ -228,6 +228,8 @@ def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
         unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
         wanted = "a whole number, " if kind.startswith("int") else ""
         return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}"
+    if kind == "too_short":
+        return f"{name}: at least {detail['ctx']['min_length']} wanted, got {value!r}"
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
     given = "" if isinstance(value, dict) else f", got {value!r}"
     return f"{name or cls.__name__}: {message}{given}"

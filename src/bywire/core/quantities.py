@@ -48,6 +48,7 @@ Inductance = Annotated[float, Unit("H", 1e-4), _POSITIVE]
 Voltage = Annotated[float, Unit("V", 12.0), _POSITIVE]
 Current = Annotated[float, Unit("A", 10.0), _POSITIVE]
 SignedCurrent = Annotated[float, Unit("A", 10.0), _FINITE]
+CurrentRate = Annotated[float, Unit("A/s", 0.2), _POSITIVE]
 TorqueConstant = Annotated[float, Unit("N*m/A", 0.03), _POSITIVE]
 
 # Mechanical

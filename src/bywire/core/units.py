@@ -7,7 +7,7 @@ import re
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-from bywire.core.errors import ParameterError, UnitError
+from bywire.core.errors import ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def parse(value: str | float, symbol: str, name: str) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(
-            f"{name} = {_quoted(value)}: one number is wanted, "
+            f"{name} = {quoted(value)}: one number is wanted, "
             f"for instance {example(symbol)!r}"
         )
     try:
@@ -93,7 +93,7 @@ def parse(value: str | float, symbol: str, name: str) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise ParameterError(
-            f"{name} = {_quoted(value)} is not admissible: "
+            f"{name} = {quoted(value)} is not admissible: "
             f"it must be any finite number{_in_unit(symbol)}"
         )
     return number
@@ -103,7 +103,7 @@ def _number(text: str, symbol: str, name: str) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None or (match[2] and not _UNIT.fullmatch(match[2])):
         raise UnitError(
-            f"{name} = {_quoted(text)} is not a quantity: write for instance {example(symbol)!r}"
+            f"{name} = {quoted(text)} is not a quantity: write for instance {example(symbol)!r}"
         )
     size, unit = float(match[1]), match[2]
     common = _COMMON.get(unit)
@@ -138,12 +138,6 @@ def _as_pint(unit: str) -> str:
     spelled = unit.replace("%", "percent").replace("·", "*")
     spelled = f"1{spelled}" if spelled.startswith("/") else spelled
     return _MOMENT.sub(lambda m: "*m*s" if m[1] else "*m", spelled)
-
-
-def _quoted(value: object) -> str:
-    shown = value if isinstance(value, str) else str(value)
-    shortened = shown if len(shown) <= 60 else f"{shown[:60]}..."
-    return repr(shortened) if isinstance(value, str) else shortened
 
 
 def _rounded(number: float) -> float:

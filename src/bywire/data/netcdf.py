@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import secrets
 from pathlib import Path
@@ -17,17 +18,21 @@ def write_recording(recording: xr.Dataset, path: Path) -> Path:
     Raises
     ------
     FileError
-        When the folder cannot be written to.
+        When the file cannot be written, for instance because the disk is full.
     """
     scratch = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
     try:
         recording.to_netcdf(scratch, engine="netcdf4", encoding=encoding)
         os.replace(scratch, path)
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror or error}") from None
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(
+            f"cannot write {path}: {reason}: choose a folder that you may write to"
+        ) from None
     finally:
-        scratch.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            scratch.unlink(missing_ok=True)
     return path
 
 
@@ -42,5 +47,5 @@ def read_recording(path: str | Path) -> xr.Dataset:
     try:
         with xr.open_dataset(path, engine="netcdf4") as opened:
             return opened.load()
-    except (OSError, ValueError) as error:
+    except (OSError, RuntimeError, ValueError) as error:
         raise FileError(f"cannot read recording {path}: {error}") from None

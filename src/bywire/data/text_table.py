@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import FileError
+from bywire.core.errors import FileError, quoted
 
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _HEADER = "a first row such as 'time [s], pedal [mm]'"
@@ -73,7 +73,7 @@ def read_table(path: Path) -> Table:
         header.pop()
     if all(_NUMBER.fullmatch(cell.replace(",", ".")) for cell in header):
         raise FileError(
-            f"{path}, line {header_line}: {shortened(separator.join(header))} holds no names and "
+            f"{path}, line {header_line}: {quoted(separator.join(header))} holds no names and "
             f"units of columns: add {_HEADER}"
         )
     for line, cells in found[1:]:
@@ -130,7 +130,7 @@ def _require_one_mark(table: Table, columns: Sequence[int], labels: Sequence[str
     if len(places) == 2:
         (first, _), (row, c) = sorted(places)
         raise FileError(
-            f"{table.where(row, labels[c])}: {shortened(table.rows[row][columns[c]])} mixes "
+            f"{table.where(row, labels[c])}: {quoted(table.rows[row][columns[c]])} mixes "
             f"decimal comma and decimal point (the other one in line {table.lines[first]}): write "
             "all numbers with one of them, and none with a separator of thousands"
         )
@@ -146,22 +146,18 @@ def _number(table: Table, cell: str, row: int, label: str) -> float:
         raise FileError(f"{where}: the cell is blank: fill it in or remove the row")
     if cell.lower().lstrip("+-") in ("nan", "na", "n/a", "inf", "infinity", "null", "none"):
         raise FileError(f"{where}: {cell!r} is no measured value: fill it in or remove the row")
-    raise FileError(f"{where}: {shortened(cell)} is not a number: correct it or remove the row")
-
-
-def shortened(text: str) -> str:
-    """Return a text of the file as an error quotes it."""
-    return repr(text if len(text) <= 60 else f"{text[:60]}...")
+    raise FileError(f"{where}: {quoted(cell)} is not a number: correct it or remove the row")
 
 
 def _text(path: Path) -> str:
-    if path.exists() and not path.is_file():
-        raise FileError(f"{path} is not a file: give the path of a text table")
     try:
+        if path.exists() and not path.is_file():
+            raise FileError(f"{path} is not a file: give the path of a text table")
         data = path.read_bytes()
-    except OSError as error:
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = error.strerror if isinstance(error, OSError) else str(error)
         raise FileError(
-            f"{path} cannot be read ({error.strerror}): check the path and its permissions"
+            f"{path} cannot be read ({reason}): check the path and its permissions"
         ) from None
     try:
         return data.decode("utf-8-sig")

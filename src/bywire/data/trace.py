@@ -20,9 +20,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core import units
-from bywire.core.errors import FileError, ParameterError, UnitError
+from bywire.core.errors import FileError, ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
-from bywire.data.text_table import Table, numbers, read_table, shortened
+from bywire.data.text_table import Table, numbers, read_table
 
 _GAP = 10.0  # median steps: a pause must be longer to count as a gap
 _CLOCKS = ("time", "t")
@@ -145,7 +145,7 @@ def _missing(table: Table, name: str, symbol: str, known: Mapping[str, _Column])
     near = get_close_matches(name.casefold(), known, n=1, cutoff=0.5)
     wanted = f"'{name} [{display_unit(symbol)}]'"
     hint = f"is it {known[near[0]].label!r}? Then rename that {wanted}" if near else f"add {wanted}"
-    there = shortened(", ".join(c.label for c in known.values()))
+    there = quoted(", ".join(c.label for c in known.values()))
     return FileError(
         f"{table.path}, line {table.header_line}: no column {name!r} among {there}: {hint}"
     )
@@ -167,7 +167,7 @@ def _unit(table: Table, column: _Column) -> Any:
         base = _base(unit)
     except Exception:
         raise UnitError(
-            f"{where}: {shortened(column.unit)} is no known unit: write for instance {example}"
+            f"{where}: {quoted(column.unit)} is no known unit: write for instance {example}"
         ) from None
     if column.symbol and base != _base(_pint(column.symbol)):
         raise UnitError(
@@ -224,4 +224,4 @@ def _require_no_gap(table: Table, clock: _Column, t: NDArray[np.float64], longes
 
 
 def _header(table: Table, label: str) -> str:
-    return f"{table.path}, line {table.header_line}, column {shortened(label)}"
+    return f"{table.path}, line {table.header_line}, column {quoted(label)}"

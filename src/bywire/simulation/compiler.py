@@ -17,9 +17,12 @@ from platformdirs import user_cache_path
 
 from bywire.core.errors import CompilerError
 
-_COMMON = ("-shared", "-fPIC", "-std=c11", "-fno-math-errno", "-fno-trapping-math")
-PLAIN = ("-O2",)
-VECTOR = ("-O3", "-march=native", "-fopenmp-simd", "-mprefer-vector-width=512")
+# Kernels compare and select all the time: without these, maxima become branches.
+_MATH = ("-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only")
+_STRICT = ("-Werror=implicit-function-declaration",)
+_COMMON = ("-shared", "-fPIC", "-std=c11", *_MATH, *_STRICT)
+PLAIN = ("-O2", "-fno-tree-vectorize")  # packing a few scalars costs more than it saves
+VECTOR = ("-O2", "-march=native", "-fopenmp-simd", "-mprefer-vector-width=512", "-ffp-contract=fast")
 TIMEOUT = 300.0
 
 

@@ -6,11 +6,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from bywire.simulation.expressions import OWN, condition, needed, text
+from bywire.simulation.expressions import OWN, PLAIN_C, Dialect, Namer, as_number, needed, text
 from bywire.simulation.graph import Graph, Node
 from bywire.simulation.stages import STATE, Stages
 
-Namer = Callable[[Node], str]
 CAP = 8  # passes through one substep before it is counted as unsettled
 
 
@@ -59,13 +58,15 @@ def literal(graph: Graph, node: Node) -> str:
     return f"({value})" if value.startswith("-") else value
 
 
-def leaf_namer(graph: Graph, leaf: Callable[[str, int], str], other: Namer) -> Namer:
+def leaf_namer(
+    graph: Graph, leaf: Callable[[str, int], str], other: Namer, constant: str = "{}"
+) -> Namer:
     """Return the namer that knows constants and leaves and leaves operations to another."""
 
     def name(node: Node) -> str:
         operation = graph.nodes[node]
         if operation.op == "const":
-            return literal(graph, node)
+            return constant.format(literal(graph, node))
         if operation.op == "leaf":
             return leaf(*operation.args)
         return other(node)
@@ -73,21 +74,31 @@ def leaf_namer(graph: Graph, leaf: Callable[[str, int], str], other: Namer) -> N
     return name
 
 
-def statements(graph: Graph, order: Sequence[Node], name: Namer, declare: str) -> list[str]:
+def statements(
+    graph: Graph,
+    order: Sequence[Node],
+    name: Namer,
+    declare: str,
+    dialect: Dialect = PLAIN_C,
+) -> list[str]:
     """Return one declaration per operation; truth values are written where they are used."""
     return [
-        f"{declare}{name(node)} = {text(graph, node, name)};"
+        f"{declare}{name(node)} = {text(graph, node, name, dialect)};"
         for node in order
         if not graph.is_boolean(node)
     ]
 
 
 def branching_statements(
-    graph: Graph, order: Sequence[Node], name: Namer, declare: str
+    graph: Graph,
+    order: Sequence[Node],
+    name: Namer,
+    declare: str,
+    dialect: Dialect = PLAIN_C,
 ) -> list[str]:
     """Return declarations in which costly functions stand inside the only branch that needs them.
 
-    For scalar code: where the condition fails, the processor skips the function.
+    Where the condition fails, the processor skips the function.
     """
     uses = Counter(a for node in order for a in graph.arguments(node))
     inside = {
@@ -99,16 +110,10 @@ def branching_statements(
     }
 
     def inlined(node: Node) -> str:
-        return f"({text(graph, node, inlined)})" if node in inside else name(node)
+        return f"({text(graph, node, inlined, dialect)})" if node in inside else name(node)
 
-    return statements(graph, [n for n in order if n not in inside], inlined, declare)
-
-
-def result(graph: Graph, node: Node, name: Namer) -> str:
-    """Return the C text of a result, also of a truth value."""
-    if graph.is_boolean(node):
-        return f"({condition(graph, node, name)} ? 1.0 : 0.0)"
-    return name(node)
+    rest = [node for node in order if node not in inside]
+    return statements(graph, rest, inlined, declare, dialect)
 
 
 def exact_pass(stages: Stages) -> str:
@@ -124,7 +129,7 @@ def exact_pass(stages: Stages) -> str:
 
     name = leaf_namer(graph, leaf, lambda node: f"v{node}")
     body = statements(graph, needed(graph, roots, lambda _: False), name, "const double ")
-    body += [f"o[{k}] = {result(graph, node, name)};" for k, node in enumerate(roots)]
+    body += [f"o[{k}] = {as_number(graph, node, name)};" for k, node in enumerate(roots)]
     nx, flag = len(stages.exact["x"]), len(roots) - 1
     return f"""
 static __attribute__((noinline, cold)) void exact_pass(const double *p, double h,

@@ -1,208 +1,221 @@
-"""Kernel of an ensemble: cases side by side in lanes, the state as structure of arrays."""
+"""Kernel of an ensemble: as many cases side by side as the processor's vectors hold."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
     Layout,
+    branching_statements,
     exact_pass,
     indented,
     layout_of,
     leaf_namer,
-    result,
-    statements,
+    unread,
 )
-from bywire.simulation.expressions import needed
+from bywire.simulation.expressions import VECTOR_C, as_number, needed
 from bywire.simulation.graph import Node
 from bywire.simulation.stages import STATE, Stages
 
-SIGNATURE = """void bw_run_lanes(const double *restrict p, double h, const double *restrict u,
+SIGNATURE = """int bw_lanes(void) { return W; }
+
+void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
     double *restrict rec)"""
 
-# As for a single run; then the strides of the stimulus between entries and between lanes, and of
-# the recording between lanes.
+# As for a single run; then whether each lane has a stimulus of its own, and the distance between
+# the recordings of two lanes.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];
-  const int64_t entry = plan[{at}], lane = plan[{at} + 1], apart = plan[{at} + 2];"""
+  const int64_t own = plan[{at}], apart = plan[{at} + 1];"""
 
 
-class _Values:
-    """Names of all values as seen from inside a loop over lanes."""
+class _Lanes:
+    """Statements of every stage, in vectors."""
 
     def __init__(self, stages: Stages) -> None:
-        self.graph, self.level = stages.graph, stages.level()
+        self.stages, self.graph, self.level = stages, stages.graph, stages.level()
         self.layout: Layout = layout_of(stages)
-        self.pass_roots = [n for kind in (*STATE, "flag") for n in stages.fast[kind]]
-        tick_roots = [node for task in stages.ticks for node in task]
-        every_root = self.pass_roots + tick_roots + stages.output
-        order = needed(self.graph, every_root, lambda _: False)
-        self.once = [n for n in order if self.level[n] == 0]
-        stop = needed(self.graph, self.pass_roots, lambda n: self.level[n] == 0)
-        self.framed = [n for n in stop if self.level[n] == 1]
-        late = [n for n in order if self.level[n] > 0]
-        substep = needed(self.graph, self.pass_roots, lambda n: self.level[n] < 2)
-        self.kept = self._slots(self.once, [*late, *every_root], every_root)
-        self.frame_kept = self._slots(self.framed, substep, self.pass_roots)
-        self.substep = substep
+        skipped = unread(stages)
+        self.results = {
+            f"{kind}{k}": node
+            for kind in ("x", "d", "r", "F")
+            for k, node in enumerate(stages.fast[kind])
+            if f"{kind}{k}" not in skipped
+        }
+        self.products = stages.quadrature.products
+        self.flag = stages.fast["flag"][0]
+        self.pass_roots = [*self.results.values(), *self.products, self.flag]
+        self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
+        self.name = leaf_namer(self.graph, self._leaf, lambda n: f"v{n}", "SET({})")
 
-    def _slots(self, made: list[Node], users: list[Node], roots: list[Node]) -> dict[Node, int]:
-        """Number the values of a stage that later stages use, truth values by their parts."""
-        wanted: set[Node] = set(roots)
-        for user in users:
-            stack = list(self.graph.arguments(user))
-            while stack:
-                node = stack.pop()
-                if self.graph.is_boolean(node):
-                    stack.extend(self.graph.arguments(node))
-                wanted.add(node)
-        kept = [n for n in made if n in wanted and not self.graph.is_boolean(n)]
-        return {node: k for k, node in enumerate(kept)}
+    def _leaf(self, kind: str, index: int) -> str:
+        if kind in ("p", "u"):
+            return f"{kind.upper()}[{index}]"
+        return "h" if kind == "h" else f"{kind}{index}"
 
-    def namer(self, leaf: Callable[[str, int], str], stage: int) -> Callable[[Node], str]:
-        """Return the namer inside stage 0 (once), 1 (a frame) or 2 (a substep)."""
+    def block(self, roots: Sequence[Node], below: int) -> list[str]:
+        """Return the statements that results need, apart from what is computed less often."""
+        order = needed(self.graph, roots, lambda n: self.level[n] < below)
+        return self.lines(order)
 
-        def other(node: Node) -> str:
-            if stage > 0 and node in self.kept:
-                return f"A[{self.kept[node]} * L + l]"
-            if stage > 1 and node in self.frame_kept:
-                return f"B[{self.frame_kept[node]} * L + l]"
-            return f"v{node}"
+    def lines(self, order: Sequence[Node]) -> list[str]:
+        """Return the statements of nodes."""
+        return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C)
 
-        return leaf_namer(self.graph, leaf, other)
+    def number(self, node: Node) -> str:
+        """Return the text of a result."""
+        return as_number(self.graph, node, self.name, VECTOR_C)
 
-    def leaf(self, kind: str, index: int) -> str:
-        """Return the text of an input."""
-        if kind == "h":
-            return "h"
-        if kind == "p":
-            return f"p[{index} * L + l]"
-        if kind == "m":
-            return f"M[{index} * L + l]"
-        if kind == "u":
-            return f"uk[{index} * entry + l * lane]"
-        return f"S[{self.layout.start[kind] + index} * L + l]"
+    def once(self) -> list[str]:
+        """Return the statements of what depends on parameters alone."""
+        ticks = [n for task in self.stages.ticks for n in task]
+        roots = [*self.pass_roots, *self.coefficients, *ticks, *self.stages.output]
+        order = needed(self.graph, roots, lambda _: False)
+        return self.lines([n for n in order if self.level[n] == 0])
+
+    def framed(self) -> list[str]:
+        """Return the statements of what changes with the ticks."""
+        roots = [*self.pass_roots, *self.coefficients]
+        order = needed(self.graph, roots, lambda n: self.level[n] == 0)
+        return self.lines([n for n in order if self.level[n] == 1])
 
 
-def emit_lanes(stages: Stages, lanes: int) -> str:
-    """Return the C source of the kernel for ``lanes`` cases side by side."""
-    values = _Values(stages)
-    graph, layout, level = values.graph, values.layout, values.level
-    size = layout.start["m"]  # entries that a substep renews
-    counters, nm = layout.start["counters"], layout.length["m"]
-    once = values.namer(values.leaf, 0)
-    frame, inner = values.namer(values.leaf, 1), values.namer(values.leaf, 2)
-
-    hoist = statements(graph, values.once, once, "const double ")
-    hoist += [f"A[{k} * L + l] = {once(n)};" for n, k in values.kept.items()]
-    framed = statements(graph, values.framed, frame, "const double ")
-    framed += [f"B[{k} * L + l] = {frame(n)};" for n, k in values.frame_kept.items()]
-    body = statements(graph, values.substep, inner, "const double ")
-    at = 0
-    for kind in STATE:
-        for node in stages.fast[kind]:
-            value = result(graph, node, inner)
-            before = f"S[{at} * L + l] + " if kind == "q" else ""
-            body.append(f"N[{at} * L + l] = {before}{value};")
-            at += 1
-    body.append(f"flag[l] = {result(graph, stages.fast['flag'][0], inner)};")
-
-    def block(roots: list[Node]) -> list[str]:
-        order = needed(graph, roots, lambda n: level[n] == 0)
-        lines = statements(graph, order, frame, "const double ")
-        return lines + [
-            f"const double w{j} = {result(graph, n, frame)};" for j, n in enumerate(roots)
-        ]
-
-    ticks = []
-    for k, roots in enumerate(stages.ticks):
-        lines = block(roots) + [f"M[{j} * L + l] = w{j};" for j in range(nm)]
-        ticks.append(
-            f"if (f % plan[{8 + k}] == 0)\n      for (int l = 0; l < L; ++l) {{\n        "
-            f"{indented(lines, 8)}\n      }}"
-        )
-    outputs = block(stages.output)
-    outputs += [f"o[{j}] = w{j};" for j in range(len(stages.output))]
+def emit_lanes(stages: Stages) -> str:
+    """Return the C source of the kernel for one vector of cases."""
+    t = _Lanes(stages)
+    layout = t.layout
+    counters, names = layout.start["counters"], _names(layout)
+    sums = [f"s{k}" for k in range(len(t.products))]
+    new = [f"V {target}_ = {t.number(n)};" for target, n in t.results.items()]
+    new += [f"V z{k} = {t.number(n)};" for k, n in enumerate(t.products)]
+    commit = [f"{target} = {target}_;" for target in t.results]
+    commit += [f"{s} += z{k};" for k, s in enumerate(sums)]
+    integrals = [
+        f"q{j} += {' + '.join(f'{t.number(c)} * s{k}' for c, k in pairs) or 'SET(0.0)'};"
+        for j, pairs in enumerate(stages.quadrature.combinations)
+    ]
+    parameters, stimuli = _count(stages, "p"), _count(stages, "u")
     return f"""{LANES}{exact_pass(stages)}
-#define L {lanes}
-
-static __attribute__((noinline)) void substep_pass(const double *restrict p, double h,
-    const double *restrict A, const double *restrict B, const double *restrict M,
-    const double *restrict S, double *restrict N, double *restrict flag) {{
-  #pragma omp simd
-  for (int l = 0; l < L; ++l) {{
-    {indented(body, 4)}
-  }}
-}}
-
-{_settle_lane(layout, len(values.pass_roots), _parameters(stages))}
+{_settle_lanes(t, parameters)}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
-  double A[{max(len(values.kept), 1)} * L] __attribute__((aligned(64)));
-  double B[{max(len(values.frame_kept), 1)} * L] __attribute__((aligned(64)));
-  double both[2][{size} * L] __attribute__((aligned(64)));
-  double M[{max(nm, 1)} * L] __attribute__((aligned(64)));
-  double flag[L] __attribute__((aligned(64)));
-  double *S = both[0], *N = both[1], *counters = state + {counters} * L;
-  memcpy(S, state, sizeof(both[0]));
-  memcpy(M, state + {size} * L, {nm} * L * sizeof(double));
-  for (int l = 0; l < L; ++l) {{
-    {indented(hoist, 4)}
-  }}
+  const M *restrict P = (const M *)p;
+  M *restrict vectors = (M *)state;
+  const V h = SET(h_);
+  V U[{max(stimuli, 1)}];
+  {indented([f"V {name} = vectors[{k}];" for k, name in enumerate(names)], 2)}
+  {indented(t.once(), 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
-    const double *restrict uk = u + (f / stim) * {_stimuli(stages)} * entry;
-    (void)uk; (void)lane;
-    {indented(ticks, 4)}
-    if (f % every == 0)
-      for (int l = 0; l < L; ++l) {{
-        double o[{max(len(stages.output), 1)}];
-        {indented(outputs, 8)}
-        double *row = rec + l * apart + (f / every - row0) * chosen;
-        for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]];
-      }}
+    for (int j = 0; j < {stimuli}; ++j) {{
+      const double *row = u + (f / stim) * {stimuli} * (own ? W : 1);
+      for (int l = 0; l < W; ++l) U[j][l] = own ? row[j * W + l] : row[j];
+    }}
+    {indented(_ticks(t), 4)}
+    if (f % every == 0) {{
+      {indented(_record(t), 6)}
+    }}
     if (f == end) break;
-    #pragma omp simd
-    for (int l = 0; l < L; ++l) {{
-      {indented(framed, 6)}
-    }}
+    {indented(t.framed(), 4)}
+    {indented([f"V {s} = SET(0.0);" for s in sums], 4)}
     for (int64_t s = 0; s < substeps; ++s) {{
-      substep_pass(p, h, A, B, M, S, N, flag);
-      double any = 0.0;
-      for (int l = 0; l < L; ++l) any += flag[l];
-      if (__builtin_expect(any != 0.0, 0))
-        for (int l = 0; l < L; ++l)
-          if (flag[l] != 0.0) settle_lane(p, h, M, S, N, counters, l);
-      double *swap = S; S = N; N = swap;
+      {indented(t.block(t.pass_roots, 2), 6)}
+      {indented(new, 6)}
+      const B flagged = NE({t.number(t.flag)}, SET(0.0));
+      if (__builtin_expect(ANY(flagged), 0)) {{
+        {indented(_repeat(t), 8)}
+      }}
+      {indented(commit, 6)}
     }}
+    {indented(integrals, 4)}
   }}
-  memcpy(state, S, sizeof(both[0]));
-  memcpy(state + {size} * L, M, {nm} * L * sizeof(double));
+  {indented([f"vectors[{k}] = {name};" for k, name in enumerate(names)], 2)}
+  (void)U; (void)P; (void)h; (void)own; (void){counters};
 }}
 """
 
 
-def _stimuli(stages: Stages) -> int:
-    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == "u")
+def _names(layout: Layout) -> list[str]:
+    """Return the names of all entries of the state vector, in order."""
+    entries = [f"{kind}{k}" for kind, count in layout.length.items() for k in range(count)]
+    return [*entries, "failures", "repeats"]
 
 
-def _parameters(stages: Stages) -> int:
-    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == "p")
+def _count(stages: Stages, kind: str) -> int:
+    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == kind)
 
 
-def _settle_lane(layout: Layout, size: int, parameters: int) -> str:
-    nx, nm = layout.length["x"], layout.length["m"]
-    before = layout.start["q"]
-    return f"""static __attribute__((noinline, cold)) void settle_lane(const double *p, double h,
-    const double *M, const double *S, double *N, double *counters, int l) {{
-  double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[{size}];
-  for (int k = 0; k < {parameters}; ++k) ps[k] = p[k * L + l];
-  for (int k = 0; k < {nm}; ++k) ms[k] = M[k * L + l];
-  for (int k = 0; k < {nx}; ++k) {{ xs[k] = S[k * L + l]; ds[k] = S[({nx} + k) * L + l]; }}
-  counters[l] += settle(ps, h, ms, xs, ds, o);
-  counters[L + l] += 1.0;
-  for (int k = 0; k < {before}; ++k) N[k * L + l] = o[k];
-  for (int k = {before}; k < {size - 1}; ++k) N[k * L + l] = S[k * L + l] + o[k];
+def _ticks(t: _Lanes) -> list[str]:
+    texts = []
+    for k, roots in enumerate(t.stages.ticks):
+        lines = t.block(roots, 1)
+        lines += [f"const V w{j} = {t.number(n)};" for j, n in enumerate(roots)]
+        lines += [f"m{j} = w{j};" for j in range(len(roots))]
+        texts.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
+    return texts
+
+
+def _record(t: _Lanes) -> list[str]:
+    roots = t.stages.output
+    return [
+        *t.block(roots, 1),
+        f"V o[{max(len(roots), 1)}];",
+        *(f"o[{j}] = {t.number(n)};" for j, n in enumerate(roots)),
+        "for (int l = 0; l < W; ++l) {",
+        "  double *row = rec + l * apart + (f / every - row0) * chosen;",
+        "  for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]][l];",
+        "}",
+    ]
+
+
+def _settle_lanes(t: _Lanes, parameters: int) -> str:
+    """Return the C function that settles the flagged lanes one by one.
+
+    It works on copies: a vector whose lanes are addressed would live in memory everywhere.
+    """
+    layout = t.layout
+    nx, nm, nz = layout.length["x"], layout.length["m"], len(t.products)
+    at, lines = 0, []
+    targets = {name: k for k, name in enumerate(t.results)}
+    for kind in STATE:
+        for k in range(layout.length[kind]):
+            if kind == "q":
+                lines.append(f"q[{k}][l] += o[{at}];")
+            elif f"{kind}{k}" in targets:
+                lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
+            at += 1
+    return f"""static __attribute__((noinline, cold)) void settle_lanes(B flagged, const M *P, double h,
+    const V *m, const V *old, V *n, V *q, V *counters) {{
+  double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[{at + 1}];
+  for (int l = 0; l < W; ++l) {{
+    if (!LANE(flagged, l)) continue;
+    for (int k = 0; k < {parameters}; ++k) ps[k] = P[k][l];
+    for (int k = 0; k < {nm}; ++k) ms[k] = m[k][l];
+    for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
+    counters[0][l] += settle(ps, h, ms, xs, ds, o);
+    counters[1][l] += 1.0;
+    for (int k = 0; k < {nz}; ++k) n[{len(targets)} + k][l] = 0.0;
+    {indented(lines, 4)}
+  }}
 }}
 """
+
+
+def _repeat(t: _Lanes) -> list[str]:
+    """Return the statements that hand a substep with flagged lanes to ``settle_lanes``."""
+    length = t.layout.length
+    old = [f"{kind}{k}" for kind in ("x", "d") for k in range(length[kind])]
+    new = [*(f"{target}_" for target in t.results), *(f"z{k}" for k in range(len(t.products)))]
+    flow = [f"q{k}" for k in range(length["q"])]
+    memory = [f"m{k}" for k in range(length["m"])]
+    arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
+    return [
+        *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
+        "V count[] = {failures, repeats};",
+        "settle_lanes(flagged, P, h_, memory, old, n, flow, count);",
+        *(f"{name} = n[{k}];" for k, name in enumerate(new)),
+        *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
+        "failures = count[0];",
+        "repeats = count[1];",
+    ]

@@ -5,16 +5,14 @@ from __future__ import annotations
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     Layout,
-    Namer,
     branching_statements,
     exact_pass,
     indented,
     layout_of,
     leaf_namer,
-    result,
     unread,
 )
-from bywire.simulation.expressions import needed
+from bywire.simulation.expressions import Namer, as_number, needed
 from bywire.simulation.graph import Node
 from bywire.simulation.stages import STATE, Stages
 
@@ -69,11 +67,11 @@ def emit_single(stages: Stages) -> str:
     ticks = []
     for k, roots in enumerate(stages.ticks):
         lines = block(needed(graph, roots, lambda n: level[n] == 0))
-        lines += [f"const double w{j} = {result(graph, n, name)};" for j, n in enumerate(roots)]
+        lines += [f"const double w{j} = {as_number(graph, n, name)};" for j, n in enumerate(roots)]
         lines += [f"m{j} = w{j};" for j in range(len(roots))]
         ticks.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
-    outputs += [f"o[{j}] = {result(graph, n, name)};" for j, n in enumerate(stages.output)]
+    outputs += [f"o[{j}] = {as_number(graph, n, name)};" for j, n in enumerate(stages.output)]
     counters = layout.start["counters"]
     return f"""{SCALAR}{exact_pass(stages)}
 {SIGNATURE} {{
@@ -93,10 +91,10 @@ def emit_single(stages: Stages) -> str:
     }}
     if (f == end) break;
     {indented(block(framed), 4)}
-    double {", ".join(f"s{k} = 0.0" for k in range(len(products) + 1))};
+    {indented([f"double s{k} = 0.0;" for k in range(len(products))], 4)}
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(block(substep), 6)}
-      if (__builtin_expect({result(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
+      if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
         {indented(_repeat(layout), 8)}
       }} else {{
         {indented(_commit(results, products, name), 8)}
@@ -134,15 +132,14 @@ def _stores(layout: Layout) -> list[str]:
 def _commit(results: dict[str, Node], products: list[Node], name: Namer) -> list[str]:
     new = [f"const double {target}_ = {name(node)};" for target, node in results.items()]
     sums = [f"s{k} += {name(node)};" for k, node in enumerate(products)]
-    count = f"s{len(products)} += 1.0;"
-    return [*new, *sums, count, *(f"{target} = {target}_;" for target in results)]
+    return [*new, *sums, *(f"{target} = {target}_;" for target in results)]
 
 
 def _integrals(stages: Stages, name: Namer) -> list[str]:
     """Return the statements that turn a frame's sums into integrals."""
-    lines, count = [], len(stages.quadrature.products)
+    lines = []
     for j, pairs in enumerate(stages.quadrature.combinations):
-        terms = [f"{name(c)} * s{count if k is None else k}" for c, k in pairs]
+        terms = [f"{name(c)} * s{k}" for c, k in pairs] or ["0.0"]
         lines.append(f"q{j} += {' + '.join(terms)};")
     return lines
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bywire.simulation.c_runtime import LANES
+from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     CAP,
     Layout,
@@ -12,10 +12,9 @@ from bywire.simulation.emission import (
     indented,
     layout_of,
     leaf_namer,
-    result,
     statements,
 )
-from bywire.simulation.expressions import needed
+from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
 
@@ -80,7 +79,7 @@ class _Tangents:
     def results(self, roots: Sequence[Node], prefix: str) -> list[str]:
         """Return the declarations of results under names of their own."""
         return [
-            f"const double {prefix}{k} = {result(self.graph, n, self.name)};"
+            f"const double {prefix}{k} = {as_number(self.graph, n, self.name)};"
             for k, n in enumerate(roots)
         ]
 
@@ -104,7 +103,7 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
         for k, (name, _) in enumerate(declared[:before])
     ]
     new_t = [f"T[{k} * L + l] {'+=' if k >= start['q'] else '='} t{k};" for k in range(before)]
-    return f"""{LANES}{exact_pass(stages)}
+    return f"""{SCALAR}{exact_pass(stages)}
 #define L {lanes}
 
 {_exact_tangents(stages)}
@@ -217,7 +216,7 @@ def _exact_tangents(stages: Stages) -> str:
     name = leaf_namer(graph, leaf, lambda node: f"v{node}")
     values = statements(graph, [n for n in order if not lane[n]], name, "const double ")
     inner = statements(graph, [n for n in order if lane[n]], name, "const double ")
-    inner += [f"o[{k} * L + l] = {result(graph, n, name)};" for k, n in enumerate(roots)]
+    inner += [f"o[{k} * L + l] = {as_number(graph, n, name)};" for k, n in enumerate(roots)]
     return f"""static __attribute__((noinline, cold)) void exact_tangents(const double *p, double h,
     const double *m, const double *x, const double *d, const double *sp, const double *sm,
     const double *sx, const double *sd, double *o) {{

@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.compiler import VECTOR, Compiler, compile_library, find_compiler
 from bywire.simulation.emission import Layout, layout_of
@@ -20,12 +21,11 @@ from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.engine import prepare
 from bywire.simulation.native import plan_array, pointer
 from bywire.simulation.program import Program
-from bywire.simulation.run import Run, Trajectory, initial_vector, simulate
+from bywire.simulation.run import Run, initial_vector, simulate
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import build_stages
 
 Array = NDArray[np.float64]
-LANES = 16
 
 
 @dataclass(frozen=True)
@@ -57,13 +57,13 @@ class Ensemble:
 class LaneKernel:
     """Compiled kernel for a group of cases."""
 
-    def __init__(self, program: Program, compiler: Compiler, lanes: int) -> None:
+    def __init__(self, program: Program, compiler: Compiler) -> None:
         stages = build_stages(program)
         self.layout: Layout = layout_of(stages)
-        self.lanes = lanes
-        self.label = f"compiled C in {lanes} lanes, {compiler.label}"
-        library = compile_library(emit_lanes(stages, lanes), VECTOR, compiler)
-        self._run = ctypes.CDLL(str(library)).bw_run_lanes
+        library = ctypes.CDLL(str(compile_library(emit_lanes(stages), VECTOR, compiler)))
+        self.lanes = int(library.bw_lanes())
+        self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
+        self._run = library.bw_run_lanes
         self._run.restype = None
 
     def run(
@@ -92,7 +92,7 @@ class LaneKernel:
         plan = np.concatenate(
             (
                 plan_array(schedule, 0, schedule.frames, selection.size),
-                [self.lanes if own else 1, int(own), rows.strides[0] // rows.itemsize],
+                [int(own), rows.strides[0] // rows.itemsize],
             )
         ).astype(np.int64)
         self._run(
@@ -108,18 +108,19 @@ class LaneKernel:
 
 def simulate_ensemble(
     run: Run,
-    parameters: Sequence[ParameterSet],
+    variations: Mapping[str, Array | Sequence[float]],
     signals: Sequence[str],
     threads: int | None = None,
 ) -> Ensemble:
-    """Compute one run for many parameter sets of the same structure.
+    """Compute one run for many values of its parameters.
 
     Parameters
     ----------
     run
-        Model, initial values, stimulus, steps; its own parameters give the structure.
-    parameters
-        One parameter set per case; sample times must be those of ``run``.
+        Model, parameters, initial values, stimulus, steps.
+    variations
+        Dotted name of a parameter -> its value in each case, shape (cases,). What is not named
+        keeps its value. Sample times cannot vary.
     signals
         Outputs to record.
     threads
@@ -127,83 +128,100 @@ def simulate_ensemble(
 
     Raises
     ------
+    UnknownNameError
+        When a parameter is unknown.
     ParameterError
-        When a case has another structure or other sample times.
+        When a value is out of range, lengths differ, or a sample time varies.
     """
-    _require_alike(run, parameters)
-    prepared = prepare(run.model, run.par)
+    program = prepare(run.model, run.par).program
+    matrix = case_matrix(run, variations)
     compiler = find_compiler()
-    names = tuple(prepared.program.outputs)
     if compiler is None:
-        return _one_by_one(run, parameters, tuple(signals))
-    kernel = _lane_kernel(prepared.program, compiler, LANES)
-    schedule = run.schedule()
+        return _one_by_one(run, variations, matrix.shape[1], tuple(signals))
+    kernel = _lane_kernel(program, compiler)
+    schedule, outputs = run.schedule(), tuple(program.outputs)
     stimulus = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
-    selection = np.array([names.index(s) for s in signals], dtype=np.int32)
-    count = len(parameters)
-    matrix = np.array([list(par.leaves().values()) for par in parameters])
-    values = np.empty((count, schedule.rows, len(signals)))
-    counters = np.zeros((count, 2), dtype=np.int64)
+    selection = np.array([outputs.index(s) for s in signals], dtype=np.int32)
+    count = matrix.shape[1]
+    padded = -(-count // kernel.lanes) * kernel.lanes
+    values = np.empty((padded, schedule.rows, len(signals)))
+    counters = np.zeros((2, padded))
     start = initial_vector(kernel.layout, run.state, run.memory)
 
     def group(first: int) -> None:
-        cases = np.minimum(np.arange(first, first + kernel.lanes), count - 1)
-        vector = np.ascontiguousarray(np.repeat(start[:, None], kernel.lanes, axis=1))
-        full = first + kernel.lanes <= count
-        rows = (
-            values[first : first + kernel.lanes]
-            if full
-            else np.empty((kernel.lanes, *values.shape[1:]))
-        )
-        kernel.run(
-            schedule, np.ascontiguousarray(matrix[cases].T), stimulus, vector, selection, rows
-        )
-        here = min(kernel.lanes, count - first)
-        if not full:
-            values[first:] = rows[:here]
-        counters[first : first + here] = vector[kernel.layout.start["counters"] :, :here].T
+        cases = np.arange(first, first + kernel.lanes)
+        vector = np.repeat(start[:, None], kernel.lanes, axis=1)
+        # Lanes beyond the last case repeat it.
+        columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
+        kernel.run(schedule, columns, stimulus, vector, selection, values[cases[0] : cases[-1] + 1])
+        counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
-        list(pool.map(group, range(0, count, kernel.lanes)))
+        list(pool.map(group, range(0, padded, kernel.lanes)))
     return Ensemble(
-        schedule.record_times, values, tuple(signals), counters[:, 0], counters[:, 1], kernel.label
+        time=schedule.record_times,
+        values=values[:count],
+        names=tuple(signals),
+        unsettled=counters[0, :count].astype(np.int64),
+        repeated=counters[1, :count].astype(np.int64),
+        engine=kernel.label,
     )
 
 
+def case_matrix(run: Run, variations: Mapping[str, Array | Sequence[float]]) -> Array:
+    """Return the parameter vectors of all cases, shape (parameters, cases), checked.
+
+    Ranges are checked for every value; rules between parameters at the extremes of each.
+    """
+    names = list(run.par.leaves())
+    arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
+    lengths = {name: array.size for name, array in arrays.items()}
+    if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
+        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
+    periods = _periods(run, run.par)
+    matrix = np.repeat(
+        np.array(list(run.par.leaves().values()))[:, None], next(iter(lengths.values())), axis=1
+    )
+    for name, array in arrays.items():
+        if name not in names:
+            raise unknown_name("parameter", name, names)
+        worst = (float(array.min()), float(array.max()), float(array.sum()))
+        for value in worst[:2] if math.isfinite(worst[2]) else worst:
+            changed = run.par.replace({name: value})
+            if _periods(run, changed) != periods:
+                raise ParameterError(f"{name} is a sample time and cannot vary within an ensemble")
+        matrix[names.index(name)] = array
+    return matrix
+
+
+def _periods(run: Run, par: ParameterSet) -> list[float]:
+    return [task.period(par) for task in run.model.tasks(par)]
+
+
 @cache
-def _lane_kernel(program: Program, compiler: Compiler, lanes: int) -> LaneKernel:
-    return LaneKernel(program, compiler, lanes)
+def _lane_kernel(program: Program, compiler: Compiler) -> LaneKernel:
+    return LaneKernel(program, compiler)
 
 
-def _require_alike(run: Run, parameters: Sequence[ParameterSet]) -> None:
-    structure, schedule = run.par.choices(), run.schedule()
-    for number, par in enumerate(parameters):
-        if par.choices() != structure:
-            raise ParameterError(
-                f"case {number} differs from the ensemble in its structural choices: "
-                "cases may differ in numbers only"
-            )
-        periods = [task.period(par) for task in run.model.tasks(par)]
-        if periods != [task.period(run.par) for task in run.model.tasks(run.par)]:
-            raise ParameterError(
-                f"case {number} has other sample times than the ensemble ({schedule.step:g} s "
-                "steps): run it apart"
-            )
-
-
-def _one_by_one(run: Run, parameters: Sequence[ParameterSet], signals: tuple[str, ...]) -> Ensemble:
+def _one_by_one(
+    run: Run,
+    variations: Mapping[str, Array | Sequence[float]],
+    count: int,
+    signals: tuple[str, ...],
+) -> Ensemble:
     """Serve without a compiler: the cases one after the other."""
-    runs: list[Trajectory] = []
-    for par in parameters:
-        single = Run(
-            run.model, par, run.state, run.memory, run.stimulus, run.duration, run.step, run.record
+    runs = [
+        simulate(
+            replace(run, par=run.par.replace({n: float(v[k]) for n, v in variations.items()})),
+            signals,
         )
-        runs.append(simulate(single, signals))
+        for k in range(count)
+    ]
     return Ensemble(
-        runs[0].time,
-        np.array([r.values for r in runs]),
-        signals,
-        np.array([r.unsettled for r in runs]),
-        np.array([r.repeated for r in runs]),
-        runs[0].engine,
+        time=runs[0].time,
+        values=np.array([r.values for r in runs]),
+        names=signals,
+        unsettled=np.array([r.unsettled for r in runs]),
+        repeated=np.array([r.repeated for r in runs]),
+        engine=runs[0].engine,
     )

@@ -1,26 +1,84 @@
-"""C text of single operations, and the order in which a set of nodes is computed."""
+"""C text of single operations, for scalars and for vectors, and the order to compute nodes in."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 
 from bywire.simulation.graph import Graph, Node
 
-_CALLS = {
-    "sqrt": "sqrt",
-    "fabs": "fabs",
-    "floor": "floor",
-    "ceil": "ceil",
-    "tan": "tan",
-    "atan": "atan",
-    "tanh": "tanh",
-    "copysign": "copysign",
-    "pow": "pow",
-    "constpow": "pow",
-}
+Namer = Callable[[Node], str]
+
 _INFIX = {"add": "+", "sub": "-", "mul": "*"}
-_COMPARE = {"lt": "<", "le": "<=", "eq": "==", "ne": "!="}
-OWN = frozenset({"exp", "log", "sin", "cos"})  # inline versions, so that lanes vectorize
+OWN = frozenset({"exp", "log", "sin", "cos"})  # costly functions
+
+
+@dataclass(frozen=True)
+class Dialect:
+    """How a kind of C writes what is not arithmetic.
+
+    Parameters
+    ----------
+    calls
+        Functions by operation.
+    select, compare, both, either, negation, extreme, inverse
+        Format strings of selections, comparisons, truth values, maxima and reciprocals.
+    exp_where
+        Format string of "c ? exp(a) : 0" where that is one operation.
+    """
+
+    calls: dict[str, str]
+    select: str
+    compare: dict[str, str]
+    both: str
+    either: str
+    negation: str
+    extreme: dict[str, str]
+    inverse: str
+    zero: str
+    one: str
+    exp_where: str = ""
+
+
+PLAIN_C = Dialect(
+    calls={
+        **{op: f"bw_{op}" for op in OWN},
+        **{op: op for op in ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")},
+        "pow": "pow",
+        "constpow": "pow",
+    },
+    select="{c} ? {a} : {b}",
+    compare={
+        "lt": "({a} < {b})",
+        "le": "({a} <= {b})",
+        "eq": "({a} == {b})",
+        "ne": "({a} != {b})",
+    },
+    both="({a} & {b})",
+    either="({a} | {b})",
+    negation="(!{a})",
+    extreme={"fmax": "{a} > {b} ? {a} : {b}", "fmin": "{a} < {b} ? {a} : {b}"},
+    inverse="1.0 / {a}",
+    zero="0.0",
+    one="1.0",
+)
+
+VECTOR_C = Dialect(
+    calls={
+        **{op: op.upper() for op in (*OWN, "sqrt", "fabs", "floor", "tan", "pow")},
+        "constpow": "POW",
+    },
+    select="SELECT({c}, {a}, {b})",
+    compare={op: f"{op.upper()}({{a}}, {{b}})" for op in ("lt", "le", "eq", "ne")},
+    both="({a} & {b})",
+    either="({a} | {b})",
+    negation="NOT({a})",
+    extreme={"fmax": "MAX({a}, {b})", "fmin": "MIN({a}, {b})"},
+    inverse="INVERSE({a})",
+    zero="SET(0.0)",
+    one="SET(1.0)",
+    exp_where="EXP_WHERE({c}, {a})",
+)
 
 
 def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) -> list[Node]:
@@ -41,13 +99,13 @@ def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) ->
     return order
 
 
-def text(graph: Graph, node: Node, name: Callable[[Node], str]) -> str:
+def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
     """Return the C expression of an operation; ``name`` gives that of its arguments."""
     operation = graph.nodes[node]
     op = operation.op
 
     def number(a: Node) -> str:
-        return f"({condition(graph, a, name)} ? 1.0 : 0.0)" if graph.is_boolean(a) else name(a)
+        return as_number(graph, a, name, dialect)
 
     if op in _INFIX:
         a, b = operation.args
@@ -55,37 +113,47 @@ def text(graph: Graph, node: Node, name: Callable[[Node], str]) -> str:
     if op == "neg":
         return f"-{number(operation.args[0])}"
     if op == "inv":
-        return f"1.0 / {number(operation.args[0])}"
-    if op == "if_else_zero":
-        truth, value = operation.args
-        return f"{condition(graph, truth, name)} ? {number(value)} : 0.0"
-    if op == "select":
-        truth, value, other = operation.args
-        return f"{condition(graph, truth, name)} ? {number(value)} : {number(other)}"
-    if op in ("fmax", "fmin"):
-        a, b = (number(x) for x in operation.args)
-        return f"{a} {'>' if op == 'fmax' else '<'} {b} ? {a} : {b}"
-    if op == "sign":
-        a = number(operation.args[0])
-        return f"({a} > 0.0 ? 1.0 : 0.0) - ({a} < 0.0 ? 1.0 : 0.0)"
-    if op in OWN:
-        return f"bw_{op}({number(operation.args[0])})"
-    return f"{_CALLS[op]}({', '.join(number(a) for a in operation.args)})"
+        return dialect.inverse.format(a=number(operation.args[0]))
+    if op == "if_else_zero" and dialect.exp_where and graph.nodes[operation.args[1]].op == "exp":
+        truth, power = operation.args
+        argument = number(graph.nodes[power].args[0])
+        return dialect.exp_where.format(c=condition(graph, truth, name, dialect), a=argument)
+    if op in ("if_else_zero", "select"):
+        truth, value, *other = operation.args
+        return dialect.select.format(
+            c=condition(graph, truth, name, dialect),
+            a=number(value),
+            b=number(other[0]) if other else dialect.zero,
+        )
+    if op in dialect.extreme:
+        # Constants second: so written, compilers see the processor's own maximum.
+        ordered = sorted(operation.args, key=lambda x: graph.nodes[x].op == "const")
+        a, b = (number(x) for x in ordered)
+        return dialect.extreme[op].format(a=a, b=b)
+    return f"{dialect.calls[op]}({', '.join(number(a) for a in operation.args)})"
 
 
-def condition(graph: Graph, node: Node, name: Callable[[Node], str]) -> str:
+def as_number(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
+    """Return the C text of a value, 1 or 0 for a truth value."""
+    if not graph.is_boolean(node):
+        return name(node)
+    chosen = dialect.select.format(
+        c=condition(graph, node, name, dialect), a=dialect.one, b=dialect.zero
+    )
+    return f"({chosen})"
+
+
+def condition(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:
     """Return the C condition of a node, true where it is not zero."""
     operation = graph.nodes[node]
     op = operation.op
-    if op in _COMPARE:
-        a, b = (
-            f"({condition(graph, x, name)} ? 1.0 : 0.0)" if graph.is_boolean(x) else name(x)
-            for x in operation.args
-        )
-        return f"({a} {_COMPARE[op]} {b})"
+    if op in dialect.compare:
+        a, b = (as_number(graph, x, name, dialect) for x in operation.args)
+        return dialect.compare[op].format(a=a, b=b)
     if op == "not":
-        return f"(!{condition(graph, operation.args[0], name)})"
+        inner = condition(graph, operation.args[0], name, dialect)
+        return dialect.negation.format(a=inner)
     if op in ("and", "or"):
-        a, b = (condition(graph, x, name) for x in operation.args)
-        return f"({a} {'&' if op == 'and' else '|'} {b})"
-    return f"({name(node)} != 0.0)"
+        a, b = (condition(graph, x, name, dialect) for x in operation.args)
+        return (dialect.both if op == "and" else dialect.either).format(a=a, b=b)
+    return dialect.compare["ne"].format(a=name(node), b=dialect.zero)

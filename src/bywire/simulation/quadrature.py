@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph, Node
 
 Terms = dict[Node | None, Node]  # product (None: the number one) -> coefficient
@@ -25,12 +26,11 @@ class Quadrature:
     products
         Nodes that every substep adds up.
     combinations
-        Per integral, pairs of a coefficient and the index of its product; None as index
-        stands for the number of substeps.
+        Per integral, pairs of a coefficient and the index of its product.
     """
 
     products: list[Node]
-    combinations: list[list[tuple[Node, int | None]]]
+    combinations: list[list[tuple[Node, int]]]
 
 
 def factored(
@@ -51,13 +51,44 @@ def factored(
     products: list[Node] = []
     combinations = []
     for rate in rates:
-        pairs: list[tuple[Node, int | None]] = []
-        for product, coefficient in expansion.terms(rate).items():
-            if product is not None and product not in products:
+        pairs: list[tuple[Node, int]] = []
+        for factor, coefficient in expansion.terms(rate).items():
+            product = graph.constant(1.0) if factor is None else factor
+            if coefficient == graph.constant(0.0):
+                continue
+            if product not in products:
                 products.append(product)
-            pairs.append((coefficient, None if product is None else products.index(product)))
+            pairs.append((coefficient, products.index(product)))
         combinations.append(pairs)
     return Quadrature(products, combinations)
+
+
+def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
+    """Return the same values, each as a sum of coefficient times value where that is shorter."""
+    new = list(roots)
+    for k, root in enumerate(roots):
+        others = [n for j, n in enumerate(new) if j != k]
+        computed = frozenset(needed(graph, others, lambda n: level[n] < 2))
+        if root in computed:
+            continue
+        own = [n for n in needed(graph, [root], lambda n: level[n] < 2) if n not in computed]
+        terms = _Expansion(graph, computed, level).terms(root)
+        inner = [p for p in terms if p is not None]
+        fresh = [
+            n for n in needed(graph, inner, lambda n: level[n] < 2) if n not in computed
+        ]
+        factors = sum(1 for p, c in terms.items() if p is not None and c != graph.constant(1.0))
+        if len(fresh) + factors + len(terms) - 1 < len(own):
+            new[k] = _summed(graph, terms)
+    return new
+
+
+def _summed(graph: Graph, terms: Terms) -> Node:
+    total = None
+    for product, coefficient in terms.items():
+        part = coefficient if product is None else graph.apply("mul", coefficient, product)
+        total = part if total is None else graph.apply("add", total, part)
+    return graph.constant(0.0) if total is None else total
 
 
 class Levels:

@@ -240,4 +240,5 @@ def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> Any:
 def _differences(before: _ContactSets, after: _ContactSets) -> list[Any]:
     """Return numbers of which one is positive where a contact set is not as it was assumed."""
     changed = [(a - b) ** 2 for a, b in zip(before.numbers, after.numbers, strict=True)]
-    return [*before.overlaps, *after.overlaps, *changed]
+    # A contact that was left out is absent if it is open at the midpoint that came out.
+    return [*after.overlaps, *changed]

@@ -12,7 +12,7 @@ from bywire.simulation.balance import balanced
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph, Node
 from bywire.simulation.program import Program
-from bywire.simulation.quadrature import Levels, Quadrature, factored
+from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
 from bywire.simulation.signs import NOT_NEGATIVE, Interval
 
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
@@ -132,7 +132,7 @@ def _balanced(
     """Return the fast pass with its sums and products in a quicker order."""
     kinds = [(kind, len(nodes)) for kind, nodes in fast.items() if kind != "q"]
     roots = [*_all_but(fast, "q"), *quadrature.products]
-    new = iter(balanced(graph, roots, level))
+    new = iter(balanced(graph, collapsed(graph, roots, level), level))
     renewed = {kind: [next(new) for _ in range(count)] for kind, count in kinds}
     return {**fast, **renewed}, Quadrature(list(new), quadrature.combinations)
 

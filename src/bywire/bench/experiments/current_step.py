@@ -6,7 +6,7 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, step_response
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
@@ -58,6 +58,7 @@ EXPERIMENT = Experiment(
     defaults=Options(i_step=0.73, duration=0.04, record=1e-4),
     cases=cases,
     judge=judge,
+    kpis=units_of("step_response", "effort", resolved={"level": "A"}),
     figures=("step-response", "time-traces"),
     step=step,
 )

@@ -11,13 +11,12 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import hysteresis, occupation
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.stimuli import ramp
-from bywire.bench.stimuli.quantities import LevelRate
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Current, Frequency, TimeConstant
+from bywire.core.quantities import Current, CurrentRate, Frequency, TimeConstant
 
 WITHOUT, WITH = "without-dither", "with-dither"
 
@@ -27,8 +26,8 @@ class Options(ParameterSet):
 
     i_max: Current
     """current demand at the turning point"""
-    slope: LevelRate
-    """slope of the demand [A/s]"""
+    slope: CurrentRate
+    """slope of the demand"""
     f_filter: Frequency
     """cut-off of the first-order low-pass on the measured current"""
     smoothing: TimeConstant
@@ -89,6 +88,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     return (*found.values(), ratio)
 
 
+_LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*response": "A*Pa"})
+
 EXPERIMENT = Experiment(
     name="friction-ramp",
     assembly="motorcycle-brake",
@@ -97,6 +98,12 @@ EXPERIMENT = Experiment(
     defaults=Options(i_max=5.0, slope=0.2, f_filter=20.0, smoothing=0.02),
     cases=cases,
     judge=judge,
+    kpis={
+        f"{name}_{suffix}": unit
+        for suffix in ("undithered", "dithered")
+        for name, unit in {**_LOOP, "p_max": "Pa"}.items()
+    }
+    | {"loop_area_ratio": "1"},
     figures=("hysteresis-loop", "time-traces"),
     finish=finish,
 )

@@ -6,7 +6,7 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
@@ -65,6 +65,7 @@ EXPERIMENT = Experiment(
     defaults=Options(p_from=6e5, p_to=37e5, duration=1.2, settle=1.0, smoothing=0.02),
     cases=cases,
     judge=judge,
+    kpis=units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
     figures=("step-response", "time-traces", "energy-balance"),
     step=step,
 )

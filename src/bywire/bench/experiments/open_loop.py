@@ -11,7 +11,7 @@ from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ParameterError
@@ -82,6 +82,7 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
+    kpis={**units_of("effort", "occupation"), "p_max": "Pa"},
     figures=("time-traces", "energy-balance"),
     driven_unit=lambda options: "A" if options.source == "current" else "V",
 )

@@ -12,7 +12,7 @@ from bywire.assemblies.motorcycle_parameters import DriveMode, MotorcycleParamet
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.stimuli.registry import Stimulus
@@ -131,5 +131,12 @@ EXPERIMENT = Experiment(
     defaults=Options(trace="", max_gap=0.1, smoothing=0.02),
     cases=cases,
     judge=judge,
+    kpis={
+        "tracking_rms": "Pa",
+        "tracking_max": "Pa",
+        "tracking_lag": "s",
+        "tracking_rms_without_lag": "Pa",
+        **units_of("effort", "occupation"),
+    },
     figures=("tracking", "time-traces"),
 )

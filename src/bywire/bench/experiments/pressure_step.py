@@ -7,7 +7,7 @@ from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
@@ -74,6 +74,10 @@ EXPERIMENT = Experiment(
     defaults=Options(p_start=25e5, i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02),
     cases=cases,
     judge=judge,
+    kpis={
+        **units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
+        "static_gain": "Pa/A",
+    },
     figures=("step-response", "time-traces"),
     step=step,
 )

@@ -11,7 +11,7 @@ from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
@@ -100,5 +100,14 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
+    kpis={
+        "time_to_empty": "s",
+        "residual_pressure": "Pa",
+        "energy_stored": "J",
+        "energy_returned": "J",
+        "energy_fed_back": "J",
+        "energy_gear": "J",
+        **units_of("effort", "occupation"),
+    },
     figures=("time-traces", "energy-balance"),
 )

@@ -87,6 +87,7 @@ EXPERIMENT = Experiment(
     defaults=Options(pressures=(2e5, 20e5, 40e5), omega_max=2.0),
     cases=cases,
     judge=judge,
+    kpis={"breakaway_apply": "N*m", "breakaway_release": "N*m"},
     figures=("stribeck-curve",),
     static=static,
 )

@@ -7,6 +7,7 @@ import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from types import MappingProxyType
 from typing import Any
 
 import xarray as xr
@@ -81,6 +82,21 @@ def family(name: str) -> Family:
     if name not in known:
         raise unknown_name("family of key figures", name, known)
     return known[name]
+
+
+def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:
+    """Return the unit of every figure of some families, by the figure's name.
+
+    Parameters
+    ----------
+    names
+        Names of the families.
+    resolved
+        SI unit of every placeholder that their figures declare, for instance
+        ``{"level": "Pa"}``.
+    """
+    figures = (figure for name in names for figure in family(name).measures.values())
+    return {figure.name: resolved.get(figure.unit, figure.unit) for figure in figures}
 
 
 def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench import stimuli
-from bywire.core import units
+from bywire.bench.values import nodes, number
 from bywire.core.errors import ParameterError, UnknownNameError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -119,30 +119,17 @@ def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
     cls = entry(kind).parameter_class
     leaves = leaf_fields(cls)
     numbers: dict[str, Any] = dict(values)
-    for name in values.keys() & leaves.keys():
+    for name in [name for name in values if name in leaves]:
         symbol = leaves[name].unit.symbol.replace("level", level_unit)
         is_table = get_origin(cls.model_fields[name].annotation) is tuple
-        parse = _parse_nodes if is_table else _parse_number
-        numbers[name] = parse(values[name], symbol, f"{kind}.{name}")
+        read = nodes if is_table else number
+        numbers[name] = read(values[name], symbol, f"{kind}.{name}")
     try:
         return Stimulus(kind, cls.create(numbers))
     except UnknownNameError as error:
         raise UnknownNameError(f"stimulus {kind!r}: {error}") from None
     except ParameterError as error:
         raise ParameterError(_in_terms_of(str(error), kind, level_unit)) from None
-
-
-def _parse_number(value: Value, symbol: str, name: str) -> float:
-    if not isinstance(value, (str, int, float)):
-        raise ParameterError(f"{name} = {value!r}: one value is wanted, not several")
-    return units.parse(value, symbol, name)
-
-
-def _parse_nodes(value: Value, symbol: str, name: str) -> tuple[float, ...]:
-    nodes = value.split(",") if isinstance(value, str) else value
-    if isinstance(nodes, (int, float)):
-        nodes = (nodes,)
-    return tuple(units.parse(node, symbol, f"{name}.{k}") for k, node in enumerate(nodes))
 
 
 def _in_terms_of(message: str, kind: str, level_unit: str) -> str:

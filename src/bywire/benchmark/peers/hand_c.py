@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.assemblies.motorcycle_output import Output
 from bywire.assemblies.motorcycle_ecu import Memory, Stimulus
 from bywire.assemblies.motorcycle_energy import Flow
+from bywire.assemblies.motorcycle_output import Output
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters as Par
 from bywire.assemblies.motorcycle_plant import State
 from bywire.core.errors import CompilerError

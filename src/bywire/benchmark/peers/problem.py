@@ -11,10 +11,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -77,9 +75,7 @@ def braking_run(
     return Run(model, par, rest(par), zeros(Memory), stimulus, duration, step, par.ecu.T_s)
 
 
-def reference(
-    par: MotorcycleParameters, stimulus: Demand, duration: float = DURATION
-) -> Solution:
+def reference(par: MotorcycleParameters, stimulus: Demand, duration: float = DURATION) -> Solution:
     """Return bywire's own solution with steps of 2.5 us, which errors are taken against."""
     done = simulate(braking_run(par, stimulus, duration, 2.5e-6), ("p_mc",))
     return Solution(done.time, done["p_mc"], 0.0)
@@ -151,43 +147,3 @@ def march(
             z = advance(z, m.duty)
             seconds += time.perf_counter() - begin
     return Solution(times, p_mc, seconds)
-
-
-@dataclass(frozen=True)
-class Symbols:
-    """The regularized plant as CasADi expressions: scaled state, duty cycle, dz/dt."""
-
-    z: Any
-    duty: Any
-    rate: Any
-
-
-def symbols(par: MotorcycleParameters, width: float) -> Symbols:
-    """Return the regularized plant for the parameters' values as constants."""
-    z, duty = ca.SX.sym("z", len(State._fields)), ca.SX.sym("duty")
-    return Symbols(z, duty, ca.vertcat(*rates(z, duty, par, width)))
-
-
-class Buffered:
-    """A CasADi function on fixed arrays, without the cost of its conversions.
-
-    Parameters
-    ----------
-    function
-        Of dense arguments, with one dense result.
-    """
-
-    def __init__(self, function: Any) -> None:
-        self._buffer, self._trigger = function.buffer()
-        self._inputs = [np.zeros(function.size_in(k)[::-1]) for k in range(function.n_in())]
-        self._output = np.zeros(function.size_out(0)[::-1])
-        for k, array in enumerate(self._inputs):
-            self._buffer.set_arg(k, memoryview(array))
-        self._buffer.set_res(0, memoryview(self._output))
-
-    def __call__(self, *arguments: Any) -> Array:
-        """Return a copy of the result, a vector or a matrix."""
-        for own, given in zip(self._inputs, arguments, strict=True):
-            own[...] = given
-        self._trigger()
-        return self._output.T.copy()

@@ -68,3 +68,8 @@ class Traced:
 
 def _bare(x: Any) -> Any:
     return x.value if isinstance(x, Traced) else x
+
+
+def traced_signals(tuple_type: Any, values: Any) -> Any:
+    """Return a signal tuple of the entries of a traced vector."""
+    return tuple_type(*(Traced(value) for value in values))

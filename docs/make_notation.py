@@ -1,0 +1,211 @@
+"""Write the generated pages: ``python docs/make_notation.py`` after a change of what they list.
+
+``notation.md`` holds symbols, names, units and meanings of parameters and signals;
+``bench-reference.md`` holds experiments with their options, stimuli and key figures. Everything
+comes from the code's own metadata, so that nothing is written twice; a test compares.
+"""
+
+from __future__ import annotations
+
+import importlib
+import math
+import pkgutil
+import typing
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from bywire import assemblies, control, plant
+from bywire.bench.kpis.registry import families
+from bywire.bench.registry import all_experiments
+from bywire.bench.stimuli.registry import entries as stimuli
+from bywire.catalog.registry import entries as parameter_sets
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
+from bywire.core.quantities import display_unit
+from bywire.core.signals import Signal, signals_of
+from bywire.report.wording import amount, range_text, unit_text
+
+HERE = Path(__file__).parent
+NOTE = "<!-- Written by docs/make_notation.py; change the code that it lists, not this page. -->"
+GREEK = ("alpha", "beta", "gamma", "delta", "eta", "theta", "mu", "nu", "rho", "sigma", "tau",
+         "omega", "zeta")  # fmt: skip
+# Heads of names whose symbol in the literature is another one.
+SYMBOLS = {"omega": r"\Omega", "duty": "D", "torque": "T", "voltage": "v", "force": "F",
+           "current": "i", "friction": "T_{fr}", "Re": r"\mathrm{Re}"}  # fmt: skip
+DERIVED = ("Factors", "Balance", "InputRate")  # tuples of derivatives: same names, other units
+
+
+def symbol(name: str) -> str:
+    """Return the symbol of a name, ``f_cfr_p`` as $f_{cfr,p}$; empty for a name that is a word."""
+    head, *rest = name.split(".")[-1].split("_")
+    if head in SYMBOLS:
+        head = SYMBOLS[head]
+    elif head in GREEK:
+        head = f"\\{head}"
+    elif len(head) == 2 and head[1].isdigit():
+        head, rest = head[0], [head[1], *rest]
+    elif len(head) > 1:
+        return ""
+    if rest == ["star"]:
+        return f"${head}^*$"
+    return f"${head}_{{{','.join(rest)}}}$" if rest else f"${head}$"
+
+
+def table(head: Iterable[str], rows: Iterable[Iterable[str]]) -> list[str]:
+    """Return the lines of a Markdown table; a column without any content is left out."""
+    content = [tuple(row) for row in rows]
+    titles = tuple(head)
+    kept = [k for k in range(len(titles)) if any(row[k] for row in content)]
+    lines = ["| " + " | ".join(titles[k] for k in kept) + " |", "|---" * len(kept) + "|"]
+    for row in content:
+        lines.append("| " + " | ".join(row[k].replace("|", "\\|") for k in kept) + " |")
+    return [*lines, ""]
+
+
+def parameter_rows(
+    cls: type[ParameterSet], defaults: Mapping[str, Any] | None = None, prefix: str = ""
+) -> Iterator[tuple[str, ...]]:
+    """Yield symbol, name, unit, default, range and meaning of numbers and choices."""
+    leaves = leaf_fields(cls)
+    for name, info in cls.model_fields.items():
+        dotted = f"{prefix}{name}"
+        kind = info.annotation
+        if isinstance(kind, type) and issubclass(kind, ParameterSet):
+            yield from parameter_rows(kind, defaults, f"{dotted}.")
+            continue
+        default = "" if defaults is None else shown(defaults[dotted], "1")
+        leaf = leaves.get(name)
+        if leaf is None:
+            known = ("true", "false") if kind is bool else typing.get_args(kind)
+            choices = ", ".join(f"`{c}`" for c in known)
+            yield "", f"`{dotted}`", "", default, choices, info.description or ""
+            continue
+        limits = interval(leaf)
+        if defaults is not None:
+            default, limits = shown(defaults[dotted], leaf.unit.symbol), range_text(leaf)
+        unit = unit_text(leaf.unit.symbol) or "1"
+        yield symbol(dotted), f"`{dotted}`", unit, default, limits, leaf.description
+
+
+def interval(leaf: Leaf) -> str:
+    """Return the admissible range in the unit that stands beside it."""
+    low = "" if math.isinf(leaf.low) else f"{'>' if leaf.low_open else '>='} {leaf.low:g}"
+    high = "" if math.isinf(leaf.high) else f"{'<' if leaf.high_open else '<='} {leaf.high:g}"
+    return ", ".join(part for part in (low, high) if part)
+
+
+def shown(value: Any, unit: str) -> str:
+    """Return a default as a bench file writes it."""
+    if isinstance(value, tuple):
+        return ", ".join(shown(v, unit) for v in value)
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f'"{value}"' if isinstance(value, str) else amount(value, unit, 6)
+
+
+def bracketed(unit: str) -> str:
+    """Return a unit as it stands behind a name, nothing for a pure number."""
+    return f" [{unit_text(display_unit(unit))}]" if unit != "1" else ""
+
+
+def modules(package: Any) -> Iterator[Any]:
+    """Yield the modules of a package."""
+    for found in pkgutil.iter_modules(package.__path__):
+        yield importlib.import_module(f"{package.__name__}.{found.name}")
+
+
+def models() -> Iterator[Any]:
+    """Yield every complete model among the assemblies."""
+    for module in modules(assemblies):
+        for value in vars(module).values():
+            own = isinstance(value, type) and value.__module__ == module.__name__
+            if own and hasattr(value, "Memory") and hasattr(value, "balance"):
+                yield value
+
+
+def element_tuples() -> Iterator[tuple[str, type]]:
+    """Yield the signal tuples of all elements and control laws, with their element."""
+    for package in (plant, control):
+        for module in modules(package):
+            for value in vars(module).values():
+                own = isinstance(value, type) and value.__module__ == module.__name__
+                if own and issubclass(value, tuple) and value.__name__ not in DERIVED:
+                    yield module.__name__.rpartition(".")[2], value
+
+
+def merged(tuples: Iterable[tuple[str, Any]]) -> list[tuple[str, ...]]:
+    """Return one row per name, unit and meaning, with all places where it stands."""
+    places: dict[tuple[str, Signal], list[str]] = {}
+    for place, each in tuples:
+        for name, signal in signals_of(each).items():
+            key = name, Signal(signal.unit, signal.label)
+            if place not in places.setdefault(key, []):
+                places[key].append(place)
+    return [
+        (symbol(name), f"`{name}`", unit_text(s.unit) or "1", s.label, ", ".join(where))
+        for (name, s), where in places.items()
+    ]
+
+
+def notation() -> str:
+    """Return the page of symbols."""
+    lines = [
+        "# Notation", "", NOTE, "",
+        "Symbol, name in code, unit and meaning. Inside, all numbers are in SI and radians;",
+        "bench files may use any unit of the same kind. A name without a symbol is a word.", "",
+        "Signs: [sign-conventions.md](sign-conventions.md).", "",
+    ]  # fmt: skip
+    for model in models():
+        known = [e for e in parameter_sets().values() if e.assembly == model.name]
+        cls = known[0].parameter_class
+        sets = ", ".join(f"`{e.name}`" for e in known)
+        lines += [f"## Parameters of {model.name}", "", f"Parameter sets: {sets}.", ""]
+        titles = ("symbol", "name", "unit", "", "range or choices", "meaning")
+        lines += table(titles, parameter_rows(cls))
+        lines += [f"## Signals of {model.name}", ""]
+        places = {
+            "recording": model.Output, "state": model.State, "memory": model.Memory,
+            "stimulus": model.Stimulus, "integral": model.Flow,
+        }  # fmt: skip
+        lines += table(("symbol", "name", "unit", "meaning", "where"), merged(places.items()))
+    lines += ["## Signals of elements and control laws", ""]
+    lines += table(("symbol", "name", "unit", "meaning", "element"), merged(element_tuples()))
+    return "\n".join(lines)
+
+
+def bench_reference() -> str:
+    """Return the page of experiments, stimuli and key figures."""
+    lines = [
+        "# Experiments, stimuli, key figures", "", NOTE, "",
+        "What a bench file can name. How to write one: [bench-files.md](bench-files.md).", "",
+        "## Experiments", "",
+    ]  # fmt: skip
+    titles = ("", "option", "", "default", "range or choices", "meaning")
+    for e in all_experiments().values():
+        driven = ", takes a `[stimulus]`" if e.driven_unit else ""
+        summary = e.summary[0].upper() + e.summary[1:]
+        lines += [f"### {e.name}", "", f"{summary}. For a {e.assembly}{driven}.", ""]
+        rows = [("", *row[1:]) for row in parameter_rows(e.options, e.defaults.flat())]
+        lines += table(titles, ((*row[:2], "", *row[3:]) for row in rows))
+        figures = (f"`{name}`{bracketed(unit)}" for name, unit in e.kpis.items())
+        lines += [f"Key figures: {', '.join(figures)}.", ""]
+    lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]
+    for s in stimuli().values():
+        lines += [f"### {s.kind}", "", s.summary, ""]
+        rows = (("", *row[1:3], "", *row[4:]) for row in parameter_rows(s.parameter_class))
+        lines += table(("", "parameter", "unit", "", "range or choices", "meaning"), rows)
+    lines += ["## Key figures", ""]
+    titles = ("name", "meaning", "family")
+    known = (
+        (f"`{m.name}`", m.definition, family.name)
+        for family in families().values() for m in family.measures.values()
+    )  # fmt: skip
+    lines += table(titles, known)
+    return "\n".join(lines)
+
+
+PAGES = {"notation.md": notation, "bench-reference.md": bench_reference}
+
+if __name__ == "__main__":
+    for file, page in PAGES.items():
+        (HERE / file).write_text(page(), encoding="utf-8")

@@ -1,0 +1,94 @@
+"""Steps, seeds and sizes that a run can have, checked before anything is computed."""
+
+from __future__ import annotations
+
+import os
+from typing import Any
+
+from bywire.bench.experiment import Case
+from bywire.core import units
+from bywire.core.errors import ParameterError, StepError, quoted
+from bywire.simulation.run import Run
+
+SHORTEST_STEP = 1e-9
+"""substep [s] below which a single tick of an ECU would take seconds"""
+LARGEST_SEED = 2**63 - 1
+"""largest seed that a recording's file can hold"""
+
+_COPIES = 3  # of the recorded rows, while they become a dataset and a file
+_GIGA = 1e9
+_FALLBACK = 8.0 * _GIGA  # where the system does not tell its memory
+
+
+def checked_step(value: Any) -> float:
+    """Return a substep [s], or raise a StepError."""
+    step = units.parse(value, "s", "simulation.step")
+    if step < SHORTEST_STEP:
+        raise StepError(
+            f"simulation.step = {step:g} s is not admissible: "
+            f"it must be >= {SHORTEST_STEP:g} s, usually 20 us"
+        )
+    return step
+
+
+def checked_interval(value: Any) -> float | None:
+    """Return a recording interval [s], None for the experiment's own, or raise a StepError."""
+    if value is None:
+        return None
+    interval = units.parse(value, "s", "simulation.record")
+    if interval <= 0:
+        raise StepError(
+            f"simulation.record = {interval:g} s is not admissible: "
+            "it must be > 0 s, usually 1 ms"
+        )
+    return interval
+
+
+def check_seed(value: Any) -> None:
+    """Raise a ParameterError unless the value is a seed."""
+    whole = isinstance(value, int) and not isinstance(value, bool)
+    if not whole or not 0 <= value <= LARGEST_SEED:
+        raise ParameterError(
+            f"simulation.seed = {quoted(value)} is not admissible: "
+            f"it must be a whole number, >= 0 and <= {LARGEST_SEED}"
+        )
+
+
+def check_extent(case: Case, run: Run) -> None:
+    """Refuse a run that records nothing, or more than the memory of this machine holds.
+
+    Parameters
+    ----------
+    case
+        The run as the experiment describes it.
+    run
+        The same as the engine takes it.
+
+    Raises
+    ------
+    StepError
+        When steps do not divide each other, or with the memory that the run would need.
+    """
+    if not run.record <= case.duration:
+        raise StepError(
+            f"a recording of {case.duration:g} s cannot have rows every {run.record:g} s: "
+            "run longer, or record more often (simulation.record)"
+        )
+    schedule = run.schedule()
+    numbers = schedule.rows * len(run.model.Output._fields) * _COPIES
+    numbers += schedule.stimulus_rows * len(run.model.Stimulus._fields)
+    needed, memory = 8.0 * numbers, _memory()
+    if needed > memory:
+        raise StepError(
+            f"a run of {run.duration:g} s, recorded every {run.record:g} s, needs about "
+            f"{needed / _GIGA:.3g} GB of memory, but this machine has {memory / _GIGA:.3g} GB: "
+            "run shorter, or record less often (simulation.record)"
+        )
+
+
+def _memory() -> float:
+    """Return the machine's memory in bytes."""
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
+    except (AttributeError, ValueError, OSError):  # not every system has it
+        return _FALLBACK

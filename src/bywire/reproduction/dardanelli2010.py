@@ -1,0 +1,64 @@
+"""Dardanelli, Alli, Savaresi (2010), reproduced: Tables 1 to 4, Figs. 3 to 7, disagreements."""
+
+from __future__ import annotations
+
+from bywire.bench.bench import Progress
+from bywire.reproduction import (
+    dardanelli2010_dither,
+    dardanelli2010_fig3,
+    dardanelli2010_fig5,
+    dardanelli2010_fig6,
+    dardanelli2010_fig7,
+    dardanelli2010_gear,
+    dardanelli2010_repair,
+    dardanelli2010_table1,
+    dardanelli2010_table2,
+    dardanelli2010_table3,
+    dardanelli2010_table4,
+)
+from bywire.reproduction.dardanelli2010_facts import CITATION
+from bywire.reproduction.dardanelli2010_runs import MAIN, Runs
+from bywire.reproduction.reproduction import Reproduction, Source
+
+PARTS = {
+    "Table 1": dardanelli2010_table1.part,
+    "Table 2": dardanelli2010_table2.part,
+    "repair of Table 1": dardanelli2010_repair.part,
+    "Table 3, Fig. 4": dardanelli2010_table3.part,
+    "Fig. 3": dardanelli2010_fig3.part,
+    "Fig. 5": dardanelli2010_fig5.part,
+    "waveforms": dardanelli2010_dither.part,
+    "Table 4": dardanelli2010_table4.part,
+    "Fig. 6": dardanelli2010_fig6.part,
+    "Fig. 7": dardanelli2010_fig7.part,
+    "gear": dardanelli2010_gear.part,
+}
+
+
+def reproduce(progress: Progress | None = None) -> Reproduction:
+    """Reproduce every table and figure.
+
+    Parameters
+    ----------
+    progress
+        Called with the label of a table or figure and its finished share, 0 to 1.
+
+    Raises
+    ------
+    RunError
+        When a run fails.
+    """
+    runs = Runs(progress)
+    parts = []
+    for label, part in PARTS.items():
+        runs.report(label, 0.0)
+        parts.append(part(runs))
+        runs.report(label, 1.0)
+    return Reproduction(MAIN, CITATION, tuple(parts))
+
+
+SOURCE = Source(
+    name=MAIN,
+    summary="electro-mechanical brake-by-wire actuator for a sport motorbike, IFAC 2010",
+    reproduce=reproduce,
+)

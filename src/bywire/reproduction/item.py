@@ -1,0 +1,126 @@
+"""A statement of a source beside what we compute."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+Tolerance = float | Literal["<=", ">="]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """A number that a source states, and where.
+
+    Parameters
+    ----------
+    value
+        The number in ``unit``, as printed.
+    unit
+        Unit as the source prints it, in pint's syntax; ``"1"`` for a pure number.
+    where
+        Place in the source.
+    """
+
+    value: float
+    unit: str
+    where: str
+
+
+@dataclass(frozen=True)
+class Item:
+    """A statement of a source beside what we compute.
+
+    Parameters
+    ----------
+    id
+        Name of the statement; ``@`` and the parameter set follow where it is not the main one.
+    unit
+        Unit of all numbers, as the source prints it.
+    stated, computed
+        The two numbers; None where nothing is stated or computed.
+    tolerance
+        Largest difference that counts as agreement; ``"<="`` or ``">="`` where the statement is
+        a bound on what is computed; None where nothing is judged.
+    agrees
+        None where nothing is stated, or where the value was tuned to the statement.
+    note
+        Where it is stated, and what a reader should know.
+    """
+
+    id: str
+    unit: str
+    stated: float | None
+    computed: float | None
+    tolerance: Tolerance | None
+    agrees: bool | None
+    note: str
+
+
+def compared(
+    name: str,
+    fact: Fact,
+    computed: float,
+    tolerance: Tolerance | None,
+    note: str = "",
+    *,
+    tuned: Literal["", "calibrated", "an input"] = "",
+) -> Item:
+    """Return a statement judged by its tolerance.
+
+    Parameters
+    ----------
+    name
+        The item's id.
+    fact
+        What is stated.
+    computed
+        What we compute, in the fact's unit; NaN agrees with nothing.
+    tolerance
+        See `Item`.
+    note
+        What a reader should know beside the place of the statement.
+    tuned
+        How the value was made to agree: then it proves nothing, and is not judged.
+    """
+    agrees = None if tuned or tolerance is None else holds(fact.value, computed, tolerance)
+    parts = (fact.where, tuned, note)
+    return Item(name, fact.unit, fact.value, computed, tolerance, agrees, _joined(parts))
+
+
+def found(name: str, unit: str, computed: float, note: str) -> Item:
+    """Return a number that the source does not state.
+
+    Parameters
+    ----------
+    name, unit, computed, note
+        As in `Item`.
+    """
+    return Item(name, unit, None, computed, None, None, note)
+
+
+def quoted(name: str, fact: Fact, note: str) -> Item:
+    """Return a statement that we compute nothing for.
+
+    Parameters
+    ----------
+    name, fact, note
+        As in `compared`.
+    """
+    return Item(name, fact.unit, fact.value, None, None, None, _joined((fact.where, note)))
+
+
+def holds(stated: float, computed: float, tolerance: Tolerance) -> bool:
+    """Return whether a computed number agrees with a stated one; NaN never does."""
+    if math.isnan(computed):
+        return False
+    if tolerance == "<=":
+        return computed <= stated
+    if tolerance == ">=":
+        return computed >= stated
+    return abs(computed - stated) <= tolerance
+
+
+def _joined(parts: tuple[str, ...]) -> str:
+    return "; ".join(part for part in parts if part)

@@ -1,0 +1,100 @@
+"""What the reproduction of a source consists of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import xarray as xr
+from matplotlib.figure import Figure
+
+from bywire.bench.bench import Progress
+from bywire.reproduction.item import Item
+
+
+@dataclass(frozen=True, eq=False)
+class Exhibit:
+    """A figure with a name for its file and a caption."""
+
+    name: str
+    figure: Figure
+    caption: str
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A table or a figure of the source, reproduced.
+
+    Parameters
+    ----------
+    title
+        Heading in the report.
+    text
+        What was done and what came out, for the report.
+    items
+        Statements beside computed numbers.
+    exhibits
+        Figures.
+    recordings
+        Runs worth keeping, by the name of their file.
+    """
+
+    title: str
+    text: str
+    items: tuple[Item, ...]
+    exhibits: tuple[Exhibit, ...] = ()
+    recordings: Mapping[str, xr.Dataset] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, eq=False)
+class Reproduction:
+    """A source, reproduced.
+
+    Parameters
+    ----------
+    source
+        Name of the source.
+    citation
+        Full citation.
+    parts
+        Its tables and figures.
+    """
+
+    source: str
+    citation: str
+    parts: tuple[Part, ...]
+
+    @property
+    def items(self) -> tuple[Item, ...]:
+        """All statements, in the order of the source."""
+        return tuple(item for part in self.parts for item in part.items)
+
+    @property
+    def figures(self) -> tuple[Exhibit, ...]:
+        """All figures."""
+        return tuple(exhibit for part in self.parts for exhibit in part.exhibits)
+
+    @property
+    def recordings(self) -> dict[str, xr.Dataset]:
+        """All recordings by name."""
+        return {name: kept for part in self.parts for name, kept in part.recordings.items()}
+
+
+@dataclass(frozen=True)
+class Source:
+    """A source that can be reproduced.
+
+    Parameters
+    ----------
+    name
+        What the command line calls it.
+    summary
+        One line for listings.
+    reproduce
+        ``reproduce(progress) -> Reproduction``; ``progress`` is called with the label of a piece
+        of work and its finished share, 0 to 1, or is None.
+    """
+
+    name: str
+    summary: str
+    reproduce: Callable[[Progress | None], Reproduction]

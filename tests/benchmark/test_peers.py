@@ -1,0 +1,94 @@
+"""The peers solve the problem that bywire solves."""
+
+from __future__ import annotations
+
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_plant import State
+from bywire.benchmark.peers import cvodes, diffrax, lsoda, pathsim
+from bywire.benchmark.peers.problem import (
+    SCALE,
+    Solution,
+    braking_run,
+    error,
+    hard_braking,
+    rates,
+    reference,
+    rest,
+)
+from bywire.benchmark.peers.symbolic import slope_and_jacobian
+from bywire.catalog.registry import entry
+from bywire.simulation.run import simulate
+
+SHORT = 0.03
+WIDTH = 3e-4
+
+
+@pytest.fixture(scope="module")
+def par() -> MotorcycleParameters:
+    found = entry("dardanelli2010").parameters()
+    assert isinstance(found, MotorcycleParameters)
+    return found
+
+
+def state(**changes: float) -> Any:
+    x = State(i=3.0, theta=25.0, omega=4.0, p_mc=2e6, p_pd=1.9e6, y_p=0.4, y_i=0.6)
+    return np.array(x._replace(**changes)) / SCALE
+
+
+@pytest.mark.parametrize("peer", [cvodes, lsoda, diffrax, pathsim])
+def test_peer_follows_bywire(peer: ModuleType, par: MotorcycleParameters) -> None:
+    if not peer.available():
+        pytest.skip("not installed")
+    exact = reference(par, hard_braking, SHORT)
+    solution = peer.solve(par, hard_braking, SHORT)
+    assert solution.time.size == round(SHORT / par.ecu.T_s) + 1
+    assert solution.seconds > 0.0
+    assert exact.p_mc[-1] > 2e4
+    assert error(solution, exact) < 1e-3
+
+
+def test_a_wide_friction_is_seen_as_an_error(par: MotorcycleParameters) -> None:
+    exact = reference(par, hard_braking, SHORT)
+    assert error(cvodes.solve(par, hard_braking, SHORT, width=1.0), exact) > 3e-3
+
+
+def test_bywire_at_20_us_is_near_its_own_reference(par: MotorcycleParameters) -> None:
+    done = simulate(braking_run(par, hard_braking, SHORT), ("p_mc",))
+    assert error(Solution(done.time, done["p_mc"], 0.0), reference(par, hard_braking, SHORT)) < 1e-3
+
+
+@pytest.mark.parametrize("omega", [4.0, 1e-4, 0.0, -1e-4, -4.0])
+def test_rates_agree_between_floats_and_symbols(omega: float, par: MotorcycleParameters) -> None:
+    slope, jacobian = slope_and_jacobian(par, WIDTH)
+    z = state(omega=omega)
+    np.testing.assert_allclose(slope(z, 0.3), rates(z.tolist(), 0.3, par, WIDTH), rtol=1e-9)
+    step = 1e-7 * np.eye(z.size)
+    columns = [(slope(z + s, 0.3) - slope(z - s, 0.3)) / 2e-7 for s in step]
+    if omega != 0.0:
+        scale = np.abs(jacobian(z, 0.3)).max()
+        np.testing.assert_allclose(jacobian(z, 0.3), np.array(columns).T, atol=1e-3 * scale)
+
+
+def test_traced_rates_agree_with_floats(par: MotorcycleParameters) -> None:
+    jax = pytest.importorskip("jax")
+    from bywire.benchmark.peers.traced import Traced
+
+    def traced(z: Any) -> Any:
+        found = rates([Traced(entry) for entry in z], 0.3, par, WIDTH)
+        return jax.numpy.stack([r.value for r in found])
+
+    with jax.enable_x64(True):
+        found = np.asarray(jax.jit(traced)(jax.numpy.asarray(state())))
+    np.testing.assert_allclose(found, rates(state().tolist(), 0.3, par, WIDTH), rtol=1e-9)
+
+
+def test_rest_has_no_pressure_and_reads_ambient(par: MotorcycleParameters) -> None:
+    x = rest(par)
+    assert (x.p_mc, x.omega, x.y_i) == (0.0, 0.0, 0.5)
+    assert x.y_p == pytest.approx(par.fluid.p_atm / 50e5)

@@ -1,0 +1,78 @@
+"""The command line, called in this process where it does not matter, in its own where it does."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Callable
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from bywire.cli.main import main
+
+SCRIPT = Path(sysconfig.get_path("scripts")) / "bywire"
+BRAKING = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
+QUICK = '\n[options]\nduration = "40 ms"\nsettle = "10 ms"\n'
+
+
+class Outcome(NamedTuple):
+    """What a command left."""
+
+    status: int
+    out: str
+    err: str
+
+    @property
+    def lines(self) -> list[str]:
+        """Lines of standard error."""
+        return self.err.strip().splitlines()
+
+
+@pytest.fixture
+def bywire(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., Outcome]:
+    """Return a function that calls ``bywire`` in this process."""
+
+    def call(*arguments: str | Path) -> Outcome:
+        monkeypatch.setattr(sys, "argv", ["bywire", *map(str, arguments)])
+        with pytest.raises(SystemExit) as ended:
+            main()
+        code = ended.value.code
+        return Outcome(code if isinstance(code, int) else 0, *capsys.readouterr())
+
+    return call
+
+
+@pytest.fixture
+def process() -> Callable[..., Outcome]:
+    """Return a function that runs the installed program ``bywire`` to its end."""
+
+    def call(*arguments: str | Path, **environment: str) -> Outcome:
+        done = subprocess.run(
+            [str(SCRIPT), *map(str, arguments)],
+            capture_output=True,
+            text=True,
+            timeout=60,
+            check=False,
+            env={**os.environ, **environment},
+        )
+        return Outcome(done.returncode, done.stdout, done.stderr)
+
+    return call
+
+
+@pytest.fixture
+def bench(tmp_path: Path) -> Callable[..., Path]:
+    """Return a function that writes a bench file, by default of a quick braking."""
+
+    def write(text: str | bytes = BRAKING + QUICK, name: str = "bench.toml") -> Path:
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write

@@ -1,0 +1,104 @@
+"""Files that are no bench files: missing, folders, binary, empty, hostile."""
+
+from __future__ import annotations
+
+import os
+import time
+
+import pytest
+from conftest import BRAKING, QUICK
+
+NOT_TEXT = b"\x89HDF\r\n\x1a\n" + bytes(range(256))
+DEEP = {
+    "lists": "x = " + "[" * 100_000,
+    "closed lists": "x = " + "[" * 2_000 + "]" * 2_000,
+    "inline tables": "x = " + "{a = " * 100_000,
+    "dotted key": "[set]\n" + "a." * 30_000 + "a = 1",
+    "quoted key": "[set]\n" + '"a" . ' * 30_000 + "a = 1",
+    "header": "[" + "a." * 30_000 + "a]",
+    "two million words": "[set]\nnote = '" + "a.b " * 200_000 + "'",
+}
+
+
+def refused(outcome, *texts):
+    """Check that an outcome is one line of error that holds some texts."""
+    assert outcome.status == 2
+    assert outcome.out == ""
+    assert len(outcome.lines) == 1
+    for text in ("bywire: error: ", *texts):
+        assert text in outcome.err
+
+
+def test_missing_file(bywire, tmp_path):
+    refused(bywire("run", tmp_path / "none.toml"), "No such file", "none.toml", "check the path")
+
+
+def test_missing_file_has_a_near_one(bywire, bench, tmp_path):
+    path = bench(name="braking.toml")
+    refused(bywire("run", tmp_path / "brakng.toml"), f"did you mean {path}?")
+
+
+def test_folder(bywire, tmp_path):
+    refused(bywire("run", tmp_path), "Is a directory")
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/zero"), reason="POSIX only")
+def test_endless_file(bywire):
+    refused(bywire("run", "/dev/zero"), "no bench file")
+
+
+def test_ten_megabytes(bywire, bench):
+    path = bench(BRAKING + "# padding\n" * 1_000_000)
+    started = time.perf_counter()
+    refused(bywire("run", path), "more than 1000 kB", "options.trace")
+    assert time.perf_counter() - started < 2.0
+
+
+@pytest.mark.parametrize("text", [b"", b"\n\n", b"# only a comment\n"])
+def test_empty_file(bywire, bench, text):
+    refused(bywire("run", bench(text)), "experiment is missing", "bywire list")
+
+
+@pytest.mark.parametrize("text", [NOT_TEXT, BRAKING.encode("utf-16")])
+def test_binary_file(bywire, bench, text):
+    refused(bywire("run", bench(text)), "not UTF-8 text")
+
+
+def test_zeros(bywire, bench):
+    refused(bywire("run", bench(bytes(1000))), "not valid TOML", "line 1")
+
+
+@pytest.mark.parametrize("kind", DEEP)
+def test_deep_nesting_ends_quickly(bywire, bench, kind):
+    path = bench(f"{BRAKING}\n{DEEP[kind]}\n")
+    started = time.perf_counter()
+    refused(bywire("run", path), str(path))
+    assert time.perf_counter() - started < 5.0
+
+
+def test_null_character_in_the_path(bywire, tmp_path):
+    assert bywire("run", f"{tmp_path}/a\0b.toml").status == 2
+
+
+@pytest.mark.parametrize("mark", [b"\xef\xbb\xbf", b""], ids=["with mark", "plain"])
+@pytest.mark.parametrize("end", ["\n", "\r\n"], ids=["unix", "windows"])
+def test_what_editors_of_other_systems_write_is_read(bywire, bench, mark, end):
+    path = bench(mark + (BRAKING + QUICK).replace("\n", end).encode())
+    assert bywire("run", path).status == 0
+
+
+def test_file_name_that_is_no_text(process, tmp_path):
+    path = os.fsencode(tmp_path) + b"/\xff.toml"
+    with open(path, "wb") as stream:
+        stream.write((BRAKING + QUICK).encode())
+    status, out, err = process("run", os.fsdecode(path), "--out", tmp_path / "out", "--json")
+    assert (status, "Traceback" in err) == (0, False)
+    assert '"bench": "?"' in out
+    assert (tmp_path / "out" / "report.html").exists()
+
+
+def test_messages_hold_no_control_characters(bywire, bench):
+    text = BRAKING.replace("hard-braking", "pedal-tracking") + '[options]\ntrace = "\\u001b[31m"\n'
+    outcome = bywire("run", bench(text))
+    refused(outcome, "cannot be read")
+    assert "\x1b" not in outcome.err

@@ -1,0 +1,29 @@
+"""Every bench file of the repository runs and meets its own requirements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import bywire
+from bywire.core.errors import FileError
+
+BENCHES = Path(__file__).parents[2] / "benches"
+FILES = sorted(BENCHES.glob("*.toml"))
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_requirements_hold(file: Path) -> None:
+    result = bywire.run(bywire.load(file))
+    missed = [f"{v.kpi} = {v.value:g} {v.unit}" for v in result.verdicts if not v.met]
+    assert not missed
+    assert result.verdicts
+    assert not result.warnings
+
+
+def test_the_ride_lies_beside_its_bench(tmp_path: Path) -> None:
+    alone = tmp_path / "pedal_tracking.toml"
+    alone.write_text((BENCHES / "pedal_tracking.toml").read_text())
+    with pytest.raises(FileError, match=r"pedal_ride\.csv"):
+        bywire.run(bywire.load(alone))

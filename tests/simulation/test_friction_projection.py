@@ -1,0 +1,110 @@
+"""The projection of set-valued frictions against brute force, for weak and strong coupling."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bywire.simulation.set_valued import project_exact, project_fast
+
+Array = NDArray[np.float64]
+COUNT = 5000
+TOLERANCE = 1e-7  # of the largest velocity of a case; S is conditioned up to 1e4
+
+
+def evaluate(project: object, S: Array, c: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Return velocities, shape (count, m), and which of them are reported as failed."""
+    count, m = c.shape
+    args = [ca.SX.sym("S", m, m), *(ca.SX.sym(name, m) for name in ("c", "lo", "hi"))]
+    result = project(*args)  # type: ignore[operator]
+    one = ca.Function("one", args, [result.w, result.failed])
+    values = [ca.DM(np.hstack(list(S))), *(ca.DM(v.T) for v in (c, low, high))]
+    w, failed = one.map(count)(*values)
+    return np.array(w).T, np.array(failed).ravel() != 0
+
+
+def violation(S: Array, c: Array, low: Array, high: Array, w: Array) -> Array:
+    """Return by how much velocities miss the conditions, as a share of the forces; shape (count,)."""
+    force = np.einsum("nij,nj->ni", S, w) - c
+    nearest = np.where(w > 0, low, np.where(w < 0, high, np.clip(force, low, high)))
+    scale = np.abs(c).max(axis=1) + np.maximum(-low, high).max(axis=1)
+    return np.abs(force - nearest).max(axis=1) / scale
+
+
+def brute(S: Array, c: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the velocities of the best combination of signs, and its violation."""
+    count, m = c.shape
+    best, least = np.zeros((count, m)), np.full(count, np.inf)
+    for signs in product((0, 1, -1), repeat=m):
+        moving = np.flatnonzero(signs)
+        w = np.zeros((count, m))
+        if moving.size:
+            right = c + np.where(np.array(signs) > 0, low, high)
+            block = S[:, moving][:, :, moving]
+            w[:, moving] = np.linalg.solve(block, right[:, moving, None])[..., 0]
+        wrong = violation(S, c, low, high, w)
+        better = wrong < least
+        best[better], least[better] = w[better], wrong[better]
+    return best, least
+
+
+def cases(m: int, coupling: str, seed: int) -> tuple[Array, Array, Array, Array]:
+    """Return random problems; ``weak``: off-diagonal terms below 0.3 of the diagonal in sum."""
+    rng = np.random.default_rng(seed)
+    off = rng.uniform(-1.0, 1.0, (COUNT, m, m)) * (1.0 - np.eye(m))
+    root = rng.normal(size=(COUNT, m, m))
+    S = {
+        "weak": np.eye(m) + 0.3 / max(m - 1, 1) * off,
+        "strong": root @ root.transpose(0, 2, 1) + 0.02 * np.eye(m),
+        "indefinite": np.eye(m) + 3.0 * off,
+    }[coupling]
+    scale = 10.0 ** rng.uniform(-3.0, 3.0, (COUNT, m, 1))
+    root = np.sqrt(scale * scale.transpose(0, 2, 1))  # rows of very different size
+    c = rng.normal(size=(COUNT, m)) * np.sqrt(scale[..., 0])
+    low, high = -rng.exponential(size=(COUNT, m)), rng.exponential(size=(COUNT, m))
+    low[rng.random((COUNT, m)) < 0.1] = 0.0  # a friction that acts in one direction only
+    units = np.sqrt(scale[..., 0])
+    return S * root, c, low * units, high * units
+
+
+@pytest.mark.parametrize("coupling", ["weak", "strong"])
+@pytest.mark.parametrize("m", [1, 2, 3])
+def test_never_wrong(m: int, coupling: str) -> None:
+    """What is not reported as failed is right; the exact projection always is."""
+    problem = cases(m, coupling, 20 + m)
+    expected, least = brute(*problem)
+    assert least.max() < 1e-9
+    scale = np.abs(expected).max(axis=1, keepdims=True) + 1e-300
+    for project in (project_fast, project_exact):
+        w, failed = evaluate(project, *problem)
+        right = (np.abs(w - expected) / scale).max(axis=1) < TOLERANCE
+        assert np.all(right | failed)
+        assert project is project_fast or not failed.any()
+    assert {tuple(row) for row in np.sign(expected).astype(int)} == set(
+        product((0, 1, -1), repeat=m)
+    )
+
+
+@pytest.mark.parametrize(
+    ("m", "coupling", "least", "most"),
+    [(1, "strong", 0.0, 0.0), (2, "weak", 0.0, 1e-3), (3, "weak", 0.0, 5e-3),
+     (2, "strong", 0.01, 0.25), (3, "strong", 0.05, 0.4)],
+)  # fmt: skip
+def test_how_often_sweeps_fail(m: int, coupling: str, least: float, most: float) -> None:
+    """Weak coupling hardly ever needs the enumeration; strong coupling does, and says so."""
+    _, failed = evaluate(project_fast, *cases(m, coupling, 40 + m))
+    assert least <= failed.mean() <= most
+
+
+@pytest.mark.parametrize("m", [2, 3])
+def test_without_a_unique_solution(m: int) -> None:
+    """An indefinite matrix may have several solutions: one of them, or a report of failure."""
+    problem = cases(m, "indefinite", 60 + m)
+    for project in (project_fast, project_exact):
+        w, failed = evaluate(project, *problem)
+        assert violation(*problem, w)[~failed].max(initial=0.0) < TOLERANCE
+        assert failed.mean() < (0.7 if project is project_fast else 1e-9)
