@@ -24,20 +24,19 @@ out = parser.parse_args().out
 
 BAR, CASES = 1e5, 256
 VARIED = ("seal.T_pr", "seal.f_cfr_p", "seal.f_cfr_n", "seal.k_brk_p", "seal.k_brk_n")
-factors = np.exp(0.25 * np.random.default_rng(2010).standard_normal((CASES, len(VARIED))))
+nominal = bywire.parameters("dardanelli2010").leaves()
+draw = np.random.default_rng(2010).standard_normal
+variations = {name: nominal[name] * np.exp(0.25 * draw(CASES)) for name in VARIED}
+for name in ("seal.k_brk_p", "seal.k_brk_n"):  # breakaway is never below Coulomb friction
+    variations[name] = np.maximum(variations[name], 1.0)
 
 bands = {}
 for label, gain in (("without dither", 0.0), ("with dither", 1.0)):
     overrides = {"ecu.dither.gain": gain}
     bench = bywire.Bench("hard-braking", "dardanelli2010", overrides=overrides)
     case = bench.cases()[0]
-    run = as_run(case, bench.step)
-    nominal = np.array([run.par.leaves()[name] for name in VARIED])
-    drawn = nominal * factors
-    drawn[:, 3:] = np.maximum(drawn[:, 3:], 1.0)  # breakaway is never below Coulomb friction
-    cases = [run.par.replace(dict(zip(VARIED, row, strict=True))) for row in drawn]
     started = time.perf_counter()
-    ensemble = bywire.simulate_ensemble(run, cases, ["p_mc"])
+    ensemble = bywire.simulate_ensemble(as_run(case, bench.step), variations, ["p_mc"])
     elapsed = time.perf_counter() - started
     # The mean over one dither period: the ripple is not the subject here.
     p = np.apply_along_axis(np.convolve, 1, ensemble["p_mc"] / BAR, np.ones(20) / 20, "valid")

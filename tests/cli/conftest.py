@@ -5,31 +5,13 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import sysconfig
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple
 
 import pytest
+from command_line import BRAKING, QUICK, SCRIPT, Outcome
 
 from bywire.cli.main import main
-
-SCRIPT = Path(sysconfig.get_path("scripts")) / "bywire"
-BRAKING = 'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
-QUICK = '\n[options]\nduration = "40 ms"\nsettle = "10 ms"\n'
-
-
-class Outcome(NamedTuple):
-    """What a command left."""
-
-    status: int
-    out: str
-    err: str
-
-    @property
-    def lines(self) -> list[str]:
-        """Lines of standard error."""
-        return self.err.strip().splitlines()
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import os
 import time
 
 import pytest
-from conftest import BRAKING, QUICK
+from command_line import BRAKING, PEDAL, QUICK, refused
 
 NOT_TEXT = b"\x89HDF\r\n\x1a\n" + bytes(range(256))
 DEEP = {
@@ -18,15 +18,6 @@ DEEP = {
     "header": "[" + "a." * 30_000 + "a]",
     "two million words": "[set]\nnote = '" + "a.b " * 200_000 + "'",
 }
-
-
-def refused(outcome, *texts):
-    """Check that an outcome is one line of error that holds some texts."""
-    assert outcome.status == 2
-    assert outcome.out == ""
-    assert len(outcome.lines) == 1
-    for text in ("bywire: error: ", *texts):
-        assert text in outcome.err
 
 
 def test_missing_file(bywire, tmp_path):
@@ -98,7 +89,6 @@ def test_file_name_that_is_no_text(process, tmp_path):
 
 
 def test_messages_hold_no_control_characters(bywire, bench):
-    text = BRAKING.replace("hard-braking", "pedal-tracking") + '[options]\ntrace = "\\u001b[31m"\n'
-    outcome = bywire("run", bench(text))
+    outcome = bywire("run", bench(PEDAL + '[options]\ntrace = "\\u001b[31m"\n'))
     refused(outcome, "cannot be read")
     assert "\x1b" not in outcome.err

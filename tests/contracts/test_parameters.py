@@ -85,10 +85,5 @@ def test_value_outside_the_range_is_refused(cls: type[ParameterSet], name: str) 
 
 
 @pytest.mark.parametrize(("cls", "name"), LEAVES, ids=LEAF_IDS)
-def test_refusal_says_unit_and_range(
-    cls: type[ParameterSet], name: str, request: pytest.FixtureRequest
-) -> None:
-    if is_table(cls, name):
-        # Strict, so that this line goes when the core explains the nodes of a table as well.
-        request.applymarker(pytest.mark.xfail(strict=True, reason="nodes: no unit, no range"))
+def test_refusal_says_unit_and_range(cls: type[ParameterSet], name: str) -> None:
     check_message(cls, name)

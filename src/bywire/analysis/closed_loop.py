@@ -42,7 +42,7 @@ def closed_loop(
     inputs
         Fields of Stimulus.
     outputs
-        Fields of State or Output.
+        Fields of Output or State.
     locked
         States held at the operating point, for instance angle and speed of a locked rotor.
 

@@ -43,7 +43,7 @@ def linearize(
     inputs
         Fields of Memory that drive the continuous part, for instance ``("i_source",)``.
     outputs
-        Fields of State or of Output.
+        Fields of Output or State; where both have one of that name, what is recorded.
     friction
         ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
         force of the sliding direction with its slope; every friction's velocity must be nonzero.
@@ -59,32 +59,42 @@ def linearize(
     -----
     The Jacobian is exact: ``x`` and the value-only ``xe`` of the protocol are the same here.
     """
-    import casadi as ca
-
     _require_known("input", inputs, model.Memory._fields)
     _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
     _require_open(model, par, state)
-    x = ca.SX.sym("x", len(state))
-    u = ca.SX.sym("u", len(inputs))
-    held = memory._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
-    made = cast(Any, model.State)(*ca.vertsplit(x))
-    rate, y = _smooth(model, par, made, held, outputs, state, friction)
-    parts = [ca.jacobian(rate, x), ca.jacobian(rate, u), ca.jacobian(y, x), ca.jacobian(y, u)]
-    point = [getattr(memory, name) for name in inputs]
-    A, B, C, D, at = (
-        np.array(part, dtype=float)
-        for part in ca.Function("jacobians", [x, u], [*parts, rate])(list(state), point)
-    )
-    state_signals, memory_signals = signals_of(model.State), signals_of(model.Memory)
-    known = signals_of(model.Output) | state_signals
+    A, B, C, D, rate = _jacobians(model, par, state, memory, inputs, outputs, friction)
+    states, held = signals_of(model.State), signals_of(model.Memory)
+    known = states | signals_of(model.Output)
     return LinearModel(
         model.name, A, B, C, D,
-        tuple(model.State._fields), tuple(inputs), tuple(outputs),
-        tuple(state_signals[name].unit for name in model.State._fields),
-        tuple(memory_signals[name].unit for name in inputs),
+        tuple(states), tuple(inputs), tuple(outputs),
+        tuple(signal.unit for signal in states.values()),
+        tuple(held[name].unit for name in inputs),
         tuple(known[name].unit for name in outputs),
-        at[:, 0],
+        rate[:, 0],
     )  # fmt: skip
+
+
+def _jacobians(
+    model: Model,
+    par: ParameterSet,
+    state: NamedTuple,
+    memory: NamedTuple,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    friction: Friction,
+) -> list[Any]:
+    """Return A, B, C, D, and the rate as a column."""
+    import casadi as ca
+
+    x, u = ca.SX.sym("x", len(state)), ca.SX.sym("u", len(inputs))
+    held = memory._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
+    at = cast(Any, model.State)(*ca.vertsplit(x))
+    rate, y = _smooth(model, par, at, held, outputs, state, friction)
+    parts = [ca.jacobian(a, b) for a in (rate, y) for b in (x, u)]
+    jacobians = ca.Function("jacobians", [x, u], [*parts, rate])
+    values = jacobians(list(state), [getattr(memory, name) for name in inputs])
+    return [np.array(value, dtype=float) for value in values]
 
 
 def _smooth(
@@ -112,7 +122,7 @@ def _smooth(
     rate = ca.vertcat(*(force[name] / getattr(mass, name) for name in x._fields))
     flow = zeros(cast(Any, model.Flow))
     out = model.output(x, held, par, contact, tuple(reaction), flow)
-    y = [getattr(x if name in x._fields else out, name) for name in outputs]
+    y = [getattr(out if name in out._fields else x, name) for name in outputs]
     return rate, ca.vertcat(*y)
 
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.harmonics import amplitudes
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import DriveMode, MotorcycleParameters
 from bywire.bench.bench import as_run
@@ -63,17 +64,33 @@ class SineTest:
         return math.exp(float(f[0] + share * (f[1] - f[0])))
 
 
+@dataclass(frozen=True)
+class Excitation:
+    """What shakes the brake.
+
+    Parameters
+    ----------
+    mode, signal
+        Drive mode and the signal of the stimulus that it obeys, for instance ``"pressure"`` and
+        ``"p_set"``.
+    p
+        Pressure at the start [Pa].
+    mean, amplitude
+        Of the signal, in its SI unit.
+    """
+
+    mode: DriveMode
+    signal: str
+    p: float
+    mean: float
+    amplitude: float
+
+
 def sine_test(
     par: MotorcycleParameters,
-    mode: DriveMode,
-    drive: str,
-    *,
-    p: float,
-    mean: float,
-    amplitude: float,
+    excitation: Excitation,
     frequencies: Sequence[float],
     settle: float = 3.0,
-    progress: Callable[[float], None] | None = None,
 ) -> SineTest:
     """Return the response of the pressure p_mc to sines around a mean, one run each.
 
@@ -81,40 +98,31 @@ def sine_test(
     ----------
     par
         Parameters of the brake.
-    mode, drive
-        Drive mode and the signal of the stimulus that it obeys, for instance ``"pressure"`` and
-        ``"p_set"``.
-    p
-        Pressure at the start [Pa].
-    mean, amplitude
-        Of the drive, in its SI unit.
+    excitation
+        What shakes it.
     frequencies
         Ascending multiples of 1/WINDOW [Hz], so that every window holds whole periods of the
         sine and of the dither.
     settle
         Time before the window [s].
-    progress
-        Called with the finished share.
 
     Raises
     ------
     ParameterError
         When a frequency is no such multiple.
     """
-    values, model = [], MotorcycleBrake()  # one instance: its kernel is prepared once
-    for k, f in enumerate(frequencies):
+    e, model = excitation, MotorcycleBrake()  # one instance: its kernel is prepared once
+    values = []
+    for f in frequencies:
         if abs(f * WINDOW - round(f * WINDOW)) > 1e-9:
             raise ParameterError(f"{f:g} Hz is no multiple of {1.0 / WINDOW:g} Hz: round it to one")
 
         def stimulus(t: Array, f: float = f) -> dict[str, Array]:
-            return {drive: mean + amplitude * np.sin(2.0 * math.pi * f * t)}
+            return {e.signal: e.mean + e.amplitude * np.sin(2.0 * math.pi * f * t)}
 
-        case = case_from_rest("sine", par, mode, p, stimulus, WINDOW, settle=settle)
+        case = case_from_rest("sine", par, e.mode, e.p, stimulus, WINDOW, settle=settle)
         found = simulate(as_run(replace(case, model=model), 20e-6), signals=("p_mc",))
         t = found.time - settle
         inside = (t > -1e-9) & (t < WINDOW - 1e-9)
-        turning = np.exp(-2j * math.pi * f * t[inside])
-        values.append(2j * np.mean(found["p_mc"][inside] * turning) / amplitude)
-        if progress is not None:
-            progress((k + 1) / len(frequencies))
+        values.append(amplitudes(t[inside], found["p_mc"][inside], f, 1)[0] / e.amplitude)
     return SineTest(np.array(frequencies, dtype=float), np.array(values))

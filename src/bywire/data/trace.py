@@ -102,6 +102,17 @@ def read_trace(
     return xr.Dataset(signals, coords={"time": time}, attrs={"source": table.path.name})
 
 
+def column_names(path: str | Path) -> tuple[str, ...]:
+    """Return the names of a trace's columns in lower case; its numbers are not looked at.
+
+    Raises
+    ------
+    FileError
+        When the file is no text table.
+    """
+    return tuple(_known(read_table(Path(path))))
+
+
 def _known(table: Table) -> dict[str, _Column]:
     """Return the named columns of the header by their names in lower case."""
     found: dict[str, _Column] = {}

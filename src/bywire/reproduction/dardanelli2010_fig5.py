@@ -157,6 +157,12 @@ def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
             f"pressure above which the width stays below {100 * REMOVED:g} % of the undithered "
             "loop's at mid-height",
         ),
+        compared(
+            f"fig5.i_max.dither{suffix}", facts.FIG5_CURRENT,
+            peak(loops.result.recordings[WITH], "i_filtered"), "<=",
+            "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more ripple "
+            "than the figure has room for",
+        ),
         found(f"fig5.jumps{suffix}", "1", float(stairs.levels.size), f"ending at {levels} bar"),
         found(
             f"fig5.share_stuck{suffix}", "%", 100.0 * values["share_stuck_undithered"],

@@ -8,7 +8,7 @@ import numpy as np
 
 from bywire.analysis.margins import bandwidth
 from bywire.analysis.pressure_loop import BAND, PressureLoop, cancelling_pi
-from bywire.analysis.sine_test import SineTest, sine_test
+from bywire.analysis.sine_test import Excitation, SineTest, sine_test
 from bywire.bench.bench import Result
 from bywire.report.bode import Response, bode
 from bywire.report.step_marks import StepFacts, StepLimits
@@ -110,10 +110,8 @@ def _tracking(result: Result, suffix: str) -> list[Item]:
 
 
 def _closed_loop(name: str, amplitude: float) -> SineTest:
-    return sine_test(
-        parameters(name), "pressure", "p_set",
-        p=P_MEAN, mean=P_MEAN, amplitude=amplitude, frequencies=FREQUENCIES,
-    )  # fmt: skip
+    excitation = Excitation("pressure", "p_set", P_MEAN, P_MEAN, amplitude)
+    return sine_test(parameters(name), excitation, FREQUENCIES)
 
 
 def _linear_loop() -> list[Item]:

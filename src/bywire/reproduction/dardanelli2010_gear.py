@@ -24,7 +24,6 @@ T_RELEASE = 200.0
 """time of the release [s]: slow against every pole, so that the damping takes nothing"""
 MECHANICAL = {
     "E_gear": "gear and screw",
-    "E_seal": "seals and gear, as friction",
     "E_damping": "fluid damping",
     "E_pipeline": "pipeline",
     "E_stored": "stored",

@@ -89,7 +89,9 @@ def _short_stroke() -> list[Item]:
     par = par.replace({"master_cylinder.x_rest": _rest(par)})
     p_end = float(brentq(lambda p: travel_at(p, par) - s_mc, P_NOMINAL, 60e5))
     return [
-        found("short_stroke.s_mc", "mm", 1e3 * s_mc, "with it Table 1 in (15) has Table 2's pole 3"),
+        found(
+            "short_stroke.s_mc", "mm", 1e3 * s_mc, "gives Table 1 in (15) the pole 3 of Table 2"
+        ),
         compared(
             "short_stroke.pole3", facts.TABLE2["pole3"], pole(s_mc), TOLERANCE * wanted,
             "Table 1 with that stroke", tuned="calibrated",

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from bywire.assemblies.motorcycle_trim import travel_at
+from bywire.catalog.registry import entry
+from bywire.report.parameter_rows import parameter_rows
+from bywire.report.tables import parameter_table
 from bywire.reproduction import dardanelli2010_facts as facts
 from bywire.reproduction.dardanelli2010_runs import SETS, Runs, parameters, peak
 from bywire.reproduction.item import Item, compared
@@ -41,4 +44,11 @@ def part(runs: Runs) -> Part:
         "seals' preload T_pr, the motor's winding, the controllers' gains and the pedal map: "
         "these are our choices, marked as such in the catalog."
     )
-    return Part("Table 1: parameters and assumptions", text, tuple(items))
+    appendix = {
+        f"All parameters of {name}": parameter_table(
+            parameter_rows(parameters(name), entry(name).values)
+        )
+        for name in SETS
+    }
+    title = "Table 1: parameters and assumptions"
+    return Part(title, text, tuple(items), appendix=appendix)

@@ -6,7 +6,7 @@ import numpy as np
 
 from bywire.analysis.motorcycle_linear import theoretical
 from bywire.analysis.rational import Rational
-from bywire.analysis.sine_test import SineTest, sine_test
+from bywire.analysis.sine_test import Excitation, SineTest, sine_test
 from bywire.assemblies.motorcycle_trim import holding_current, travel_at
 from bywire.report.bode import Response, bode
 from bywire.reproduction import dardanelli2010_facts as facts
@@ -140,10 +140,8 @@ def _sines(runs: Runs) -> dict[str, SineTest]:
         par = parameters(name)
         step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
         start = step.bench.chosen_options.flat()["p_start"]
-        found_tests[name] = sine_test(
-            par, "current", "i_set", p=start, mean=holding_current(start, par), amplitude=0.1,
-            frequencies=FREQUENCIES,
-        )  # fmt: skip
+        excitation = Excitation("current", "i_set", start, holding_current(start, par), 0.1)
+        found_tests[name] = sine_test(par, excitation, FREQUENCIES)
     return found_tests
 
 

@@ -9,6 +9,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from bywire.bench.bench import Progress
+from bywire.report.tables import Table
 from bywire.reproduction.item import Item
 
 
@@ -37,6 +38,8 @@ class Part:
         Figures.
     recordings
         Runs worth keeping, by the name of their file.
+    appendix
+        Tables that stay folded in the report, by title.
     """
 
     title: str
@@ -44,6 +47,7 @@ class Part:
     items: tuple[Item, ...]
     exhibits: tuple[Exhibit, ...] = ()
     recordings: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    appendix: Mapping[str, Table] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,6 +15,7 @@ from bywire.report.files import write_bytes
 from bywire.report.page import (
     Banner,
     Block,
+    Details,
     FigureBlock,
     Paragraph,
     Section,
@@ -107,6 +108,7 @@ def _page(reproduction: Reproduction, path: Path) -> Path:
         blocks: list[Block] = [Paragraph(part.text)]
         blocks += [FigureBlock(e.figure, e.caption) for e in part.exhibits]
         blocks += [TableBlock(_table(part.items))] if part.items else []
+        blocks += [Details(title, [TableBlock(t)]) for title, t in part.appendix.items()]
         sections.append(Section(part.title, blocks))
     return write_page(
         path,

@@ -80,17 +80,22 @@ static inline int ANY(B m) {
 #define SELECT(m, a, b) ((V)(((I)(a) & (m)) | ((I)(b) & ~(m))))
 #define MAX(a, b) SELECT((a) > (b), a, b)
 #define MIN(a, b) SELECT((a) < (b), a, b)
-static inline V each(double (*f)(double), V a) {
-  for (int l = 0; l < W; ++l) a[l] = f(a[l]);
-  return a;
-}
 #define FLOOR(a) each(floor, a)
 #define SQRT(a) each(sqrt, a)
 #endif
 #endif
 #define FABS(a) ((V)((I)(a) & INT64_MAX))
-static inline V LOG(V a) { for (int l = 0; l < W; ++l) a[l] = log(a[l]); return a; }
-static inline V TAN(V a) { for (int l = 0; l < W; ++l) a[l] = tan(a[l]); return a; }
+#define COPYSIGN(a, b) ((V)(((I)(a) & INT64_MAX) | ((I)(b) & INT64_MIN)))
+/* Rare functions, lane by lane. */
+static inline V each(double (*f)(double), V a) {
+  for (int l = 0; l < W; ++l) a[l] = f(a[l]);
+  return a;
+}
+#define LOG(a) each(log, a)
+#define TAN(a) each(tan, a)
+#define ATAN(a) each(atan, a)
+#define TANH(a) each(tanh, a)
+#define CEIL(a) each(ceil, a)
 static inline V POW(V a, V b) { for (int l = 0; l < W; ++l) a[l] = pow(a[l], b[l]); return a; }
 """
 

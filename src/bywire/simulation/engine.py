@@ -71,7 +71,9 @@ _PREPARED: dict[tuple[object, ...], Prepared] = {}
 def prepare(model: Model, par: ParameterSet) -> Prepared:
     """Return what is built for a model of this structure; the numbers of ``par`` do not matter."""
     structure = tuple(sorted((k, str(v)) for k, v in par.choices().items()))
-    key = (type(model), repr(model), type(par), structure)
+    # Models without fields of their own have no text of their own either, only an address.
+    own = repr(sorted(vars(model).items()))
+    key = (type(model), own, type(par), structure)
     if key not in _PREPARED:
         _PREPARED[key] = Prepared(model, par)
     return _PREPARED[key]

@@ -21,7 +21,14 @@ from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.engine import prepare
 from bywire.simulation.native import plan_array, pointer
 from bywire.simulation.program import Program
-from bywire.simulation.run import Run, initial_vector, simulate
+from bywire.simulation.run import (
+    Run,
+    initial_vector,
+    require_finite,
+    sampled_stimulus,
+    selected,
+    simulate,
+)
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import build_stages
 
@@ -129,7 +136,9 @@ def simulate_ensemble(
     Raises
     ------
     UnknownNameError
-        When a parameter is unknown.
+        When a parameter or a signal is unknown.
+    SolverError
+        When a trajectory leaves the numbers.
     ParameterError
         When a value is out of range, lengths differ, or a sample time varies.
     """
@@ -140,8 +149,8 @@ def simulate_ensemble(
         return _one_by_one(run, variations, matrix.shape[1], tuple(signals))
     kernel = _lane_kernel(program, compiler)
     schedule, outputs = run.schedule(), tuple(program.outputs)
-    stimulus = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
-    selection = np.array([outputs.index(s) for s in signals], dtype=np.int32)
+    stimulus = sampled_stimulus(run, schedule)
+    selection = selected(outputs, signals)
     count = matrix.shape[1]
     padded = -(-count // kernel.lanes) * kernel.lanes
     values = np.empty((padded, schedule.rows, len(signals)))
@@ -154,6 +163,8 @@ def simulate_ensemble(
         # Lanes beyond the last case repeat it.
         columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
         kernel.run(schedule, columns, stimulus, vector, selection, values[cases[0] : cases[-1] + 1])
+        last = min(cases[-1], count - 1)
+        require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:

@@ -10,6 +10,7 @@ from bywire.simulation.graph import Graph, Node
 Namer = Callable[[Node], str]
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*"}
+_LIBRARY = ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")
 OWN = frozenset({"exp", "log", "sin", "cos"})  # costly functions
 
 
@@ -43,7 +44,7 @@ class Dialect:
 PLAIN_C = Dialect(
     calls={
         **{op: f"bw_{op}" for op in OWN},
-        **{op: op for op in ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")},
+        **{op: op for op in _LIBRARY},
         "pow": "pow",
         "constpow": "pow",
     },
@@ -65,7 +66,7 @@ PLAIN_C = Dialect(
 
 VECTOR_C = Dialect(
     calls={
-        **{op: op.upper() for op in (*OWN, "sqrt", "fabs", "floor", "tan", "pow")},
+        **{op: op.upper() for op in (*OWN, *_LIBRARY, "pow")},
         "constpow": "POW",
     },
     select="SELECT({c}, {a}, {b})",

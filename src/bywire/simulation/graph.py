@@ -291,6 +291,12 @@ class Graph:
             return self.apply("sub", operation.args[1], operation.args[0])
         return None
 
+    def _sign(self, a: Node) -> Node:
+        zero, one = self.constant(0.0), self.constant(1.0)
+        above = self.apply("if_else_zero", self.apply("lt", zero, a), one)
+        below = self.apply("if_else_zero", self.apply("lt", a, zero), one)
+        return self.apply("sub", above, below)
+
     def _fmax(self, a: Node, b: Node) -> Node | None:
         first, second = self._intervals[a], self._intervals[b]
         return a if first.low >= second.high else b if second.low >= first.high else None

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import SolverError
+from bywire.core.errors import ParameterError, SolverError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.emission import Layout
@@ -121,6 +121,10 @@ def simulate(
         When steps and sample times do not divide each other.
     SolverError
         When the trajectory leaves the numbers.
+    ParameterError
+        When the stimulus is not finite.
+    UnknownNameError
+        When a signal is unknown.
     """
     prepared = prepare(run.model, run.par)
     chosen = prepared.engine(engine)
@@ -130,8 +134,8 @@ def simulate(
     request = Request(
         schedule=schedule,
         parameters=np.array(list(run.par.leaves().values())),
-        stimulus=np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64),
-        selection=np.array([names.index(s) for s in wanted], dtype=np.int32),
+        stimulus=sampled_stimulus(run, schedule),
+        selection=selected(names, wanted),
     )
     vector = initial_vector(chosen.layout, run.state, run.memory)
     values = np.empty((schedule.rows, len(wanted)))
@@ -161,26 +165,66 @@ def _advance_all(
     begin, size = 0, 16 * schedule.record_frames
     while begin < schedule.frames:
         end = min(begin + size, schedule.frames)
-        started = time.perf_counter()
+        started, saved = time.perf_counter(), vector.copy()
         row = -(-begin // schedule.record_frames)
         try:
             engine.advance(request, vector, begin, end, values[row:])
         except KeyboardInterrupt:
+            vector[:] = saved
             return begin
-        _require_finite(engine.layout, vector, end * schedule.frame)
-        if progress is not None:
-            progress(end / schedule.frames)
+        require_finite(engine.layout, vector, f"the run left the numbers before t = "
+                       f"{end * schedule.frame:g} s")  # fmt: skip
+        begin = end
+        try:
+            if progress is not None:
+                progress(end / schedule.frames)
+        except KeyboardInterrupt:
+            return begin
         elapsed = max(time.perf_counter() - started, 1e-9)
         factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
         size = max(int(size * factor) // schedule.record_frames, 1) * schedule.record_frames
-        begin = end
     return begin
 
 
-def _require_finite(layout: Layout, vector: Array, t: float) -> None:
-    x = vector[: layout.length["x"]]
-    if not np.all(np.isfinite(x)):
+def require_finite(layout: Layout, vector: Array, what: str) -> None:
+    """Raise ``SolverError`` unless all that a run, or several, carry on are numbers.
+
+    Not the states alone: a friction whose force is no number would pass for one that sticks.
+    """
+    if not np.all(np.isfinite(vector[: layout.start["counters"]])):
         raise SolverError(
-            f"the run left the numbers before t = {t:g} s: look for a parameter far from its "
-            "usual magnitude, or take a smaller step"
+            f"{what}: look for a parameter far from its usual magnitude, or take a smaller step"
         )
+
+
+def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
+    """Return the rows of the stimulus that a run needs, shape (rows, nu).
+
+    Raises
+    ------
+    ParameterError
+        When one of them is not finite.
+    """
+    rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
+    holes = np.argwhere(~np.isfinite(rows))
+    if holes.size:
+        row, signal = holes[0]
+        raise ParameterError(
+            f"the stimulus {run.model.Stimulus._fields[signal]} is {rows[row, signal]} at "
+            f"t = {schedule.stimulus_times[row]:g} s: it must be finite all through the run"
+        )
+    return rows
+
+
+def selected(names: Sequence[str], signals: Sequence[str]) -> NDArray[np.int32]:
+    """Return the indices of signals among the outputs' names.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    for signal in signals:
+        if signal not in names:
+            raise unknown_name("signal", signal, names)
+    return np.array([names.index(s) for s in signals], dtype=np.int32)

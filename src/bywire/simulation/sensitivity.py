@@ -17,7 +17,14 @@ from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import prepare
 from bywire.simulation.native import plan_array, pointer
 from bywire.simulation.program import Program
-from bywire.simulation.run import Run, Trajectory, initial_vector
+from bywire.simulation.run import (
+    Run,
+    Trajectory,
+    initial_vector,
+    require_finite,
+    sampled_stimulus,
+    selected,
+)
 from bywire.simulation.stages import build_stages
 
 Array = NDArray[np.float64]
@@ -90,7 +97,9 @@ def simulate_with_sensitivities(
     Raises
     ------
     UnknownNameError
-        When a parameter is unknown.
+        When a parameter or a signal is unknown.
+    SolverError
+        When the trajectory leaves the numbers.
     CompilerError
         When there is no compiler.
     """
@@ -104,9 +113,9 @@ def simulate_with_sensitivities(
         raise CompilerError("sensitivities need a C compiler: install the extra bywire[compiler]")
     kernel = _tangent_kernel(prepared.program, tuple(names.index(p) for p in parameters), compiler)
     schedule = run.schedule()
-    stimulus = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
+    stimulus = sampled_stimulus(run, schedule)
     outputs = tuple(prepared.program.outputs)
-    selection = np.array([outputs.index(s) for s in signals], dtype=np.int32)
+    selection = selected(outputs, signals)
     plan = plan_array(schedule, 0, schedule.frames, selection.size)
     values = np.empty((schedule.rows, selection.size))
     count = len(parameters)
@@ -123,6 +132,7 @@ def simulate_with_sensitivities(
         kernel.run(
             (p, stimulus, vector, plan, selection, values, seeds, tangents, rec_t), schedule.step
         )
+        require_finite(kernel.layout, vector, "the run left the numbers")
         derivatives[:, :, first : first + here] = rec_t[:, :, :here]
     counters = vector[kernel.layout.start["counters"] :]
     trajectory = Trajectory(

@@ -17,12 +17,13 @@ from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.control import pedal_map
-from bywire.core.errors import FileError
+from bywire.core.errors import FileError, quoted
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
-from bywire.data.trace import read_trace
+from bywire.data.trace import column_names, read_trace
 from bywire.plant import pedal
 
+_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the best one first
 # Built-in ride: pedal travel [mm] over time [s], our choice: three pulls of rising haste, a
 # modulated one, and a hold; the map makes 5 to 30 bar of it, the range of Fig. 7b.
 _TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
@@ -90,14 +91,17 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
         travel = PchipInterpolator(_TIMES, np.array(_TRAVELS) * 1e-3)(times)
         ride = xr.Dataset({"pedal": ("time", travel)}, coords={"time": times})
     else:
-        ride = read_trace(options.trace, max_gap=max(options.max_gap, 1e-9))
-    if "pressure" in ride or "force" in ride:
-        return ride
+        names = column_names(options.trace)
+        chosen = next((name for name in _COLUMNS if name in names), None)
+        if chosen is None:
+            raise FileError(
+                f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
+                "force [N] or pressure [bar]: rename the one that the brake shall follow"
+            )
+        wanted = {chosen: _COLUMNS[chosen]}
+        ride = read_trace(options.trace, wanted, max_gap=max(options.max_gap, 1e-9))
     if "pedal" not in ride:
-        raise FileError(
-            f"{options.trace}: none of its columns ({', '.join(map(str, ride))}) is pedal [mm], "
-            "force [N] or pressure [bar]: rename the one that the brake shall follow"
-        )
+        return ride
     return ride.assign(force=pedal.force_at(ride["pedal"], par.pedal))  # type: ignore[arg-type]
 
 

@@ -1,0 +1,107 @@
+"""Single runs, ensembles and sensitivities against hand-written C."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from functools import partial
+from statistics import median
+
+import numpy as np
+
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.benchmark.peers.hand_c import THREADS, HandWritten
+from bywire.benchmark.peers.problem import braking_run, hard_braking
+from bywire.benchmark.result import Result, at_least, at_most, vector_doubles
+from bywire.simulation.ensemble import case_matrix, simulate_ensemble
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+CASES = 1024
+VARIED = ("motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "caliper.K_pd", "fluid.beta")
+DIRECTIONS = (
+    "motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "caliper.K_pd", "fluid.beta",
+    "gear.J_mot", "pipeline.d_pl",
+)  # fmt: skip
+_ROUNDS, _ENSEMBLE_ROUNDS = 60, 7
+Work = Callable[[], float]
+
+
+def interleaved(works: dict[str, Work], rounds: int) -> dict[str, list[float]]:
+    """Run pieces of work in turn and return their seconds; each returns its own."""
+    for work in works.values():
+        work()  # warm
+    seconds: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(rounds):
+        for name, work in works.items():
+            seconds[name].append(work())
+    return seconds
+
+
+def ratio(seconds: dict[str, list[float]], over: str, under: str) -> float:
+    """Return the median of the ratios of neighbors: the machine's drift cancels."""
+    return median(a / b for a, b in zip(seconds[over], seconds[under], strict=True))
+
+
+def timed(work: Callable[[], object]) -> Work:
+    """Return work that tells its seconds."""
+
+    def measured() -> float:
+        begin = time.perf_counter()
+        work()
+        return time.perf_counter() - begin
+
+    return measured
+
+
+def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
+    """Measure one hard-braking run against hand-written C, and the price of eight tangents."""
+    run = braking_run(par, hard_braking)
+    hand = HandWritten(par).single(run)
+    seconds = interleaved(
+        {
+            "bywire": timed(partial(simulate, run)),
+            "hand": hand,
+            "tangents": timed(
+                partial(simulate_with_sensitivities, run, DIRECTIONS, ("p_mc", "omega"))
+            ),
+        },
+        _ROUNDS,
+    )
+    plain = median(seconds["bywire"])
+    return [
+        at_most("single.hand_c", ratio(seconds, "bywire", "hand"), 1.0, "ratio",
+                "one hard-braking run of 1.2 s, all outputs, over hand-written C, both -O2"),
+        Result("single.realtime_factor", run.duration / plain, "1", note="simulated over wall time"),
+        at_most("sensitivities.plain", ratio(seconds, "tangents", "bywire"), 4.5, "ratio",
+                "eight directions with the value over a plain run"),
+    ]  # fmt: skip
+
+
+def ensemble(par: MotorcycleParameters) -> list[Result]:
+    """Measure 1,024 variations on all cores against scalar C with OpenMP."""
+    run = braking_run(par, hard_braking)
+    signals = ("p_mc", "i", "stuck")
+    draw = np.random.default_rng(0)
+    leaves = par.leaves()
+    variations = {n: leaves[n] * draw.uniform(0.9, 1.1, CASES) for n in VARIED}
+    opponent = _hand_ensemble(run, variations, signals)
+    seconds = interleaved(
+        {
+            "bywire": timed(partial(simulate_ensemble, run, variations, signals)),
+            "hand": opponent,
+        },
+        _ENSEMBLE_ROUNDS,
+    )
+    width = vector_doubles()
+    return [
+        at_least("ensemble.hand_c", ratio(seconds, "hand", "bywire"), 0.7 * width, "times faster",
+                 f"{CASES} variations of {len(VARIED)} parameters, all cores, over scalar C with "
+                 f"OpenMP; 0.7 of the vector width, {width} doubles"),
+    ]  # fmt: skip
+
+
+def _hand_ensemble(run: Run, variations: dict[str, np.ndarray], signals: tuple[str, ...]) -> Work:
+    matrix, names = case_matrix(run, variations), list(run.par.leaves())
+    cases = [run.par.with_leaves(dict(zip(names, column, strict=True))) for column in matrix.T]
+    return HandWritten(run.par, THREADS).ensemble(run, cases, signals)

@@ -1,0 +1,175 @@
+"""Acceptance: Dardanelli, Alli, Savaresi (2010), table by table and figure by figure."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bywire.reproduction.dardanelli2010 import PARTS, reproduce
+from bywire.reproduction.reproduction import Reproduction
+from bywire.reproduction.results import as_json, write
+
+Items = Mapping[str, dict[str, Any]]
+TABLE2 = {"K": 10.1, "zero": 160.0, "pole1": 0.866, "pole2": 9.75, "pole3": 4.7e4}
+REQUIRED = {
+    *(f"table2.{key}{suffix}" for key in TABLE2 for suffix in ("", "@table1")),
+    "table1.x_mc", "table1.Re",
+    *(f"table3.{key}" for key in ("k_brk_p", "f_cfr_p", "c", "mu_T", "f_cfr_n", "k_brk_n")),
+    *(
+        f"table4.{region}.{key}"
+        for region in ("low", "medium", "high")
+        for key in ("K", "zero", "T1", "T2", "T_L")
+    ),
+    "fig3.bandwidth", "fig3.bandwidth.free", "fig3.overshoot", "fig3.rise_time",
+    "fig4.top_tick",
+    *(
+        f"fig5.{key}{suffix}"
+        for key in (
+            "p_max", "p_max.dither", "loop_area_ratio", "removed_above", "jumps", "share_stuck"
+        )
+        for suffix in ("", "@table1")
+    ),
+    *(f"dither.{wave}.thd" for wave in ("sine", "square", "triangle")),
+    "fig6.peak", "fig6.change", "fig6.change.theoretical",
+    *(
+        f"fig7.{key}{suffix}"
+        for key in ("overshoot", "steady_state_error", "rise_time", "bandwidth")
+        for suffix in ("", "@table1")
+    ),
+    "fig7.phase_margin", "fig7.phase_margin.pi", "fig7.crossover", "fig7b.lag",
+}  # fmt: skip
+DISAGREEMENTS = {
+    *(f"table2.{key}@table1" for key in TABLE2),  # Table 1 in (15) is not Table 2
+    *(f"calibrated.{name}" for name in ("A_mc", "J_mot", "K_pd", "d_pl")),  # what repairs it
+    "short_stroke.p_end",  # the stroke alone cannot
+    "laminar.coefficient",  # 32 against 8
+    "gear.returned.paper",  # the gear gains energy
+    "table4.medium.K", "table4.medium.K@table1",  # dithered gain
+    "table4.air",  # order of the slow pair
+    "fig4.top_tick",  # breakaway at 40 bar
+    "section3.mu",  # mu_F against mu_T
+    "fig5.loop_area_ratio", "fig5.removed_above",  # "totally removed"
+    "fig7.bandwidth", "fig7.bandwidth@table1",  # 10 Hz
+}  # fmt: skip
+STAGES: list[tuple[str, float]] = []
+
+
+@pytest.fixture(scope="module")
+def reproduction() -> Reproduction:
+    return reproduce(lambda label, share: STAGES.append((label, share)))
+
+
+@pytest.fixture(scope="module")
+def items(reproduction: Reproduction) -> Items:
+    return by_id(as_json(reproduction)["items"])
+
+
+def by_id(listed: Iterable[dict[str, Any]]) -> Items:
+    found = {item["id"]: item for item in listed}
+    return found
+
+
+def flaws(items: Items) -> list[str]:
+    """Return everything that the acceptance of this source does not admit."""
+    wrong = [f"{name} is missing" for name in sorted(REQUIRED - items.keys())]
+    wrong += [
+        f"{name} is not flagged"
+        for name in sorted(DISAGREEMENTS)
+        if name not in items or items[name]["agrees"] is not False
+    ]
+    wrong += [
+        f"{name} computes nothing"
+        for name, item in items.items()
+        if item["computed"] is None and not name.endswith((".zero", ".T_L"))
+    ]
+    for key, value in TABLE2.items():
+        item = items.get(f"table2.{key}")
+        if item is None:
+            continue
+        if item["agrees"] is not None or "calibrated" not in item["note"]:
+            wrong.append(f"table2.{key} counts as evidence")
+        if abs(item["computed"] / value - 1.0) > 5e-3:
+            wrong.append(f"table2.{key} is off")
+    return wrong
+
+
+def test_every_required_statement_is_there_and_every_disagreement_flagged(items: Items) -> None:
+    assert flaws(items) == []
+
+
+def test_identifiers_are_unique(reproduction: Reproduction) -> None:
+    names = [item.id for item in reproduction.items]
+    assert len(names) == len(set(names))
+
+
+def test_the_gate_can_fail(items: Items) -> None:
+    """Each kind of flaw is found when it is made."""
+    for change, expected in (
+        (lambda d: d.pop("fig7.bandwidth@table1"), "fig7.bandwidth@table1 is missing"),
+        (lambda d: d["gear.returned.paper"].update(agrees=True), "gear.returned.paper is not"),
+        (lambda d: d["table2.K"].update(computed=10.2), "table2.K is off"),
+        (lambda d: d["table2.zero"].update(agrees=True), "table2.zero counts"),
+        (lambda d: d["fig5.p_max"].update(computed=None), "fig5.p_max computes nothing"),
+    ):
+        spoiled = copy.deepcopy(dict(items))
+        change(spoiled)
+        assert any(flaw.startswith(expected) for flaw in flaws(spoiled))
+
+
+def test_numbers_that_follow_from_the_printed_ones(items: Items) -> None:
+    expected = {
+        "table2.K@table1": (7.60, 1e-3),
+        "table2.zero@table1": (88.9, 1e-3),
+        "fig4.top_tick": (2.6 * (2e-3 + 1.6e-8 * 40e5), 1e-9),
+        "section3.mu": (2e-7 / 3e-4, 1e-9),
+        "laminar.coefficient": (8.0, 1e-9),
+        "short_stroke.s_mc": (8.42, 1e-3),
+        "short_stroke.p_end": (39.0, 5e-3),
+        "table4.medium.step_peak": (3.76, 2e-3),
+        "table4.medium.step_peak_time": (0.72, 1e-2),
+        "table4.medium.step_final": (3.57, 1e-9),
+        "gear.stored.pads@table1": (0.616, 1e-3),
+        "fig7.phase_margin": (64.0, 0.02),
+    }
+    for name, (value, tolerance) in expected.items():
+        assert items[name]["computed"] == pytest.approx(value, rel=tolerance), name
+
+
+def test_gear_gains_by_eq_8_and_never_by_the_directional_law(items: Items) -> None:
+    for suffix in ("", "@table1"):
+        gain = items[f"gear.returned.paper{suffix}"]
+        assert gain["computed"] / gain["stated"] == pytest.approx(1.0 / 0.9, rel=3e-3)
+        loss = items[f"gear.returned.directional{suffix}"]
+        assert loss["computed"] / loss["stated"] == pytest.approx(2.0 - 1.0 / 0.9, rel=3e-3)
+        assert loss["agrees"] is True
+
+
+def test_figures_and_requirements(items: Items) -> None:
+    """What the nonlinear brake shows, within the scatter of what the paper leaves open."""
+    assert items["fig5.jumps"]["computed"] in (6, 7)
+    assert 80.0 < items["fig5.share_stuck"]["computed"] < 95.0
+    assert items["fig5.loop_area_ratio.slow"]["agrees"] is True
+    assert items["fig7.overshoot"]["agrees"] is True
+    assert items["fig7.steady_state_error"]["agrees"] is True
+    assert items["fig7.phase_margin"]["agrees"] is True
+    assert items["fig7.hunting"]["computed"] > 1.0
+    assert 2.0 < items["fig7.bandwidth"]["computed"] < 5.0
+    assert items["fig3.bandwidth"]["computed"] == pytest.approx(100.0, abs=5.0)
+
+
+def test_report_shows_every_figure_and_progress_every_part(
+    reproduction: Reproduction, tmp_path: Path
+) -> None:
+    names = {exhibit.name for exhibit in reproduction.figures}
+    assert names >= {"fig3", "fig4", "fig5", "fig6", "fig7a", "fig7b", "table2-bode"}
+    paths = write(reproduction, tmp_path)
+    html = paths[0].read_text(encoding="utf-8")
+    assert html.count("<figcaption>Figure") == len(reproduction.figures)
+    assert json.loads(paths[1].read_text()) == as_json(reproduction)
+    assert {p.suffix for p in paths[2:]} == {".nc"}
+    assert [label for label, share in STAGES if share == 1.0] == list(PARTS)

@@ -1,0 +1,142 @@
+"""Linear models of the sampled loops against simulations that share nothing with them."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.signal import cont2discrete
+
+from bywire.analysis.closed_loop import closed_loop
+from bywire.analysis.current_loop import current_loop
+from bywire.analysis.pressure_loop import PressureLoop, cancelling_pi
+from bywire.analysis.rational import first_orders
+from bywire.analysis.sine_test import Excitation, SineTest, sine_test
+from bywire.assemblies.motorcycle_brake import MotorcycleBrake
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_trim import memory_at, state_at
+from bywire.bench.bench import as_run
+from bywire.bench.motorcycle_case import case_from_rest
+from bywire.catalog.registry import entry
+from bywire.control import current_pi, low_pass_2, pressure_pid
+from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.signals import zeros
+from bywire.simulation.run import simulate
+
+MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))
+FRICTIONLESS = {
+    "seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "seal.mu_T": 0.0,
+    "ecu.dither.waveform": "off", "adc.law": "ideal",
+}  # fmt: skip
+
+
+def brake(**changes: Any) -> MotorcycleParameters:
+    found = entry("dardanelli2010").parameters().replace(changes)
+    assert isinstance(found, MotorcycleParameters)
+    return found
+
+
+@pytest.mark.parametrize("rotor", ["locked", "free"])
+def test_current_loop_is_that_of_the_simulation(rotor: Any) -> None:
+    """A small step of the set point, tick by tick."""
+    lock = {"seal.T_pr": 10.0, "adc.law": "ideal"}
+    par = brake(**(lock if rotor == "locked" else FRICTIONLESS))
+    height, p = 0.01, 20e5
+    hold = memory_at(p, par).i_source
+    case = case_from_rest(
+        "step", par, "current-direct", p, lambda t: {"i_set": hold + height * (t >= -1e-9)}, 0.05
+    )
+    run = simulate(as_run(case, 5e-6), signals=("i",))
+    loop = current_loop(par, p, rotor)
+    z, expected = np.zeros(len(loop.states)), []
+    for _ in run.time:
+        expected.append(float((loop.C @ z)[0] + loop.D[0, 0]))
+        z = loop.A @ z + loop.B[:, 0]
+    assert np.max(np.abs((run["i"] - hold) / height - expected)) < 2e-3
+    assert max(expected) > 0.9
+
+
+def test_closed_pressure_loop_is_that_of_sine_tests() -> None:
+    """Without friction the nonlinear brake is nearly linear: one model checks the other."""
+    par = brake(**FRICTIONLESS)
+    own = par.replace({"drive.mode": "pressure"})
+    assert isinstance(own, MotorcycleParameters)
+    p = 20e5
+    linear = closed_loop(
+        MotorcycleBrake(), own, state_at(p, own), memory_at(p, own),
+        inputs=("p_set",), outputs=("p_mc",),
+    )  # fmt: skip
+    f = (0.5, 2.0, 10.0)
+    measured = sine_test(par, Excitation("pressure", "p_set", p, p, 1e4), f, settle=2.0)
+    expected = linear.response(np.array(f))[:, 0, 0]
+    np.testing.assert_allclose(measured.values, expected, rtol=2e-3)
+
+
+def test_pressure_loop_is_that_of_a_simulation_of_its_chain() -> None:
+    """Sine of 4 Hz through the laws on floats and a discretized motor, brake and filter."""
+    par, f, count = brake(), 4.0, 4000
+    T, ecu = par.ecu.T_s, par.ecu
+    loop = PressureLoop(par, MEDIUM, p=25e5)
+    drive = par.supply.V_bat - 2.0 * par.supply.R_bat * memory_at(25e5, par).duty * (
+        memory_at(25e5, par).i_source
+    )
+    plant = _chain(par, drive, T)
+    x = np.zeros(plant[0].shape[0])
+    pid, pi, low = zeros(pressure_pid.State), zeros(current_pi.State), zeros(low_pass_2.State)
+    demand, pressure = 1e3 * np.sin(2.0 * math.pi * f * T * np.arange(count)), np.zeros(count)
+    for k in range(count):
+        i_meas, pressure[k], p_meas = plant[2] @ x
+        signals = pressure_pid.Input(p_ref=float(demand[k]), p_meas=float(p_meas))
+        pid, wanted = pressure_pid.output(pid, signals, T, ecu.pressure)
+        low, smooth = low_pass_2.output(low, wanted.i, T, ecu.filter)
+        pi, out = current_pi.output(pi, current_pi.Input(smooth.y, float(i_meas)), T, ecu.current)
+        x = plant[0] @ x + plant[1][:, 0] * out.duty
+    last = slice(count - 1000, count)
+    turning = np.exp(-2j * math.pi * f * T * np.arange(count)[last])
+    got = np.mean(pressure[last] * turning) / np.mean(demand[last] * turning)
+    assert got == pytest.approx(complex(loop.closed(np.array([f]))[0]), rel=1e-3)
+
+
+def _chain(par: MotorcycleParameters, volts: float, T: float) -> tuple[Any, ...]:
+    """Return the sampled chain from duty to measured current, pressure, measured pressure."""
+    m, w = par.motor, 2.0 * math.pi * par.anti_alias.f_aa
+    R = m.R_m + par.supply.R_bat * memory_at(25e5, par).duty ** 2
+    s = np.array(MEDIUM.den) / MEDIUM.den[0]
+    b = np.array([0.0, 0.0, *MEDIUM.num]) / MEDIUM.den[0]
+    A, B, C = np.zeros((6, 6)), np.zeros((6, 1)), np.zeros((3, 6))
+    A[0, 0], B[0, 0] = -R / m.L_m, volts / m.L_m  # current
+    A[1, :2] = w, -w  # measured current
+    A[2, 0], A[2, 2:5], A[3, 2], A[4, 3] = 1.0, -s[1:], 1.0, 1.0  # brake
+    A[5, 2:5], A[5, 5] = w * b[1:], -w  # measured pressure
+    C[0, 1], C[1, 2:5], C[2, 5] = 1.0, b[1:], 1.0
+    return cont2discrete((A, B, C, np.zeros((3, 1))), T)[:3]
+
+
+def test_pid_and_pi_have_their_known_margins() -> None:
+    loop = PressureLoop(brake(), MEDIUM)
+    pid = loop.margin()
+    assert pid.crossover == pytest.approx(10.0, abs=0.2)
+    assert pid.phase == pytest.approx(64.0, abs=1.0)
+    pi = cancelling_pi(loop, 1.0 / (2.0 * math.pi * 1.25), 10.0).margin()
+    assert pi.crossover == pytest.approx(10.0, rel=1e-6)
+    assert pi.phase == pytest.approx(16.0, abs=1.0)
+
+
+def test_bandwidth_of_a_sine_test_is_interpolated() -> None:
+    f = np.array([0.25, 1.0, 4.0, 6.0, 30.0])
+    lag = SineTest(f, 1.0 / (1.0 + 1j * f / 5.0))
+    assert lag.bandwidth(of=1.0) == pytest.approx(5.0, rel=0.01)
+    slope = SineTest(f, (2.0 / f).astype(complex))
+    assert slope.bandwidth(of=1.0) == pytest.approx(2.0 * math.sqrt(2.0), rel=1e-12)
+    assert math.isnan(SineTest(f, np.ones(5, dtype=complex)).bandwidth())
+
+
+def test_refusals() -> None:
+    with pytest.raises(ParameterError, match="no multiple"):
+        sine_test(brake(), Excitation("pressure", "p_set", 20e5, 20e5, 1e5), (0.3,))
+    par = brake(**{"drive.mode": "pressure"})
+    with pytest.raises(UnknownNameError, match="p_sett"):
+        closed_loop(
+            MotorcycleBrake(), par, state_at(20e5, par), memory_at(20e5, par),
+            inputs=("p_sett",), outputs=("p_mc",),
+        )  # fmt: skip

@@ -1,0 +1,129 @@
+"""Ctrl-C: status 130, no traceback, and what was finished is kept."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from command_line import LONG, SCRIPT, Outcome, no_half_files
+
+import bywire as package
+from bywire.bench.bench import run
+from bywire.simulation.virtual_machine import VirtualMachine
+
+posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+
+
+def interrupted(wait_for: Path, pause: float, *arguments: str | Path) -> Outcome:
+    """Start a run without a compiler, and interrupt it a while after a file has appeared."""
+    with subprocess.Popen(
+        [str(SCRIPT), "run", *map(str, arguments)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        env={**os.environ, "BYWIRE_CC": "none"},
+    ) as running:
+        give_up = time.monotonic() + 30.0
+        while not wait_for.exists() and time.monotonic() < give_up:
+            time.sleep(0.02)
+        time.sleep(pause)
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate(timeout=30)
+        return Outcome(running.returncode, out, err)
+
+
+@posix
+@pytest.mark.parametrize("pause", [0.0, 2.5], ids=["while it is set up", "while it runs"])
+def test_interrupt_ends_with_130(bench, tmp_path, pause):
+    out = tmp_path / "out"
+    outcome = interrupted(out, pause, bench(LONG), "--out", out, "--json")
+    assert outcome.status == 130
+    assert "Traceback" not in outcome.err
+    assert "bywire: interrupted" in outcome.lines[-1]
+    no_half_files(tmp_path)
+    if outcome.out:
+        assert outcome.object["status"] == "interrupted"
+        assert outcome.object["kpis"] == {}
+    for path in out.glob("*.nc"):
+        assert package.read_recording(path).attrs["status"] == "interrupted"
+
+
+class InterruptedMachine(VirtualMachine):
+    """A virtual machine in which Ctrl-C arrives in a given chunk."""
+
+    calls, last = 0, 3
+
+    def advance(self, *arguments):
+        """Run the chunk, or be interrupted in the midst of it."""
+        type(self).calls += 1
+        if self.calls > self.last:
+            raise KeyboardInterrupt
+        super().advance(*arguments)
+
+
+@pytest.fixture
+def machine(monkeypatch):
+    """Put the interrupted machine in place of the real one."""
+    monkeypatch.setattr("bywire.simulation.engine._PREPARED", {})
+    monkeypatch.setattr("bywire.simulation.engine.VirtualMachine", InterruptedMachine)
+    monkeypatch.setattr("bywire.simulation.engine.find_compiler", lambda: None)
+    monkeypatch.setattr("bywire.simulation.engine._warn_once", lambda: None)
+    monkeypatch.setattr(InterruptedMachine, "calls", 0)
+    return InterruptedMachine
+
+
+def test_partial_recording_is_kept(bywire, bench, tmp_path, machine):
+    out = tmp_path / "out"
+    outcome = bywire("run", bench(LONG), "--out", out, "--json")
+    assert outcome.status == 130
+    assert outcome.lines == [f"bywire: interrupted; what was finished is in {out}"]
+    assert outcome.object["status"] == "interrupted"
+    assert sorted(p.name for p in out.iterdir()) == ["result.json", "without-dither.nc"]
+    assert sorted(outcome.object["files"]) == sorted(map(str, out.iterdir()))
+    assert json.loads((out / "result.json").read_text())["status"] == "interrupted"
+    recording = package.read_recording(out / "without-dither.nc")
+    assert recording.attrs["status"] == "interrupted"
+    assert recording.sizes["time"] > 16
+    assert "i_filtered" in recording
+    no_half_files(tmp_path)
+
+
+@pytest.mark.parametrize("last", [0, 1])
+def test_interrupt_before_anything_is_recorded(bywire, bench, tmp_path, machine, monkeypatch, last):
+    monkeypatch.setattr(machine, "last", last)
+    text = LONG.replace("friction-ramp", "hard-braking").replace('slope = "0.005 A/s"', "")
+    outcome = bywire("run", bench(text), "--out", tmp_path / "out")
+    assert outcome.status == 130
+    assert "Traceback" not in outcome.err
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["result.json"]
+
+
+def test_finished_runs_are_kept_when_the_next_one_is_interrupted(machine, monkeypatch, bench):
+    text = LONG.replace("0.005 A/s", "20 A/s").replace("10 ms", "1 ms")
+    monkeypatch.setattr(machine, "last", 10**9)
+
+    def stop_at_the_second(label: str, share: float) -> None:
+        if label == "with-dither":
+            raise KeyboardInterrupt
+
+    result = run(package.load(bench(text)), stop_at_the_second)
+    assert result.status == "interrupted"
+    assert list(result.recordings) == ["without-dither"]
+    assert result.recordings["without-dither"].attrs["status"] == "done"
+
+
+def test_interrupt_while_the_results_are_written(bywire, bench, tmp_path, monkeypatch):
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bywire.report.bench_report.save_figure", stopped)
+    text = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'
+    outcome = bywire("run", bench(text), "--out", tmp_path / "out")
+    assert (outcome.status, outcome.lines) == (130, ["bywire: interrupted"])
+    assert [p.name for p in (tmp_path / "out").iterdir()] == ["curve.nc"]

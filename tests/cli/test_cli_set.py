@@ -1,0 +1,95 @@
+"""Changes of a bench from the command line."""
+
+from __future__ import annotations
+
+import pytest
+from command_line import BRAKING, OPEN_LOOP, QUICK, refused
+
+import bywire as package
+
+
+@pytest.mark.parametrize(
+    ("change", "texts"),
+    [
+        ("options.p_to", ["--set options.p_to", "KEY=VALUE"]),
+        ("=3", ["--set =3", "KEY=VALUE"]),
+        ("options.p_to=", ["--set options.p_to=", "KEY=VALUE"]),
+        ("", ["KEY=VALUE"]),
+        ("p_to=30bar", ["unknown parameter 'p_to'", "'options.p_to'"]),
+        ("options.p_too=30bar", ["unknown option of hard-braking 'p_too'", "'p_to'"]),
+        ("option.p_to=30bar", ["unknown section 'option'", "'options'"]),
+        ("options=3", ["options is a section", "options.NAME=VALUE"]),
+        ("options.p_to.x=3", ["unknown option of hard-braking 'p_to.x'", "'p_to'"]),
+        ("motor.R_n=0.4ohm", ["unknown parameter 'motor.R_n'", "'motor.R_m'"]),
+        ("motor.R_m=0.4", ["a pure number cannot be ohm", "'1.5 ohm'"]),
+        ("motor.R_m=9bar", ["bar cannot be ohm"]),
+        ("motor.R_m=-1ohm", ["motor.R_m = -1.0 ohm", "> 0 ohm"]),
+        ("motor.R_m=nan", ["is not a quantity"]),
+        ("simulation.stepp=1us", ["unknown key in [simulation] 'stepp'", "'step'"]),
+        ("simulation.step=1e-30s", [">= 1e-09 s"]),
+        ("simulation.seed=x", ["simulation.seed = 'x'", "whole number"]),
+        ("simulation.seed=" + "9" * 5000, ["simulation.seed = ", "whole number"]),
+        ("requirements.overshot=<= 1 %", ["unknown KPI", "'overshoot'"]),
+        ("requirements.overshoot=1 %", ["write for instance '<= 15 %'"]),
+        ("requirements.overshoot<=1 %", ["unknown KPI", "'overshoot'"]),
+        ("experiment=hard-breaking", ["unknown experiment", "'hard-braking'"]),
+        ("parameters=dardaneli", ["unknown parameter set", "'dardanelli2010'"]),
+        ("assembly=wedge", ["assembly = 'wedge'", "motorcycle-brake"]),
+        ("stimulus.kind=step", ["brings its own stimulus"]),
+        ("gear.law=papr", ["gear.law", "did you mean 'paper'?"]),
+    ],
+)
+def test_bad_change_gets_one_clear_line(bywire, bench, change, texts):
+    refused(bywire("run", bench(), "--set", change), *texts)
+
+
+def test_the_same_key_twice(bywire, bench):
+    arguments = ("--set", "motor.R_m=1ohm", "--set", "motor.R_m=2ohm")
+    refused(bywire("run", bench(), *arguments), "motor.R_m is set twice")
+
+
+@pytest.mark.parametrize("section", ["options", "set", "simulation", "requirements", "stimulus"])
+def test_change_of_a_section_that_is_none(bywire, bench, section):
+    path = bench(f"{BRAKING}{section} = 3\n")
+    refused(bywire("run", path, "--set", f"{section}.x=1"), f"[{section}] must be a section")
+
+
+def test_changes_are_those_of_the_file(bywire, bench, tmp_path):
+    changes = {
+        "motor.R_m": "0.4 ohm",
+        "ecu.dither.waveform": "square",
+        "options.p_to": "30 bar",
+        "simulation.step": "40 us",
+        "simulation.record": "2 ms",
+        "simulation.seed": "7",
+        "requirements.peak_current": "<= 25 A",
+        "name": "changed",
+        "parameters": "dardanelli2010-table1",
+    }
+    arguments = [part for key, value in changes.items() for part in ("--set", f"{key}={value}")]
+    outcome = bywire("run", bench(), "--out", tmp_path / "out", "--json", *arguments)
+    assert outcome.status == 0
+    assert outcome.object["bench"] == "changed"
+    assert outcome.object["requirements"][0]["limit"] == "<= 25 A"
+    recording = package.read_recording(tmp_path / "out" / "run.nc")
+    assert recording.attrs["step"] == 40e-6
+    assert recording.attrs["seed"] == 7
+    assert recording.attrs["parameter_set"] == "dardanelli2010-table1"
+    assert '"R_m":0.4' in recording.attrs["parameters"]
+    assert '"waveform":"square"' in recording.attrs["parameters"]
+    assert float(recording["time"][1] - recording["time"][0]) == pytest.approx(2e-3)
+    assert float(recording["p_ref"][-1]) == pytest.approx(30e5)
+
+
+def test_change_wins_over_every_spelling_in_the_file(bywire, bench):
+    for text in ('"motor.R_m" = 0', "motor.R_m = 0", "[set.motor]\nR_m = 0"):
+        section = "" if text.startswith("[") else "[set]\n"
+        path = bench(f"{BRAKING}{QUICK}\n{section}{text}\n")
+        assert bywire("run", path, "--set", "motor.R_m=0.4ohm").status == 0
+
+
+def test_stimulus_from_the_command_line(bywire, bench):
+    path = bench(OPEN_LOOP + '[options]\nduration = "20 ms"\n')
+    kind = ("kind=table", "times=0 s, 10 ms", "values=0 A, 1 A", "between=linear")
+    arguments = [part for text in kind for part in ("--set", f"stimulus.{text}")]
+    assert bywire("run", path, *arguments).status == 0

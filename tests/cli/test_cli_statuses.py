@@ -1,0 +1,131 @@
+"""Exit statuses and streams of the installed program."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import subprocess
+from pathlib import Path
+
+import pytest
+from command_line import BRAKING, QUICK, SCRIPT, refused
+
+from bywire import __version__
+
+STRICT = QUICK + '\n[requirements]\npeak_current = "<= 1 A"\nenergy = ">= 1 kJ"\n'
+
+
+def shell(command: str, **environment: str) -> subprocess.CompletedProcess[str]:
+    """Run a line of the shell with the program in place of ``bywire``."""
+    line = command.replace("bywire ", f"{shlex.quote(str(SCRIPT))} ")
+    return subprocess.run(
+        ["bash", "-o", "pipefail", "-c", line],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=False,
+        env={**os.environ, **environment},
+    )
+
+
+def test_done_is_0(process, bench):
+    status, out, err = process("run", bench())
+    assert (status, err) == (0, "")
+    assert "overshoot" in out
+
+
+def test_requirement_not_met_is_1(process, bench):
+    outcome = process("run", bench(BRAKING + STRICT), "--json")
+    assert outcome.status == 1
+    assert outcome.object["status"] == "failed"
+    assert [r["met"] for r in outcome.object["requirements"]] == [False, False]
+    assert [line.split()[4] for line in outcome.lines] == ["peak_current", "energy"]
+
+
+def test_bad_input_is_2(process, bench):
+    refused(process("run", bench(BRAKING + "[set]\nmotor.R_m = -1\n")), "must be > 0 ohm")
+
+
+def test_failed_run_is_3(process, bench):
+    outcome = process("run", bench(BRAKING + '[options]\np_from = "1e9 bar"\n'), "--json")
+    refused(outcome, "left the numbers", "smaller step", status=3)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["run"], "Missing argument"),
+        (["run", "a", "b"], "unexpected extra argument"),
+        (["run", "a", "--sett", "b"], "--set"),
+        (["run", "a", "--set"], "requires an argument"),
+        (["lst"], "Did you mean 'list'?"),
+        (["list", "--yaml"], "No such option"),
+        (["reproduce"], "Missing argument"),
+    ],
+)
+def test_wrong_usage_is_2(bywire, arguments, text):
+    status, out, err = bywire(*arguments)
+    assert (status, out) == (2, "")
+    assert text in err
+    assert "Traceback" not in err
+
+
+def test_a_defect_is_3_and_never_a_verdict(bywire, bench, monkeypatch):
+    def broken(*_):
+        raise ZeroDivisionError("seeded")
+
+    monkeypatch.setattr("bywire.cli.run_command.run", broken)
+    status, out, err = bywire("run", bench(), "--json")
+    assert (status, out) == (3, "")
+    assert "seeded" in err
+    assert "please report it" in err
+
+
+@pytest.mark.parametrize("flag", ["--help", "-h", "--version"])
+def test_help_and_version(bywire, flag):
+    status, out, err = bywire(flag)
+    assert (status, err) == (0, "")
+    assert ("Usage" if "h" in flag else __version__) in out or out.strip() == __version__
+
+
+def test_list_is_complete(bywire):
+    status, out, err = bywire("list", "--json")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    assert set(found) == {"assemblies", "parameter_sets", "experiments", "stimuli", "kpis"}
+    text = bywire("list").out
+    for content in found.values():
+        assert content
+        assert all(f"  {name}" in text for name in content)
+
+
+@pytest.mark.parametrize("buffered", ["", "1"], ids=["buffered", "unbuffered"])
+@pytest.mark.parametrize("reader", ["true", "head -1"])
+def test_reader_that_leaves_is_no_error(buffered, reader):
+    done = shell(f"(sleep 0.3; bywire list) | {reader}", PYTHONUNBUFFERED=buffered)
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_status_survives_a_closed_pipe(bench):
+    done = shell(f"bywire run {bench(BRAKING + STRICT)} --json | true")
+    assert done.returncode == 1
+    assert "Traceback" not in done.stderr
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="Linux only")
+def test_full_disk_behind_standard_output():
+    done = shell("bywire list > /dev/full")
+    assert done.returncode == 2
+    assert done.stderr.startswith("bywire: error: cannot write to standard output: No space")
+
+
+def test_closed_standard_error_keeps_results_clean(bench):
+    done = shell(f"bywire run {bench(BRAKING + STRICT)} --json 2>&-")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["status"] == "failed"
+
+
+def test_terminal_without_unicode(bench):
+    done = shell(f"bywire list && bywire run {bench()}", PYTHONIOENCODING="ascii")
+    assert (done.returncode, done.stderr) == (0, "")

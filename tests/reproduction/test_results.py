@@ -1,0 +1,82 @@
+"""A made-up reproduction as JSON, table and folder."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.figure import Figure
+
+from bywire.core.errors import FileError, UnknownNameError
+from bywire.data.netcdf import read_recording
+from bywire.report.tables import text_table
+from bywire.reproduction.item import Fact, compared, found
+from bywire.reproduction.registry import find_source, sources
+from bywire.reproduction.reproduction import Exhibit, Part, Reproduction
+from bywire.reproduction.results import as_json, as_table, write
+
+KEYS = ["id", "unit", "stated", "computed", "tolerance", "agrees", "note"]
+
+
+@pytest.fixture
+def made_up() -> Reproduction:
+    figure = Figure(figsize=(4.0, 2.0))
+    figure.subplots().plot([0, 1], [0, 1])
+    recording = xr.Dataset(
+        {"p_mc": ("time", np.arange(3.0), {"units": "Pa"})}, coords={"time": np.arange(3.0)}
+    )
+    items = (
+        compared("t.K", Fact(10.1, "bar/A", "Table 2"), 7.6, 0.05),
+        compared("t.n", Fact(1.0, "1", "Table <2>"), math.nan, "<="),
+        found("t.x", "s", math.inf, "ours"),
+    )
+    part = Part(
+        "Table 2", "text", items, (Exhibit("fig", figure, "A figure."),), {"run/1 a": recording},
+        {"More": text_table(("a",), [("b",)])},
+    )  # fmt: skip
+    return Reproduction("made-up", "Nobody, 2010", (part,))
+
+
+def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
+    content = as_json(made_up)
+    assert list(content) == ["source", "items"]
+    assert all(list(item) == KEYS for item in content["items"])
+    json.dumps(content, allow_nan=False)
+    assert [item["computed"] for item in content["items"]] == [7.6, None, None]
+    assert [item["agrees"] for item in content["items"]] == [False, False, None]
+    assert content["items"][1]["tolerance"] == "<="
+
+
+def test_table_has_a_row_per_item(made_up: Reproduction) -> None:
+    assert [row[0].text for row in as_table(made_up).rows] == ["t.K", "t.n", "t.x"]
+
+
+def test_folder_is_complete_and_self_contained(made_up: Reproduction, tmp_path: Path) -> None:
+    folder = tmp_path / "new" / "folder"
+    paths = write(made_up, folder)
+    assert [p.name for p in paths] == ["report.html", "results.json", "run-1-a.nc"]
+    assert sorted(p.name for p in folder.iterdir()) == sorted(p.name for p in paths)
+    html = paths[0].read_text(encoding="utf-8")
+    assert "0 statements agree, 2 disagree" in html
+    assert "Table &lt;2&gt;" in html
+    assert "<svg" in html
+    assert "<script" not in html
+    assert json.loads(paths[1].read_text()) == as_json(made_up)
+    np.testing.assert_array_equal(read_recording(paths[2])["p_mc"], [0.0, 1.0, 2.0])
+
+
+def test_folder_that_cannot_be_made_is_one_clear_error(
+    made_up: Reproduction, tmp_path: Path
+) -> None:
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileError, match="cannot make the output folder"):
+        write(made_up, tmp_path / "file" / "folder")
+
+
+def test_sources_are_found_by_name() -> None:
+    assert find_source("dardanelli2010").summary
+    assert set(sources()) >= {"dardanelli2010"}
+    with pytest.raises(UnknownNameError, match="dardanelli2010"):
+        find_source("dardaneli2010")

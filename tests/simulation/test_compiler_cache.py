@@ -1,0 +1,190 @@
+"""The C compiler and its cache: damage, races, failures, and doing without."""
+
+from __future__ import annotations
+
+import ctypes
+import os
+import stat
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import pytest
+
+from bywire.core.errors import CompilerError
+from bywire.simulation import compiler as compiler_module
+from bywire.simulation import engine as engine_module
+from bywire.simulation.compiler import PLAIN, Compiler, compile_library, find_compiler
+from bywire.simulation.run import simulate
+from systems.two_mass import rig
+
+SOURCE = "double twice(double x) { return 2.0 * x; }\n"
+
+
+@pytest.fixture
+def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    folder = tmp_path / "kernels"
+    monkeypatch.setenv("BYWIRE_CACHE", str(folder))
+    return folder
+
+
+def system_compiler() -> Compiler:
+    found = find_compiler()
+    assert found is not None
+    return found
+
+
+def twice(library: Path) -> float:
+    function = ctypes.CDLL(str(library)).twice
+    function.restype, function.argtypes = ctypes.c_double, [ctypes.c_double]
+    return float(function(21.0))
+
+
+class Counting:
+    """Stands in for the compiler's start and counts it."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.starts, run = 0, subprocess.run
+
+        def counted(*args: object, **kwargs: object) -> object:
+            self.starts += 1
+            return run(*args, **kwargs)  # type: ignore[call-overload]
+
+        monkeypatch.setattr(compiler_module.subprocess, "run", counted)
+
+
+def test_compiled_once(cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    compiler, counting = system_compiler(), Counting(monkeypatch)
+    first = compile_library(SOURCE, PLAIN, compiler)
+    assert twice(first) == 42.0
+    assert first.parent == cache
+    assert compile_library(SOURCE, PLAIN, compiler) == first
+    assert counting.starts == 1
+    assert compile_library(SOURCE, ("-O1",), compiler) != first
+    assert compile_library(SOURCE + "\n", PLAIN, compiler) != first
+    assert counting.starts == 3
+
+
+@pytest.mark.parametrize("damage", ["truncated", "flipped", "no digest", "empty"])
+def test_a_damaged_entry_is_compiled_again(
+    damage: str, cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiler = system_compiler()
+    library = compile_library(SOURCE, PLAIN, compiler)
+    content = library.read_bytes()
+    if damage == "no digest":
+        library.with_suffix(".sha256").unlink()
+    else:
+        # A new file, as a copy that failed would leave: the old one may be mapped.
+        library.unlink()
+        middle = len(content) // 2
+        flipped = content[:middle] + bytes([content[middle] ^ 255]) + content[middle + 1 :]
+        kinds = {"truncated": content[:middle], "flipped": flipped, "empty": b""}
+        library.write_bytes(kinds[damage])
+    counting = Counting(monkeypatch)
+    again = compile_library(SOURCE, PLAIN, compiler)
+    assert counting.starts == 1
+    assert twice(again) == 42.0
+    compile_library(SOURCE, PLAIN, compiler)
+    assert counting.starts == 1
+    assert not [p for p in cache.iterdir() if p.suffix not in (".so", ".sha256")]
+
+
+RACE = """
+import sys
+from systems.two_mass import rig
+from bywire.simulation.run import simulate
+print(repr(float(simulate(rig(0.01), engine="compiled")["x_1"][-1])))
+"""
+
+
+def test_two_processes_at_once(cache: Path) -> None:
+    """Both compile into a fresh cache; both get the kernel, and so does a third one."""
+    tests = str(Path(__file__).parents[1])
+    environment = os.environ | {"PYTHONPATH": os.pathsep.join([tests, *sys.path])}
+    command = [sys.executable, "-W", "error", "-c", RACE]
+
+    def start() -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+
+    both = [start(), start()]
+    done = [process.communicate(timeout=100) for process in both]
+    assert [process.returncode for process in both] == [0, 0], done
+    expected = repr(float(simulate(rig(0.01))["x_1"][-1]))
+    assert [out.strip() for out, _ in done] == [expected] * 2
+    assert len(list(cache.glob("*.so"))) == 1
+    assert len(list(cache.iterdir())) == 2
+
+
+def test_no_compiler_falls_back_with_one_warning(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("BYWIRE_CC", "none")
+    monkeypatch.setattr(engine_module, "_PREPARED", {})
+    find_compiler.cache_clear()
+    engine_module._warn_once.cache_clear()
+    try:
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            results = [simulate(rig(0.002 + 1e-3 * k, rare=bool(k))) for k in range(2)]
+            quiet = simulate(rig(0.002), engine="virtual-machine")
+        assert [w.category for w in caught] == [UserWarning]
+        assert "bywire[compiler]" in str(caught[0].message)
+        assert {r.engine for r in [*results, quiet]} == {"virtual machine (no C compiler)"}
+    finally:
+        monkeypatch.undo()
+        find_compiler.cache_clear()
+    assert simulate(rig(0.002))["x_1"][-1] == pytest.approx(results[0]["x_1"][-1], rel=1e-9)
+
+
+def script(path: Path, text: str) -> Path:
+    path.write_text(f"#!/bin/sh\n{text}\n")
+    path.chmod(path.stat().st_mode | stat.S_IXUSR)
+    return path
+
+
+def test_a_compiler_that_fails(cache: Path, tmp_path: Path) -> None:
+    """Its own words are passed on; nothing is left in the cache."""
+    broken = script(tmp_path / "brokencc", "echo 'fatal: no space left' >&2; exit 1")
+    with pytest.raises(CompilerError, match=r"(?s)refused a generated kernel.*no space left"):
+        compile_library(SOURCE, PLAIN, Compiler((str(broken),), "broken 1.0"))
+    with pytest.raises(CompilerError, match=r"refused a generated kernel"):
+        compile_library("this is not C\n", PLAIN, system_compiler())
+    with pytest.raises(CompilerError, match="did not run"):
+        compile_library(SOURCE, PLAIN, Compiler((str(tmp_path / "gone"),), "gone 1.0"))
+    assert list(cache.iterdir()) == []
+
+
+def test_a_compiler_that_writes_nothing(cache: Path, tmp_path: Path) -> None:
+    """Exit status 0 without a library is a failure too."""
+    idle = script(tmp_path / "idlecc", "exit 0")
+    with pytest.raises(CompilerError):
+        compile_library(SOURCE, PLAIN, Compiler((str(idle),), "idle 1.0"))
+
+
+def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    find_compiler.cache_clear()
+    try:
+        named = script(tmp_path / "mycc", "echo 'my compiler 7'")
+        monkeypatch.setenv("BYWIRE_CC", str(named))
+        assert find_compiler() == Compiler((str(named),), "my compiler 7")
+        find_compiler.cache_clear()
+        monkeypatch.setenv("BYWIRE_CC", str(tmp_path / "missing"))
+        with pytest.raises(CompilerError, match="missing' names no program"):
+            find_compiler()
+    finally:
+        monkeypatch.undo()
+        find_compiler.cache_clear()
+
+
+def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A private folder among the temporary files serves instead."""
+    blocked = tmp_path / "file"
+    blocked.write_text("not a folder")
+    monkeypatch.setenv("BYWIRE_CACHE", str(blocked / "kernels"))
+    monkeypatch.setattr(compiler_module.tempfile, "gettempdir", lambda: str(tmp_path))
+    library = compile_library(SOURCE, PLAIN, system_compiler())
+    assert twice(library) == 42.0
+    assert library.parent.parent == tmp_path
+    assert stat.S_IMODE(library.parent.stat().st_mode) == 0o700

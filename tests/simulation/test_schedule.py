@@ -1,0 +1,90 @@
+"""Steps, sample times and recording intervals: how they divide each other, and who refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bywire.core.errors import StepError
+from bywire.simulation.run import simulate
+from bywire.simulation.schedule import plan
+from systems.three_contacts import heart
+from systems.two_mass import rig
+
+
+def test_plan_of_two_tasks() -> None:
+    schedule = plan(0.01, 20e-6, {"slow": 1e-3, "fast": 2e-4}, 5e-4)
+    assert schedule.substeps == 5  # 0.1 ms divides 1, 0.2 and 0.5 ms
+    assert schedule.frame == pytest.approx(1e-4)
+    assert schedule.task_frames == (10, 2)
+    assert (schedule.record_frames, schedule.frames) == (5, 100)
+    assert (schedule.rows, schedule.stimulus_rows) == (21, 51)
+    np.testing.assert_allclose(schedule.record_times, 5e-4 * np.arange(21), atol=1e-15)
+    np.testing.assert_allclose(schedule.stimulus_times, 2e-4 * np.arange(51), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("step", "record", "period", "name", "interval"),
+    [(30e-6, 1e-3, 1e-3, "drive", "1000"), (40e-6, 1e-4, 1e-3, "recording", "100"),
+     (3e-3, 3e-3, 1e-3, "drive", "1000"), (20.001e-6, 1e-3, 1e-3, "drive", "1000")],
+)  # fmt: skip
+def test_a_step_that_does_not_divide(
+    step: float, record: float, period: float, name: str, interval: str
+) -> None:
+    """The message has both numbers, whose interval it is, and a step that would do."""
+    with pytest.raises(StepError) as caught:
+        plan(0.1, step, {"drive": period}, record)
+    text = str(caught.value)
+    assert f"step = {step * 1e6:g} us" in text
+    assert f"{name} interval of {interval} us" in text
+    proposed = float(text.split()[-2]) * 1e-6
+    whole = (record if name == "recording" else period) / proposed
+    assert whole == pytest.approx(round(whole), rel=1e-5)
+
+
+@pytest.mark.parametrize(("duration", "step"), [(0.1, 0.0), (0.1, -1e-5), (0.1, np.nan), (0.0, 2e-5)])
+def test_neither_zero_nor_negative(duration: float, step: float) -> None:
+    with pytest.raises(StepError, match="not admissible: it must be > 0 s"):
+        plan(duration, step, {"drive": 1e-3}, 1e-3)
+
+
+def test_a_run_refuses_before_it_starts() -> None:
+    with pytest.raises(StepError, match="30 us does not divide the slow interval of 1000 us"):
+        simulate(heart(0.01, step=30e-6, record=1e-3))
+
+
+@pytest.mark.parametrize("duration", [1e-3, 3e-3, 0.1, 0.3, 1.1])
+@pytest.mark.parametrize("step", [20e-6, 1e-6 / 3.0 * 3.0, 1e-3 / 7.0])
+def test_time_axis_is_whole(duration: float, step: float) -> None:
+    """As many rows as asked for, whatever floating point makes of the quotients."""
+    schedule = plan(duration, step, {"drive": 1e-3}, 1e-3)
+    assert schedule.rows == round(duration / 1e-3) + 1
+    assert schedule.frames * schedule.substeps * step == pytest.approx(duration, rel=1e-9)
+
+
+def test_a_duration_between_rows_is_rounded_up() -> None:
+    result = simulate(rig(2.5e-3, record=1e-3))
+    np.testing.assert_allclose(result.time, [0.0, 1e-3, 2e-3, 3e-3], atol=1e-12)
+    assert result.values.shape[0] == 4
+
+
+def test_recording_interval_does_not_change_the_run() -> None:
+    """Frames are cut differently, the substeps are the same."""
+    coarse, fine = (simulate(rig(0.02, record=record)) for record in (1e-3, 4e-5))
+    np.testing.assert_array_equal(coarse["x_1"], fine["x_1"][::25])
+    for name in ("E_source", "E_friction"):
+        np.testing.assert_allclose(coarse[name], fine[name][::25], rtol=1e-12, atol=1e-15)
+
+
+def test_stimulus_is_sampled_at_the_fastest_task() -> None:
+    asked: list[np.ndarray] = []
+    run = heart(0.01)
+
+    def demand(t: np.ndarray) -> np.ndarray:
+        asked.append(t)
+        return run.stimulus(t)
+
+    simulate(replace(run, stimulus=demand))
+    np.testing.assert_allclose(np.concatenate(asked), 2e-4 * np.arange(51), atol=1e-12)
