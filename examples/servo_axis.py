@@ -19,7 +19,7 @@ from pydantic import Field
 
 import bywire
 from bywire.core import ops
-from bywire.core.model import Task
+from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Inertia, RotaryDamping, Torque, Unit, Voltage
 from bywire.core.signals import Angle, Energy, Signal, Speed, zeros
@@ -90,17 +90,16 @@ def control(x, m, u, par):
     return Memory(seen, ops.clip(wanted, -par.v_max, par.v_max), m.v_i + par.T_s * growth)
 
 
-class ServoAxis:
+class ServoAxis(Model):
     """The wiring: mass_k dx_k/dt = balance_k, and what is not smooth beside it."""
 
     name = "servo-axis"
     State, Memory, Stimulus, Flow, Output = State, Memory, Stimulus, Flow, Output
     frictions = ("omega",)  # this state's equation carries a set-valued force
-    limits = usually_open = ()
 
     def tasks(self, par):
         """Return the controllers and their sample times; several share one memory."""
-        return (Task("control", lambda p: p.T_s, control),)
+        return (Task("control", par.T_s, control),)
 
     def mass(self, xe, par):
         """Return inductance, unity, inertia."""
@@ -115,14 +114,6 @@ class ServoAxis:
     def bounds(self, x, xe, m, par, contact):
         """Return the dry friction while turning forward, backward; at rest all between."""
         return ((-par.T_forward, par.T_backward),)
-
-    def compliance(self, par):
-        """Return nothing: there is no contact."""
-        return ()
-
-    def gap(self, x, xe, par):
-        """Return nothing: there is no contact."""
-        return ()
 
     def powers(self, x, rate, m, par, contact, reaction):
         """Return the power of the source, and what copper and friction take."""

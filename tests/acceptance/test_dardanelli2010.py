@@ -70,8 +70,7 @@ def items(reproduction: Reproduction) -> Items:
 
 
 def by_id(listed: Iterable[dict[str, Any]]) -> Items:
-    found = {item["id"]: item for item in listed}
-    return found
+    return {item["id"]: item for item in listed}
 
 
 def flaws(items: Items) -> list[str]:
@@ -156,7 +155,8 @@ def test_figures_and_requirements(items: Items) -> None:
     assert items["fig5.loop_area_ratio.slow"]["agrees"] is True
     assert items["fig7.overshoot"]["agrees"] is True
     assert items["fig7.steady_state_error"]["agrees"] is True
-    assert items["fig7.phase_margin"]["agrees"] is True
+    assert items["fig7.phase_margin"]["computed"] >= 60.0
+    assert items["fig7.phase_margin"]["agrees"] is None  # the gains were tuned to it
     assert items["fig7.hunting"]["computed"] > 1.0
     assert 2.0 < items["fig7.bandwidth"]["computed"] < 5.0
     assert items["fig3.bandwidth"]["computed"] == pytest.approx(100.0, abs=5.0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import fields
 from typing import Any
 
@@ -58,5 +57,3 @@ def _ecu(rows: list[Stimulus], memory: Any, par: MotorcycleParameters) -> Contro
         return float(memory.duty)
 
     return tick
-
-

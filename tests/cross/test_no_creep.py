@@ -9,8 +9,9 @@ import pytest
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current
-from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.bench import as_run
+from bywire.bench.experiment import fixed
+from bywire.bench.motorcycle_case import case_from_rest
 from bywire.catalog.registry import entry
 from bywire.simulation.run import Run, Trajectory, simulate
 from cross.motorcycle_reference import plant_of
@@ -26,11 +27,8 @@ def held_at(share: float, sigma: int, law: str, mode: str, duration: float) -> R
     plant, i = plant_of(par), holding_current(P_HELD, par)
     breakaway = -excess(plant, sigma, i, P_HELD) / plant.direction(sigma)[0]
     wanted = i + sigma * share * breakaway
-    name, level = ("i_set", wanted) if mode == "current-source" else ("v_set", par.motor.R_m * wanted)
-    case = case_from_rest(
-        "held", par, mode, P_HELD, lambda t: {name: np.full(t.shape, level)}, duration,
-        record=1e-3,
-    )  # fmt: skip
+    level = {"i_set": wanted} if mode == "current-source" else {"v_set": par.motor.R_m * wanted}
+    case = case_from_rest("held", par, mode, P_HELD, fixed(**level), duration, record=1e-3)
     current = wanted if mode == "voltage-source" else case.state.i  # its winding is at rest too
     return as_run(replace(case, state=case.state._replace(i=current)), 20e-6)
 

@@ -100,7 +100,8 @@ def _parts(other: Any) -> tuple[float, Any]:
 def differentiate(function: Callable[[list[Any]], Any], at: Array) -> tuple[Array, Array]:
     """Return values and Jacobian of a function of a list, shapes (m,) and (m, n)."""
     n = at.size
-    results = [_parts(r) for r in function([Dual(float(v), e) for v, e in zip(at, np.eye(n))])]
+    seeds = [Dual(float(v), e) for v, e in zip(at, np.eye(n), strict=True)]
+    results = [_parts(r) for r in function(seeds)]
     values = np.array([v for v, _ in results], dtype=float)
     return values, np.array([np.broadcast_to(s, n) for _, s in results]).reshape(-1, n)
 
@@ -174,7 +175,7 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
 
         def force(x: Any, K: Array = K, y: Array = y) -> tuple[Any, ...]:
             gap = list(chain.from_iterable(model.gap(model.State(*x), model.State(*y), par)))
-            return tuple(sum((k * g for k, g in zip(row, gap)), 0.0) for row in K)
+            return tuple(sum((k * g for k, g in zip(row, gap, strict=True)), 0.0) for row in K)
 
         def right(x: Any, force: Any = force, y: Array = y) -> Any:
             state, fixed = model.State(*x), model.State(*map(float, y))
@@ -231,9 +232,9 @@ def simulate(
     record: float,
     cap: int = 8,
 ) -> tuple[Array, Point]:
-    """Run a model from a state and a memory: recorded outputs, shape (rows, signals), and the end."""
+    """Run a model from (state, memory): recorded outputs, shape (rows, signals), and the end."""
     tasks = model.tasks(par)
-    every = [round(task.period(par) / step) for task in tasks]
+    every = [round(task.period / step) for task in tasks]
     recorded, total = round(record / step), round(duration / step)
     reactions, contacts = len(model.frictions + model.limits), sum(map(len, model.compliance(par)))
     x = np.array(start[0], dtype=float)

@@ -138,6 +138,17 @@ def test_no_compiler_falls_back_with_one_warning(monkeypatch: pytest.MonkeyPatch
     assert simulate(rig(0.002))["x_1"][-1] == pytest.approx(results[0]["x_1"][-1], rel=1e-9)
 
 
+def test_native_code_is_kept_apart_per_processor(
+    cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A cache folder shared between machines must not hand out instructions that one lacks."""
+    compiler, native = system_compiler(), (*PLAIN, "-march=native")
+    plain, here = (compile_library(SOURCE, flags, compiler) for flags in (PLAIN, native))
+    monkeypatch.setattr(compiler_module, "_processor", lambda: "flags: another one")
+    assert compile_library(SOURCE, native, compiler) != here
+    assert compile_library(SOURCE, PLAIN, compiler) == plain
+
+
 def script(path: Path, text: str) -> Path:
     path.write_text(f"#!/bin/sh\n{text}\n")
     path.chmod(path.stat().st_mode | stat.S_IXUSR)

@@ -28,7 +28,7 @@ def evaluate(project: object, S: Array, c: Array, low: Array, high: Array) -> tu
 
 
 def violation(S: Array, c: Array, low: Array, high: Array, w: Array) -> Array:
-    """Return by how much velocities miss the conditions, as a share of the forces; shape (count,)."""
+    """Return how far velocities miss the conditions, as a share of the forces; shape (count,)."""
     force = np.einsum("nij,nj->ni", S, w) - c
     nearest = np.where(w > 0, low, np.where(w < 0, high, np.clip(force, low, high)))
     scale = np.abs(c).max(axis=1) + np.maximum(-low, high).max(axis=1)

@@ -42,7 +42,7 @@ def worst(recording: xr.Dataset) -> float:
 
 @pytest.mark.parametrize("experiment", [BRAKING, RELEASE], ids=lambda e: e[0])
 def test_residual_falls_with_the_square_of_the_step(
-    experiment: tuple[str, dict[str, float]]
+    experiment: tuple[str, dict[str, float]],
 ) -> None:
     steps = np.array([40e-6, 20e-6, 10e-6, 5e-6])
     recordings = [recorded(experiment, h) for h in steps]

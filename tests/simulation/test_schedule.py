@@ -44,7 +44,9 @@ def test_a_step_that_does_not_divide(
     assert whole == pytest.approx(round(whole), rel=1e-5)
 
 
-@pytest.mark.parametrize(("duration", "step"), [(0.1, 0.0), (0.1, -1e-5), (0.1, np.nan), (0.0, 2e-5)])
+@pytest.mark.parametrize(
+    ("duration", "step"), [(0.1, 0.0), (0.1, -1e-5), (0.1, np.nan), (0.0, 2e-5)]
+)
 def test_neither_zero_nor_negative(duration: float, step: float) -> None:
     with pytest.raises(StepError, match="not admissible: it must be > 0 s"):
         plan(duration, step, {"drive": 1e-3}, 1e-3)

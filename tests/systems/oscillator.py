@@ -81,7 +81,7 @@ class Oscillator:
 
     def tasks(self, par: Parameters) -> tuple[Task, ...]:
         """Return the counter."""
-        return (Task("counter", lambda p: float(p.T_s), lambda x, m, u, p: Memory(m.ticks + 1.0)),)
+        return (Task("counter", par.T_s, lambda x, m, u, p: Memory(m.ticks + 1.0)),)
 
     def mass(self, xe: State, par: Parameters) -> State:
         """Return the mass."""

@@ -168,8 +168,8 @@ class ThreeContacts:
     def tasks(self, par: Parameters) -> tuple[Task, ...]:
         """Return both controllers; the slow one runs first where both are due."""
         return (
-            Task("slow", lambda p: float(p.T_slow), _slow),
-            Task("fast", lambda p: float(p.T_fast), _fast),
+            Task("slow", par.T_slow, _slow),
+            Task("fast", par.T_fast, _fast),
         )
 
     def mass(self, xe: State, par: Parameters) -> State:
@@ -242,7 +242,11 @@ def wiggled(t: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def heart(
-    duration: float, step: float = 20e-6, record: float = 1e-4, stiffer: float = 1.0, **changes: float
+    duration: float,
+    step: float = 20e-6,
+    record: float = 1e-4,
+    stiffer: float = 1.0,
+    **changes: float,
 ) -> Run:
     """Return a run from rest, with contacts stiffer by a factor and other changed parameters."""
     stiff = {name: getattr(PARAMETERS, name) * stiffer for name in ("K_S", "K_W", "K_C")}

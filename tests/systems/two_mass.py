@@ -1,4 +1,4 @@
-"""Two masses with dry friction, a stiff spring between them, and a wall: a small rig for the engine.
+"""Two masses with dry friction, a stiff spring between them, and a wall: a rig for the engine.
 
 The drive pushes mass 1 over a cogged rail. The spring hardens, the friction of mass 2 grows with
 its force on the wall, so that the rig has everything that the engine treats apart: nonlinear
@@ -130,7 +130,7 @@ class TwoMass:
 
     def tasks(self, par: Parameters) -> tuple[Task, ...]:
         """Return the drive: it holds the demanded force."""
-        return (Task("drive", lambda p: float(p.T_s), lambda x, m, u, p: Memory(u.force)),)
+        return (Task("drive", par.T_s, lambda x, m, u, p: Memory(u.force)),)
 
     def mass(self, xe: State, par: Parameters) -> State:
         """Return the masses."""

@@ -62,7 +62,7 @@ def closed_loop(
     fields = model.Memory._fields
     plant = linearize(model, par, state, memory, inputs=fields, outputs=outputs)
     kept = [name for name in plant.states if name not in locked]
-    plant = plant.reduced(kept, held=bool(locked)).sampled(tasks[0].period(par))
+    plant = plant.reduced(kept, held=bool(locked)).sampled(tasks[0].period)
     M_x, M_m, M_u = _tick(model, par, state, memory, inputs, kept)
     A = np.block([[plant.A + plant.B @ M_x, plant.B @ M_m], [M_x, M_m]])
     C = np.hstack([plant.C + plant.D @ M_x, plant.D @ M_m])

@@ -110,6 +110,8 @@ def sine_test(
     ------
     ParameterError
         When a frequency is no such multiple.
+    KeyboardInterrupt
+        When the user stopped a run.
     """
     e, model = excitation, MotorcycleBrake()  # one instance: its kernel is prepared once
     values = []
@@ -122,6 +124,8 @@ def sine_test(
 
         case = case_from_rest("sine", par, e.mode, e.p, stimulus, WINDOW, settle=settle)
         found = simulate(as_run(replace(case, model=model), 20e-6), signals=("p_mc",))
+        if found.status == "interrupted":
+            raise KeyboardInterrupt
         t = found.time - settle
         inside = (t > -1e-9) & (t < WINDOW - 1e-9)
         values.append(amplitudes(t[inside], found["p_mc"][inside], f, 1)[0] / e.amplitude)

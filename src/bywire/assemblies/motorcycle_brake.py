@@ -49,8 +49,8 @@ class MotorcycleBrake:
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the ECU's task, or that of an ideal source."""
         if par.drive.mode in ("voltage-source", "current-source"):
-            return (Task("source", lambda p: float(p.drive.T_source), self._source),)
-        return (Task("ecu", lambda p: float(p.ecu.T_s), self._ecu),)
+            return (Task("source", par.drive.T_source, self._source),)
+        return (Task("ecu", par.ecu.T_s, self._ecu),)
 
     def _ecu(self, x: plant.State, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
         return ecu.tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -152,6 +152,21 @@ class Bench:
         return found
 
 
+    def runs(self) -> dict[str, Run]:
+        """Return the runs by label, for ensembles and sensitivities.
+
+        Their time starts with the experiment's settling, ``Case.settle`` before its zero.
+        """
+        return {
+            case.label: as_run(case, self.step, self.record, (self.seed, number))
+            for number, case in enumerate(self.cases())
+        }
+
+    def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
+        """Return this bench with further parameters changed."""
+        return replace(self, overrides={**self.overrides, **overrides})
+
+
 @dataclass(frozen=True)
 class Result:
     """What a bench gave.
@@ -169,6 +184,27 @@ class Result:
     kpis: tuple[Kpi, ...]
     verdicts: tuple[Verdict, ...]
     status: str
+
+    @property
+    def recording(self) -> xr.Dataset:
+        """The recording of an experiment that makes one run."""
+        if len(self.recordings) != 1:
+            labels = ", ".join(self.recordings)
+            raise ParameterError(f"this experiment made several recordings: take one of {labels}")
+        return next(iter(self.recordings.values()))
+
+    def kpi(self, name: str) -> Kpi:
+        """Return one KPI by name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        by_name = {kpi.name: kpi for kpi in self.kpis}
+        if name not in by_name:
+            raise unknown_name("KPI", name, by_name)
+        return by_name[name]
 
     @property
     def warnings(self) -> list[str]:

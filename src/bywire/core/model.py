@@ -34,19 +34,22 @@ class Task:
     name
         What recordings and messages call it.
     period
-        Sample time [s] from the parameters; a whole number of substeps.
+        Sample time [s]; a whole number of substeps.
     tick
         ``tick(x, memory, stimulus, par) -> memory``: reads the plant at the sampling instant
         and returns the memory with the fields that this task owns renewed.
     """
 
     name: str
-    period: Callable[[Any], float]
+    period: float
     tick: Callable[[Any, Any, Any, Any], Any]
 
 
 class Model(Protocol):
-    """What the engine integrates. All methods are pure and symbolic-ready."""
+    """What the engine integrates. All methods are pure and symbolic-ready.
+
+    A model may inherit from this class; frictions, limits and contacts then default to none.
+    """
 
     @property
     def name(self) -> str:
@@ -81,20 +84,20 @@ class Model(Protocol):
     @property
     def frictions(self) -> tuple[str, ...]:
         """Velocity states with dry friction."""
-        ...
+        return ()
 
     @property
     def limits(self) -> tuple[str, ...]:
         """States that cannot fall below zero; rarely at zero for long (see ``scheme``)."""
-        ...
+        return ()
 
     @property
     def usually_open(self) -> tuple[bool, ...]:
-        """Per contact group, whether it rarely touches, as end stops do.
+        """Per contact group, whether it rarely touches, as end stops do; none by default.
 
         Speed only: an open group costs nothing but its check, a touching one the exact pass.
         """
-        ...
+        return ()
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
         """Return the controllers, in the order in which they run when due together."""
@@ -115,18 +118,18 @@ class Model(Protocol):
 
         The force is ``low`` where the velocity is positive, ``high`` where it is negative.
         """
-        ...
+        return ()
 
     def compliance(self, par: Any) -> tuple[Matrix, ...]:
         """Return one positive definite compliance matrix per contact group."""
-        ...
+        return ()
 
     def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:
         """Return per group the overlaps d, affine in x (and its rates through the states).
 
         The contact forces F >= 0 of a group solve ``C F - d >= 0, F (C F - d) = 0``.
         """
-        ...
+        return ()
 
     def powers(
         self,

@@ -102,8 +102,8 @@ def part(runs: Runs) -> Part:
     )  # fmt: skip
     text = (
         "Without dither the pressure climbs in stick-slip jumps. With dither the loop shrinks to "
-        "a few per cent. What is left above some bar is no friction hysteresis but delay: a ramp "
-        "ten times slower leaves next to nothing. Dither turns dry friction into damping, which "
+        "a fraction. Most of what is left is no friction hysteresis but delay: a ramp ten times "
+        "slower leaves next to nothing. Dither turns dry friction into damping, which "
         "makes the brake slower; and because seals rub more while applying, it lowers the gain. "
         "The largest pressure depends on how much of the dither reaches the motor, hence on the "
         "damping of the 80 Hz filter, which is not printed."
@@ -155,7 +155,7 @@ def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
             f"fig5.removed_above{suffix}", facts.FIG5_REMOVED, loops.removed_above,
             float(LEVELS[0] / BAR),
             f"pressure above which the width stays below {100 * REMOVED:g} % of the undithered "
-            "loop's at mid-height",
+            f"loop's at mid-height; {LEVELS[0] / BAR:g} bar is the lowest level looked at",
         ),
         compared(
             f"fig5.i_max.dither{suffix}", facts.FIG5_CURRENT,
@@ -185,6 +185,8 @@ def _slow_area(name: str) -> float:
     bench = Bench("friction-ramp", name, options={"slope": slope})
     case = next(c for c in bench.cases() if c.label == WITH)
     found_run = simulate(as_run(case, bench.step), signals=("i", "p_mc"))
+    if found_run.status == "interrupted":
+        raise KeyboardInterrupt
     t = found_run.time
     period = 1.0 / parameters(name).ecu.dither.f_dit
     i, p = (smoothed(t, found_run[signal], period) for signal in ("i", "p_mc"))

@@ -66,11 +66,22 @@ class Runs:
             Names of experiment and parameter set.
         overrides, options, stimulus
             As in `Bench`.
+
+        Raises
+        ------
+        RunError
+            When a run fails.
+        KeyboardInterrupt
+            When the user stopped a run: half a reproduction is none.
         """
         bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
-        if repr(bench) not in self._known:
-            self._known[repr(bench)] = run(bench)
-        return self._known[repr(bench)]
+        key = repr(bench)
+        if key not in self._known:
+            result = run(bench)
+            if result.status == "interrupted":
+                raise KeyboardInterrupt
+            self._known[key] = result
+        return self._known[key]
 
     def settled_step(self, name: str, p: float, i_step: float) -> Result:
         """Return a current step that begins where the dithered pressure has settled at ``p``.

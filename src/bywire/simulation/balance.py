@@ -12,7 +12,8 @@ from collections import Counter
 from collections.abc import Sequence
 
 from bywire.simulation.expressions import needed
-from bywire.simulation.graph import Graph, Node
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
 from bywire.simulation.quadrature import Levels
 
 # Cycles from operands to result, about right for the processors of the last ten years.

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import importlib.util
 import os
+import platform
 import shutil
 import subprocess
 import sys
@@ -22,7 +23,8 @@ _MATH = ("-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite
 _STRICT = ("-Werror=implicit-function-declaration",)
 _COMMON = ("-shared", "-fPIC", "-std=c11", *_MATH, *_STRICT)
 PLAIN = ("-O2", "-fno-tree-vectorize")  # packing a few scalars costs more than it saves
-VECTOR = ("-O2", "-march=native", "-fopenmp-simd", "-mprefer-vector-width=512", "-ffp-contract=fast")
+_WIDE = ("-march=native", "-mprefer-vector-width=512", "-ffp-contract=fast")
+VECTOR = ("-O2", "-fopenmp-simd", *_WIDE)
 TIMEOUT = 300.0
 
 
@@ -93,7 +95,9 @@ def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> 
     CompilerError
         With the first lines of the compiler's message.
     """
-    key = hashlib.sha256("\0".join((source, *flags, compiler.label)).encode()).hexdigest()[:32]
+    built_for = _processor() if "-march=native" in flags else ""
+    parts = "\0".join((source, *flags, compiler.label, built_for))
+    key = hashlib.sha256(parts.encode()).hexdigest()[:32]
     folder = _writable(cache_folder())
     library, digest = folder / f"{key}.so", folder / f"{key}.sha256"
     if _intact(library, digest):
@@ -109,14 +113,24 @@ def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> 
     return library
 
 
+@cache
+def _processor() -> str:
+    """Return what tells processors of different abilities apart that share a cache folder."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        return next(line for line in lines if line.startswith(("flags", "Features")))
+    except (OSError, StopIteration):
+        return f"{platform.machine()} {platform.processor()}"
+
+
 def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: Path) -> None:
     command = [*compiler.command, *_COMMON, *flags, str(source), "-o", str(target), "-lm"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         raise CompilerError(f"{compiler.label} did not run: {error}") from None
-    if done.returncode != 0:
-        message = "\n".join(done.stderr.splitlines()[:6])
+    if done.returncode != 0 or not target.exists():
+        message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
         raise CompilerError(f"{compiler.label} refused a generated kernel:\n{message}")
 
 

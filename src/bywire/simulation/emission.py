@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
 from bywire.simulation.expressions import OWN, PLAIN_C, Dialect, Namer, as_number, needed, text
-from bywire.simulation.graph import Graph, Node
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
 CAP = 8  # passes through one substep before it is counted as unsettled

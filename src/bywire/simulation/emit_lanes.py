@@ -15,7 +15,7 @@ from bywire.simulation.emission import (
     unread,
 )
 from bywire.simulation.expressions import VECTOR_C, as_number, needed
-from bywire.simulation.graph import Node
+from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """int bw_lanes(void) { return W; }
@@ -185,8 +185,8 @@ def _settle_lanes(t: _Lanes, parameters: int) -> str:
             elif f"{kind}{k}" in targets:
                 lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
             at += 1
-    return f"""static __attribute__((noinline, cold)) void settle_lanes(B flagged, const M *P, double h,
-    const V *m, const V *old, V *n, V *q, V *counters) {{
+    return f"""static __attribute__((noinline, cold)) void settle_lanes(B flagged, const M *P,
+    double h, const V *m, const V *old, V *n, V *q, V *counters) {{
   double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[{at + 1}];
   for (int l = 0; l < W; ++l) {{
     if (!LANE(flagged, l)) continue;

@@ -13,7 +13,7 @@ from bywire.simulation.emission import (
     unread,
 )
 from bywire.simulation.expressions import Namer, as_number, needed
-from bywire.simulation.graph import Node
+from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,

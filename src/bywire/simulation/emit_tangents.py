@@ -15,7 +15,7 @@ from bywire.simulation.emission import (
     statements,
 )
 from bywire.simulation.expressions import as_number, needed
-from bywire.simulation.graph import Node
+from bywire.simulation.operation import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
 
 SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const double *restrict u,

@@ -82,7 +82,7 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
 @cache
 def _warn_once() -> None:
     warnings.warn(
-        "no C compiler: runs use the virtual machine, about 100 times slower; "
+        "no C compiler: runs use the virtual machine, about 200 times slower; "
         "install one, or the extra bywire[compiler]",
         stacklevel=2,
     )

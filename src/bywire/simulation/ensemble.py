@@ -206,7 +206,7 @@ def case_matrix(run: Run, variations: Mapping[str, Array | Sequence[float]]) -> 
 
 
 def _periods(run: Run, par: ParameterSet) -> list[float]:
-    return [task.period(par) for task in run.model.tasks(par)]
+    return [task.period for task in run.model.tasks(par)]
 
 
 @cache

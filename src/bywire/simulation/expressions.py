@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from bywire.simulation.graph import Graph, Node
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
 
 Namer = Callable[[Node], str]
 

@@ -11,7 +11,8 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from bywire.simulation.expressions import needed
-from bywire.simulation.graph import Graph, Node
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
 
 Terms = dict[Node | None, Node]  # product (None: the number one) -> coefficient
 _MOST = 4  # terms that multiplying out may give; beyond, the product stays as it is
@@ -74,9 +75,7 @@ def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
         own = [n for n in needed(graph, [root], lambda n: level[n] < 2) if n not in computed]
         terms = _Expansion(graph, computed, level).terms(root)
         inner = [p for p in terms if p is not None]
-        fresh = [
-            n for n in needed(graph, inner, lambda n: level[n] < 2) if n not in computed
-        ]
+        fresh = [n for n in needed(graph, inner, lambda n: level[n] < 2) if n not in computed]
         factors = sum(1 for p, c in terms.items() if p is not None and c != graph.constant(1.0))
         if len(fresh) + factors + len(terms) - 1 < len(own):
             new[k] = _summed(graph, terms)
@@ -141,15 +140,15 @@ class _Expansion:
     def _sum(self, a: Terms, b: Terms) -> Terms:
         total = dict(a)
         for product, c in b.items():
-            total[product] = (
-                self._graph.apply("add", total[product], c) if product in total else c
-            )
+            total[product] = self._graph.apply("add", total[product], c) if product in total else c
         return total
 
     def _product(self, a: Terms, b: Terms) -> Terms:
         total: Terms = {}
         for pa, ca in a.items():
             for pb, cb in b.items():
-                product = pa if pb is None else pb if pa is None else self._graph.apply("mul", pa, pb)
+                product = pb if pa is None else pa
+                if pa is not None and pb is not None:
+                    product = self._graph.apply("mul", pa, pb)
                 total = self._sum(total, {product: self._graph.apply("mul", ca, cb)})
         return total

@@ -53,7 +53,7 @@ class Run:
 
     def schedule(self) -> Schedule:
         """Return the integer plan of the run."""
-        periods = {task.name: task.period(self.par) for task in self.model.tasks(self.par)}
+        periods = {task.name: task.period for task in self.model.tasks(self.par)}
         return plan(self.duration, self.step, periods, self.record)
 
 
@@ -98,6 +98,18 @@ def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[floa
     return vector
 
 
+def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
+    """Return what a kernel needs to compute a run; all outputs by default."""
+    names = tuple(prepare(run.model, run.par).program.outputs)
+    schedule = run.schedule()
+    return Request(
+        schedule=schedule,
+        parameters=np.array(list(run.par.leaves().values())),
+        stimulus=sampled_stimulus(run, schedule),
+        selection=selected(names, names if signals is None else signals),
+    )
+
+
 def simulate(
     run: Run,
     signals: Sequence[str] | None = None,
@@ -128,15 +140,9 @@ def simulate(
     """
     prepared = prepare(run.model, run.par)
     chosen = prepared.engine(engine)
-    schedule = run.schedule()
-    names = tuple(prepared.program.outputs)
-    wanted = names if signals is None else tuple(signals)
-    request = Request(
-        schedule=schedule,
-        parameters=np.array(list(run.par.leaves().values())),
-        stimulus=sampled_stimulus(run, schedule),
-        selection=selected(names, wanted),
-    )
+    wanted = tuple(prepared.program.outputs) if signals is None else tuple(signals)
+    request = request_for(run, wanted)
+    schedule = request.schedule
     vector = initial_vector(chosen.layout, run.state, run.memory)
     values = np.empty((schedule.rows, len(wanted)))
     finished = _advance_all(chosen, request, vector, values, progress)

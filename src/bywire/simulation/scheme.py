@@ -146,7 +146,9 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
 def _contact_sets(model: Model, par: ParameterSet, d: Any, exact: bool) -> _ContactSets:
     """Choose the active subsets of all groups; the fast pass takes rare contacts as open."""
     blocks, numbers, overlaps, at = [], [], [], 0
-    for C, rare in zip(model.compliance(par), model.usually_open, strict=True):
+    matrices = model.compliance(par)
+    rarely = model.usually_open or (False,) * len(matrices)
+    for C, rare in zip(matrices, rarely, strict=True):
         n = len(C)
         group = d[at : at + n]
         at += n

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -15,6 +16,7 @@ from bywire.simulation.compiler import VECTOR, Compiler, compile_library, find_c
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import prepare
+from bywire.simulation.expressions import needed
 from bywire.simulation.native import plan_array, pointer
 from bywire.simulation.program import Program
 from bywire.simulation.run import (
@@ -25,10 +27,18 @@ from bywire.simulation.run import (
     sampled_stimulus,
     selected,
 )
-from bywire.simulation.stages import build_stages
+from bywire.simulation.stages import Stages, build_stages
 
 Array = NDArray[np.float64]
 DIRECTIONS = 8
+
+
+def rounds(stages: Stages) -> bool:
+    """Return whether a sampled value of the plant is rounded, as a converter does."""
+    graph = stages.graph
+    moving = stages.varies(frozenset({"x"}))
+    order = needed(graph, [n for task in stages.ticks for n in task], lambda _: False)
+    return any(graph.nodes[n].op == "floor" and moving[graph.nodes[n].args[0]] for n in order)
 
 
 @dataclass(frozen=True)
@@ -65,6 +75,7 @@ class TangentKernel:
         library = compile_library(emit_tangents(stages, DIRECTIONS), VECTOR, compiler)
         self._run = ctypes.CDLL(str(library)).bw_run_tangents
         self._run.restype = None
+        self.rounds = rounds(stages)
 
     def run(self, arrays: Sequence[NDArray[np.generic]], step: float) -> None:
         """Call the kernel; the arrays are p, u, state, plan, selection, rec, seeds, T, rec_t."""
@@ -112,6 +123,12 @@ def simulate_with_sensitivities(
     if compiler is None:
         raise CompilerError("sensitivities need a C compiler: install the extra bywire[compiler]")
     kernel = _tangent_kernel(prepared.program, tuple(names.index(p) for p in parameters), compiler)
+    if kernel.rounds:
+        warnings.warn(
+            "a sampled value is rounded to whole codes, through which derivatives are zero: "
+            "closed loops look open; choose the law without rounding (adc.law = 'ideal')",
+            stacklevel=2,
+        )
     schedule = run.schedule()
     stimulus = sampled_stimulus(run, schedule)
     outputs = tuple(prepared.program.outputs)

@@ -10,7 +10,8 @@ import casadi as ca
 
 from bywire.simulation.balance import balanced
 from bywire.simulation.expressions import needed
-from bywire.simulation.graph import Graph, Node
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
 from bywire.simulation.program import Program
 from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
 from bywire.simulation.signs import NOT_NEGATIVE, Interval

@@ -201,7 +201,7 @@ def overshoot(response: StepResponse) -> float | Undefined:
 
 @measure("level")
 def steady_state_error(response: StepResponse) -> float | Undefined:
-    """Set point after the step less the mean response in the window of the steady state.
+    """Magnitude of the set point less the mean response in the window of the steady state.
 
     Trapezoidal mean over the window's samples, by default the last 20 % of the time after the
     step. Ripple averages out but for an incomplete period.
@@ -209,7 +209,7 @@ def steady_state_error(response: StepResponse) -> float | Undefined:
     if not response.is_tracking:
         return Undefined("no set point is given")
     mean = _mean(response)
-    return mean if isinstance(mean, Undefined) else response.end - mean
+    return mean if isinstance(mean, Undefined) else abs(response.end - mean)
 
 
 @measure("level")

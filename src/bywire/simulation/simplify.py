@@ -1,0 +1,190 @@
+"""Simplifications of an expression graph: one rule per operation, the simpler node or None."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from bywire.simulation.operation import Node, Operation
+
+if TYPE_CHECKING:
+    from bywire.simulation.graph import Graph
+
+
+def _assign(graph: Graph, a: Node) -> Node:
+    return a
+
+
+def _div(graph: Graph, a: Node, b: Node) -> Node:
+    return graph.apply("mul", a, graph.apply("inv", b))
+
+
+def _inv(graph: Graph, a: Node) -> Node | None:
+    operation = graph.nodes[a]
+    return int(operation.args[0]) if operation.op == "inv" else None
+
+
+def _sq(graph: Graph, a: Node) -> Node:
+    return graph.apply("mul", a, a)
+
+
+def _twice(graph: Graph, a: Node) -> Node:
+    return graph.apply("mul", graph.constant(2.0), a)
+
+
+def _constpow(graph: Graph, a: Node, b: Node) -> Node | None:
+    return _pow(graph, a, b)
+
+
+def _pow(graph: Graph, a: Node, b: Node) -> Node | None:
+    exponent = graph.value(b)
+    if exponent == 1.0:
+        return a
+    if exponent == 2.0:
+        return graph.apply("mul", a, a)
+    if exponent == 0.5:
+        return graph.apply("sqrt", a)
+    return None
+
+
+def _add(graph: Graph, a: Node, b: Node) -> Node | None:
+    if graph.value(a) == 0.0:
+        return b
+    if graph.value(b) == 0.0:
+        return a
+    if graph.nodes[b].op == "neg":
+        return graph.apply("sub", a, graph.nodes[b].args[0])
+    if graph.nodes[a].op == "neg":
+        return graph.apply("sub", b, graph.nodes[a].args[0])
+    return _paired_selection(graph, a, b) or _gathered(graph, "add", a, b)
+
+
+def _gathered(graph: Graph, op: str, a: Node, b: Node) -> Node | None:
+    """Turn a + (b + x) into (a + b) + x where a and b are fixed and x is not; likewise a b x."""
+    for fixed, other in ((a, b), (b, a)):
+        inner = graph.nodes[other]
+        if not graph.fixed[fixed] or graph.fixed[other] or inner.op != op:
+            continue
+        for first, second in (inner.args, inner.args[::-1]):
+            if graph.fixed[first]:
+                return graph.apply(op, graph.apply(op, fixed, first), second)
+    return None
+
+
+def _paired_selection(graph: Graph, a: Node, b: Node) -> Node | None:
+    """Turn (c ? x : 0) + (!c ? y : 0) into c ? x : y."""
+    first, second = graph.nodes[a], graph.nodes[b]
+    if first.op != "if_else_zero" or second.op != "if_else_zero":
+        return None
+    for (c, x), (negated, y) in ((first.args, second.args), (second.args, first.args)):
+        if graph.nodes[negated] == Operation("not", (c,)):
+            return graph.intern(Operation("select", (c, x, y)))
+    return None
+
+
+def _sub(graph: Graph, a: Node, b: Node) -> Node | None:
+    if a == b:
+        return graph.constant(0.0)
+    if graph.value(b) == 0.0:
+        return a
+    if graph.value(a) == 0.0:
+        return graph.apply("neg", b)
+    if graph.nodes[b].op == "neg":
+        return graph.apply("add", a, graph.nodes[b].args[0])
+    if graph.fixed[b] and graph.nodes[a].op in ("add", "sub") and not graph.fixed[a]:
+        inner = graph.nodes[a]
+        first, second = inner.args
+        if graph.fixed[first]:
+            return graph.apply(inner.op, graph.apply("sub", first, b), second)
+        if graph.fixed[second] and inner.op == "add":
+            return graph.apply("add", graph.apply("sub", second, b), first)
+    return None
+
+
+def _mul(graph: Graph, a: Node, b: Node) -> Node | None:
+    for factor, other in ((a, b), (b, a)):
+        value = graph.value(factor)
+        if value == 0.0:
+            return graph.constant(0.0)
+        if value == 1.0:
+            return other
+        if value == -1.0:
+            return graph.apply("neg", other)
+    return _gathered(graph, "mul", a, b) or _distributed(graph, a, b)
+
+
+def _distributed(graph: Graph, a: Node, b: Node) -> Node | None:
+    """Turn a (b + x) into a b + a x where a and b are fixed and x is not.
+
+    As many operations, but chains of such factors collapse into one product and one sum.
+    """
+    for factor, other in ((a, b), (b, a)):
+        inner = graph.nodes[other]
+        if not graph.fixed[factor] or graph.fixed[other] or inner.op not in ("add", "sub"):
+            continue
+        if graph.fixed[inner.args[0]] != graph.fixed[inner.args[1]]:
+            parts = (graph.apply("mul", factor, x) for x in inner.args)
+            return graph.apply(inner.op, *parts)
+    return None
+
+
+def _neg(graph: Graph, a: Node) -> Node | None:
+    operation = graph.nodes[a]
+    if operation.op == "neg":
+        return int(operation.args[0])
+    if operation.op == "sub":
+        return graph.apply("sub", operation.args[1], operation.args[0])
+    return None
+
+
+def _sign(graph: Graph, a: Node) -> Node:
+    zero, one = graph.constant(0.0), graph.constant(1.0)
+    above = graph.apply("if_else_zero", graph.apply("lt", zero, a), one)
+    below = graph.apply("if_else_zero", graph.apply("lt", a, zero), one)
+    return graph.apply("sub", above, below)
+
+
+def _fmax(graph: Graph, a: Node, b: Node) -> Node | None:
+    first, second = graph.intervals[a], graph.intervals[b]
+    return a if first.low >= second.high else b if second.low >= first.high else None
+
+
+def _fmin(graph: Graph, a: Node, b: Node) -> Node | None:
+    first, second = graph.intervals[a], graph.intervals[b]
+    return a if first.high <= second.low else b if second.high <= first.low else None
+
+
+def _fabs(graph: Graph, a: Node) -> Node | None:
+    return a if graph.intervals[a].positive else None
+
+
+def _if_else_zero(graph: Graph, c: Node, a: Node) -> Node | None:
+    if graph.value(a) == 0.0:
+        return graph.constant(0.0)
+    operation = graph.nodes[a]
+    if operation.op == "mul":
+        # c ? k exp(x) : 0 is k (c ? exp(x) : 0): the selection can be shared, and branched on.
+        for factor, costly in (operation.args, operation.args[::-1]):
+            if graph.nodes[costly].op == "exp":
+                return graph.apply("mul", factor, graph.apply("if_else_zero", c, costly))
+    return None
+
+
+RULES: dict[str, Callable[..., Node | None]] = {
+    "assign": _assign,
+    "div": _div,
+    "inv": _inv,
+    "sq": _sq,
+    "twice": _twice,
+    "constpow": _constpow,
+    "pow": _pow,
+    "add": _add,
+    "sub": _sub,
+    "mul": _mul,
+    "neg": _neg,
+    "sign": _sign,
+    "fmax": _fmax,
+    "fmin": _fmin,
+    "fabs": _fabs,
+    "if_else_zero": _if_else_zero,
+}

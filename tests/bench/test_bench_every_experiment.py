@@ -1,0 +1,115 @@
+"""Every experiment runs from two lines, and gives what it declares."""
+
+from __future__ import annotations
+
+import json
+import math
+import pkgutil
+
+import pytest
+
+import bywire
+from bywire.bench import experiments
+from bywire.bench.bench import Result
+from bywire.bench.registry import all_experiments
+from bywire.bench.stimuli.registry import entries as stimuli
+from bywire.report.bench_figures import bench_figures
+from bywire.report.bench_results import as_json
+
+NAMES = sorted(all_experiments())
+SETS = ["dardanelli2010", "dardanelli2010-table1"]
+LINES = 'experiment = "{}"\nparameters = "dardanelli2010"\n'
+STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory) -> dict[str, Result]:
+    """Run every experiment once, from a bench file of two lines."""
+    folder = tmp_path_factory.mktemp("benches")
+    found = {}
+    for name in NAMES:
+        path = folder / f"{name}.toml"
+        driven = all_experiments()[name].driven_unit is not None
+        path.write_text(LINES.format(name) + (STEP.format("A") if driven else ""))
+        found[name] = bywire.run(bywire.load(path))
+    return found
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_two_lines_are_enough(results, name):
+    result = results[name]
+    assert result.status == "passed"
+    assert result.warnings == []
+    assert result.recordings
+    for recording in result.recordings.values():
+        assert recording.attrs.get("status", "done") == "done"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_kpis_are_those_declared(results, name):
+    declared = all_experiments()[name].kpis
+    assert {kpi.name: kpi.unit for kpi in results[name].kpis} == dict(declared)
+    for kpi in results[name].kpis:
+        assert kpi.definition.endswith(".")
+        assert math.isfinite(kpi.value) or kpi.note
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_figure_it_names_exists(results, name):
+    shown = bench_figures(results[name])
+    kinds = all_experiments()[name].figures
+    assert kinds
+    for kind in kinds:
+        assert any(figure.name.startswith(kind) for figure in shown)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_results_are_json(results, name):
+    text = json.dumps(as_json(results[name], []), allow_nan=False)
+    assert json.loads(text)["kpis"].keys() == all_experiments()[name].kpis.keys()
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_signal_has_unit_and_name(results, name):
+    for recording in results[name].recordings.values():
+        for variable in recording.variables.values():
+            assert variable.attrs["units"]
+            assert variable.attrs["long_name"]
+
+
+@pytest.mark.parametrize("parameters", SETS)
+@pytest.mark.parametrize("name", NAMES)
+def test_every_parameter_set_of_the_assembly_fits(name, parameters):
+    definition = all_experiments()[name]
+    stimulus = {"kind": "step", "start": 0, "end": 1, "t_step": 0} if definition.driven_unit else {}
+    bench = bywire.Bench(name, parameters, stimulus=stimulus)
+    for case in bench.cases():
+        assert type(case.par) is type(bench.par)
+
+
+def test_names_are_those_of_their_files():
+    modules = {module.name for module in pkgutil.iter_modules(experiments.__path__)}
+    assert {name.replace("-", "_") for name in NAMES} == modules
+
+
+@pytest.mark.parametrize("kind", sorted(stimuli()))
+@pytest.mark.parametrize(("source", "unit"), [("current", "A"), ("voltage", "V")])
+def test_every_stimulus_drives_the_open_loop(kind, source, unit):
+    values = {
+        "step": {"start": 0, "end": f"1 {unit}", "t_step": 0.01},
+        "ramp": {"start": 0, "end": f"1 {unit}", "slope": f"50 {unit}/s", "t_start": 0,
+                 "t_hold": 0, "after": "return"},
+        "sine": {"mean": f"1 {unit}", "amplitude": f"1 {unit}", "f": "100 Hz", "t_start": 0,
+                 "phase": 0},
+        "chirp": {"mean": f"1 {unit}", "amplitude": f"1 {unit}", "f_start": "1 Hz",
+                  "f_end": "100 Hz", "t_sweep": "40 ms", "sweep": "linear", "t_start": 0},
+        "multisine": {"mean": f"1 {unit}", "amplitude": f"0.1 {unit}", "f_base": "10 Hz", "n": 5,
+                      "t_start": 0},
+        "table": {"times": "0 s, 20 ms", "values": f"0 {unit}, 1 {unit}", "between": "hold"},
+    }  # fmt: skip
+    options = {"source": source, "duration": "50 ms"}
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", options=options, stimulus={"kind": kind, **values[kind]}
+    )
+    recording = bywire.run(bench).recordings["run"]
+    assert float(abs(recording["i"]).max()) > 0.1

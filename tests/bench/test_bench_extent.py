@@ -1,0 +1,97 @@
+"""Durations, steps and rows: what divides, what a machine can hold."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import bywire
+from bywire.bench import extent
+from bywire.core.errors import StepError
+
+SET = "dardanelli2010"
+STEP = {"kind": "step", "start": 0, "end": "1 A", "t_step": 0}
+
+
+def braking(**changes) -> bywire.Bench:
+    """Return a hard braking."""
+    return bywire.Bench("hard-braking", SET, **changes)
+
+
+@pytest.mark.parametrize("step", ["1 us", "5 us", "20 us", "40 us", "100 us", "1 ms"])
+def test_steps_that_divide_the_period_of_the_ecu(step):
+    bench = braking(step=step, options={"duration": "5 ms", "settle": 0})
+    assert bywire.run(bench).status == "passed"
+
+
+@pytest.mark.parametrize("step", ["3 us", "30 us", "333 us", "2 ms", "1 s", "1e9 s"])
+def test_steps_that_do_not_are_refused(step):
+    with pytest.raises(StepError, match="does not divide the ecu interval of 1000 us"):
+        bywire.run(braking(step=step))
+
+
+@pytest.mark.parametrize("record", ["20 us", "200 us", "1 ms", "5 ms", "1.2 s"])
+def test_recording_intervals(record):
+    bench = braking(record=record)
+    recording = bywire.run(bench).recordings["run"]
+    assert recording.sizes["time"] >= 2
+    interval = float(recording["time"][1] - recording["time"][0])
+    assert interval == pytest.approx(bench.record)
+
+
+@pytest.mark.parametrize("record", ["10 us", "30 us", "1e-9 s"])
+def test_recording_intervals_that_the_step_does_not_divide(record):
+    with pytest.raises(StepError, match="does not divide the recording interval"):
+        bywire.run(braking(record=record))
+
+
+@pytest.mark.parametrize("record", ["1.21 s", "1e300 s"])
+def test_recording_interval_longer_than_the_run(record):
+    with pytest.raises(StepError, match=r"1\.2 s cannot have rows every .*record more often"):
+        bywire.run(braking(record=record))
+
+
+@pytest.mark.parametrize("duration", ["1e9 s", "1e300 s"])
+def test_run_that_no_memory_holds(duration):
+    options = {"duration": duration}
+    bench = bywire.Bench("open-loop", SET, options=options, stimulus=STEP)
+    with pytest.raises(StepError, match=r"needs about .* GB of memory, but this machine has"):
+        bywire.run(bench)
+
+
+def test_recording_less_often_needs_less(monkeypatch):
+    monkeypatch.setattr(extent, "_memory", lambda: 2e6)
+    with pytest.raises(StepError, match=r"0\.002 GB.*record less often"):
+        bywire.run(braking())
+    assert bywire.run(braking(record="10 ms")).status == "passed"
+
+
+def test_infinite_duration():
+    options = {"i_max": 1e308, "slope": 1e-308}
+    with pytest.raises(StepError, match="inf"):
+        bywire.run(bywire.Bench("friction-ramp", SET, options=options))
+
+
+def test_memory_of_this_machine_is_plausible():
+    assert 1e8 < extent._memory() < 1e16
+
+
+def test_system_that_does_not_tell_its_memory(monkeypatch):
+    def unknown(name):
+        raise ValueError(name)
+
+    monkeypatch.setattr("os.sysconf", unknown, raising=False)
+    assert extent._memory() == 8e9
+
+
+@pytest.mark.parametrize("value", [1e-9, 1, "3 ms"])
+def test_admissible_step(value):
+    assert extent.checked_step(value) >= extent.SHORTEST_STEP
+    assert extent.checked_interval(value) == extent.checked_step(value)
+
+
+@pytest.mark.parametrize("value", [0, 9.99e-10, -1, -math.inf, math.nan, "x", [1], None, False])
+def test_inadmissible_step(value):
+    with pytest.raises(bywire.BywireError, match=r"simulation\.step"):
+        extent.checked_step(value)

@@ -1,0 +1,171 @@
+"""The bench as a Python object: frozen, complete, and the same thing as a bench file."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+
+import pytest
+
+import bywire
+from bywire.bench.bench_file import flattened, from_mapping, load
+from bywire.core.errors import InputError, ParameterError, StepError, UnitError, UnknownNameError
+
+SET = "dardanelli2010"
+TEXT = """
+experiment = "hard-braking"
+parameters = "dardanelli2010"
+assembly = "motorcycle-brake"
+name = "both"
+
+[set]
+motor.R_m = "0.4 ohm"
+"pipeline.d_pl" = "8 mm"
+
+[set.ecu.dither]
+waveform = "square"
+
+[options]
+p_to = "30 bar"
+duration = 0.5
+
+[simulation]
+step = "40 us"
+record = "2 ms"
+seed = 3
+
+[requirements]
+overshoot = "<= 15 %"
+"""
+
+
+def same() -> bywire.Bench:
+    """Return the bench of ``TEXT`` as a Python object."""
+    return bywire.Bench(
+        experiment="hard-braking",
+        parameters=SET,
+        name="both",
+        overrides={
+            "motor.R_m": "0.4 ohm",
+            "pipeline.d_pl": "8 mm",
+            "ecu.dither.waveform": "square",
+        },
+        options={"p_to": "30 bar", "duration": 0.5},
+        step=40e-6,
+        record=2e-3,
+        seed=3,
+        requirements={"overshoot": "<= 15 %"},
+    )
+
+
+def test_file_and_object_are_equal(tmp_path):
+    path = tmp_path / "both.toml"
+    path.write_text(TEXT)
+    loaded = load(path)
+    assert loaded == same()
+    assert loaded.par == same().par
+    assert loaded.chosen_options == same().chosen_options
+    assert loaded != dataclasses.replace(same(), seed=4)
+
+
+def test_texts_and_numbers_are_the_same_values():
+    name, resistance = "hard-braking", "motor.R_m"
+    texts = bywire.Bench(name, SET, {resistance: "400 mohm"}, step="40 us", record="2 ms")
+    numbers = bywire.Bench(name, SET, {resistance: 0.4}, step=40e-6, record=2e-3)
+    assert texts.par == numbers.par
+    assert (texts.step, texts.record) == (numbers.step, numbers.record)
+
+
+@pytest.mark.parametrize("field", [field.name for field in dataclasses.fields(bywire.Bench)])
+def test_nothing_can_be_assigned(field):
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        setattr(same(), field, None)
+
+
+def test_parameters_are_frozen_too():
+    bench = same()
+    with pytest.raises(ValueError, match="frozen"):
+        bench.par.motor.R_m = 1.0
+    with pytest.raises(ValueError, match="frozen"):
+        bench.chosen_options.p_to = 1.0
+
+
+def test_what_was_given_may_change_afterwards():
+    overrides = {"motor.R_m": 0.4}
+    bench = bywire.Bench("hard-braking", SET, overrides)
+    overrides["motor.R_m"] = -1.0
+    assert bench.overrides == {"motor.R_m": 0.4}
+    assert bench.par.motor.R_m == 0.4
+
+
+def test_name_of_a_file_is_the_default(tmp_path):
+    path = tmp_path / "my braking.toml"
+    path.write_text('experiment = "hard-braking"\nparameters = "dardanelli2010"\n')
+    assert load(path).name == "my braking"
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "text"),
+    [
+        ({"experiment": "hard-breaking"}, UnknownNameError, "did you mean 'hard-braking'"),
+        ({"experiment": 3}, ParameterError, "experiment = 3: a text is wanted"),
+        ({"parameters": "x"}, UnknownNameError, "unknown parameter set 'x'"),
+        ({"parameters": None}, ParameterError, "parameters = None: a text is wanted"),
+        ({"name": 3}, ParameterError, "name = 3: a text is wanted"),
+        ({"overrides": {"motor.R_m": -1}}, ParameterError, "must be > 0 ohm"),
+        ({"overrides": {"motor.R_m": math.nan}}, ParameterError, "any finite number in ohm"),
+        ({"overrides": {"motor.R_m": "1 bar"}}, UnitError, "bar cannot be ohm"),
+        ({"overrides": {"motor.R_m": True}}, UnitError, "one number is wanted"),
+        ({"overrides": {"motor.R_m": None}}, UnitError, "one number is wanted"),
+        ({"overrides": {"motor.R_m": 10**5000}}, ParameterError, "300 digits or more"),
+        ({"overrides": {"motor": {}}}, UnknownNameError, "unknown parameter 'motor'"),
+        ({"overrides": {"options.p_to": 1}}, UnknownNameError, "unknown parameter"),
+        ({"options": {"p_to": -1}}, ParameterError, "must be > 0 Pa"),
+        ({"step": 0}, StepError, "simulation.step = 0 s"),
+        ({"step": -1e-6}, StepError, "must be >= 1e-09 s"),
+        ({"step": math.inf}, ParameterError, "any finite number in s"),
+        ({"step": "1 bar"}, UnitError, "bar cannot be s"),
+        ({"record": 0}, StepError, "simulation.record = 0 s"),
+        ({"record": math.nan}, ParameterError, "any finite number in s"),
+        ({"seed": -1}, ParameterError, "simulation.seed = -1"),
+        ({"seed": 2**63}, ParameterError, "<= 9223372036854775807"),
+        ({"seed": 1.0}, ParameterError, "whole number"),
+        ({"seed": True}, ParameterError, "whole number"),
+        ({"stimulus": {"kind": "step"}}, ParameterError, "brings its own stimulus"),
+        ({"requirements": {"overshot": "<= 1 %"}}, UnknownNameError, "'overshoot'"),
+        ({"requirements": {"overshoot": 0.1}}, ParameterError, "cannot be read"),
+    ],
+)
+def test_what_does_not_fit_is_refused_at_construction(changes, error, text):
+    with pytest.raises(error, match=text):
+        bywire.Bench(**{"experiment": "hard-braking", "parameters": SET, **changes})
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "options"),
+    [
+        ("drive.mode", "pedal", {}),
+        ("ecu.dither.waveform", "square", {"how": "current-off"}),
+    ],
+)
+def test_override_without_effect_is_refused(name, value, options):
+    bench = bywire.Bench("release", SET, {name: value}, options)
+    with pytest.raises(ParameterError, match=r"would have no effect.*leave it out"):
+        bench.cases()
+
+
+def test_override_that_one_of_two_runs_takes_is_kept():
+    bench = bywire.Bench("friction-ramp", SET, {"ecu.dither.waveform": "square"})
+    waveforms = [case.par.ecu.dither.waveform for case in bench.cases()]
+    assert waveforms == ["off", "square"]
+
+
+def test_nested_sections_become_dotted_names():
+    assert flattened({"a": {"b": 1, "c": {"d": [2]}}, "e": 3}) == {"a.b": 1, "a.c.d": [2], "e": 3}
+
+
+def test_content_without_a_file(tmp_path):
+    content = {"experiment": "hard-braking", "parameters": SET}
+    assert from_mapping(content, tmp_path, "x") == bywire.Bench("hard-braking", SET, name="x")
+    with pytest.raises(InputError, match="unknown key 'x'"):
+        from_mapping({**content, "x": 1}, tmp_path, "x")

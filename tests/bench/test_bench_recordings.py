@@ -1,0 +1,162 @@
+"""Recordings: what they say of themselves, their files, and what the seed decides."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import bywire
+from bywire.bench.recording import energy_residual, parameter_hash
+from bywire.core.errors import FileError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+
+SHORT = {"duration": "60 ms", "settle": "20 ms"}
+
+
+def braking(**changes) -> bywire.Bench:
+    """Return a short hard braking."""
+    return bywire.Bench("hard-braking", "dardanelli2010", **{"options": SHORT, **changes})
+
+
+def recorded(**changes) -> xr.Dataset:
+    """Return the recording of a short hard braking."""
+    return bywire.run(braking(**changes)).recordings["run"]
+
+
+@pytest.fixture(scope="module")
+def recording() -> xr.Dataset:
+    """Return one recording for all tests that only look at it."""
+    return recorded(seed=5)
+
+
+def test_recording_says_how_it_was_made(recording):
+    attrs = recording.attrs
+    assert attrs["bywire_version"] == bywire.__version__
+    assert attrs["parameter_set"] == "dardanelli2010"
+    assert attrs["parameter_hash"] == parameter_hash(braking().cases()[0].par)
+    assert (attrs["seed"], attrs["step"], attrs["status"]) == (5, 20e-6, "done")
+    assert attrs["engine"]
+    assert json.loads(attrs["parameters"])["motor"]["R_m"] == 0.35
+    assert attrs["warnings"] == ""
+
+
+def test_parameters_of_a_recording_can_be_used_again(recording):
+    cls: type[ParameterSet] = type(braking().par)
+    again = cls.model_validate_json(recording.attrs["parameters"])
+    assert again == braking().cases()[0].par
+
+
+def test_hash_follows_the_parameters():
+    par = braking().par
+    assert parameter_hash(par) == parameter_hash(braking(seed=9).par)
+    assert parameter_hash(par) != parameter_hash(par.replace({"motor.R_m": 0.36}))
+    assert parameter_hash(par) != parameter_hash(par.replace({"gear.law": "directional"}))
+
+
+def test_signals_are_those_of_the_model(recording):
+    declared = signals_of(braking().cases()[0].model.Output)
+    assert set(recording.data_vars) == set(declared)
+    for name, signal in declared.items():
+        assert recording[name].attrs == {"units": signal.unit, "long_name": signal.label}
+        assert np.all(np.isfinite(recording[name].values))
+
+
+def test_time_is_regular_and_holds_zero(recording):
+    time = recording["time"].values
+    np.testing.assert_allclose(np.diff(time), 1e-3, rtol=1e-9)
+    assert 0.0 in time
+    assert time[0] == pytest.approx(-0.02)
+    assert time[-1] == pytest.approx(0.06)
+
+
+def test_netcdf_gives_the_same_recording_back(recording, tmp_path):
+    path = bywire.write_recording(recording, tmp_path / "run.nc")
+    again = bywire.read_recording(path)
+    xr.testing.assert_identical(again, recording)
+    assert again.attrs == recording.attrs
+    assert list(again.data_vars) == list(recording.data_vars)
+    assert [p.name for p in tmp_path.iterdir()] == ["run.nc"]
+
+
+def test_static_characteristic_gives_itself_back_too(tmp_path):
+    curve = bywire.run(bywire.Bench("stribeck", "dardanelli2010")).recordings["curve"]
+    path = bywire.write_recording(curve, tmp_path / "curve.nc")
+    xr.testing.assert_identical(bywire.read_recording(path), curve)
+
+
+def test_file_that_cannot_be_written_leaves_the_old_one(recording, tmp_path):
+    (tmp_path / "taken").write_text("mine")
+    with pytest.raises(FileError, match="cannot write"):
+        bywire.write_recording(recording, tmp_path / "taken" / "run.nc")
+    path = bywire.write_recording(recording, tmp_path / "run.nc")
+    before = path.read_bytes()
+    broken = recording.assign_attrs(broken=object())
+    with pytest.raises((FileError, TypeError)):
+        bywire.write_recording(broken, path)
+    assert path.read_bytes() == before
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["run.nc", "taken"]
+
+
+@pytest.mark.parametrize("content", [b"", b"no recording", b"CDF", b"\x89HDF\r\n\x1a\n"])
+def test_file_that_is_no_recording(tmp_path, content):
+    path = tmp_path / "run.nc"
+    path.write_bytes(content)
+    with pytest.raises(FileError, match=r"cannot read recording .*run\.nc"):
+        bywire.read_recording(path)
+
+
+def test_recording_that_is_not_there(tmp_path):
+    with pytest.raises(FileError, match="No such file"):
+        bywire.read_recording(tmp_path / "none.nc")
+    with pytest.raises(FileError, match="cannot read recording"):
+        bywire.read_recording(tmp_path)
+
+
+def test_same_seed_same_bits():
+    noisy = {"overrides": {"adc.noise": 1e-3}}
+    xr.testing.assert_identical(recorded(seed=1, **noisy), recorded(seed=1, **noisy))
+
+
+def test_other_seed_other_noise():
+    noisy = {"overrides": {"adc.noise": 1e-3}}
+    one, two = recorded(seed=1, **noisy), recorded(seed=2, **noisy)
+    difference = one["p_meas"] - two["p_meas"]
+    assert float(abs(difference).max()) > 0.0
+    assert float(abs(difference).max()) < 1e5  # codes of a 12-bit converter, not another brake
+
+
+def test_without_noise_the_seed_does_nothing():
+    one, two = recorded(seed=1), recorded(seed=2)
+    xr.testing.assert_equal(one, two)
+    assert one.attrs["seed"] != two.attrs["seed"]
+
+
+def test_two_runs_of_one_bench_have_noise_of_their_own():
+    bench = bywire.Bench(
+        "friction-ramp",
+        "dardanelli2010",
+        {"adc.noise": 1e-3, "ecu.dither.waveform": "off"},
+        {"i_max": "0.1 A", "slope": "2 A/s"},
+    )
+    # With the waveform off the second run takes a sine, so only the first tick is comparable.
+    first = [run["i_meas"].values[:2] for run in bywire.run(bench).recordings.values()]
+    assert np.any(first[0] != first[1])
+
+
+def test_energy_balance_closes(recording):
+    residual = energy_residual(recording)
+    spent = float(recording["E_source"][-1] - recording["E_source"][0])
+    assert float(abs(residual).max()) < 1e-3 * abs(spent)
+    assert residual.attrs["units"] == "J"
+
+
+def test_engines_agree_on_every_signal():
+    compiled = bywire.run(braking()).recordings["run"]
+    slow = bywire.run(braking(), engine="virtual-machine").recordings["run"]
+    for name in compiled.data_vars:
+        scale = float(abs(compiled[name]).max())
+        assert float(abs(compiled[name] - slow[name]).max()) <= 1e-6 * scale
