@@ -30,7 +30,7 @@ CHECKS = {
 
 def main() -> int:
     """Run one recipe and return its exit status."""
-    if sys.version_info < (3, 11):
+    if sys.version_info < (3, 11):  # noqa: UP036  this file runs on whatever is there
         print(f"bywire needs Python 3.11 or newer, this is {sys.version.split()[0]}")
         return 2
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])

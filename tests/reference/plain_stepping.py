@@ -63,12 +63,6 @@ class Dual:
     def __gt__(self, other: Any) -> bool:
         return bool(self.value > _parts(other)[0])
 
-    def __le__(self, other: Any) -> bool:
-        return not self > other
-
-    def __ge__(self, other: Any) -> bool:
-        return not self < other
-
     def __eq__(self, other: object) -> bool:
         return bool(self.value == _parts(other)[0])
 
@@ -233,8 +227,8 @@ def simulate(
     cap: int = 8,
 ) -> tuple[Array, Point]:
     """Run a model from (state, memory): recorded outputs, shape (rows, signals), and the end."""
-    tasks = model.tasks(par)
-    every = [round(task.period / step) for task in tasks]
+    every = [(task, round(task.period / step)) for task in model.tasks(par)]
+    fastest = min(period for _, period in every)
     recorded, total = round(record / step), round(duration / step)
     reactions, contacts = len(model.frictions + model.limits), sum(map(len, model.compliance(par)))
     x = np.array(start[0], dtype=float)
@@ -242,10 +236,9 @@ def simulate(
     at.q = np.zeros(len(model.Flow._fields))
     rows = []
     for k in range(total + 1):
-        fastest = min(every)
         u = stimulus(np.array([k // fastest * fastest * step]))[0]
         state = model.State(*map(float, at.x))
-        for task, period in zip(tasks, every, strict=True):
+        for task, period in every:
             if k % period == 0:
                 at.m = task.tick(state, at.m, model.Stimulus(*map(float, u)), par)
         if k % recorded == 0:

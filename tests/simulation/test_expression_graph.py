@@ -84,8 +84,8 @@ def test_divisions_become_products() -> None:
 def test_folding() -> None:
     graph, roots = built(
         lambda x, y, z, p, q, r: (
-            ca.exp(ca.SX(0.0)) + 2.0 * ca.SX(3.0), 0.0 * x + y, 1.0 * x, x - x, ca.minus(0.0, -x), -1.0 * x,
-            x + (-y), -(x - y), ca.sqrt(ca.SX(2.0)), x**2, x**0.5,
+            ca.exp(ca.SX(0.0)) + 2.0 * ca.SX(3.0), 0.0 * x + y, 1.0 * x, x - x, 0.0 - (-x),
+            -1.0 * x, x + (-y), -(x - y), ca.sqrt(ca.SX(2.0)), x**2, x**0.5,
         )
     )  # fmt: skip
     names = [graph.nodes[n].op for n in roots]

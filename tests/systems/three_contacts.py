@@ -37,11 +37,9 @@ Count = Annotated[float, Signal("1", "count")]
 class Parameters(ParameterSet):
     """Screws, wedge, contacts, frictions, controllers."""
 
-    M_S: Mass
-    """inertia of a motor as seen at its screw"""
+    M_S: Mass  # of a motor, as seen at its screw
     M_W: Mass
-    K_CAL: Stiffness
-    """stiffness of the calliper as the wedge sees it"""
+    K_CAL: Stiffness  # of the caliper, as the wedge sees it
     K_S: Stiffness
     K_W: Stiffness
     K_C: Stiffness
@@ -181,10 +179,8 @@ class ThreeContacts:
     ) -> State:
         """Return velocities and forces."""
         f_1, f_2, f_12 = contact
-        return State(
-            x.V_1, m.force_1 + f_1 - f_12, x.V_2, m.force_2 + f_12 - f_2, x.v,
-            f_2 - f_1 - par.K_CAL * x.x,
-        )  # fmt: skip
+        screw_1, screw_2 = m.force_1 + f_1 - f_12, m.force_2 + f_12 - f_2
+        return State(x.V_1, screw_1, x.V_2, screw_2, x.v, f_2 - f_1 - par.K_CAL * x.x)
 
     def bounds(
         self, x: State, xe: State, m: Memory, par: Parameters, contact: tuple[float, ...]

@@ -151,7 +151,6 @@ class Bench:
                 )
         return found
 
-
     def runs(self) -> dict[str, Run]:
         """Return the runs by label, for ensembles and sensitivities.
 

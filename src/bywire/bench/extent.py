@@ -38,8 +38,7 @@ def checked_interval(value: Any) -> float | None:
     interval = units.parse(value, "s", "simulation.record")
     if interval <= 0:
         raise StepError(
-            f"simulation.record = {interval:g} s is not admissible: "
-            "it must be > 0 s, usually 1 ms"
+            f"simulation.record = {interval:g} s is not admissible: it must be > 0 s, usually 1 ms"
         )
     return interval
 

@@ -39,8 +39,8 @@ _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d{1,3})?)\s*(.*?
 # Names, products, quotients and small powers; nothing that would make pint compute. A separator
 # between two names is required: without one, a long word could be split in a billion ways.
 _POWER = r"[A-Za-zµμΩ%°]+(?:(?:\*\*|\^)-?\d|[²³])?"
-_FACTOR = rf"(?:{_POWER}|\({_POWER}(?:\s*[*·]\s*{_POWER})*\))"
-_UNIT = re.compile(rf"(?:1?\s*/\s*)?{_FACTOR}(?:(?:\s*[*/·]\s*|\s+){_FACTOR})*")
+_FACTOR = rf"(?:{_POWER}|\({_POWER}(?: *[*·] *{_POWER})*\))"
+_UNIT = re.compile(rf"(?:1? */ *)?{_FACTOR}(?:(?: *[*/·] *| +){_FACTOR})*")
 _MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
 _LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
 _RATES = ("Hz", "rad/s")  # pint takes rad as a pure number and would turn 60 rpm into 6.28 Hz

@@ -73,7 +73,8 @@ def part(runs: Runs) -> Part:
 def _nonlinear(runs: Runs, name: str, suffix: str, final: Fact, rise: Fact) -> list[Item]:
     """Return the nonlinear brake's step, and the pressure that the dither costs it."""
     values = kpis(runs.settled_step(name, START, HEIGHT))
-    bias = before(runs.bench("pressure-step", name, options={"p_start": START})) / BAR
+    frictionless = {"p_start": START, "start": "frictionless"}
+    bias = before(runs.bench("pressure-step", name, options=frictionless)) / BAR
     return [
         compared(
             f"fig6.change{suffix}", final, values["static_gain"] * HEIGHT / BAR,

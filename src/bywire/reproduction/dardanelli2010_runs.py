@@ -86,9 +86,6 @@ class Runs:
     def settled_step(self, name: str, p: float, i_step: float) -> Result:
         """Return a current step that begins where the dithered pressure has settled at ``p``.
 
-        Asymmetric friction under dither shifts the pressure from that of the frictionless
-        equilibrium, so the experiment's start is corrected twice by the ratio.
-
         Parameters
         ----------
         name
@@ -98,15 +95,7 @@ class Runs:
         i_step
             Height of the step [A].
         """
-        start = p
-        for _ in range(2):
-            start *= p / before(self._step(name, start, i_step))
-        return self._step(name, start, i_step)
-
-    def _step(self, name: str, start: float, i_step: float) -> Result:
-        return self.bench(
-            "pressure-step", name, options={"p_start": round(start), "i_step": i_step}
-        )
+        return self.bench("pressure-step", name, options={"p_start": p, "i_step": i_step})
 
 
 def before(step: Result) -> float:

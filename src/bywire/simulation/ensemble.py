@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.compiler import VECTOR, Compiler, compile_library, find_compiler
+from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.engine import prepare
@@ -67,7 +67,9 @@ class LaneKernel:
     def __init__(self, program: Program, compiler: Compiler) -> None:
         stages = build_stages(program)
         self.layout: Layout = layout_of(stages)
-        library = ctypes.CDLL(str(compile_library(emit_lanes(stages), VECTOR, compiler)))
+        library = ctypes.CDLL(
+            str(compile_library(emit_lanes(stages), vector_flags(compiler), compiler))
+        )
         self.lanes = int(library.bw_lanes())
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
         self._run = library.bw_run_lanes

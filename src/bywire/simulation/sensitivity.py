@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, unknown_name
-from bywire.simulation.compiler import VECTOR, Compiler, compile_library, find_compiler
+from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import prepare
@@ -72,7 +72,9 @@ class TangentKernel:
         stages = build_stages(program, directions)
         self.layout: Layout = layout_of(stages)
         self.label = f"compiled C with tangents, {compiler.label}"
-        library = compile_library(emit_tangents(stages, DIRECTIONS), VECTOR, compiler)
+        library = compile_library(
+            emit_tangents(stages, DIRECTIONS), vector_flags(compiler), compiler
+        )
         self._run = ctypes.CDLL(str(library)).bw_run_tangents
         self._run.restype = None
         self.rounds = rounds(stages)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -9,6 +11,7 @@ from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
+from bywire.bench.motorcycle_operating_point import settled_start
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, TimeConstant
@@ -18,7 +21,9 @@ class Options(ParameterSet):
     """The step of the current demand."""
 
     p_start: Pressure
-    """pressure from whose equilibrium the run starts"""
+    """pressure before the step"""
+    start: Literal["settled", "frictionless"]
+    """whether the pressure under dither settles at p_start, or the equilibrium without friction"""
     i_step: Current
     """height of the step of the current demand"""
     duration: Duration
@@ -33,11 +38,14 @@ def cases(
     par: MotorcycleParameters, options: Options, _: Stimulus | None = None
 ) -> tuple[Case, ...]:
     """Return the one run, open pressure loop, closed current loop."""
-    i = holding_current(options.p_start, par)
+    p = options.p_start
+    if options.start == "settled" and options.settle > 0:
+        p = settled_start(p, par, options.settle)
+    i = holding_current(p, par)
     stimulus = step_at_zero("i_set", i, i + options.i_step)
     return (
         case_from_rest(
-            "run", par, "current", options.p_start, stimulus, options.duration,
+            "run", par, "current", p, stimulus, options.duration,
             settle=options.settle, keep=min(options.settle, 0.5),
         ),
     )  # fmt: skip
@@ -71,7 +79,9 @@ EXPERIMENT = Experiment(
     assembly="motorcycle-brake",
     summary="current step of 0.35 A at 25 bar from equilibrium, dither on (Fig. 6)",
     options=Options,
-    defaults=Options(p_start=25e5, i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02),
+    defaults=Options(
+        p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02
+    ),
     cases=cases,
     judge=judge,
     kpis={

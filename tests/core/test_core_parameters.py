@@ -1,0 +1,182 @@
+"""Parameter sets: built, changed, walked, and refused with a message that helps."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import pydantic
+import pytest
+from pydantic import Field, model_validator
+
+from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
+from bywire.core.quantities import Fraction, Length, Resistance, Unit
+
+Nodes = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
+
+
+class Inner(ParameterSet):
+    """A part."""
+
+    R: Resistance
+    """resistance"""
+    law: Literal["paper", "directional"]
+    """which equations"""
+
+
+class Outer(ParameterSet):
+    """A whole of parts, numbers, a table and choices."""
+
+    inner: Inner
+    """the part"""
+    share: Fraction
+    """how much"""
+    table: Annotated[Nodes, Unit("Pa"), Field(min_length=1)]
+    """pressures"""
+    n: Annotated[int, Unit("1"), Field(ge=1, le=9)]
+    """how many"""
+    on: bool
+    """whether"""
+    note: str
+    """what about it"""
+    long: Length
+    """longer than short"""
+    short: Length
+    """shorter than long"""
+
+    @model_validator(mode="after")
+    def _is_ordered(self) -> Outer:
+        if self.short >= self.long:
+            raise ValueError("short must be shorter than long")
+        return self
+
+
+VALUES: dict[str, Any] = {
+    "inner.R": 0.35, "inner.law": "paper", "share": 0.9, "table": (0.0, 1e5, 2e5), "n": 3,
+    "on": True, "note": "as built", "long": 2.0, "short": 1.0,
+}  # fmt: skip
+
+
+def made(**changes: Any) -> Outer:
+    """Return the set, changed."""
+    return Outer.create(VALUES | changes)
+
+
+def test_created_and_flat_are_inverse():
+    assert made().flat() == VALUES
+    assert Outer.create(made().flat()) == made()
+    assert made().inner.R == 0.35
+
+
+def test_replaced_values_are_checked_again():
+    other = made().replace({"inner.R": 0.4, "share": 1.0})
+    assert (other.inner.R, other.share) == (0.4, 1.0)
+    assert made().inner.R == 0.35
+    with pytest.raises(ParameterError, match=r"inner\.R = -3\.0 ohm .* must be > 0 ohm"):
+        made().replace({"inner.R": -3.0})
+    with pytest.raises(ParameterError, match="short must be shorter than long"):
+        made().replace({"short": 3.0})
+
+
+def test_nothing_can_be_assigned_or_added():
+    with pytest.raises(pydantic.ValidationError, match="frozen"):
+        made().share = 0.5
+    with pytest.raises(pydantic.ValidationError, match="frozen"):
+        made().inner.R = 0.5
+    with pytest.raises(pydantic.ValidationError, match="extra"):
+        Inner(R=1.0, law="paper", L=2.0)  # type: ignore[call-arg]
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"inner.R": 0.0}, "inner.R = 0.0 ohm is not admissible: it must be > 0 ohm"),
+        ({"inner.R": math.nan}, "inner.R = nan ohm is not admissible: it must be > 0 ohm"),
+        ({"inner.R": math.inf}, "inner.R = inf ohm is not admissible: it must be > 0 ohm"),
+        ({"inner.R": "much"}, "inner.R = much ohm is not admissible: it must be > 0 ohm"),
+        ({"inner.R": None}, "inner.R = None ohm is not admissible: it must be > 0 ohm"),
+        ({"share": 1.1}, "share = 1.1 is not admissible: it must be > 0 and <= 1"),
+        ({"n": 2.5}, "n = 2.5 is not admissible: it must be a whole number, >= 1 and <= 9"),
+        ({"n": 10}, "n = 10 is not admissible: it must be >= 1 and <= 9"),
+        ({"table": (0.0, -1.0)}, "table.1 = -1.0 Pa is not admissible: it must be >= 0 Pa"),
+        ({"table": (math.nan,)}, "table.0 = nan Pa is not admissible: it must be >= 0 Pa"),
+        ({"table": ()}, "table: at least 1 wanted, got ()"),
+        ({"inner.law": "papr"}, "inner.law: it must be 'paper' or 'directional', got 'papr': "
+                                "did you mean 'paper'?"),
+        ({"inner.law": 3}, "inner.law: it must be 'paper' or 'directional', got 3"),
+        ({"on": "maybe"}, "on: it must be true or false, got 'maybe'"),
+        ({"on": [1]}, "on: it must be true or false, got [1]"),
+        ({"note": 3}, "note: it must be a text, got 3"),
+        ({"short": 2.0}, "Outer: short must be shorter than long"),
+    ],
+)  # fmt: skip
+def test_refusal_is_one_line_that_helps(changes, text):
+    with pytest.raises(ParameterError) as refused:
+        made(**changes)
+    assert str(refused.value) == text
+
+
+def test_several_mistakes_get_a_line_each():
+    with pytest.raises(ParameterError) as refused:
+        made(**{"inner.R": -1.0, "share": 2.0})
+    assert [line.split()[0] for line in str(refused.value).splitlines()] == ["inner.R", "share"]
+
+
+def test_missing_value():
+    values = {name: value for name, value in VALUES.items() if name != "inner.R"}
+    with pytest.raises(ParameterError, match=r"inner\.R is missing: give it a value"):
+        Outer.create(values)
+
+
+@pytest.mark.parametrize("name", ["inner.r", "inner", "inner.R.x", "tabel", "table.0", "", ".", "__class__"])  # fmt: skip  # noqa: E501
+def test_unknown_name(name):
+    with pytest.raises(UnknownNameError, match="unknown parameter"):
+        made(**{name: 1.0})
+
+
+def test_leaves_spread_tables():
+    assert made().leaves() == {
+        "inner.R": 0.35, "share": 0.9, "table.0": 0.0, "table.1": 1e5, "table.2": 2e5, "n": 3.0,
+        "long": 2.0, "short": 1.0,
+    }  # fmt: skip
+    assert all(type(value) is float for value in made().leaves().values())
+
+
+def test_choices_hold_the_length_of_tables():
+    assert made().choices() == {
+        "inner.law": "paper", "table": 3, "on": True, "note": "as built",
+    }  # fmt: skip
+    assert made(table=(1.0,)).choices()["table"] == 1
+
+
+def test_leaves_can_be_put_back_as_anything():
+    names = made().leaves()
+    symbols = made().with_leaves({name: f"<{name}>" for name in names})
+    assert symbols.inner.R == "<inner.R>"
+    assert symbols.table == ("<table.0>", "<table.1>", "<table.2>")
+    assert symbols.inner.law == "paper"
+    assert symbols.on is True
+    assert made().with_leaves(names) == made()
+
+
+def test_fields_know_unit_range_and_description():
+    leaves = leaf_fields(Outer)
+    assert list(leaves) == ["inner.R", "share", "table", "n", "long", "short"]
+    assert leaves["inner.R"].unit.symbol == "ohm"
+    assert leaves["inner.R"].description == "resistance"
+    assert leaves["inner.R"].range_text == "> 0 ohm"
+    assert leaves["share"].range_text == "> 0 and <= 1"
+    assert leaves["table"].range_text == ">= 0 Pa"
+    assert choice_fields(Outer) == {
+        "inner.law": "which equations", "on": "whether", "note": "what about it",
+    }  # fmt: skip
+
+
+def test_fields_cannot_be_changed_by_who_reads_them():
+    with pytest.raises(TypeError):
+        leaf_fields(Outer)["x"] = leaf_fields(Outer)["n"]  # type: ignore[index]
+
+
+def test_json_round_trip():
+    assert Outer.model_validate_json(made().model_dump_json()) == made()
