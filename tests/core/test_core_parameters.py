@@ -129,7 +129,9 @@ def test_missing_value():
         Outer.create(values)
 
 
-@pytest.mark.parametrize("name", ["inner.r", "inner", "inner.R.x", "tabel", "table.0", "", ".", "__class__"])  # fmt: skip  # noqa: E501
+@pytest.mark.parametrize(
+    "name", ["inner.r", "inner", "inner.R.x", "tabel", "table.0", "", ".", "__class__"]
+)
 def test_unknown_name(name):
     with pytest.raises(UnknownNameError, match="unknown parameter"):
         made(**{name: 1.0})

@@ -10,13 +10,16 @@ import sys
 import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from bywire.core.errors import CompilerError
 from bywire.simulation import compiler as compiler_module
 from bywire.simulation import engine as engine_module
 from bywire.simulation.compiler import PLAIN, Compiler, compile_library, find_compiler
+from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
 from systems.two_mass import rig
 
 SOURCE = "double twice(double x) { return 2.0 * x; }\n"
@@ -129,13 +132,19 @@ def test_no_compiler_falls_back_with_one_warning(monkeypatch: pytest.MonkeyPatch
             warnings.simplefilter("always")
             results = [simulate(rig(0.002 + 1e-3 * k, rare=bool(k))) for k in range(2)]
             quiet = simulate(rig(0.002), engine="virtual-machine")
+            cases = simulate_ensemble(rig(0.002), {"m_1": [0.8, 1.6]}, ["x_1"])
+        with pytest.raises(CompilerError, match=r"bywire\[compiler\]"):
+            simulate_with_sensitivities(rig(0.002), ["m_1"], ["x_1"])
         assert [w.category for w in caught] == [UserWarning]
         assert "bywire[compiler]" in str(caught[0].message)
-        assert {r.engine for r in [*results, quiet]} == {"virtual machine (no C compiler)"}
+        assert {r.engine for r in [*results, quiet, cases]} == {"virtual machine (no C compiler)"}
     finally:
         monkeypatch.undo()
         find_compiler.cache_clear()
-    assert simulate(rig(0.002))["x_1"][-1] == pytest.approx(results[0]["x_1"][-1], rel=1e-9)
+    compiled = simulate(rig(0.002))["x_1"]
+    np.testing.assert_allclose(results[0]["x_1"], compiled, rtol=1e-9)
+    np.testing.assert_allclose(cases["x_1"][0], compiled, rtol=1e-9)
+    np.testing.assert_allclose(cases["x_1"][1], simulate(rig(0.002, m_1=1.6))["x_1"], rtol=1e-9)
 
 
 def test_native_code_is_kept_apart_per_processor(

@@ -52,6 +52,7 @@ def test_residual_falls_with_the_square_of_the_step(
     if experiment is RELEASE:
         assert recordings[1]["at_stop"].max() == 1.0
         assert recordings[1]["q_makeup"].max() > 1e-7
+        assert all(r["p_mc"].min() == 0.0 for r in recordings)
 
 
 @pytest.mark.parametrize("experiment", [BRAKING, RELEASE], ids=lambda e: e[0])

@@ -13,6 +13,7 @@ from bywire.core.errors import UnknownNameError
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from systems.three_contacts import heart
+from systems.two_mass import rig
 
 Array = NDArray[np.float64]
 
@@ -80,13 +81,24 @@ def test_first_slips_of_the_ramp() -> None:
         np.testing.assert_allclose(computed, wanted, rtol=0.02, err_msg=name)
 
 
-def test_contacts_and_frictions() -> None:
-    """Selections of contact sets, sweeps and signs are differentiated as they are taken."""
-    run = heart(0.012, record=1e-3)
-    signals, names = ("X_1", "X_2", "x"), ("F_S0", "loss", "mu", "g", "K_S", "M_S", "k_p")
+HEART = (("X_1", "X_2", "x"), ("F_S0", "loss", "mu", "g", "K_S", "M_S", "k_p"))
+RIG = (("x_1", "x_2"), ("F_c1", "m_1", "k_wall", "mu", "damping"))
+
+
+@pytest.mark.parametrize(
+    ("run", "signals", "names"),
+    [(heart(0.012, record=1e-3), *HEART),
+     (heart(0.02, record=1e-3, stiffer=300.0, tau=0.0), HEART[0], ("F_S0", "loss", "K_S", "M_S")),
+     (rig(0.006, record=1e-3), *RIG),
+     (rig(0.006, record=1e-3, rare=True, k_wall=1.5e9), *RIG)],
+    ids=["heart", "repeated passes", "rig", "rare contact"],
+)  # fmt: skip
+def test_contacts_and_frictions(run: Run, signals: tuple[str, ...], names: tuple[str, ...]) -> None:
+    """Selections of contact sets, sweeps, signs and repetitions are differentiated as taken."""
     result = simulate_with_sensitivities(run, names, signals)
+    assert result.trajectory.status == "done"
     for k, name in enumerate(names):
-        wanted = differences(run, name, 1e-6, signals)
+        wanted = differences(run, name, 1e-7, signals)
         computed = result.derivatives[:, :, k] * run.par.leaves()[name]
         scale = np.abs(wanted).max() + 1e-7 * np.abs(result.trajectory.values).max()
         assert np.abs(computed - wanted).max() < 1e-4 * scale, name

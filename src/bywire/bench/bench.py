@@ -19,6 +19,7 @@ from bywire.bench.registry import find_experiment
 from bywire.bench.requirements import Verdict, check, judge
 from bywire.bench.stimuli import registry as stimuli
 from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimulus_file import with_nodes
 from bywire.bench.values import parsed
 from bywire.catalog.registry import entry
 from bywire.core.errors import ParameterError, quoted, unknown_name
@@ -42,7 +43,8 @@ class Bench:
         Other parameters and options of the experiment, by dotted name: SI numbers, or texts with
         units such as ``"0.35 ohm"``. Durations below may be written so as well.
     stimulus
-        ``{"kind": ..., **parameters}`` for experiments that take a stimulus.
+        ``{"kind": ..., **parameters}`` for experiments that take a stimulus; a table may come
+        from a file, see ``stimulus_file``.
     step
         Substep [s].
     record
@@ -131,7 +133,8 @@ class Bench:
         kind = values.pop("kind", None)
         if not isinstance(kind, str):
             raise ParameterError(f"[stimulus] needs a kind: {', '.join(sorted(stimuli.entries()))}")
-        return stimuli.create(kind, values, driven_unit(self.chosen_options))
+        unit = driven_unit(self.chosen_options)
+        return stimuli.create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs that the experiment consists of.

@@ -68,15 +68,13 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     for key in ("experiment", "parameters"):
         if key not in content:
             raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")
-    options = flattened(content.get("options", {}))
-    if options.get("trace") and isinstance(options["trace"], str):
-        options["trace"] = str(folder / options["trace"])
+    options = _located(flattened(content.get("options", {})), "trace", folder)
     bench = Bench(
         experiment=content["experiment"],
         parameters=content["parameters"],
         overrides=flattened(content.get("set", {})),
         options=options,
-        stimulus=content.get("stimulus", {}),
+        stimulus=_located(content.get("stimulus", {}), "file", folder),
         requirements=content.get("requirements", {}),
         name=content.get("name", name),
         **_simulation(content.get("simulation", {})),
@@ -88,6 +86,14 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
             f"{bench.definition.assembly}"
         )
     return bench
+
+
+def _located(values: Mapping[str, Any], key: str, folder: Path) -> dict[str, Any]:
+    """Return values whose path under a key starts at a folder, unless it is absolute."""
+    path = values.get(key)
+    if not path or not isinstance(path, str):
+        return dict(values)
+    return {**values, key: str(folder / path)}
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -6,7 +6,9 @@ import json
 from pathlib import Path
 
 from bywire.cli import output
+from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
+from bywire.core.errors import FileError
 
 
 def execute(source: str, out: Path | None, as_text: bool) -> None:
@@ -16,9 +18,16 @@ def execute(source: str, out: Path | None, as_text: bool) -> None:
     from bywire.reproduction.results import as_json, as_table, write
 
     chosen = find_source(source)
+    if out is not None:
+        require_folder(out)
     with progress_bar() as progress:
         found = chosen.reproduce(progress)
+    trouble: FileError | None = None
     if out is not None:
-        files = write(found, out)
-        output.message(f"report: {files[0]}")
+        try:
+            output.message(f"report: {write(found, out)[0]}")
+        except FileError as error:  # a full disk must not cost the numbers too
+            trouble = error
     output.result(json.dumps(as_json(found)) if as_text else table_text(as_table(found)))
+    if trouble is not None:
+        raise trouble

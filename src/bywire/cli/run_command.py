@@ -10,6 +10,7 @@ from pathlib import Path
 from bywire.bench.bench import Result, run
 from bywire.bench.bench_file import read
 from bywire.cli import output
+from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import FileError
 
@@ -20,7 +21,7 @@ def execute(path: Path, changes: Mapping[str, str], out: Path | None, as_text: b
     """Run a bench file and return the exit status."""
     bench = read(path, changes)
     if out is not None:
-        _require_folder(out)
+        require_folder(out)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         with progress_bar() as progress:
@@ -68,18 +69,3 @@ def _show(result: Result, files: list[Path], as_text: bool) -> None:
             output.message(
                 f"requirement not met: {verdict.kpi} is {found}, wanted {verdict.limit}{note}"
             )
-
-
-def _require_folder(out: Path) -> None:
-    """Refuse an output folder that cannot be written before anything is computed."""
-    from tempfile import TemporaryFile
-
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=out):
-            pass
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(
-            f"cannot write to the output folder {out}: {reason}; name another one with --out"
-        ) from None

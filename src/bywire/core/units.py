@@ -84,8 +84,7 @@ def parse(value: str | float, symbol: str, name: str) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(
-            f"{name} = {quoted(value)}: one number is wanted, "
-            f"for instance {example(symbol)!r}"
+            f"{name} = {quoted(value)}: one number is wanted, for instance {example(symbol)!r}"
         )
     try:
         number = _number(value, symbol, name) if isinstance(value, str) else float(value)

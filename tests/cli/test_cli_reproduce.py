@@ -1,0 +1,71 @@
+"""``bywire reproduce`` with input that it cannot take, and with results that it cannot write."""
+
+from __future__ import annotations
+
+import json
+import time
+
+import pytest
+from command_line import refused
+
+from bywire.reproduction.registry import sources
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    """Put an empty reproduction in place of the long computation, and count its calls."""
+    source = next(iter(sources().values()))
+    calls = []
+
+    class Quick:
+        """What the command asks of a source."""
+
+        @staticmethod
+        def reproduce(progress):
+            """Compute nothing."""
+            calls.append(progress)
+            return source.name
+
+    monkeypatch.setattr("bywire.reproduction.registry.find_source", lambda name: Quick)
+    monkeypatch.setattr("bywire.reproduction.results.as_json", lambda found: {"source": found})
+    return calls
+
+
+@pytest.mark.parametrize("flag", [(), ("--json",)], ids=["table", "json"])
+def test_unknown_source(bywire, flag):
+    refused(bywire("reproduce", "dardaneli2010", *flag), "unknown source", "'dardanelli2010'")
+
+
+def test_source_is_a_name_and_never_a_path(bywire):
+    refused(bywire("reproduce", "../catalog/dardanelli2010"), "unknown source")
+
+
+def test_folder_is_checked_before_anything_is_computed(bywire, tmp_path, quick):
+    taken = tmp_path / "taken"
+    taken.write_text("mine")
+    started = time.perf_counter()
+    outcome = bywire("reproduce", "dardanelli2010", "--out", taken)
+    refused(outcome, "output folder", "File exists", "--out")
+    assert quick == []
+    assert time.perf_counter() - started < 5.0
+
+
+def test_results_are_shown_even_when_they_cannot_be_written(bywire, tmp_path, quick, monkeypatch):
+    from bywire.core.errors import FileError
+
+    def full(*_):
+        raise FileError("cannot write x: No space left on device")
+
+    monkeypatch.setattr("bywire.reproduction.results.write", full)
+    status, out, err = bywire("reproduce", "dardanelli2010", "--out", tmp_path, "--json")
+    assert (status, json.loads(out)) == (2, {"source": "dardanelli2010"})
+    assert err == "bywire: error: cannot write x: No space left on device\n"
+
+
+def test_interrupt_is_130(bywire, monkeypatch):
+    def stopped(name):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bywire.reproduction.registry.find_source", stopped)
+    status, out, err = bywire("reproduce", "dardanelli2010", "--json")
+    assert (status, out, err) == (130, "", "bywire: interrupted\n")

@@ -1,0 +1,65 @@
+"""What the tests of the repository share: its files, and what its modules import."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "src" / "bywire"
+MODULES = sorted(PACKAGE.rglob("*.py"))
+FOLDERS = (".git", ".venv", "results", "dist", "build", "node_modules")
+
+
+def label(path: Path) -> str:
+    """Return how a file is named in the tests' output."""
+    return path.relative_to(ROOT).as_posix()
+
+
+@cache
+def tree(path: Path) -> ast.Module:
+    """Return the syntax tree of a module."""
+    return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def imports(module: ast.AST, *, typing_too: bool = True) -> Iterator[str]:
+    """Yield the full names of the modules that a module imports, inside functions as well."""
+    for node in ast.iter_child_nodes(module):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+        elif isinstance(node, ast.If) and not typing_too and _is_for_typing(node.test):
+            continue
+        else:
+            yield from imports(node, typing_too=typing_too)
+
+
+def _is_for_typing(test: ast.expr) -> bool:
+    return getattr(test, "id", getattr(test, "attr", "")) == "TYPE_CHECKING"
+
+
+def importers(library: str, *, typing_too: bool = True) -> set[str]:
+    """Return the modules of the package that import a library, relative to the package."""
+    return {
+        path.relative_to(PACKAGE).as_posix()
+        for path in MODULES
+        for name in imports(tree(path), typing_too=typing_too)
+        if name == library or name.startswith(f"{library}.")
+    }
+
+
+@cache
+def tracked() -> tuple[Path, ...]:
+    """Return the files of the repository: those that git knows or would add, where it is there."""
+    try:
+        command = ["git", "-C", str(ROOT), "ls-files", "-co", "--exclude-standard", "-z"]
+        names = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+        found = [ROOT / name for name in names.split("\0") if name]
+    except (OSError, subprocess.CalledProcessError):  # an unpacked archive
+        found = [p for p in ROOT.rglob("*") if not {*p.relative_to(ROOT).parts} & {*FOLDERS}]
+        found = [p for p in found if "cache" not in str(p.relative_to(ROOT))]
+    return tuple(sorted(path for path in found if path.is_file()))

@@ -1,0 +1,141 @@
+"""The files of the repository: sizes, paths that exist, nothing of anybody's machine."""
+
+from __future__ import annotations
+
+import configparser
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+from repository_sources import MODULES, PACKAGE, ROOT, label, tracked
+
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+LIMIT = 400
+# Home folders, temporary folders, hosts that serve packages.
+FOREIGN = re.compile(
+    r"(?<![\w.])/(?:root|home/\w|Users/\w|work/|mnt/|opt/\w|tmp/\w)[\w/.-]*"
+    r"|[A-Z]:\\\\?Users|https?://[^\s\"')>]*(?:/simple|pypi|artifactory|nexus|devpi|mirror)"
+    r"|--(?:extra-)?index-url|\b(?:localhost|127\.0\.0\.1|10\.\d+\.\d+\.\d+)\b"
+)
+BINARY = {".png", ".nc", ".mat", ".parquet", ".pdf", ".ico"}
+
+
+def foreign(text: str) -> list[str]:
+    """Return what belongs to a machine and not to the project."""
+    return [match[0] for match in FOREIGN.finditer(text)]
+
+
+def names_in(requirements: list[str]) -> set[str]:
+    """Return the names of requirements, as package indexes compare them."""
+    names = (re.match(r"[A-Za-z0-9._-]+", text) for text in requirements)
+    return {re.sub(r"[-_.]+", "-", match[0]).lower() for match in names if match}
+
+
+def locked(name: str) -> set[str]:
+    """Return the names in a lock file."""
+    lines = (ROOT / name).read_text(encoding="utf-8").splitlines()
+    return names_in([line for line in lines if line[:1].isalnum()])
+
+
+@pytest.mark.parametrize("path", MODULES, ids=label)
+def test_files_stay_small(path):
+    assert len(path.read_text(encoding="utf-8").splitlines()) <= LIMIT
+
+
+def test_nothing_names_a_machine_or_a_package_host():
+    own = Path(__file__).name  # holds the patterns and their examples
+    found = {}
+    for path in tracked():
+        if path.suffix in BINARY or path.name == own:
+            continue
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        hits = [f"line {k}: {hit}" for k, line in enumerate(lines, 1) for hit in foreign(line)]
+        if hits:
+            found[label(path)] = hits[:3]
+    assert found == {}
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["/root/x", "/home/me", "/tmp/out", r"C:\Users\me", "https://pypi.org/simple", "--index-url"],
+)
+def test_the_gate_of_machine_names_can_fail(text):
+    assert foreign(f"see {text} there")
+
+
+@pytest.mark.parametrize(
+    "text", ["/dev/null", "a/home/b", "src/work/x", "https://doi.org/10.3182/x"]
+)
+def test_the_gate_of_machine_names_lets_the_rest_pass(text):
+    assert foreign(f"see {text} there") == []
+
+
+def configured_paths() -> list[str]:
+    """Return the paths that tools are pointed at."""
+    tools = PROJECT["tool"]
+    paths = [PROJECT["project"]["readme"], *PROJECT["project"]["license-files"]]
+    paths += tools["hatch"]["build"]["targets"]["wheel"]["packages"]
+    paths += tools["ruff"]["src"] + tools["mypy"]["files"]
+    paths += tools["pytest"]["ini_options"]["testpaths"]
+    paths += tools["pytest"]["ini_options"]["pythonpath"]
+    paths += [p.split("*")[0] for p in tools["ruff"]["lint"].get("per-file-ignores", {})]
+    return [path for path in paths if path]
+
+
+@pytest.mark.parametrize("path", configured_paths())
+def test_every_configured_path_exists(path):
+    assert (ROOT / path).exists()
+
+
+def test_every_program_exists():
+    for target in PROJECT["project"]["scripts"].values():
+        module, function = target.split(":")
+        path = ROOT / "src" / f"{module.replace('.', '/')}.py"
+        assert f"def {function}(" in path.read_text(encoding="utf-8")
+
+
+def test_contract_of_layers_names_the_package():
+    contract = configparser.ConfigParser()
+    contract.read(ROOT / ".importlinter", encoding="utf-8")
+    assert (ROOT / "src" / contract["importlinter"]["root_package"]).samefile(PACKAGE)
+
+
+def test_every_path_of_the_texts_exists():
+    """A file that README and CONTRIBUTING name is there."""
+    for name in ("README.md", "CONTRIBUTING.md"):
+        text = (ROOT / name).read_text(encoding="utf-8")
+        linked = re.findall(r"\]\((?!https?:)([^)#]+)", text)
+        missing = [path for path in linked if not (ROOT / path).exists()]
+        assert missing == [], name
+
+
+@pytest.mark.parametrize("lock", ["requirements.lock", "requirements-dev.lock"])
+def test_every_dependency_is_locked(lock):
+    project = PROJECT["project"]
+    wanted = names_in(project["dependencies"])
+    if lock == "requirements-dev.lock":
+        wanted |= names_in(project["optional-dependencies"]["dev"])
+    assert wanted - locked(lock) == set()
+
+
+def test_every_locked_package_has_hashes():
+    for lock in ("requirements.lock", "requirements-dev.lock"):
+        blocks = re.split(r"\n(?=[A-Za-z0-9])", (ROOT / lock).read_text(encoding="utf-8"))
+        pinned = [block for block in blocks if block[:1].isalnum()]
+        assert pinned
+        assert [block.split()[0] for block in pinned if "--hash=sha256:" not in block] == []
+
+
+def test_version_is_one():
+    text = (PACKAGE / "__init__.py").read_text(encoding="utf-8")
+    assert f'__version__ = "{PROJECT["project"]["version"]}"' in text
+
+
+def test_every_marker_of_pytest_is_used():
+    markers = PROJECT["tool"]["pytest"]["ini_options"].get("markers", [])
+    texts = [p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("*.py")]
+    for marker in markers:
+        name = marker.split(":")[0]
+        assert any(f"mark.{name}" in text for text in texts), name

@@ -1,0 +1,86 @@
+"""Where libraries are imported, and what a start of the program loads."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+
+import pytest
+from repository_sources import MODULES, PACKAGE, importers, imports, label, tree
+
+HEAVY = ("casadi", "matplotlib", "pint", "scipy", "xarray", "netCDF4", "control", "pandas")
+
+
+def loaded(*lines: str) -> set[str]:
+    """Return the heavy libraries that some lines load in a fresh interpreter."""
+    report = f"print(*[m for m in {HEAVY!r} if m in sys.modules], file=sys.stderr)"
+    done = subprocess.run(
+        [sys.executable, "-c", "\n".join(["import sys", *lines, report])],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return set(done.stderr.split())
+
+
+def test_import_loads_no_heavy_library():
+    assert loaded("import bywire", "bywire.__version__, dir(bywire)") == set()
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]], ids=" ".join)
+def test_help_loads_no_heavy_library(arguments):
+    lines = (
+        f"sys.argv = ['bywire', *{arguments!r}]",
+        "from bywire.cli.main import main",
+        "try:",
+        "    main()",
+        "except SystemExit:",
+        "    pass",
+    )
+    assert loaded(*lines) == set()
+
+
+def test_the_gate_of_loading_can_fail():
+    assert loaded("import bywire", "bywire.load") >= {"xarray"}
+
+
+def test_pint_has_one_home():
+    assert importers("pint") == {"core/units.py"}
+
+
+@pytest.mark.parametrize("library", ["matplotlib", "plotly"])
+def test_figures_have_one_home(library):
+    """Other layers may name a Figure in an annotation, which loads nothing."""
+    homes = {path.split("/")[0] for path in importers(library, typing_too=False)}
+    assert homes <= {"report"}
+
+
+@pytest.mark.parametrize("folder", ["core", "plant", "control", "assemblies", "simulation"])
+def test_recordings_are_unknown_below_the_bench(folder):
+    assert not [path for path in importers("xarray") if path.startswith(f"{folder}/")]
+
+
+def test_recordings_are_known_in_the_bench():
+    assert "bench/recording.py" in importers("xarray")
+
+
+@pytest.mark.parametrize("library", ["pickle", "marshal", "shelve", "dill", "cloudpickle", "yaml"])
+def test_nothing_reads_formats_that_execute(library):
+    assert importers(library) == set()
+
+
+def test_nothing_is_evaluated():
+    for path in MODULES:
+        calls = [node.func for node in ast.walk(tree(path)) if isinstance(node, ast.Call)]
+        names = {function.id for function in calls if isinstance(function, ast.Name)}
+        found = names & {"eval", "exec", "compile", "__import__", "breakpoint", "input"}
+        assert not found, label(path)
+
+
+def test_imports_are_found_inside_functions_and_for_typing():
+    module = tree(PACKAGE / "core" / "units.py")
+    assert "pint" in set(imports(module))
+    assert "pint" in set(imports(module, typing_too=False))
+    assert "typing" in set(imports(module))

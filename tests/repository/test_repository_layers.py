@@ -1,0 +1,102 @@
+"""Imports run downward only: the contract in ``.importlinter`` holds, and can fail."""
+
+from __future__ import annotations
+
+import configparser
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from repository_sources import MODULES, PACKAGE, ROOT, imports, label, tree
+
+CONTRACT = ROOT / ".importlinter"
+SYMBOLIC = ("casadi", "numpy", "scipy", "xarray", "pint", "matplotlib")
+
+
+def lint(folder: Path) -> subprocess.CompletedProcess[str]:
+    """Run the linter on the package that lies in a folder."""
+    code = "import sys; from importlinter.cli import lint_imports_command as run; run()"
+    return subprocess.run(
+        [sys.executable, "-c", code, "--config", str(CONTRACT), "--no-cache"],
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(folder), "PYTHONIOENCODING": "utf-8"},
+    )
+
+
+@pytest.fixture(scope="module")
+def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return a folder with a copy of the package."""
+    folder = tmp_path_factory.mktemp("copy")
+    ignored = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(PACKAGE, folder / "bywire", ignore=ignored)
+    return folder
+
+
+def test_contract_is_kept():
+    done = lint(ROOT / "src")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 kept, 0 broken" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("module", "line"),
+    [
+        ("core/errors.py", "from bywire.bench.bench import Bench"),
+        ("plant/dc_motor.py", "from bywire.simulation.run import simulate"),
+        ("control/current_pi.py", "import bywire.plant.dc_motor"),
+        ("bench/bench.py", "def late():\n    from bywire.report.files import save_figure"),
+        ("report/page.py", "from bywire.cli import main"),
+    ],
+    ids=lambda value: value.split("/")[0] if value.endswith(".py") else "",
+)
+def test_contract_can_fail(copy, module, line):
+    path = copy / "bywire" / module
+    before = path.read_text(encoding="utf-8")
+    path.write_text(f"{before}\n\n{line}\n", encoding="utf-8")
+    try:
+        done = lint(copy)
+    finally:
+        path.write_text(before, encoding="utf-8")
+    assert done.returncode == 1
+    assert "BROKEN" in done.stdout
+    assert f"bywire.{module.removesuffix('.py').replace('/', '.')}" in done.stdout
+
+
+def test_folder_without_a_layer_is_refused(copy):
+    stray = copy / "bywire" / "helpers"
+    stray.mkdir()
+    (stray / "__init__.py").write_text('"""No layer."""\n', encoding="utf-8")
+    try:
+        done = lint(copy)
+    finally:
+        shutil.rmtree(stray)
+    assert done.returncode == 1
+    assert "helpers" in done.stdout
+
+
+def test_every_folder_is_a_package():
+    """The linter does not look into folders without ``__init__.py``."""
+    folders = {path.parent for path in MODULES}
+    assert [label(f) for f in sorted(folders) if not (f / "__init__.py").is_file()] == []
+
+
+def test_every_layer_of_the_contract_exists():
+    contract = configparser.ConfigParser()
+    contract.read(CONTRACT, encoding="utf-8")
+    layers = contract["importlinter:contract:layers"]["layers"].replace("|", "\n").split()
+    assert contract["importlinter:contract:layers"]["exhaustive"] == "true"
+    assert [layer for layer in layers if not (PACKAGE / layer / "__init__.py").is_file()] == []
+
+
+@pytest.mark.parametrize("folder", ["plant", "control", "assemblies"])
+def test_equations_know_no_library(folder):
+    """Equations call ``core.ops``, so that they run on floats, symbols and quantities alike."""
+    for path in (PACKAGE / folder).glob("*.py"):
+        found = {name.split(".")[0] for name in imports(tree(path))}
+        assert not found & {*SYMBOLIC}, label(path)
