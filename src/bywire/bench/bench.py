@@ -240,23 +240,25 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     recordings: dict[str, xr.Dataset] = {}
     if definition.static is not None:
         recordings |= definition.static(bench.par, options)
-    for number, case in enumerate(bench.cases()):
-        try:
+    try:
+        for number, case in enumerate(bench.cases()):
             recording = _recorded(bench, case, number, progress, engine)
-        except KeyboardInterrupt:  # outside the engine, which keeps what it has
-            return Result(bench, recordings, (), (), "interrupted")
-        interrupted = recording.attrs["status"] == "interrupted"
-        if interrupted and recording.sizes["time"] < 2:
-            return Result(bench, recordings, (), (), "interrupted")
-        if definition.finish is not None:
-            recording = definition.finish(recording, options)
-        recordings[case.label] = recording
-        if interrupted:
-            return Result(bench, recordings, (), (), "interrupted")
+            is_complete = recording.attrs["status"] != "interrupted"
+            if is_complete or recording.sizes["time"] > 1:
+                finish = definition.finish or _as_it_is
+                recordings[case.label] = finish(recording, options)
+            if not is_complete:
+                raise KeyboardInterrupt
+    except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
+        return Result(bench, recordings, (), (), "interrupted")
     kpis = definition.judge(recordings, options)
     verdicts = judge(bench.requirements, kpis)
     status = "passed" if all(v.met for v in verdicts) else "failed"
     return Result(bench, recordings, kpis, verdicts, status)
+
+
+def _as_it_is(recording: xr.Dataset, _: Any) -> xr.Dataset:
+    return recording
 
 
 def _recorded(

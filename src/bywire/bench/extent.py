@@ -73,8 +73,24 @@ def check_extent(case: Case, run: Run) -> None:
             f"a recording of {case.duration:g} s cannot have rows every {run.record:g} s: "
             "run longer, or record more often (simulation.record)"
         )
+    check_memory(run, len(run.model.Output._fields))
+
+
+def check_memory(run: Run, signals: int) -> None:
+    """Refuse a run whose rows do not fit into this machine.
+
+    Parameters
+    ----------
+    signals
+        How many signals are recorded.
+
+    Raises
+    ------
+    StepError
+        When steps do not divide each other, or with the memory that the run would need.
+    """
     schedule = run.schedule()
-    numbers = schedule.rows * len(run.model.Output._fields) * _COPIES
+    numbers = schedule.rows * signals * _COPIES
     numbers += schedule.stimulus_rows * len(run.model.Stimulus._fields)
     needed, memory = 8.0 * numbers, _memory()
     if needed > memory:

@@ -7,6 +7,7 @@ import numpy as np
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at
+from bywire.bench.extent import check_memory
 from bywire.core.errors import SolverError
 from bywire.simulation.run import Run, simulate
 
@@ -59,6 +60,9 @@ def _settled(start: float, par: MotorcycleParameters, settle: float) -> float:
         return rows
 
     run = Run(MotorcycleBrake(), own, state_at(start, own), memory_at(start, own), stimulus, settle)
+    check_memory(run, 1)
     trajectory = simulate(run, ("p_mc",))
+    if trajectory.status == "interrupted":
+        raise KeyboardInterrupt
     late = trajectory.time >= (1.0 - _WINDOW) * settle
     return float(trajectory["p_mc"][late].mean())

@@ -75,6 +75,8 @@ def watch(recording: xr.Dataset, par: ParameterSet, trajectory: Trajectory) -> l
     found: list[str] = []
     if not recording.sizes["time"]:  # interrupted before the first row
         return found
+    if trajectory.doubt:
+        found.append(trajectory.doubt)
     if trajectory.unsettled:
         found.append(
             f"{trajectory.unsettled} substeps hit the cap of the contact iteration: "

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bywire.core.errors import FileError, ParameterError
+from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.data.trace import read_trace
 
 _KEYS = ("file", "column", "max_gap")
@@ -35,8 +35,11 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
         return dict(values)
     if "times" in rest or "values" in rest:
         raise ParameterError("stimulus 'table': give either file, or times and values")
-    path, column = str(values["file"]), values.get("column")
-    wanted = None if column is None else {str(column): level_unit}
+    for key in ("file", "column"):
+        if not isinstance(values.get(key, ""), str):
+            raise ParameterError(f"stimulus.{key}: it must be a text, got {quoted(values[key])}")
+    path, column = values["file"], values.get("column")
+    wanted = None if column is None else {column: level_unit}
     trace = read_trace(path, wanted, max_gap=values.get("max_gap", 0.1))
     names = [str(name) for name in trace.data_vars]
     if len(names) != 1:

@@ -9,6 +9,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.errors import CompilerError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.compiler import find_compiler
@@ -16,6 +17,8 @@ from bywire.simulation.emission import Layout
 from bywire.simulation.native import Request, SingleKernel
 from bywire.simulation.program import Program, build_program
 from bywire.simulation.virtual_machine import VirtualMachine
+
+KINDS = ("auto", "compiled", "virtual-machine")
 
 
 class Engine(Protocol):
@@ -51,7 +54,16 @@ class Prepared:
         kind
             ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled where there is a
             compiler, else the virtual machine, with one warning.
+
+        Raises
+        ------
+        UnknownNameError
+            For any other name.
+        CompilerError
+            For ``"compiled"`` without a compiler.
         """
+        if kind not in KINDS:
+            raise unknown_name("engine", kind, KINDS)
         if kind not in self._engines:
             self._engines[kind] = self._build(kind)
         return self._engines[kind]
@@ -60,7 +72,12 @@ class Prepared:
         compiler = None if kind == "virtual-machine" else find_compiler()
         if compiler is not None:
             return SingleKernel(self.program, compiler)
-        if kind != "virtual-machine":
+        if kind == "compiled":
+            raise CompilerError(
+                "there is no C compiler: install one, or the extra bywire[compiler], or take "
+                "engine = 'auto'"
+            )
+        if kind == "auto":
             _warn_once()
         return VirtualMachine(self.program)
 

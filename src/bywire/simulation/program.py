@@ -11,6 +11,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
 from bywire.simulation.scheme import Pass, Symbols, build_pass
+from bywire.simulation.stiff_contacts import contact_jacobians
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
 
@@ -36,6 +37,8 @@ class Program:
     ----------
     parameter_ranges
         Names in the order of the parameter vector, each with its admissible range.
+    contact_jacobians
+        ``(x, m, p)`` -> Jacobians of dx/dt with contacts open and closed.
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, contact, flow, flag)``, see ``scheme.Pass``.
     ticks
@@ -51,6 +54,7 @@ class Program:
     exact: Any
     ticks: tuple[Any, ...]
     output: Any
+    contact_jacobians: Any
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
@@ -123,6 +127,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
             for k, task in enumerate(tasks)
         ),
         output=output,
+        contact_jacobians=contact_jacobians(model, symbolic, s.x, s.m, p),
     )
 
 

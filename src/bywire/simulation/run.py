@@ -17,6 +17,7 @@ from bywire.simulation.emission import Layout
 from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule, plan
+from bywire.simulation.stiff_contacts import unresolved
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
@@ -72,6 +73,8 @@ class Trajectory:
         ``interrupted`` when the user stopped it (rows end there).
     unsettled, repeated
         Substeps that hit the cap, and that took more than one pass.
+    doubt
+        Why the result may be wrong though every substep settled; empty where there is none.
     vector
         State vector at the end.
     """
@@ -84,6 +87,7 @@ class Trajectory:
     repeated: int
     engine: str
     vector: Array
+    doubt: str = ""
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (rows,)."""
@@ -160,7 +164,18 @@ def simulate(
         repeated=int(counters[1]),
         engine=chosen.label,
         vector=vector,
+        doubt=_doubt(run),
     )
+
+
+def _doubt(run: Run) -> str:
+    """Return why the step may be too long for the contacts, judged at the start."""
+    jacobians = prepare(run.model, run.par).program.contact_jacobians
+    if not run.model.compliance(run.par):
+        return ""
+    p = np.array(list(run.par.leaves().values()))
+    opened, closed = jacobians(np.array(run.state), np.array(run.memory), p)
+    return unresolved(np.array(opened), np.array(closed), run.step)
 
 
 def _advance_all(

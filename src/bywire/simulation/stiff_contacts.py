@@ -1,0 +1,63 @@
+"""Whether the step resolves the contacts: stiff, lightly damped ones give wrong rebounds silently.
+
+A contact that swings at omega on its bodies is safe for h omega <= 2. Beyond, the rebound from a
+contact without damping can be several times faster than the approach, though every substep
+settles; damping of about half the critical one or more keeps it bounded.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
+
+SAFE, DAMPED = 2.0, 0.5  # h omega, and damping ratio
+
+
+def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -> Any:
+    """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed."""
+    groups = model.compliance(par)
+    K = ca.diagcat(*(_stiffness(C) for C in groups)) if groups else SX(0, 0)
+    force = SX.sym("contact_", K.shape[0])
+    state = symbol_tuple(model.State, x)
+    f = column(model.balance(state, state, symbol_tuple(model.Memory, m), par, scalars(force)))
+    gap = column([d for group in model.gap(state, state, par) for d in group])
+    rate = f / column(model.mass(state, par))
+    opened = ca.substitute(ca.jacobian(rate, x), force, SX.zeros(force.shape[0]))
+    through = ca.jacobian(rate, force) @ K @ ca.jacobian(gap, x)
+    return ca.Function("contact_jacobians", [x, m, p], [opened, opened + through])
+
+
+def _stiffness(C: Any) -> Any:
+    return ca.inv(SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))))
+
+
+def unresolved(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> str:
+    """Return what is wrong with a step for the closed contacts; empty where nothing is.
+
+    Parameters
+    ----------
+    opened, closed
+        Jacobians of dx/dt [1/s], shape (nx, nx) each.
+    step
+        Substep [s].
+    """
+    if not (np.all(np.isfinite(opened)) and np.all(np.isfinite(closed))):
+        return ""
+    fastest = np.abs(np.linalg.eigvals(opened).imag).max(initial=0.0)
+    for mode in np.linalg.eigvals(closed):
+        omega = abs(mode)
+        swings = abs(mode.imag) > 1.2 * fastest and -mode.real < DAMPED * omega
+        if swings and step * omega > SAFE:
+            return (
+                f"a closed contact swings at {omega / (2 * np.pi):.4g} Hz, too fast for steps of "
+                f"{step * 1e6:g} us: rebounds may be wrong; take steps of at most "
+                f"{SAFE / omega * 1e6:.2g} us, a softer contact, or more damping"
+            )
+    return ""
