@@ -9,6 +9,7 @@ import pytest
 
 import bywire
 from bywire.bench.bench_file import flattened, from_mapping, load
+from bywire.catalog.registry import entry
 from bywire.core.errors import InputError, ParameterError, StepError, UnitError, UnknownNameError
 
 SET = "dardanelli2010"
@@ -152,6 +153,13 @@ def test_override_without_effect_is_refused(name, value, options):
     bench = bywire.Bench("release", SET, {name: value}, options)
     with pytest.raises(ParameterError, match=r"would have no effect.*leave it out"):
         bench.cases()
+
+
+def test_set_of_another_assembly_is_refused(monkeypatch):
+    other = dataclasses.replace(entry(SET), name="wedge", assembly="wedge-brake")
+    monkeypatch.setattr("bywire.bench.bench.entry", lambda name: other)
+    with pytest.raises(ParameterError, match=r"tests a motorcycle-brake.* is for a wedge-brake"):
+        bywire.Bench("hard-braking", "wedge")
 
 
 def test_override_that_one_of_two_runs_takes_is_kept():

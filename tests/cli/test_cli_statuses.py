@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -129,3 +130,20 @@ def test_closed_standard_error_keeps_results_clean(bench):
 def test_terminal_without_unicode(bench):
     done = shell(f"bywire list && bywire run {bench()}", PYTHONIOENCODING="ascii")
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="terminals of POSIX")
+def test_progress_of_a_terminal_stays_off_standard_output(bench):
+    import pty
+
+    master, slave = pty.openpty()
+    with subprocess.Popen(
+        [str(SCRIPT), "run", str(bench()), "--json"], stdout=subprocess.PIPE, stderr=slave
+    ) as running:
+        out, _ = running.communicate(timeout=60)
+    os.close(slave)
+    shown = os.read(master, 100_000)
+    os.close(master)
+    assert json.loads(out)["status"] == "passed"
+    assert b"%" in shown
+    assert b"Traceback" not in shown

@@ -117,6 +117,13 @@ def test_refusal_is_one_line_that_helps(changes, text):
     assert str(refused.value) == text
 
 
+@pytest.mark.parametrize("name", ["inner.law", "on", "note"])
+def test_long_value_is_cut_off(name):
+    with pytest.raises(ParameterError) as refused:
+        made(**{name: ["x" * 1_000_000]})
+    assert len(str(refused.value)) < 300
+
+
 def test_several_mistakes_get_a_line_each():
     with pytest.raises(ParameterError) as refused:
         made(**{"inner.R": -1.0, "share": 2.0})

@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import xarray as xr
 
 from bywire import __version__
@@ -49,9 +50,9 @@ def record(
         for name, s in signals.items()
         if name in trajectory.names
     }
-    recording = xr.Dataset(
-        variables, coords={"time": ("time", np.round(time[kept], 12), {"units": "s"})}
-    )
+    # As an index of pandas: from an array, xarray would load pint to see what it is.
+    axis = pd.Index(np.round(time[kept], 12), name="time")
+    recording = xr.Dataset(variables, coords={"time": ("time", axis, {"units": "s"})})
     recording["time"].attrs["long_name"] = "time"
     warnings = watch(recording, run.par, trajectory)
     recording.attrs = {

@@ -12,6 +12,9 @@ from bywire.bench.bench import Progress
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
     """Yield a function that shows the finished share of a labelled piece of work."""
+    if not sys.stderr.isatty():
+        yield lambda label, share: None
+        return
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
@@ -23,7 +26,6 @@ def progress_bar() -> Iterator[Progress]:
         TimeRemainingColumn(),
         console=console,
         transient=True,
-        disable=not sys.stderr.isatty(),
     )
     tasks = {}
     with bar:

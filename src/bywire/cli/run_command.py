@@ -12,7 +12,7 @@ from bywire.bench.bench_file import read
 from bywire.cli import output
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
-from bywire.core.errors import FileError
+from bywire.core.errors import BywireError
 
 _STATUS = {"passed": 0, "failed": 1, "interrupted": 130}
 
@@ -40,7 +40,7 @@ def execute(path: Path, changes: Mapping[str, str], out: Path | None, as_text: b
     return _STATUS[result.status]
 
 
-def _written(result: Result, out: Path | None) -> tuple[list[Path], FileError | None]:
+def _written(result: Result, out: Path | None) -> tuple[list[Path], BywireError | None]:
     """Write the results where wanted; a full disk must not cost the numbers too."""
     if out is None:
         return [], None
@@ -48,7 +48,7 @@ def _written(result: Result, out: Path | None) -> tuple[list[Path], FileError | 
 
     try:
         return write_result(result, out), None
-    except FileError as error:
+    except BywireError as error:
         return [], error
 
 

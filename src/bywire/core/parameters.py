@@ -21,7 +21,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.quantities import Unit
 
 T = TypeVar("T", bound="ParameterSet")
@@ -229,17 +229,14 @@ def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
         wanted = "a whole number, " if kind.startswith("int") else ""
         return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}"
     if kind == "too_short":
-        return f"{name}: at least {detail['ctx']['min_length']} wanted, got {value!r}"
+        return f"{name}: at least {detail['ctx']['min_length']} wanted, got {quoted(value)}"
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
-    given = "" if isinstance(value, dict) else f", got {value!r}"
+    given = "" if isinstance(value, dict) else f", got {quoted(value)}"
     return f"{name or cls.__name__}: {message}{given}"
 
 
-_PLAIN_WORDS = {
-    "bool_parsing": "it must be true or false",
-    "bool_type": "it must be true or false",
-    "string_type": "it must be a text",
-}
+_BOOL, _TEXT = "it must be true or false", "it must be a text"
+_PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
 
 
 def _is_length(detail: Mapping[str, Any]) -> bool:
@@ -247,6 +244,6 @@ def _is_length(detail: Mapping[str, Any]) -> bool:
 
 
 def _unknown_choice(name: str, value: Any, expected: str) -> str:
-    near = get_close_matches(str(value), re.findall(r"'([^']*)'", expected), n=1, cutoff=0.5)
-    hint = f": did you mean {near[0]!r}?" if near else ""
-    return f"{name}: it must be {expected}, got {value!r}{hint}"
+    near = get_close_matches(quoted(value), re.findall(r"'[^']*'", expected), n=1, cutoff=0.6)
+    hint = f": did you mean {near[0]}?" if near else ""
+    return f"{name}: it must be {expected}, got {quoted(value)}{hint}"

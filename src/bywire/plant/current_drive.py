@@ -1,0 +1,112 @@
+"""Commercial motor drive: analog current loop with filters, limit and averaged PWM stage."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    Current,
+    Duration,
+    DutyPerCurrent,
+    DutyPerCurrentTime,
+    Factor,
+    Frequency,
+    Resistance,
+    Voltage,
+)
+from bywire.core.signals import Signal
+
+
+class Parameters(ParameterSet):
+    """Continuous current controller; the PWM ripple (40 kHz) is averaged out."""
+
+    f_demand: Frequency
+    """corner of the demand's filter"""
+    f_sense: Frequency
+    """corner of the current measurement's filter"""
+    G_sense: Factor
+    """scale of the current measurement, 1 where it is calibrated"""
+    i_max: Current
+    """limit of the filtered demand's magnitude"""
+    k_p: DutyPerCurrent
+    """proportional gain, duty cycle per current"""
+    k_i: DutyPerCurrentTime
+    """integral gain"""
+    T_t: Duration
+    """tracking time of the anti-wind-up"""
+    V_dc: Voltage
+    """supply voltage: gain and limit of the PWM stage"""
+    R_off: Resistance
+    """what the diodes act like while the stage is off: resistance that empties the winding"""
+
+
+class State(NamedTuple):
+    """Filtered demand, filtered measurement, integral part."""
+
+    demand: Annotated[float, Signal("A", "filtered current demand", 5.0)]
+    sensed: Annotated[float, Signal("A", "sensed current", 5.0)]
+    integral: Annotated[float, Signal("1", "integral part of the drive", 0.1)]
+
+
+class Rate(NamedTuple):
+    """Derivatives of the states."""
+
+    demand: Annotated[float, Signal("A/s", "rate of the demand", 1e3)]
+    sensed: Annotated[float, Signal("A/s", "rate of the sensed current", 1e3)]
+    integral: Annotated[float, Signal("1/s", "rate of the integral part", 100.0)]
+
+
+class Input(NamedTuple):
+    """Current demand, motor current, back-EMF, and whether the stage is on."""
+
+    i_ref: Annotated[float, Signal("A", "current demand", 5.0)]
+    i: Annotated[float, Signal("A", "motor current", 5.0)]
+    emf: Annotated[float, Signal("V", "back-EMF", 5.0)]
+    on: Annotated[float, Signal("1", "power stage on")]
+
+
+class Output(NamedTuple):
+    """Voltage at the motor."""
+
+    v: Annotated[float, Signal("V", "motor voltage", 10.0)]
+
+
+def error(x: State, par: Parameters) -> Annotated[float, Signal("A", "current error", 1.0)]:
+    """Return the limited demand less the sensed current."""
+    return ops.clip(x.demand, -par.i_max, par.i_max) - x.sensed
+
+
+def output(x: State, u: Input, par: Parameters) -> Output:
+    r"""Return the motor voltage.
+
+    .. math:: V = V_{dc}\, \mathrm{sat}(k_p e + I), \quad |\mathrm{sat}| \le 1
+
+    While the stage is off, back-EMF less R_off i: the current dies away and stays zero.
+
+    References
+    ----------
+    Roberts et al. (2003), section "Current controller". PWM gain and limit are the supply's.
+    """
+    duty = ops.clip(par.k_p * error(x, par) + x.integral, -1.0, 1.0)
+    return Output(v=ops.where(u.on > 0.5, par.V_dc * duty, u.emf - par.R_off * u.i))
+
+
+def rate(x: State, u: Input, par: Parameters) -> Rate:
+    r"""Return the derivatives of filters and integral part.
+
+    .. math:: \dot I = k_i e + (\mathrm{sat}(k_p e + I) - k_p e - I)/T_t
+
+    The last term is the anti-wind-up (our reading; the paper names none). While the stage is off,
+    the integral part decays with T_t.
+    """
+    e = error(x, par)
+    wanted = par.k_p * e + x.integral
+    growth = par.k_i * e + (ops.clip(wanted, -1.0, 1.0) - wanted) / par.T_t
+    return Rate(
+        demand=2.0 * math.pi * par.f_demand * (u.i_ref - x.demand),
+        sensed=2.0 * math.pi * par.f_sense * (par.G_sense * u.i - x.sensed),
+        integral=ops.where(u.on > 0.5, growth, -x.integral / par.T_t),
+    )

@@ -1,0 +1,119 @@
+"""Wedge: moved by the screws, pulled in by the pad's friction, pushed out by its slope."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Gain, Length, Mass, Unit
+from bywire.core.signals import Energy, Power, Signal
+
+WedgeAngle = Annotated[float, Unit("rad", 0.35), Field(gt=0, lt=1.5, allow_inf_nan=False)]
+SpringRate = Annotated[float, Unit("N/m", 1e4), Field(ge=0, allow_inf_nan=False)]
+
+
+class Parameters(ParameterSet):
+    """Symmetric wedge on rollers; positive travel brakes positive rotation of the disc."""
+
+    alpha: WedgeAngle
+    """wedge angle"""
+    M_W: Mass
+    """mass of the moving wedge and pad"""
+    mu_B: Gain
+    """coefficient of friction between pads and disc"""
+    k_return: SpringRate
+    """return spring toward the middle; 0 for none"""
+    x_stop: Length
+    """travel at which the end stops stand, on either side"""
+
+
+class State(NamedTuple):
+    """Travel and velocity, zero in the middle."""
+
+    x: Annotated[float, Signal("m", "wedge travel", 5e-4)]
+    v: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
+
+
+class Factors(NamedTuple):
+    """Factors of the derivatives."""
+
+    x: Annotated[float, Signal("1", "unity")]
+    v: Annotated[float, Signal("kg", "mass", 0.6)]
+
+
+class Balance(NamedTuple):
+    """What drives travel and velocity."""
+
+    x: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
+    v: Annotated[float, Signal("N", "accelerating force", 100.0)]
+
+
+class Input(NamedTuple):
+    """Forces on the wedge, the side on which it stands, and the disc's direction."""
+
+    F_M: Annotated[float, Signal("N", "actuation force", 400.0)]
+    F_N: Annotated[float, Signal("N", "normal force", 3e3)]
+    F_stop: Annotated[float, Signal("N", "load of the end stops", 100.0)]
+    friction: Annotated[float, Signal("N", "friction force", 50.0)]
+    side: Annotated[float, Signal("1", "side of the wedge, +1 or -1")]
+    turning: Annotated[float, Signal("1", "direction of the disc, 0 when stopped")]
+
+
+def slope(par: Parameters) -> Annotated[float, Signal("1", "slope of the wedge", 0.4)]:
+    """Return the tangent of the wedge angle."""
+    return ops.sin(par.alpha) / ops.cos(par.alpha)
+
+
+def side(x: State) -> Annotated[float, Signal("1", "side of the wedge")]:
+    """Return +1 for travel from zero up, -1 below."""
+    return ops.where(x.x < 0, -1.0, 1.0)
+
+
+def mass(par: Parameters) -> Factors:
+    """Return the factors of the derivatives: 1 and the mass."""
+    return Factors(x=1.0, v=par.M_W)
+
+
+def balance(x: State, u: Input, par: Parameters) -> Balance:
+    r"""Return velocity and force.
+
+    .. math::
+        M_W \ddot x = F_M + (\mu_B s(\Omega) - \mathrm{sgn}(x) \tan\alpha) F_N
+        - k x - F_{stop} + F_{FRICT}
+
+    References
+    ----------
+    Roberts et al. (2003), section "Wedge and calliper"; our extraction prints mu_R for the pad.
+    """
+    self_reinforcing = (par.mu_B * u.turning - u.side * slope(par)) * u.F_N
+    force = u.F_M + self_reinforcing - par.k_return * x.x - u.F_stop + u.friction
+    return Balance(x=x.v, v=force)
+
+
+def pad_power(x: State, u: Input, par: Parameters) -> Power:
+    """Return the work of the disc on the wedge: the energy of the self-reinforcement."""
+    return par.mu_B * u.turning * u.F_N * x.v
+
+
+def brake_factor(par: Parameters) -> Annotated[float, Signal("1", "brake factor C*")]:
+    r"""Return the frictionless brake factor, :math:`C^* = 2 \mu_B / (\tan\alpha - \mu_B)`.
+
+    References
+    ----------
+    Roberts et al. (2003), section "Principle": positive means push, negative means pull.
+    """
+    return 2.0 * par.mu_B / (slope(par) - par.mu_B)
+
+
+def energy(x: State, par: Parameters) -> Energy:
+    """Return the energy of motion and of the return spring."""
+    return 0.5 * par.M_W * x.v * x.v + 0.5 * par.k_return * x.x * x.x
+
+
+def power_in(x: State, u: Input, par: Parameters) -> Power:
+    """Return the power of all forces on the wedge but the return spring's."""
+    against = u.side * slope(par) * u.F_N + u.F_stop
+    return (u.F_M + u.friction - against) * x.v + pad_power(x, u, par)
