@@ -68,11 +68,14 @@ class Pass:
 
 @dataclass(frozen=True)
 class _Linearized:
-    """The model's smooth part and its derivatives, evaluated where the substep needs them."""
+    """The model's smooth part and its Jacobian, evaluated where the substep needs them.
+
+    ``rows[i] + J[i, :] d`` is the balance at the midpoint x + d: exactly in rows that are linear,
+    to second order in the error of the predicted midpoint in the others.
+    """
 
     rows: list[Form]
     J: Any
-    nonlinear: list[bool]
 
 
 @dataclass(frozen=True)
@@ -109,11 +112,6 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     mass = column(model.mass(symbol_tuple(model.State, y), par))
     A = ca.diag(2.0 / s.h * mass) - linear.J
     right = dict(enumerate(linear.rows))
-    for j, curved in enumerate(linear.nonlinear):
-        if curved:
-            for i in range(s.x.shape[0]):
-                rest = right[i].rest - linear.J[i, j] * s.d[j]
-                right[i] = Form(right[i].coefficients, rest)
     kept = _set_valued_states(model, exact)
     reduced = eliminate(A, right, kept, s.x, changing)
     projection, reaction = _project(model, s, reduced, bounds, exact)
@@ -194,14 +192,19 @@ def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _
     J = ca.jacobian(f, x) + ca.jacobian(f, force) @ ca.jacobian(pressed, x)
     J = ca.substitute(J, force, pressed)
     changing = ca.vertcat(x, xe, s.x, s.d)
-    rows = [
-        Form(
-            {j: ca.substitute(c, xe, y) for j, c in row.coefficients.items()},
-            ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(at, y)),
-        )
-        for row in forms(with_contact, J, x, changing, bent)
-    ]
-    return _Linearized(rows, ca.substitute(J, ca.vertcat(x, xe), ca.vertcat(at, y)), curved)
+    slopes = ca.substitute(J, ca.vertcat(x, xe), ca.vertcat(at, y))
+    rows = []
+    for i, row in enumerate(forms(with_contact, J, x, changing, bent)):
+        # Linear rows start from x. The others were taken at the predicted midpoint in the states
+        # that they are nonlinear in, so the part of J d that leads there comes off again.
+        point = at if bent[i] else s.x
+        rest = ca.substitute(row.rest, ca.vertcat(x, xe), ca.vertcat(point, y))
+        if bent[i]:
+            for j in range(n):
+                rest = rest - slopes[i, j] * s.d[j] if curved[j] else rest
+        fixed = {j: ca.substitute(c, xe, y) for j, c in row.coefficients.items()}
+        rows.append(Form(fixed, rest))
+    return _Linearized(rows, slopes)
 
 
 def _bounds(model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any) -> list[Any]:

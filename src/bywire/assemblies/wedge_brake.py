@@ -1,0 +1,171 @@
+"""The wedge brake: two motors, screws, brake heart, wedge, caliper, disc, and its controllers.
+
+Source: R. Roberts, M. Schautt, H. Hartmann, B. Gombert, "Modelling and Validation of the
+Mechatronic Wedge Brake", SAE, 2003.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from bywire.assemblies import wedge_control as control
+from bywire.assemblies import wedge_energy as energy
+from bywire.assemblies import wedge_output as recording
+from bywire.assemblies import wedge_plant as plant
+from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.core.model import Bounds, Matrix, Task
+from bywire.plant import (
+    brake_heart,
+    current_drive,
+    drive_supply,
+    end_stop,
+    flywheel,
+    moment_sensor,
+    roller_screw,
+    servo_motor,
+    shaft_encoder,
+    wedge,
+    wedge_caliper,
+)
+
+Par = WedgeParameters
+
+
+class WedgeBrake:
+    """Model of the brake for the engine; see ``bywire.core.model.Model``.
+
+    Four dry frictions: both shafts (bearings and screw), the wedge, the pads on the disc. Six
+    contacts: three coupled ones in the heart, the caliper, two end stops of the wedge.
+    """
+
+    name: ClassVar[str] = "wedge-brake"
+    State: ClassVar = plant.State
+    Memory: ClassVar = control.Memory
+    Stimulus: ClassVar = control.Stimulus
+    Flow: ClassVar = energy.Flow
+    Output: ClassVar = recording.Output
+    frictions: ClassVar[tuple[str, ...]] = ("omega_1", "omega_2", "v", "Omega")
+    limits: ClassVar[tuple[str, ...]] = ()
+    usually_open: ClassVar[tuple[bool, ...]] = (False, False, True, True)
+
+    def tasks(self, par: Par) -> tuple[Task, ...]:
+        """Return the controllers, the outer one first."""
+        T = par.control
+        if par.command.mode == "current":
+            return (Task("current", T.T_fast, self._current),)
+        position = Task("position", T.T_fast, self._position)
+        if par.command.mode == "position":
+            return (position,)
+        return (Task("moment", T.T_slow, self._moment), position)
+
+    def _moment(
+        self, x: plant.State, m: control.Memory, u: control.Stimulus, par: Par
+    ) -> control.Memory:
+        return control.moment_tick(_readings(x, par), m, u, par)
+
+    def _position(
+        self, x: plant.State, m: control.Memory, u: control.Stimulus, par: Par
+    ) -> control.Memory:
+        return control.position_tick(_readings(x, par), m, u, par)
+
+    def _current(
+        self, x: plant.State, m: control.Memory, u: control.Stimulus, par: Par
+    ) -> control.Memory:
+        return control.current_tick(m, u)
+
+    def mass(self, xe: plant.State, par: Par) -> plant.State:
+        """Return inductances, inertias and masses."""
+        rows: list[float] = []
+        for motor in (par.motor_1, par.motor_2):
+            rows += (1.0, 1.0, 1.0, *servo_motor.mass(motor))
+        body, disc = wedge.mass(par.wedge), flywheel.mass(par.flywheel)
+        return plant.State._make((*rows, *body, *disc, 1.0, 1.0))
+
+    def balance(
+        self,
+        x: plant.State,
+        xe: plant.State,
+        m: control.Memory,
+        par: Par,
+        contact: tuple[float, ...],
+    ) -> plant.State:
+        """Return voltages, torques, forces, and the filters' rates."""
+        w = plant.wires(xe, par, contact)
+        rows: list[float] = []
+        for s, force in zip(plant.sides(x, xe, m, par), (w.F_1, w.F_2), strict=True):
+            seen = plant.drive_input(s, m)
+            load = roller_screw.load_torque(roller_screw.Input(force, 0.0), par.screw)
+            v = current_drive.output(s.drive, seen, par.drive).v
+            rows += current_drive.rate(s.drive, seen, par.drive)
+            rows += servo_motor.balance(s.motor, servo_motor.Input(v, load, 0.0), s.par)
+        body = wedge.balance(wedge.State(x.x, x.v), plant.wedge_input(w, 0.0), par.wedge)
+        disc = flywheel.balance(flywheel.State(x.Omega, x.phi), flywheel.Input(0.0), par.flywheel)
+        # Value-only: the brake does not feel the measurement of its power.
+        power = drive_supply.power(plant.motor_power(xe, m, par), par.supply)
+        moment = moment_sensor.rate(x.y_M, w.M_B, par.moment_sensor)
+        shown = drive_supply.rate(x.y_P, power, par.supply)
+        return plant.State._make((*rows, *body, *disc, moment, shown))
+
+    def bounds(
+        self,
+        x: plant.State,
+        xe: plant.State,
+        m: control.Memory,
+        par: Par,
+        contact: tuple[float, ...],
+    ) -> tuple[Bounds, ...]:
+        """Return the limits of the frictions on both shafts, on the wedge and on the disc."""
+        w = plant.wires(xe, par, contact)
+        found: list[Bounds] = []
+        for s, force in zip(plant.sides(x, xe, m, par), (w.F_1, w.F_2), strict=True):
+            bearing, screw = plant.shaft_friction(s, force, par)
+            found.append((-(bearing + screw.T_p), bearing + screw.T_n))
+        sliding = plant.wedge_bound(w, par)
+        moment = wedge_caliper.moment(w.F_N, par.wedge.mu_B, 1.0, par.caliper)
+        return (*found, (-sliding, sliding), (-moment, moment))
+
+    def compliance(self, par: Par) -> tuple[Matrix, ...]:
+        """Return the compliances: coupled ones of the heart, the caliper, the end stops."""
+        stop = end_stop.compliance(par.stop)
+        caliper = wedge_caliper.compliance(par.caliper)
+        return (brake_heart.matrix(par.heart), ((caliper,),), ((stop,),), ((stop,),))
+
+    def gap(self, x: plant.State, xe: plant.State, par: Par) -> tuple[tuple[float, ...], ...]:
+        """Return the damped overlaps of all contacts."""
+        heart = brake_heart.overlaps(plant.heart_input(x, par), par.heart)
+        caliper = wedge_caliper.overlap(plant.caliper_input(x, xe, par), par.caliper)
+        stop = end_stop.overlaps(plant.stop_input(x, par), par.stop)
+        return (tuple(heart), (caliper,), (stop.near,), (stop.far,))
+
+    def powers(
+        self,
+        x: plant.State,
+        rate: plant.State,
+        m: control.Memory,
+        par: Par,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> energy.Flow:
+        """Return the powers for the energy balance."""
+        return energy.rates(x, m, par, contact, reaction)
+
+    def output(
+        self,
+        x: plant.State,
+        m: control.Memory,
+        par: Par,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: energy.Flow,
+    ) -> recording.Output:
+        """Return what is recorded at an instant."""
+        return recording.instant(x, m, par, contact, reaction, flow)
+
+
+def _readings(x: plant.State, par: Par) -> control.Readings:
+    return control.Readings(
+        theta_1=shaft_encoder.reading(x.theta_1, par.encoder),
+        theta_2=shaft_encoder.reading(x.theta_2, par.encoder),
+        M=x.y_M,
+        Omega=x.Omega,
+    )

@@ -1,0 +1,99 @@
+"""Moment pulses: a step of the moment demand, then pulses to 80 % (Roberts 2003, Fig. 7)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.wedge_case import UNITS, braking, case_from_parked, mean, steps, swing
+from bywire.control.moment_control import SomeMoment
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Fraction, Unit
+
+Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
+
+
+class Options(ParameterSet):
+    """The braking maneuver; its times are ours, the figure's text gives none."""
+
+    M_high: SomeMoment
+    """moment demanded"""
+    low: Fraction
+    """share of it to which the pulses fall"""
+    t_hold: Duration
+    """time from the step to the first pulse"""
+    t_low: Duration
+    """length of each pulse"""
+    t_high: Duration
+    """time between pulses, and after the last one"""
+    pulses: Count
+    """number of pulses"""
+    settle: Duration
+    """time parked before the step"""
+
+
+def _end(options: Options) -> float:
+    return options.t_hold + options.pulses * (options.t_low + options.t_high)
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return the one run."""
+    levels = {0.0: options.M_high}
+    for k in range(options.pulses):
+        begin = options.t_hold + k * (options.t_low + options.t_high)
+        levels[begin] = options.low * options.M_high
+        levels[begin + options.t_low] = options.M_high
+    return (
+        case_from_parked(
+            par, lambda t: {"M_set": steps(t, levels)}, _end(options),
+            settle=options.settle, keep=options.settle,
+        ),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the figures of the braking, of its hold and of its pulses."""
+    run = recordings["run"]
+    begin, end = 0.5 * options.t_hold, options.t_hold
+    low_end = options.t_hold + options.t_low
+    hold = mean(run, "M_B", begin, end)
+    fallen = mean(run, "M_B", low_end - 0.2 * options.t_low, low_end)
+    own = (
+        Kpi("hold_moment", hold, "N*m", "Mean moment in the second half of the hold."),
+        Kpi("hold_ripple", swing(run, "M_B", begin, end), "N*m",
+            "Moment peak to peak in the second half of the hold: the disc's run-out."),
+        Kpi("hold_power", mean(run, "P_in", begin, end), "W",
+            "Mean input power in the second half of the hold, standby included."),
+        Kpi("brake_power", hold * mean(run, "Omega", begin, end), "W",
+            "Mean braking power in the second half of the hold."),
+        Kpi("pulse_moment", fallen, "N*m",
+            "Mean moment in the last fifth of the first pulse."),
+    )  # fmt: skip
+    return (*braking(run, options.M_high, options.t_hold), *own)
+
+
+EXPERIMENT = Experiment(
+    name="moment-pulses",
+    assembly="wedge-brake",
+    summary="moment step to 200 N m, then pulses to 80 % (Fig. 7)",
+    options=Options,
+    defaults=Options(
+        M_high=200.0, low=0.8, t_hold=0.5, t_low=0.2, t_high=0.2, pulses=3, settle=0.05
+    ),
+    cases=cases,
+    judge=judge,
+    kpis=UNITS
+    | {
+        "hold_moment": "N*m",
+        "hold_ripple": "N*m",
+        "hold_power": "W",
+        "brake_power": "W",
+        "pulse_moment": "N*m",
+    },
+    figures=("energy-balance",),
+)

@@ -1,0 +1,142 @@
+"""What the wedge brake's experiments share: runs that start parked, and key figures of braking."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.assemblies.wedge_brake import WedgeBrake
+from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.assemblies.wedge_start import memory_at, state_at
+from bywire.bench.experiment import Case
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.recording import energy_residual
+
+Array = NDArray[np.float64]
+Signals = Mapping[str, Array]
+
+UNITS = {
+    "contact_time": "s",
+    "time_to_90": "s",
+    "peak_power": "W",
+    "peak_power_filtered": "W",
+    "peak_normal_force": "N",
+    "caliper_energy": "J",
+    "disc_share": "%",
+    "rate_limited": "%",
+    "peak_speed": "rad/s",
+    "energy_in": "J",
+    "energy_braked": "J",
+    "energy_left": "J",
+}
+"""units of the key figures of :func:`braking`"""
+
+
+def case_from_parked(
+    par: WedgeParameters,
+    stimulus: Callable[[Array], Signals],
+    duration: float,
+    changes: Mapping[str, Any] | None = None,
+    **timing: float,
+) -> Case:
+    """Return the run of an experiment that starts parked, preloaded, without current.
+
+    Parameters
+    ----------
+    changes
+        Parameters that the experiment sets.
+    timing
+        ``settle``, ``keep`` and ``record`` of the case [s].
+    """
+    own = par.replace({"command.mode": "moment", **(changes or {})})
+    return Case(
+        label="run",
+        model=WedgeBrake(),
+        par=own,
+        state=state_at(0.0, own),
+        memory=memory_at(0.0, own),
+        stimulus=stimulus,
+        duration=duration,
+        **timing,
+    )
+
+
+def steps(t: Array, levels: Mapping[float, float]) -> Array:
+    """Return a signal that takes each level from its time [s] on, and zero before the first."""
+    y = np.zeros(t.shape)
+    for begin, level in sorted(levels.items()):
+        y = np.where(t >= begin - 1e-9, level, y)
+    return y
+
+
+def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
+    """Return the key figures of a braking that begins at time zero.
+
+    Parameters
+    ----------
+    target
+        Moment demanded [N m].
+    end
+        Time [s] at which the demand changes for the first time.
+    """
+    after = run.sel(time=slice(-1e-9, None))
+    held = run.sel(time=slice(-1e-9, end + 1e-9))
+    peak = int(np.argmax(held["U_caliper"].values))
+    stored = float(held["U_caliper"].values[peak])
+    work = float(held["W_disc"].values[peak] - held["W_disc"].values[0])
+    share = 100.0 * work / stored if stored > 0 else math.nan
+    texts: dict[str, tuple[float, str]] = {
+        "contact_time": (first(held, "F_N", 0.0), "Time until the pads press on the disc."),
+        "time_to_90": (first(held, "y_M", 0.9 * target),
+                       "Time until the moment sensor first shows 90 % of the demand."),
+        "peak_power": (float(after["P_in"].max()), "Largest power at the drives' input."),
+        "peak_power_filtered": (float(after["P_meas"].max()),
+                                "Largest power at the drives' input, as the rig measures it."),
+        "peak_normal_force": (float(after["F_N"].max()), "Largest normal force."),
+        "caliper_energy": (stored, "Largest energy of the caliper before the demand changes."),
+        "disc_share": (share, "Work of the disc on the wedge until then, over that energy."),
+        "rate_limited": (100.0 * float(held["sat_rate"].mean()),
+                         "Share of the time until the demand changes on the software rate limit."),
+        "peak_speed": (float(np.abs(after["omega_1"]).max()), "Largest speed of motor 1."),
+        "energy_in": (_gained(after, "W_supply"), "Energy at the drives' input, standby included."),
+        "energy_braked": (_gained(after, "W_brake"), "Energy taken from the disc."),
+        "energy_left": (float(np.abs(energy_residual(run)).max()),
+                        "Largest residual of the energy balance: the step's error."),
+    }  # fmt: skip
+    return tuple(_kpi(name, *texts[name]) for name in UNITS)
+
+
+def first(run: xr.Dataset, name: str, level: float) -> float:
+    """Return when a signal first exceeds a level [s], interpolated; NaN where it never does."""
+    t, y = run["time"].values, run[name].values
+    above = np.flatnonzero(y > level)
+    if above.size == 0 or above[0] == 0:
+        return math.nan
+    k = int(above[0])
+    if level == 0.0:
+        return float(t[k])
+    return float(t[k - 1] + (level - y[k - 1]) / (y[k] - y[k - 1]) * (t[k] - t[k - 1]))
+
+
+def mean(run: xr.Dataset, name: str, begin: float, end: float) -> float:
+    """Return the mean of a signal between two times [s]."""
+    return float(run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).mean())
+
+
+def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
+    """Return the peak-to-peak value of a signal between two times [s]."""
+    return float(np.ptp(run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values))
+
+
+def _gained(run: xr.Dataset, name: str) -> float:
+    return float(run[name].values[-1] - run[name].values[0])
+
+
+def _kpi(name: str, value: float, text: str) -> Kpi:
+    note = "" if math.isfinite(value) else "the level is never reached in time"
+    return Kpi(name, value, UNITS[name], text, note)

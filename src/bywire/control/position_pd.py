@@ -1,0 +1,86 @@
+"""Motor position control: stiffness and damping by the encoder, current demand to the drive."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Gt
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Factor, Frequency, Inertia, TorqueConstant, Weight
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
+
+
+class Parameters(ParameterSet):
+    """Second-order position loop, without integral part.
+
+    A high bandwidth (60 Hz) serves the brake; a low one (12 Hz) keeps clear of the current limit.
+    """
+
+    f_n: Frequency
+    """natural frequency of the loop on a free shaft"""
+    zeta: Factor
+    """damping ratio"""
+    c: Weight
+    """share of the reference's speed that the damping leaves alone; 0 damps the whole speed"""
+    f_speed: Frequency
+    """corner of the filter behind the encoder's differences"""
+    i_max: Current
+    """limit of the current demand's magnitude"""
+    J_hat: Inertia
+    """inertia as the controller believes it"""
+    K_hat: TorqueConstant
+    """torque constant as the controller believes it"""
+
+
+class State(NamedTuple):
+    """Last angle and filtered speed."""
+
+    last: Annotated[float, Signal("rad", "last measured angle", 3.0)]
+    speed: Annotated[float, Signal("rad/s", "measured speed", 50.0)]
+
+
+class Input(NamedTuple):
+    """Reference, its speed, and the measured angle."""
+
+    theta_ref: Annotated[float, Signal("rad", "angle reference", 3.0)]
+    omega_ref: Annotated[float, Signal("rad/s", "speed of the reference", 50.0)]
+    theta: Annotated[float, Signal("rad", "measured angle", 3.0)]
+
+
+class Output(NamedTuple):
+    """Current demand."""
+
+    i: Annotated[float, Signal("A", "current demand", 5.0)]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the controller by one sample.
+
+    .. math::
+        i = \frac{J}{K_T} \left(\omega_n^2 (\theta_{ref} - \theta)
+        + 2 \zeta \omega_n (c\, \omega_{ref} - \hat\omega)\right)
+
+    with the speed from differences of the encoder behind a first-order filter.
+
+    References
+    ----------
+    Roberts et al. (2003), section "Motor & rollerscrew alone": two bandwidths, no law is given.
+    """
+    angle = 2.0 * math.pi * par.f_speed * T
+    difference = (u.theta - x.last) / T
+    speed = x.speed + angle / (1.0 + angle) * (difference - x.speed)
+    w = 2.0 * math.pi * par.f_n
+    stiff = w * w * (u.theta_ref - u.theta)
+    damped = 2.0 * par.zeta * w * (par.c * u.omega_ref - speed)
+    i = par.J_hat / par.K_hat * (stiff + damped)
+    return State(last=u.theta, speed=speed), Output(i=ops.clip(i, -par.i_max, par.i_max))
+
+
+def at_rest(theta: Annotated[float, Signal("rad", "measured angle", 3.0)]) -> State:
+    """Return the state of a shaft that stands at an angle."""
+    return State(last=theta, speed=0.0)

@@ -1,0 +1,76 @@
+"""Offset between the two screws: squeeze the wedge against free-play, or push it together."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Force, GearRatio, Position
+from bywire.core.signals import Signal
+
+ScrewTravel = Annotated[float, Signal("m", "offset of each screw", 4e-5)]
+
+
+class Parameters(ParameterSet):
+    """Positive offsets preload the wedge, negative ones let the screws push on each other.
+
+    ``law``: ``"preload"`` keeps the preload; ``"scheduled"`` preloads near the neutral point and
+    lets the motors co-operate where the actuation force is large.
+    """
+
+    law: Literal["preload", "scheduled"]
+    """whether the offset depends on the actuation force"""
+    delta_preload: Position
+    """offset of each screw from the middle, preload"""
+    delta_together: Position
+    """offset of each screw from the middle, co-operation (law "scheduled")"""
+    F_low: Force
+    """actuation force up to which the wedge is preloaded (law "scheduled")"""
+    F_high: Force
+    """actuation force from which the motors work together (law "scheduled")"""
+    k_hat: GearRatio
+    """travel per shaft angle as the controller believes it"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Parameters:
+        if not self.F_low < self.F_high:
+            raise ValueError(
+                f"screw_offset.F_low = {self.F_low:g} N must be below F_high = {self.F_high:g} N"
+            )
+        return self
+
+
+class Output(NamedTuple):
+    """References of both shafts."""
+
+    theta_1: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
+    theta_2: Annotated[float, Signal("rad", "angle reference 2", 3.0)]
+
+
+def offset(
+    F_M: Annotated[float, Signal("N", "actuation force, estimated", 1000.0)], par: Parameters
+) -> ScrewTravel:
+    """Return the offset of each screw; between the two forces it changes linearly."""
+    if par.law == "preload":
+        return par.delta_preload
+    nodes = (par.F_low, par.F_high)
+    return ops.interpolate(ops.fabs(F_M), nodes, (par.delta_preload, par.delta_together))
+
+
+def output(
+    theta: Annotated[float, Signal("rad", "angle reference", 3.0)],
+    delta: ScrewTravel,
+    par: Parameters,
+) -> Output:
+    """Return the references of both shafts around a common one.
+
+    References
+    ----------
+    Roberts et al. (2003), section "Brake heart": preload near the ideal point, co-operation
+    elsewhere.
+    """
+    apart = delta / par.k_hat
+    return Output(theta_1=theta - apart, theta_2=theta + apart)
