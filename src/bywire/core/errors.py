@@ -8,6 +8,7 @@
     │   ├── UnitError             a quantity whose unit does not fit
     │   ├── UnknownNameError      a name that nothing answers to
     │   ├── FileError             a file that cannot be read, understood or written
+    │   ├── ModelError            a model that does not give what the protocol asks for
     │   └── StepError             steps and sample times that do not divide each other
     └── RunError                  exit status 3: the computation failed
         ├── SolverError           a trajectory that left the numbers or did not settle
@@ -48,6 +49,10 @@ class UnknownNameError(InputError):
 
 class FileError(InputError):
     """A file that cannot be read, understood or written."""
+
+
+class ModelError(InputError):
+    """A model that does not give what the protocol asks for."""
 
 
 class StepError(InputError):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import importlib.util
 import os
@@ -14,16 +15,16 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from platformdirs import user_cache_path
-
 from bywire.core.errors import CompilerError
+from bywire.simulation.kernel_cache import intact, sha256, usable_folder
 
 # Kernels compare and select all the time: without these, maxima become branches.
 _MATH = ("-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only")
 _STRICT = ("-Werror=implicit-function-declaration",)
 _COMMON = ("-shared", "-fPIC", "-std=c11", *_MATH, *_STRICT)
 PLAIN = ("-O2", "-fno-tree-vectorize")  # packing a few scalars costs more than it saves
-_WIDE = ("-march=native", "-mprefer-vector-width=512", "-ffp-contract=fast")
+_X86 = platform.machine().lower() in ("x86_64", "amd64")
+_WIDE = ("-march=native", "-ffp-contract=fast", *(("-mprefer-vector-width=512",) if _X86 else ()))
 _VECTOR = ("-O2", "-fopenmp-simd", *_WIDE)
 _GCC = ("-fschedule-insns", "-fsched-pressure")  # a tenth quicker there; clang has no such option
 TIMEOUT = 300.0
@@ -59,17 +60,21 @@ def find_compiler() -> Compiler | None:
     wanted = os.environ.get("BYWIRE_CC", "")
     if wanted == "none":
         return None
-    for name in [wanted] if wanted else ["cc", "gcc", "clang"]:
-        path = shutil.which(name)
-        if path:
-            return _labelled((path,))
+    if wanted and shutil.which(wanted):
+        return _labelled((str(shutil.which(wanted)),))
     if wanted:
         raise CompilerError(
             f"BYWIRE_CC = {wanted!r} names no program: "
             "unset it, or set it to a C compiler or 'none'"
         )
+    commands: list[tuple[str, ...]] = [
+        (path,) for name in ("cc", "gcc", "clang") if (path := shutil.which(name))
+    ]
     if importlib.util.find_spec("ziglang") is not None:
-        return _labelled((sys.executable, "-m", "ziglang", "cc"))
+        commands.append((sys.executable, "-m", "ziglang", "cc"))
+    for command in commands:
+        with contextlib.suppress(CompilerError):  # a broken one must not hide the next
+            return _labelled(command)
     return None
 
 
@@ -80,14 +85,10 @@ def _labelled(command: tuple[str, ...]) -> Compiler:
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         raise CompilerError(f"the C compiler {command[0]} does not start: {error}") from None
+    if done.returncode != 0:
+        raise CompilerError(f"the C compiler {command[0]} does not tell its version")
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0]
     return Compiler(command, first.strip())
-
-
-def cache_folder() -> Path:
-    """Return the folder of compiled kernels (``BYWIRE_CACHE`` moves it)."""
-    moved = os.environ.get("BYWIRE_CACHE")
-    return Path(moved) if moved else user_cache_path("bywire", "bywire") / "kernels"
 
 
 def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> Path:
@@ -101,19 +102,19 @@ def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> 
     CompilerError
         With the first lines of the compiler's message.
     """
-    built_for = _processor() if "-march=native" in flags else ""
-    parts = "\0".join((source, *flags, compiler.label, built_for))
+    built_for = _processor() if "-march=native" in flags else platform.machine()
+    parts = "\0".join((source, *_COMMON, *flags, compiler.label, built_for))
     key = hashlib.sha256(parts.encode()).hexdigest()[:32]
-    folder = _writable(cache_folder())
+    folder = usable_folder()
     library, digest = folder / f"{key}.so", folder / f"{key}.sha256"
-    if _intact(library, digest):
+    if intact(library, digest):
         return library
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
         text, built = Path(scratch) / "kernel.c", Path(scratch) / "kernel.so"
         text.write_text(source)
         _compile(compiler, flags, text, built)
         fresh = Path(scratch) / "digest"
-        fresh.write_text(_sha256(built))
+        fresh.write_text(sha256(built))
         os.replace(built, library)
         os.replace(fresh, digest)
     return library
@@ -138,29 +139,3 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: P
     if done.returncode != 0 or not target.exists():
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
         raise CompilerError(f"{compiler.label} refused a generated kernel:\n{message}")
-
-
-def _writable(folder: Path) -> Path:
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        fallback = Path(tempfile.gettempdir()) / f"bywire-{os.getuid()}"
-        fallback.mkdir(mode=0o700, exist_ok=True)
-        if fallback.stat().st_uid != os.getuid():
-            raise CompilerError(
-                f"neither {folder} nor {fallback} can hold compiled kernels: set BYWIRE_CACHE"
-            ) from None
-        return fallback
-
-
-def _intact(library: Path, digest: Path) -> bool:
-    try:
-        return _sha256(library) == digest.read_text()
-    except OSError:
-        return False
-
-
-def _sha256(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()

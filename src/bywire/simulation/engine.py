@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import warnings
+from collections.abc import Mapping
 from functools import cache
 from typing import Protocol
 
@@ -43,6 +45,7 @@ class Prepared:
     """Programs and engines of one structure of a model, built on demand."""
 
     def __init__(self, model: Model, par: ParameterSet) -> None:
+        self.model = model  # alive as long as what is known by its identity
         self.program: Program = build_program(model, par)
         self._engines: dict[str, Engine] = {}
 
@@ -83,17 +86,32 @@ class Prepared:
 
 
 _PREPARED: dict[tuple[object, ...], Prepared] = {}
+_LOCK = threading.RLock()
 
 
 def prepare(model: Model, par: ParameterSet) -> Prepared:
     """Return what is built for a model of this structure; the numbers of ``par`` do not matter."""
     structure = tuple(sorted((k, str(v)) for k, v in par.choices().items()))
-    # Models without fields of their own have no text of their own either, only an address.
-    own = repr(sorted(vars(model).items()))
+    fields = sorted(getattr(model, "__dict__", {}).items())
+    own = tuple((name, _fingerprint(value)) for name, value in fields)
     key = (type(model), own, type(par), structure)
-    if key not in _PREPARED:
-        _PREPARED[key] = Prepared(model, par)
-    return _PREPARED[key]
+    with _LOCK:
+        if key not in _PREPARED:
+            _PREPARED[key] = Prepared(model, par)
+        return _PREPARED[key]
+
+
+def _fingerprint(value: object) -> object:
+    """Return what tells a model's own values apart: contents, else the object itself."""
+    if isinstance(value, np.ndarray):
+        return (value.shape, value.dtype.str, value.tobytes())
+    if isinstance(value, (str, int, float, bool, type(None))):
+        return repr(value)
+    if isinstance(value, (tuple, list)):
+        return tuple(_fingerprint(v) for v in value)
+    if isinstance(value, Mapping):
+        return tuple((str(k), _fingerprint(v)) for k, v in value.items())
+    return id(value)  # kept alive by the model that Prepared holds
 
 
 @cache

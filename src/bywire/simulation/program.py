@@ -10,6 +10,7 @@ import casadi as ca
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
+from bywire.simulation.model_check import check_model
 from bywire.simulation.scheme import Pass, Symbols, build_pass
 from bywire.simulation.stiff_contacts import contact_jacobians
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
@@ -78,6 +79,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
         Any parameter set of the wanted structure: its numbers are not used, they become
         arguments.
     """
+    check_model(model, par)
     names = tuple(par.leaves())
     p = SX.sym("p", len(names))
     symbolic = par.with_leaves(dict(zip(names, scalars(p), strict=True)))

@@ -43,8 +43,8 @@ class Schedule:
 
     @property
     def stimulus_frames(self) -> int:
-        """Frames per row of the stimulus: those of the fastest task."""
-        return min(self.task_frames)
+        """Frames per row of the stimulus: what divides the intervals of all tasks."""
+        return math.gcd(*self.task_frames)
 
     @property
     def stimulus_rows(self) -> int:
@@ -112,9 +112,18 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
 def _whole(period: float, step: float, name: str) -> int:
     count = round(period / step)
     if count < 1 or abs(count * step - period) > _TOLERANCE * period:
-        near = period / max(count, 1)
         raise StepError(
             f"step = {step * 1e6:g} us does not divide the {name} interval of {period * 1e6:g} us: "
-            f"take for instance {near * 1e6:g} us"
+            f"take for instance {_divisor(period, step):.12g} us"
         )
     return count
+
+
+def _divisor(period: float, step: float) -> float:
+    """Return a step [us] that divides a period, at most the given one and short to write."""
+    least = max(math.ceil(period / step - _TOLERANCE), 1)
+    for count in range(least, 8 * least + 8):
+        candidate = period / count * 1e6
+        if abs(candidate - round(candidate, 3)) <= 1e-12 * candidate:
+            return round(candidate, 3)
+    return period / least * 1e6

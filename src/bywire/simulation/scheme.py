@@ -231,6 +231,9 @@ def _project(
     c = column([reduced.start(row, half) for row in range(len(reduced.kept))])
     projection = (project_exact if exact else project_fast)(half, c, low, high)
     reaction = half @ projection.w - c
+    first = len(model.frictions)
+    for k in range(first, reaction.shape[0]):  # away from its limit a state feels nothing of it
+        reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))
     if not exact:
         reaction = ca.vertcat(reaction, SX.zeros(len(model.limits)))
     return projection, reaction

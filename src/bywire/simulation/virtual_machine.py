@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any
 
 import numpy as np
@@ -32,9 +33,14 @@ class VirtualMachine:
         self._exact = _Call(program.exact)
         self._ticks = [_Call(tick) for tick in program.ticks]
         self._output = _Call(program.output)
+        self._lock = threading.Lock()  # the functions' buffers serve one run at a time
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
         """Run frames begin..end: renews ``state`` and fills ``rows`` in place."""
+        with self._lock:
+            self._advance(request, state, begin, end, rows)
+
+    def _advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
         schedule = request.schedule
         p, h = request.parameters, np.array([schedule.step])
         part = {
