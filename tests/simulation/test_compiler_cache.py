@@ -16,6 +16,7 @@ import pytest
 from bywire.core.errors import CompilerError
 from bywire.simulation import compiler as compiler_module
 from bywire.simulation import engine as engine_module
+from bywire.simulation import kernel_cache
 from bywire.simulation.compiler import PLAIN, Compiler, compile_library, find_compiler
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import simulate
@@ -208,3 +209,14 @@ def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.Monk
     assert twice(library) == 42.0
     assert library.parent.parent == tmp_path
     assert stat.S_IMODE(library.parent.stat().st_mode) == 0o700
+
+
+def test_folders_that_others_may_write_to_are_not_trusted(tmp_path, monkeypatch):
+    shared = tmp_path / "shared"
+    shared.mkdir()
+    shared.chmod(0o777)
+    monkeypatch.setenv("BYWIRE_CACHE", str(shared))
+    with pytest.raises(CompilerError, match="can be written by others"):
+        kernel_cache.usable_folder()
+    shared.chmod(0o700)
+    assert kernel_cache.usable_folder() == shared

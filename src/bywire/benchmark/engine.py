@@ -16,9 +16,10 @@ from bywire.benchmark.peers.hand_c import THREADS, HandWritten
 from bywire.benchmark.peers.problem import braking_run, hard_braking
 from bywire.benchmark.result import Result, at_least, at_most, vector_doubles
 from bywire.simulation.engine import prepare
-from bywire.simulation.ensemble import case_matrix, simulate_ensemble
+from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, initial_vector, request_for, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
+from bywire.simulation.variations import case_matrix
 
 CASES = 1024
 VARIED = ("motor.R_m", "motor.K_e", "seal.T_pr", "seal.f_cfr_p", "caliper.K_pd", "fluid.beta")

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import ctypes
-import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cache
@@ -13,8 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.parameters import ParameterSet
+from bywire.core.errors import ParameterError
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_lanes import emit_lanes
@@ -31,6 +29,7 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import build_stages
+from bywire.simulation.variations import Variations, case_matrix
 
 Array = NDArray[np.float64]
 
@@ -117,7 +116,7 @@ class LaneKernel:
 
 def simulate_ensemble(
     run: Run,
-    variations: Mapping[str, Array | Sequence[float]],
+    variations: Variations,
     signals: Sequence[str],
     threads: int | None = None,
 ) -> Ensemble:
@@ -129,11 +128,12 @@ def simulate_ensemble(
         Model, parameters, initial values, stimulus, steps.
     variations
         Dotted name of a parameter -> its value in each case, shape (cases,). What is not named
-        keeps its value. Sample times cannot vary.
+        keeps its value. Sample times cannot vary. All cases start from the state and memory of
+        ``run``: where a varied parameter moves the equilibrium, let the run settle first.
     signals
         Outputs to record.
     threads
-        Threads to use; all cores by default.
+        Threads to use, >= 1; all cores by default.
 
     Raises
     ------
@@ -145,10 +145,12 @@ def simulate_ensemble(
         When a value is out of range, lengths differ, or a sample time varies.
     """
     program = prepare(run.model, run.par).program
+    if threads is not None and threads < 1:
+        raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
     matrix = case_matrix(run, variations)
     compiler = find_compiler()
     if compiler is None:
-        return _one_by_one(run, variations, matrix.shape[1], tuple(signals))
+        return _one_by_one(run, variations, tuple(signals))
     kernel = _lane_kernel(program, compiler)
     schedule, outputs = run.schedule(), tuple(program.outputs)
     stimulus = sampled_stimulus(run, schedule)
@@ -181,52 +183,18 @@ def simulate_ensemble(
     )
 
 
-def case_matrix(run: Run, variations: Mapping[str, Array | Sequence[float]]) -> Array:
-    """Return the parameter vectors of all cases, shape (parameters, cases), checked.
-
-    Ranges are checked for every value; rules between parameters at the extremes of each.
-    """
-    names = list(run.par.leaves())
-    arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
-    lengths = {name: array.size for name, array in arrays.items()}
-    if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
-        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
-    periods = _periods(run, run.par)
-    matrix = np.repeat(
-        np.array(list(run.par.leaves().values()))[:, None], next(iter(lengths.values())), axis=1
-    )
-    for name, array in arrays.items():
-        if name not in names:
-            raise unknown_name("parameter", name, names)
-        worst = (float(array.min()), float(array.max()), float(array.sum()))
-        for value in worst[:2] if math.isfinite(worst[2]) else worst:
-            changed = run.par.replace({name: value})
-            if _periods(run, changed) != periods:
-                raise ParameterError(f"{name} is a sample time and cannot vary within an ensemble")
-        matrix[names.index(name)] = array
-    return matrix
-
-
-def _periods(run: Run, par: ParameterSet) -> list[float]:
-    return [task.period for task in run.model.tasks(par)]
-
-
 @cache
 def _lane_kernel(program: Program, compiler: Compiler) -> LaneKernel:
     return LaneKernel(program, compiler)
 
 
-def _one_by_one(
-    run: Run,
-    variations: Mapping[str, Array | Sequence[float]],
-    count: int,
-    signals: tuple[str, ...],
-) -> Ensemble:
+def _one_by_one(run: Run, variations: Variations, signals: tuple[str, ...]) -> Ensemble:
     """Serve without a compiler: the cases one after the other."""
+    arrays = {name: np.atleast_1d(values) for name, values in variations.items()}
+    count = next(iter(arrays.values())).size
     runs = [
         simulate(
-            replace(run, par=run.par.replace({n: float(v[k]) for n, v in variations.items()})),
-            signals,
+            replace(run, par=run.par.replace({n: float(v[k]) for n, v in arrays.items()})), signals
         )
         for k in range(count)
     ]

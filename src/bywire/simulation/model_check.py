@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import casadi as ca
@@ -72,13 +73,27 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
 
 def _evaluated(model: Model, part: str, *arguments: Any) -> Any:
     try:
-        return getattr(model, part)(*arguments)
+        value = getattr(model, part)(*arguments)
+        if _holds_nan(value):  # what math.exp and the like make of a symbol
+            raise TypeError("a symbol was turned into a number")
+        return value
     except (AttributeError, NotImplementedError, RuntimeError, TypeError) as error:
         reason = str(error).splitlines()[-1] if str(error) else type(error).__name__
         raise ModelError(
             f"{model.name}: {part} cannot be evaluated on symbols ({reason}): use core.ops for "
             "functions and core.ops.where instead of if, math and numpy"
         ) from error
+
+
+def _holds_nan(value: Any) -> bool:
+    if isinstance(value, (tuple, list)):
+        return any(_holds_nan(v) for v in value)
+    if not isinstance(value, (float, ca.SX)):
+        return False
+    function = ca.Function("part", ca.symvar(ca.SX(value)), [ca.SX(value)])
+    codes = range(function.n_instructions())
+    constants = [k for k in codes if function.instruction_id(k) == ca.OP_CONST]
+    return any(math.isnan(function.instruction_constant(k)) for k in constants)
 
 
 def _sized(model: Model, part: str, value: Any, wanted: int, meaning: str) -> None:

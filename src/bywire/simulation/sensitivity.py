@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import CompilerError, unknown_name
+from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_tangents import emit_tangents
@@ -122,6 +122,13 @@ def simulate_with_sensitivities(
     for name in parameters:
         if name not in names:
             raise unknown_name("parameter", name, names)
+    if not parameters:
+        raise ParameterError("sensitivities need at least one parameter: name it")
+    wanted = (len(run.state), len(parameters))
+    if initial is not None and np.shape(initial) != wanted:
+        raise ParameterError(
+            f"initial has the shape {np.shape(initial)}, wanted is {wanted}: states, parameters"
+        )
     compiler = find_compiler()
     if compiler is None:
         raise CompilerError("sensitivities need a C compiler: install the extra bywire[compiler]")

@@ -35,13 +35,3 @@ def nonlinear(expression: Any, variables: Any) -> list[bool]:
 def depends(expression: Any, variables: Any) -> bool:
     """Return whether an expression contains any of the variables."""
     return bool(ca.depends_on(expression, variables)) if variables.numel() else False
-
-
-def choose(cases: Sequence[tuple[Any, Any]]) -> Any:
-    """Return the value of the first case with the largest score; cases are (score, value)."""
-    best_score, best = cases[0]
-    for score, value in cases[1:]:
-        better = score > best_score
-        best = ca.if_else(better, value, best)
-        best_score = ca.fmax(score, best_score)
-    return best

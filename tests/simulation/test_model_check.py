@@ -1,0 +1,80 @@
+"""Mistakes in a user's model are said in the model's own terms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bywire.core.errors import ModelError
+from bywire.simulation.model_check import check_model
+from systems.nonlinear_drive import PARAMETERS, NonlinearDrive, State
+from systems.three_contacts import heart
+
+
+class IfOnAValue(NonlinearDrive):
+    def balance(self, x, xe, m, par, contact):
+        return State(m.v, x.omega, 1.0 if x.omega > 0 else -1.0)
+
+
+class MathOnASymbol(NonlinearDrive):
+    def balance(self, x, xe, m, par, contact):
+        return State(m.v, x.omega, math.exp(x.omega))
+
+
+class TooFewRows(NonlinearDrive):
+    def balance(self, x, xe, m, par, contact):
+        return (m.v, x.omega)
+
+
+class NoMass(NonlinearDrive):
+    def mass(self, xe, par):
+        return None
+
+
+class NoTask(NonlinearDrive):
+    def tasks(self, par):
+        return ()
+
+
+class Misspelled(NonlinearDrive):
+    frictions = ("omga",)
+
+
+class BareBounds(NonlinearDrive):
+    frictions = ("omega",)
+
+    def bounds(self, x, xe, m, par, contact):
+        return (-1.0, 1.0)
+
+
+class GroupWithoutGap(NonlinearDrive):
+    def compliance(self, par):
+        return (((1.0,),),)
+
+
+@pytest.mark.parametrize(
+    ("model", "words"),
+    [
+        (IfOnAValue, "core.ops.where instead of if"),
+        (MathOnASymbol, "core.ops"),
+        (TooFewRows, "balance returns 2 values, wanted are 3"),
+        (NoMass, "mass returns 0 values, wanted are 3"),
+        (NoTask, "tasks returns none"),
+        (Misspelled, "frictions names 'omga'"),
+        (BareBounds, "bounds returns 2 values, wanted are 1"),
+        (GroupWithoutGap, "must match"),
+    ],
+)
+def test_mistake_is_named(model: type[NonlinearDrive], words: str) -> None:
+    with pytest.raises(ModelError, match=words) as caught:
+        check_model(model(), PARAMETERS)
+    assert model.name in str(caught.value)
+
+
+def test_sound_models_pass() -> None:
+    check_model(NonlinearDrive(), PARAMETERS)
+    run, _ = heart(0.02), None
+    check_model(run.model, run.par)
+    assert np.isfinite(run.step)
