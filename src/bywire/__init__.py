@@ -16,8 +16,10 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
-    from bywire.bench.bench import Bench, Result, run
+    from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
+    from bywire.bench.result import Result
+    from bywire.bench.running import run
     from bywire.catalog.registry import parameters
     from bywire.core.errors import BywireError
     from bywire.data.netcdf import read_recording, write_recording
@@ -29,14 +31,14 @@ _HOMES = {
     "Bench": "bench.bench",
     "BywireError": "core.errors",
     "Ensemble": "simulation.ensemble",
-    "Result": "bench.bench",
+    "Result": "bench.result",
     "Run": "simulation.run",
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
     "load": "bench.bench_file",
     "parameters": "catalog.registry",
     "read_recording": "data.netcdf",
-    "run": "bench.bench",
+    "run": "bench.running",
     "simulate": "simulation.run",
     "simulate_ensemble": "simulation.ensemble",
     "simulate_with_sensitivities": "simulation.sensitivity",

@@ -11,8 +11,8 @@ from bywire.analysis.motorcycle_linear import linear_model, theoretical
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at, travel_at
-from bywire.bench.bench import as_run
 from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.running import as_run
 from bywire.catalog.registry import entry
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.simulation.run import simulate

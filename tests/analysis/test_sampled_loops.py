@@ -15,8 +15,8 @@ from bywire.analysis.sine_test import Excitation, SineTest, sine_test
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at
-from bywire.bench.bench import as_run
 from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.running import as_run
 from bywire.catalog.registry import entry
 from bywire.control import current_pi, low_pass_2, pressure_pid
 from bywire.core.errors import ParameterError, UnknownNameError

@@ -10,27 +10,34 @@ import pytest
 
 import bywire
 from bywire.bench import experiments
-from bywire.bench.bench import Result
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
+from bywire.catalog.registry import entries
 from bywire.report.bench_figures import bench_figures
 from bywire.report.bench_results import as_json
 
 NAMES = sorted(all_experiments())
-SETS = ["dardanelli2010", "dardanelli2010-table1"]
-LINES = 'experiment = "{}"\nparameters = "dardanelli2010"\n'
+PAIRS = [
+    (experiment.name, found.name)
+    for experiment in all_experiments().values()
+    for found in entries().values()
+    if found.assembly == experiment.assembly
+]
+FIRST = dict(reversed(PAIRS))  # of every experiment, the first parameter set that fits it
+LINES = 'experiment = "{}"\nparameters = "{}"\n'
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory) -> dict[str, Result]:
+def results(tmp_path_factory) -> dict[str, bywire.Result]:
     """Run every experiment once, from a bench file of two lines."""
     folder = tmp_path_factory.mktemp("benches")
     found = {}
     for name in NAMES:
         path = folder / f"{name}.toml"
         driven = all_experiments()[name].driven_unit is not None
-        path.write_text(LINES.format(name) + (STEP.format("A") if driven else ""))
+        lines = LINES.format(name, FIRST[name])
+        path.write_text(lines + (STEP.format("A") if driven else ""))
         found[name] = bywire.run(bywire.load(path))
     return found
 
@@ -39,7 +46,9 @@ def results(tmp_path_factory) -> dict[str, Result]:
 def test_two_lines_are_enough(results, name):
     result = results[name]
     assert result.status == "passed"
-    assert result.warnings == []
+    expected = ["retracted stop"] if name == "release" else []  # its port is not modeled
+    assert len(result.warnings) == len(expected)
+    assert all(part in text for part, text in zip(expected, result.warnings, strict=True))
     assert result.recordings
     for recording in result.recordings.values():
         assert recording.attrs.get("status", "done") == "done"
@@ -47,8 +56,8 @@ def test_two_lines_are_enough(results, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_kpis_are_those_declared(results, name):
-    declared = all_experiments()[name].kpis
-    assert {kpi.name: kpi.unit for kpi in results[name].kpis} == dict(declared)
+    declared = all_experiments()[name].kpis_with(results[name].bench.chosen_options)
+    assert {kpi.name: kpi.unit for kpi in results[name].kpis} == declared
     for kpi in results[name].kpis:
         assert kpi.definition.endswith(".")
         assert math.isfinite(kpi.value) or kpi.note
@@ -66,7 +75,7 @@ def test_every_figure_it_names_exists(results, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_results_are_json(results, name):
     text = json.dumps(as_json(results[name], []), allow_nan=False)
-    assert json.loads(text)["kpis"].keys() == all_experiments()[name].kpis.keys()
+    assert set(json.loads(text)["kpis"]) <= set(all_experiments()[name].kpis)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -77,8 +86,7 @@ def test_every_signal_has_unit_and_name(results, name):
             assert variable.attrs["long_name"]
 
 
-@pytest.mark.parametrize("parameters", SETS)
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(("name", "parameters"), PAIRS)
 def test_every_parameter_set_of_the_assembly_fits(name, parameters):
     definition = all_experiments()[name]
     stimulus = {"kind": "step", "start": 0, "end": 1, "t_step": 0} if definition.driven_unit else {}
@@ -93,7 +101,16 @@ def test_names_are_those_of_their_files():
 
 
 @pytest.mark.parametrize("kind", sorted(stimuli()))
-@pytest.mark.parametrize(("source", "unit"), [("current", "A"), ("voltage", "V")])
+@pytest.mark.parametrize(
+    ("source", "unit"),
+    [
+        ("current", "A"),
+        ("voltage", "V"),
+        ("current-loop", "A"),
+        ("current-direct", "A"),
+        ("pressure", "bar"),
+    ],
+)
 def test_every_stimulus_drives_the_open_loop(kind, source, unit):
     values = {
         "step": {"start": 0, "end": f"1 {unit}", "t_step": 0.01},

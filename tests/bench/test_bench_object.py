@@ -4,13 +4,21 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from pathlib import Path
 
 import pytest
 
 import bywire
 from bywire.bench.bench_file import flattened, from_mapping, load
 from bywire.catalog.registry import entry
-from bywire.core.errors import InputError, ParameterError, StepError, UnitError, UnknownNameError
+from bywire.core.errors import (
+    FileError,
+    InputError,
+    ParameterError,
+    StepError,
+    UnitError,
+    UnknownNameError,
+)
 
 SET = "dardanelli2010"
 TEXT = """
@@ -28,7 +36,7 @@ waveform = "square"
 
 [options]
 p_to = "30 bar"
-duration = 0.5
+duration = "0.5 s"
 
 [simulation]
 step = "40 us"
@@ -51,7 +59,7 @@ def same() -> bywire.Bench:
             "pipeline.d_pl": "8 mm",
             "ecu.dither.waveform": "square",
         },
-        options={"p_to": "30 bar", "duration": 0.5},
+        options={"p_to": "30 bar", "duration": "0.5 s"},
         step=40e-6,
         record=2e-3,
         seed=3,
@@ -150,9 +158,8 @@ def test_what_does_not_fit_is_refused_at_construction(changes, error, text):
     ],
 )
 def test_override_without_effect_is_refused(name, value, options):
-    bench = bywire.Bench("release", SET, {name: value}, options)
     with pytest.raises(ParameterError, match=r"would have no effect.*leave it out"):
-        bench.cases()
+        bywire.Bench("release", SET, {name: value}, options).cases()
 
 
 def test_set_of_another_assembly_is_refused(monkeypatch):
@@ -166,6 +173,47 @@ def test_override_that_one_of_two_runs_takes_is_kept():
     bench = bywire.Bench("friction-ramp", SET, {"ecu.dither.waveform": "square"})
     waveforms = [case.par.ecu.dither.waveform for case in bench.cases()]
     assert waveforms == ["off", "square"]
+
+
+@pytest.mark.parametrize(
+    ("experiment", "changes", "error", "text"),
+    [
+        ("open-loop", {}, ParameterError, r"needs a \[stimulus\] section"),
+        ("hard-braking", {"step": "30 us"}, StepError, "does not divide the ecu interval"),
+        ("pressure-step", {"step": "30 us"}, StepError, "does not divide the ecu interval"),
+        ("hard-braking", {"record": "30 us"}, StepError, "does not divide the recording"),
+        ("pedal-tracking", {"options": {"trace": "none.csv"}}, FileError, "none.csv"),
+    ],
+)
+def test_what_costs_no_run_is_checked_at_construction(experiment, changes, error, text):
+    with pytest.raises(error, match=text):
+        bywire.Bench(experiment, SET, **changes)
+
+
+@pytest.mark.parametrize("path", ["benches/a.toml", Path("a.toml")])
+def test_run_takes_a_bench_and_says_so(path):
+    with pytest.raises(
+        ParameterError, match=r"takes a Bench: bywire\.load\(.*a\.toml'\) makes one"
+    ):
+        bywire.run(path)
+
+
+def test_numbers_are_si_in_python_and_need_a_unit_in_files(tmp_path):
+    content = {"experiment": "hard-braking", "parameters": SET, "options": {"p_to": 30e5}}
+    assert bywire.Bench("hard-braking", SET, options=content["options"]).chosen_options.p_to == 30e5
+    with pytest.raises(UnitError, match="a pure number cannot be Pa"):
+        from_mapping(content, tmp_path, "x")
+    zero = {**content, "options": {"settle": 0, "smoothing": "0"}}
+    assert from_mapping(zero, tmp_path, "x").chosen_options.smoothing == 0.0
+
+
+def test_smoothing_follows_the_dither_unless_given():
+    dithered = {"ecu.dither.f_dit": "40 Hz"}
+    for name in ("hard-braking", "friction-ramp", "pedal-tracking", "pressure-step"):
+        assert bywire.Bench(name, SET).chosen_options.smoothing == pytest.approx(0.02)
+        assert bywire.Bench(name, SET, dithered).chosen_options.smoothing == pytest.approx(0.025)
+        given = bywire.Bench(name, SET, dithered, {"smoothing": "10 ms"})
+        assert given.chosen_options.smoothing == 0.01
 
 
 def test_nested_sections_become_dotted_names():

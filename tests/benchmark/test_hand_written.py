@@ -42,6 +42,11 @@ def levels(*steps: tuple[float, float]) -> object:
 
 CASES = {
     "hard braking": ({}, hard_braking),
+    "bridge that limits the duty cycle": ({"bridge.D_max": 0.3}, hard_braking),
+    "sensors at the ends of their ranges": (
+        {"pressure_sensor.p_high": 30e5, "current_sensor.i_high": 8.0},
+        hard_braking,
+    ),
     "finer converter": ({"adc.codes": 1e9}, hard_braking),
     "release": ({}, levels((0.0, 20.0), (0.2, 0.0))),
     "release, nearly without friction": (

@@ -14,7 +14,7 @@ import pytest
 from command_line import LONG, SCRIPT, Outcome, no_half_files
 
 import bywire as package
-from bywire.bench.bench import run
+from bywire.bench.running import run
 from bywire.simulation.virtual_machine import VirtualMachine
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -34,7 +34,11 @@ def interrupted(wait_for: Path, pause: float, *arguments: str | Path) -> Outcome
             time.sleep(0.02)
         time.sleep(pause)
         running.send_signal(signal.SIGINT)
-        out, err = running.communicate(timeout=30)
+        try:
+            out, err = running.communicate(timeout=30)
+        except subprocess.TimeoutExpired:
+            running.kill()
+            raise
         return Outcome(running.returncode, out, err)
 
 
@@ -137,3 +141,20 @@ def test_interrupt_while_the_operating_point_is_looked_for(bywire, bench, tmp_pa
     assert outcome.status == 130
     assert outcome.object["status"] == "interrupted"
     assert len(outcome.lines) == 1
+
+
+def test_interrupt_while_graphs_are_built_is_not_lost(
+    bywire, bench, tmp_path, machine, monkeypatch
+):
+    """CasADi would swallow it, and the run go on to its end."""
+    from bywire.simulation.program import build_program
+
+    def interrupted_build(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return build_program(*arguments)
+
+    monkeypatch.setattr("bywire.simulation.engine.build_program", interrupted_build)
+    monkeypatch.setattr(machine, "last", 10**9)
+    outcome = bywire("run", bench(), "--out", tmp_path / "out", "--json")
+    assert outcome.status == 130
+    assert outcome.object["files"] == [str(tmp_path / "out" / "result.json")]

@@ -62,6 +62,14 @@ def test_folder_is_made_with_its_parents(bywire, bench, tmp_path):
     assert (tmp_path / "a" / "b" / "c" / "report.html").is_file()
 
 
+@pytest.mark.parametrize("out", ["", " "])
+def test_no_folder_is_not_the_current_one(bywire, bench, tmp_path, monkeypatch, out):
+    path = bench()
+    monkeypatch.chdir(tmp_path)
+    refused(bywire("run", path, "--out", out), "--out", "name a folder")
+    assert [p.name for p in tmp_path.iterdir()] == [path.name]
+
+
 def test_file_in_place_of_the_folder(bywire, bench, tmp_path):
     taken = tmp_path / "taken"
     taken.write_text("mine", encoding="utf-8")
@@ -119,7 +127,7 @@ def test_end_stop_is_a_warning_and_the_run_is_done(bywire, bench, tmp_path):
 def test_warnings_of_a_library_come_as_messages(bywire, bench, monkeypatch):
     import warnings
 
-    from bywire.bench.bench import run
+    from bywire.bench.running import run
 
     def noisy(*arguments):
         warnings.warn("seeded", RuntimeWarning, stacklevel=1)

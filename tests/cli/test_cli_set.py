@@ -48,6 +48,22 @@ def test_the_same_key_twice(bywire, bench):
     refused(bywire("run", bench(), *arguments), "motor.R_m is set twice")
 
 
+@pytest.mark.parametrize("value", ["0.4", "1e-3"])
+def test_number_without_a_unit_gets_the_same_answer_in_file_and_change(bywire, bench, value):
+    expected = f"motor.R_m = {float(value)!r} has the wrong unit: a pure number cannot be ohm"
+    changed = bywire("run", bench(), "--set", f"motor.R_m={float(value)!r}")
+    written = bywire("run", bench(f"{BRAKING}[set]\nmotor.R_m = {value}\n"))
+    for outcome in (changed, written):
+        refused(outcome, expected.replace("= ", "= '", 1).replace(" has", "' has", 1), "'1.5 ohm'")
+    assert changed.err == written.err
+
+
+def test_zero_and_pure_numbers_need_no_unit(bywire, bench):
+    path = bench(f"{BRAKING}{QUICK}\n[set]\nseal.T_pr = 0\necu.dither.gain = 0.9\n")
+    arguments = ("--set", "options.smoothing=0", "--set", "gear.eta_g=0.9")
+    assert bywire("run", path, *arguments).status == 0
+
+
 @pytest.mark.parametrize("section", ["options", "set", "simulation", "requirements", "stimulus"])
 def test_change_of_a_section_that_is_none(bywire, bench, section):
     path = bench(f"{BRAKING}{section} = 3\n")

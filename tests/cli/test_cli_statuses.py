@@ -10,9 +10,10 @@ import sys
 from pathlib import Path
 
 import pytest
-from command_line import BRAKING, QUICK, SCRIPT, refused
+from command_line import BRAKING, OPEN_LOOP, QUICK, SCRIPT, refused
 
 from bywire import __version__
+from bywire.bench.registry import find_experiment
 
 STRICT = QUICK + '\n[requirements]\npeak_current = "<= 1 A"\nenergy = ">= 1 kJ"\n'
 
@@ -45,11 +46,12 @@ def test_requirement_not_met_is_1(process, bench):
 
 
 def test_bad_input_is_2(process, bench):
-    refused(process("run", bench(BRAKING + "[set]\nmotor.R_m = -1\n")), "must be > 0 ohm")
+    refused(process("run", bench(BRAKING + '[set]\nmotor.R_m = "-1 ohm"\n')), "must be > 0 ohm")
 
 
 def test_failed_run_is_3(process, bench):
-    outcome = process("run", bench(BRAKING + '[options]\np_from = "1e9 bar"\n'), "--json")
+    stimulus = '[stimulus]\nkind = "step"\nstart = 0\nend = "1e300 A"\nt_step = "5 ms"\n'
+    outcome = process("run", bench(OPEN_LOOP + stimulus), "--json")
     refused(outcome, "left the numbers", "smaller step", status=3)
 
 
@@ -94,11 +96,15 @@ def test_list_is_complete(bywire):
     status, out, err = bywire("list", "--json")
     assert (status, err) == (0, "")
     found = json.loads(out)
-    assert set(found) == {"assemblies", "parameter_sets", "experiments", "stimuli", "kpis"}
+    titles = {"assemblies", "parameter_sets", "experiments", "stimuli", "kpis"}
+    assert set(found) == titles | {"kpis_of_experiments"}
     text = bywire("list").out
     for content in found.values():
         assert content
         assert all(f"  {name}" in text for name in content)
+    for name, kpis in found["kpis_of_experiments"].items():
+        assert kpis == dict(find_experiment(name).kpis)
+        assert all(kpi in text for kpi in kpis)
 
 
 @pytest.mark.parametrize("buffered", ["", "1"], ids=["buffered", "unbuffered"])

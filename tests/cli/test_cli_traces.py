@@ -96,11 +96,21 @@ def test_trace_that_cannot_be_read(bywire, bench, name, text):
     refused(bywire("run", bench(f'{PEDAL}[options]\ntrace = "{name}"\n')), text)
 
 
-def test_ride_beyond_the_pedal_is_a_run_like_any_other(bywire, ride, tmp_path):
-    text = HEADER + "0,-9\n0.1,-9\n0.2,1e6\n"
-    path = ride(text)
-    outcome = bywire("run", path, "--set", "options.max_gap=1s", "--out", tmp_path / "out")
-    assert outcome.status == 0
+@pytest.mark.parametrize(
+    ("column", "value", "texts"),
+    [
+        ("pedal [mm]", 46, ["pedal goes up to 46 mm", "its stop at 45 mm"]),
+        ("force [N]", 1e6, ["force goes up to 1e+06 N", "pedal.x_max = 45 mm"]),
+    ],
+)
+def test_ride_beyond_the_stop_of_the_pedal_is_refused(bywire, ride, column, value, texts):
+    path = ride(f"time [s],{column}\n0,9\n0.1,9\n0.2,{value}\n", options='max_gap = "1 s"\n')
+    refused(bywire("run", path), "ride.csv", *texts)
+
+
+def test_ride_up_to_the_stop_is_a_run_like_any_other(bywire, ride, tmp_path):
+    path = ride(HEADER + "0,-9\n0.1,-9\n0.2,45\n", options='max_gap = "1 s"\n')
+    assert bywire("run", path, "--out", tmp_path / "out").status == 0
     recording = package.read_recording(tmp_path / "out" / "run.nc")
     assert float(recording["p_ref"].max()) == pytest.approx(40e5)  # the end of the pedal map
 

@@ -50,7 +50,7 @@ class Mistake(NamedTuple):
     error: type[Exception] = AssertionError
 
 
-CODES = "Field(gt=0, allow_inf_nan=False)"
+CODES = "Field(ge=2, allow_inf_nan=False)"
 
 MISTAKES = {
     "sign of the back EMF": Mistake(
@@ -124,16 +124,16 @@ MISTAKES = {
     ),
     "slope of a fine staircase": Mistake(
         "plant/adc",
-        "ops.floor(noisy * par.codes + 0.5) / par.codes",
-        "ops.floor(noisy * par.codes * 1e6) / (par.codes * 1e6)",
+        "ops.clip(ops.floor(reading * par.codes + 0.5), 0.0, par.codes - 1.0) / par.codes",
+        "ops.floor(reading * par.codes * 1e6) / (par.codes * 1e6)",
         on(check_jacobian, "sample"),
     ),
-    "infinity taken": Mistake("plant/adc", CODES, "Field(gt=0)", codes_range),
+    "infinity taken": Mistake("plant/adc", CODES, "Field(ge=2)", codes_range),
     "number without unit": Mistake(
         "plant/dc_motor", "R_m: Resistance", "R_m: float", round_trip, TypeError
     ),
     "lost in JSON": Mistake(
-        "plant/adc", CODES, "Field(gt=0, exclude=True)", round_trip, pydantic.ValidationError
+        "plant/adc", CODES, "Field(ge=2, exclude=True)", round_trip, pydantic.ValidationError
     ),
 }
 

@@ -9,9 +9,9 @@ import pytest
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current
-from bywire.bench.bench import as_run
 from bywire.bench.experiment import fixed
 from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.running import as_run
 from bywire.catalog.registry import entry
 from bywire.simulation.run import Run, Trajectory, simulate
 from cross.motorcycle_reference import plant_of

@@ -19,7 +19,8 @@ def test_requirements_hold(file: Path) -> None:
     missed = [f"{v.kpi} = {v.value:g} {v.unit}" for v in result.verdicts if not v.met]
     assert not missed
     assert result.verdicts
-    assert not result.warnings
+    unexpected = [text for text in result.warnings if "retracted stop" not in text]
+    assert not unexpected
 
 
 def test_the_ride_lies_beside_its_bench(tmp_path: Path) -> None:

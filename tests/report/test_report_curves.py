@@ -61,6 +61,8 @@ def test_loop_of_a_dithered_current_is_its_average() -> None:
     raw, applying, releasing, _ = heights(drawn)
     assert raw.max() > 5.5
     assert max(applying.max(), releasing.max()) < 5.05
+    assert "ripple around the average over 20 ms" in legend_of(drawn)
+    assert not any("ripple" in name for name in legend_of(hysteresis_loop({"raw": ramp}).axes[0]))
 
 
 def test_stribeck_curve_is_vertical_at_rest(curve: xr.Dataset) -> None:
@@ -99,6 +101,25 @@ def test_energy_bars_balance_and_negative_losses_give(recording: xr.Dataset) -> 
     names = legend_of(drawn.axes[0])
     assert any(name.startswith("gear and screw (gives)") for name in names)
     assert not any("not accounted for" in name for name in names)
+
+
+def test_a_sink_has_the_same_color_in_every_figure(recording: xr.Dataset) -> None:
+    def colors(figure: Figure) -> dict[str, object]:
+        axes = figure.axes[0]
+        bars, names = axes.get_legend_handles_labels()
+        sinks = [name.split(" (gives)")[0].split(":")[0] for name in names]
+        return dict(zip(sinks, bars, strict=True))
+
+    def look(bar: object) -> object:
+        return bar.patches[0].get_facecolor()  # type: ignore[attr-defined]
+
+    whole = colors(energy_balance(recording))
+    few = {"E_damping": "fluid damping", "E_other": "other", "E_gear": "gear and screw"}
+    other = recording.assign(E_other=recording["E_copper"])
+    part = colors(energy_balance(other, sinks=few))
+    for name in ("fluid damping", "gear and screw"):
+        assert look(part[name]) == look(whole[name])
+    assert len({look(bar) for name, bar in part.items() if name in few.values()}) == 3
 
 
 def test_energy_that_is_missing_is_shown(recording: xr.Dataset) -> None:

@@ -115,6 +115,17 @@ def test_step_marks_stand_where_they_belong(recording: xr.Dataset) -> None:
     assert "±2 % band" in legend_of(axes)
 
 
+def test_marks_sit_on_the_averaged_curve_where_that_was_judged(recording: xr.Dataset) -> None:
+    axes = step_response(recording, limits=LIMITS, facts=FACTS, smoothing=0.02).axes[0]
+    drawn = {str(line.get_label()): line for line in axes.lines}
+    averaged, raw = drawn["averaged over 20 ms"], drawn["master-cylinder pressure"]
+    top = np.max(np.asarray(averaged.get_ydata(), dtype=float))
+    assert drawn["overshoot: 12.6 %"].get_ydata() == pytest.approx([top])
+    assert top < recording["p_mc"].max().item() / 1e5 - 0.01
+    assert averaged.get_linewidth() < raw.get_linewidth()
+    assert (averaged.get_alpha() or 1.0) > (raw.get_alpha() or 1.0)
+
+
 def test_a_falling_step_is_judged_downward(recording: xr.Dataset) -> None:
     mirrored = recording.assign(p_mc=-1.0 * recording["p_mc"])
     mirrored["p_mc"].attrs = recording["p_mc"].attrs
@@ -167,6 +178,25 @@ def test_long_recordings_are_thinned_but_keep_their_peak(long_recording: xr.Data
     axes = time_traces(spiked).axes[0]
     assert max(len(values) for values in heights(axes)) < 4_000
     assert max(values.max() for values in heights(axes)) == pytest.approx(99.0)
+
+
+def test_a_ripple_that_fills_an_area_is_pale_behind_its_average(
+    long_recording: xr.Dataset,
+) -> None:
+    rippled = long_recording.copy()
+    ripple = np.sin(2.0 * np.pi * 50.0 * long_recording["time"].values)
+    rippled["i"] = ("time", 3.0 + ripple, long_recording["i"].attrs)
+    rippled["i_ref"] = ("time", 3.0 + ripple, long_recording["i_ref"].attrs)
+    axes = time_traces(rippled).axes[1]
+    assert legend_of(axes)[:2] == [
+        "motor current, 100 ms average (pale: ripple)", "current set point, 100 ms average",
+    ]
+    band, average, set_point = axes.lines
+    assert np.ptp(np.asarray(band.get_ydata())) == pytest.approx(2.0, rel=1e-3)
+    for line in (average, set_point):
+        assert np.allclose(np.asarray(line.get_ydata(), dtype=float), 3.0, atol=0.02)
+    assert band.get_zorder() < average.get_zorder()
+    assert band.get_alpha() < 0.5
 
 
 def test_missing_variables_are_left_out_and_nothing_at_all_is_refused(

@@ -17,6 +17,7 @@ from bywire.report.tables import (
     parameter_table,
     reproduction_table,
     text_table,
+    verdict_table,
 )
 
 KPIS = kpi_table(
@@ -65,12 +66,27 @@ def test_statements_without_value_or_verdict_show_a_dash() -> None:
             ReproductionRow("gain", 10.1, 10.098, "bar/A", "0.5 %", True, "calibrated"),
             ReproductionRow("pole", 0.866, 1.3, "Hz", 0.01, False),
             ReproductionRow("area", None, 0.068, "1"),
+            ReproductionRow("overshoot", 15.0, 5.1, "%", "<=", True, "", "requirement"),
         ]
     )
     assert texts(table) == [
-        ["gain", "10.1 bar/A", "10.1 bar/A", "0.5 %", "yes", "calibrated"],
-        ["pole", "0.866 Hz", "1.3 Hz", "0.01 Hz", "no", ""],
-        ["area", "-", "0.068", "-", "-", ""],
+        ["gain", "", "10.1 bar/A", "10.1 bar/A", "0.5 %", "yes", "calibrated"],
+        ["pole", "", "0.866 Hz", "1.3 Hz", "0.01 Hz", "no", ""],
+        ["area", "", "-", "0.068", "-", "-", ""],
+        ["overshoot", "requirement", "<= 15 %", "5.1 %", "-", "yes", ""],
+    ]
+
+
+def test_verdicts_without_notes_are_narrow() -> None:
+    rows = [
+        ReproductionRow("overshoot", 15.0, 5.1, "%", "<=", True, "a long note", "requirement"),
+        ReproductionRow("pole", 0.866, 1.3, "Hz", 0.01, False),
+        ReproductionRow("area", None, 0.068, "1"),
+    ]
+    assert texts(verdict_table(rows)) == [
+        ["overshoot", "<= 15 %", "5.1 %", "agrees"],
+        ["pole", "0.866 Hz", "1.3 Hz", "disagrees"],
+        ["area", "-", "0.068", "-"],
     ]
 
 

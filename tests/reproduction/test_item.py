@@ -24,6 +24,19 @@ def test_compared_keeps_place_and_note() -> None:
     item = compared("a", FACT, 3.3, ">=", "with dither")
     assert (item.agrees, item.stated, item.unit) == (False, 10.0, "Hz")
     assert item.note == "section 6; with dither"
+    assert item.kind == "printed"
+
+
+def test_kind_comes_from_the_statement() -> None:
+    axis = Fact(0.15, "N*m", "axis limit: top of Fig. 4", "axis")
+    assert compared("a", axis, 0.17, "<=").kind == "axis"
+    assert quoted("a", axis, "not modeled").kind == "axis"
+    assert found("a", "s", 0.1, "ours").kind == "ours"
+
+
+def test_parameter_set_follows_the_at_sign() -> None:
+    assert found("a.b@table1", "s", 0.1, "").parameter_set == "table1"
+    assert found("a.b", "s", 0.1, "").parameter_set == ""
 
 
 def test_what_was_tuned_proves_nothing() -> None:

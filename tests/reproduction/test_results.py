@@ -16,6 +16,10 @@ from bywire.reproduction.item import Fact, compared, found
 from bywire.reproduction.registry import find_source, sources
 from bywire.reproduction.reproduction import Exhibit, Part, Reproduction
 from bywire.reproduction.results import as_json, as_table, write
+from bywire.reproduction.root_cause import RootCause
+from bywire.reproduction.tally import Tally, tallies
+from bywire.reproduction.terminal_text import terminal_text
+from bywire.reproduction.tolerance import SHARE, Allowance
 
 KEYS = ["id", "unit", "stated", "computed", "tolerance", "agrees", "note"]
 
@@ -36,7 +40,11 @@ def made_up() -> Reproduction:
         "Table 2", "text", items, (Exhibit("fig", figure, "A figure."),), {"run/1 a": recording},
         {"More": text_table(("a",), [("b",)])},
     )  # fmt: skip
-    return Reproduction("made-up", "Nobody, 2010", (part,))
+    return Reproduction(
+        "made-up", "Nobody, 2010", (part,), (RootCause("Tables differ.", ("t.K*",)),),
+        (Allowance("gains", 0.05, SHARE, "two digits"), Allowance("time", 0.1, "s", "a guess")),
+        {"": "The set"},
+    )  # fmt: skip
 
 
 def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
@@ -47,24 +55,53 @@ def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
     assert [item["computed"] for item in content["items"]] == [7.6, None, None]
     assert [item["agrees"] for item in content["items"]] == [False, False, None]
     assert content["items"][1]["tolerance"] == "<="
+    assert content["items"][0]["note"] == "Table 2; kind: printed"
+    assert content["items"][2]["note"] == "ours; kind: ours"
 
 
 def test_table_has_a_row_per_item(made_up: Reproduction) -> None:
     assert [row[0].text for row in as_table(made_up).rows] == ["t.K", "t.n", "t.x"]
 
 
+def test_verdicts_are_counted_for_each_parameter_set() -> None:
+    fact = Fact(1.0, "1", "Table 1")
+    items = [
+        compared("a", fact, 1.0, 0.1),
+        compared("b@other", fact, 2.0, 0.1),
+        found("c", "1", 1.0, ""),
+    ]
+    assert tallies(items) == {"": Tally(1, 0, 1), "other": Tally(0, 1, 0)}
+
+
+@pytest.mark.parametrize("width", [40, 80, 200])
+def test_terminal_shows_verdicts_then_causes_counts_and_the_report(
+    made_up: Reproduction, width: int
+) -> None:
+    lines = terminal_text(made_up, width, "report: here").splitlines()
+    assert lines[0].split() == ["statement", "stated", "computed", "verdict"]
+    assert lines[2].split() == ["t.K", "10.1", "bar/A", "7.6", "bar/A", "disagrees"]
+    assert max(map(len, lines)) <= width + 8
+    assert lines[-1] == "report: here"
+    rest = " ".join(lines[lines.index("In short") :])
+    assert "- Tables differ. [1 disagreement]" in rest
+    assert "- The set: 0 agree, 2 disagree," in rest
+
+
 def test_folder_is_complete_and_self_contained(made_up: Reproduction, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
     paths = write(made_up, folder)
-    assert [p.name for p in paths] == ["report.html", "results.json", "run-1-a.nc"]
+    assert [p.name for p in paths] == ["report.html", "results.json", "fig.png", "run-1-a.nc"]
     assert sorted(p.name for p in folder.iterdir()) == sorted(p.name for p in paths)
     html = paths[0].read_text(encoding="utf-8")
-    assert "0 statements agree, 2 disagree" in html
+    assert "0 agree, 2 disagree, 1 without verdict" in html
+    assert "Tables differ. [1 disagreement]" in html
+    for text in ("5 % of what is stated", "0.1 s", "two digits", "&lt;= 1", "printed"):
+        assert text in html
     assert "Table &lt;2&gt;" in html
     assert "<svg" in html
     assert "<script" not in html
     assert json.loads(paths[1].read_text()) == as_json(made_up)
-    np.testing.assert_array_equal(read_recording(paths[2])["p_mc"], [0.0, 1.0, 2.0])
+    np.testing.assert_array_equal(read_recording(paths[3])["p_mc"], [0.0, 1.0, 2.0])
 
 
 def test_folder_that_cannot_be_made_is_one_clear_error(

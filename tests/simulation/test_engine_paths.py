@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.bench.bench import Bench, as_run
+from bywire.bench.bench import Bench
+from bywire.bench.running import as_run
 from bywire.core.signals import signals_of
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate

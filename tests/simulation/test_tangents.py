@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.bench.bench import Bench, as_run
+from bywire.bench.bench import Bench
+from bywire.bench.running import as_run
 from bywire.core.errors import UnknownNameError
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities

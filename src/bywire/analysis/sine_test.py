@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from bywire.analysis.harmonics import amplitudes
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import DriveMode, MotorcycleParameters
-from bywire.bench.bench import as_run
 from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.running import as_run
 from bywire.core.errors import ParameterError
 from bywire.simulation.run import simulate
 

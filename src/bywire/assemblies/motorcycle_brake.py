@@ -56,7 +56,7 @@ class MotorcycleBrake:
         return ecu.tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)
 
     def _source(self, x: plant.State, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-        return ecu.source_tick(m, u, par)
+        return ecu.source_tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)
 
     def mass(self, xe: plant.State, par: Par) -> plant.State:
         """Return inductance, inertia and fluid compliances."""

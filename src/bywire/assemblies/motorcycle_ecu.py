@@ -55,33 +55,53 @@ class Readings(NamedTuple):
 
 def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
     """Run the ECU once: convert, close the pressure loop if asked to, close the current loop."""
-    mode = par.drive.mode
     p_share = adc.sample(readings.p, u.noise_p, par.adc)
     i_share = adc.sample(readings.i, u.noise_i, par.adc)
-    m = m._replace(
-        p_meas=pressure_sensor.value(p_share, par.pressure_sensor) - par.ecu.p_atm,
-        i_meas=current_sensor.value(i_share, par.current_sensor),
-    )
-    if mode == "current-direct":
+    m = m._replace(**_values(p_share, i_share, par))
+    if par.drive.mode == "current-direct":
         m = m._replace(i_star=u.i_set, i_dit=0.0, i_ref=u.i_set)
     else:
         m = _shaped(_demand(m, u, par), par)
+    limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
     pi, out = current_pi.output(
         current_pi.State(m.pi_integral),
-        current_pi.Input(i_ref=m.i_ref, i_meas=m.i_meas),
+        current_pi.Input(i_ref=m.i_ref, i_meas=m.i_meas, D_lim=limit),
         par.ecu.T_s,
         par.ecu.current,
     )
-    duty = h_bridge.limited(out.duty, par.bridge)
-    saturated = ops.where(ops.fabs(duty) >= par.ecu.current.D_max, 1.0, 0.0)
-    return m._replace(duty=duty, sat_duty=saturated, pi_integral=pi.integral)
+    saturated = ops.where(ops.fabs(out.duty) >= limit, 1.0, 0.0)
+    return m._replace(duty=out.duty, sat_duty=saturated, pi_integral=pi.integral)
 
 
-def source_tick(m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Hold the value of an ideal source."""
+def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
+    """Hold the value of an ideal source, and what the converters see meanwhile.
+
+    Nothing reads that but the recording, and ``shown`` rounds it: a rounding within a tick would
+    look like a loop through which derivatives are lost.
+    """
+    p_share = adc.noisy(readings.p, u.noise_p, par.adc)
+    i_share = adc.noisy(readings.i, u.noise_i, par.adc)
+    m = m._replace(**_values(p_share, i_share, par))
     if par.drive.mode == "voltage-source":
         return m._replace(v_source=u.v_set)
     return m._replace(i_source=u.i_set, i_ref=u.i_set)
+
+
+def shown(m: Memory, par: MotorcycleParameters) -> dict[str, float]:
+    """Return the measurements as the converters give them, in all modes."""
+    if par.drive.mode not in ("voltage-source", "current-source") or par.adc.law == "ideal":
+        return {"p_meas": m.p_meas, "i_meas": m.i_meas}
+    p = pressure_sensor.reading(m.p_meas + par.ecu.p_atm, par.pressure_sensor)
+    i = current_sensor.reading(m.i_meas, par.current_sensor)
+    return _values(adc.rounded(p, par.adc), adc.rounded(i, par.adc), par)
+
+
+def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
+    """Return the measurements that the shares of the two spans stand for."""
+    return {
+        "p_meas": pressure_sensor.value(p, par.pressure_sensor) - par.ecu.p_atm,
+        "i_meas": current_sensor.value(i, par.current_sensor),
+    }
 
 
 def _demand(m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:

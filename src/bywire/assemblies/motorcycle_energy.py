@@ -6,7 +6,13 @@ from typing import Annotated, NamedTuple
 
 from bywire.assemblies.motorcycle_ecu import Memory
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_plant import State, cylinder_input, stop_input, wires
+from bywire.assemblies.motorcycle_plant import (
+    State,
+    cylinder_input,
+    port_input,
+    stop_input,
+    wires,
+)
 from bywire.core import ops
 from bywire.core.signals import Signal
 from bywire.plant import (
@@ -52,12 +58,11 @@ def rates(
     """Return the powers at the midpoint of a substep, and 1 while the shaft is stuck."""
     w = wires(x, m, par, contact)
     friction, makeup = reaction
-    gear, seal = _dry_losses(x, par, w.force, friction)
+    gear, seal = _dry_losses(x, par, friction)
     shaft = ball_screw_gear.State(x.theta, x.omega)
     gear = gear + ball_screw_gear.transmission_loss(shaft, w.torque, rate.omega, par.gear)
     supply = battery_supply.Input(i_dc=w.i_dc)
-    port_u = reservoir_port.Input(w.x_mc, x.p_mc)
-    port = reservoir_port.power_loss(port_u, par.port, par.fluid)
+    port = reservoir_port.power_loss(port_input(x, par), par.port, par.fluid)
     ideal = par.drive.mode in ("voltage-source", "current-source")
     source = w.voltage * w.current if ideal else battery_supply.power_source(supply, par.supply)
     return Flow(
@@ -89,13 +94,15 @@ def stored(x: State, par: Par) -> float:
     )
 
 
-def _dry_losses(x: State, par: Par, load: float, friction: float) -> tuple[float, float]:
-    """Return the powers lost in the gear's and in the seals' dry friction."""
+def _dry_losses(x: State, par: Par, friction: float) -> tuple[float, float]:
+    """Return the powers lost in the gear's and in the seals' dry friction.
+
+    What the seals can take at this speed is theirs, the rest is the gear's.
+    """
     total = -friction * x.omega
     if par.gear.law == "paper":
         return 0.0 * total, total
     seal = seal_friction.output(seal_friction.Input(x.omega, x.p_mc), par.seal)
-    bounds = ball_screw_gear.friction_bounds(seal.T_p, seal.T_n, load, par.gear)
-    applying = x.omega > 0
-    share = ops.where(applying, seal.T_p, seal.T_n) / ops.where(applying, -bounds.low, bounds.high)
-    return total * (1.0 - share), total * share
+    most = ops.where(x.omega > 0, seal.T_p, seal.T_n) * ops.fabs(x.omega)
+    loss = ops.fmin(most, total)
+    return total - loss, loss

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from bywire.assemblies.motorcycle_ecu import Memory
+from bywire.assemblies.motorcycle_ecu import Memory, shown
 from bywire.assemblies.motorcycle_energy import Flow, stored
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_plant import State, Wires, stop_input, wires
@@ -87,6 +87,7 @@ def instant(
     P_el = w.voltage * w.current if ideal else par.supply.V_bat * w.i_dc
     F_stop = end_stop.load(end_stop.Forces(*contact))
     direct = {name: getattr(m, name) for name in Memory._fields if name in Output._fields}
+    direct |= shown(m, par)
     return Output(
         **direct,
         **{name: value for name, value in flow._asdict().items() if name != "W_stop"},

@@ -63,11 +63,17 @@ class EcuParameters(ParameterSet):
     pedal_map: pedal_map.Parameters
 
     @model_validator(mode="after")
-    def _filter_fits_sampling(self) -> EcuParameters:
+    def _fits_sampling(self) -> EcuParameters:
         if self.filter.f_c * self.T_s >= 0.5:
             raise ValueError(
                 f"ecu.filter.f_c = {self.filter.f_c:g} Hz must stay below half the sample rate, "
                 f"{0.5 / self.T_s:g} Hz"
+            )
+        if self.dither.waveform != "off" and self.dither.f_dit * self.T_s >= 0.5:
+            raise ValueError(
+                f"ecu.dither.f_dit = {self.dither.f_dit:g} Hz must stay below half the sample "
+                f"rate, {0.5 / self.T_s:g} Hz: lower it, sample faster (ecu.T_s), or set "
+                "ecu.dither.waveform = 'off'"
             )
         return self
 
@@ -93,3 +99,20 @@ class MotorcycleParameters(ParameterSet):
     pedal: pedal.Parameters
     ecu: EcuParameters
     drive: DriveParameters
+
+    @model_validator(mode="after")
+    def _chamber_has_room(self) -> MotorcycleParameters:
+        cylinder = self.master_cylinder
+        stroke, closed = cylinder.x_end - cylinder.x_rest, reservoir_port.closed_at(self.port)
+        if not closed < stroke:
+            raise ValueError(
+                f"port.x_port = {self.port.x_port:g} m must be less than the piston's stroke "
+                f"x_end - x_rest = {stroke:g} m: the port would never close"
+            )
+        room = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest - closed)
+        if self.fluid.air == "entrained" and not self.fluid.V_air < room:
+            raise ValueError(
+                f"fluid.V_air = {self.fluid.V_air:g} m**3 must be less than the chamber's volume "
+                f"where pressure begins to build up, {room:g} m**3"
+            )
+        return self

@@ -87,10 +87,15 @@ def stop_input(x: State, par: Par) -> end_stop.Input:
     return end_stop.Input(x=piston.x, v=piston.v, x_rest=cylinder.x_rest, x_end=cylinder.x_end)
 
 
+def port_input(x: State, par: Par) -> reservoir_port.Input:
+    """Return the reservoir port's input: its stroke counts from the retracted end."""
+    travel = ball_screw_gear.output(ball_screw_gear.State(x.theta, x.omega), par.gear).x
+    return reservoir_port.Input(x=travel - par.master_cylinder.x_rest, p=x.p_mc)
+
+
 def port_conductance(xe: State, par: Par) -> float:
     """Return the conductance of the reservoir port [m^3/(s Pa)]."""
-    travel = ball_screw_gear.output(ball_screw_gear.State(xe.theta, xe.omega), par.gear).x
-    return reservoir_port.output(reservoir_port.Input(travel, xe.p_mc), par.port).G
+    return reservoir_port.output(port_input(xe, par), par.port).G
 
 
 def _electrics(x: State, m: Memory, par: Par) -> tuple[float, float, float]:

@@ -127,7 +127,8 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
     common = ops.where(m.on > 0.5, advanced, 0.5 * (r.theta_1 + r.theta_2))
     position, offset = par.control.position, par.control.offset
     F_M = position.K_hat * (m.i_1_ref + m.i_2_ref) / offset.k_hat
-    delta = screw_offset.offset(F_M, offset)
+    target = screw_offset.offset(F_M, offset)
+    delta = screw_offset.advance(m.delta, target, par.control.T_fast, offset)
     both = screw_offset.output(common, delta, offset)
     return m._replace(
         theta_ref=common, delta=delta, theta_1_ref=both.theta_1, theta_2_ref=both.theta_2

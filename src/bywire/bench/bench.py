@@ -2,21 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-import xarray as xr
-from numpy.typing import NDArray
-
-from bywire.bench.experiment import Case, Experiment
-from bywire.bench.extent import check_extent, check_seed, checked_interval, checked_step
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.recording import record
+from bywire.bench.experiment import Case, Cases, Experiment
+from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.registry import find_experiment
-from bywire.bench.requirements import Verdict, check, judge
+from bywire.bench.requirements import check
+from bywire.bench.running import as_run
 from bywire.bench.stimuli import registry as stimuli
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.stimulus_file import with_nodes
@@ -24,9 +19,7 @@ from bywire.bench.values import parsed
 from bywire.catalog.registry import entry
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.run import Run, simulate
-
-Progress = Callable[[str, float], None]
+from bywire.simulation.run import Run
 
 
 @dataclass(frozen=True)
@@ -59,7 +52,8 @@ class Bench:
     Raises
     ------
     InputError
-        At construction, for anything that does not fit.
+        At construction, for anything that does not fit: names, values, files, steps. What only
+        a run or this machine's memory shows comes when it is run.
     """
 
     experiment: str
@@ -94,8 +88,8 @@ class Bench:
                 "use experiment 'open-loop'"
             )
         self._check_names()
-        _ = self.par, self.chosen_options, self.chosen_stimulus
-        check(self.requirements, chosen.kpis)
+        check(self.requirements, chosen.kpis_with(self.chosen_options))
+        self._made(chosen.preview or chosen.cases)
 
     def _check_names(self) -> None:
         """Refuse options that stand among the parameters, the likeliest mistake of all."""
@@ -119,9 +113,10 @@ class Bench:
     @cached_property
     def chosen_options(self) -> ParameterSet:
         """Validated options of the experiment."""
-        definition = self.definition
-        values = parsed(definition.options, self.options, f"option of {definition.name}")
-        return definition.defaults.replace(values)
+        chosen = self.definition
+        following = {} if chosen.following is None else chosen.following(self.par)
+        values = parsed(chosen.options, self.options, f"option of {chosen.name}")
+        return chosen.defaults.replace({**following, **values})
 
     @cached_property
     def chosen_stimulus(self) -> Stimulus | None:
@@ -137,14 +132,12 @@ class Bench:
         return stimuli.create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
 
     def cases(self) -> tuple[Case, ...]:
-        """Return the runs that the experiment consists of.
+        """Return the runs that the experiment consists of, with settling times as they are run."""
+        return self._made(self.definition.cases)
 
-        Raises
-        ------
-        ParameterError
-            When all of them set a parameter that the bench sets otherwise.
-        """
-        found = self.definition.cases(self.par, self.chosen_options, self.chosen_stimulus)
+    def _made(self, make: Cases) -> tuple[Case, ...]:
+        """Return cases, or refuse overrides without effect and steps that do not divide."""
+        found = make(self.par, self.chosen_options, self.chosen_stimulus)
         wanted, made = self.par.flat(), [case.par.flat() for case in found]
         for name in self.overrides:
             if made and all(values[name] != wanted[name] for values in made):
@@ -152,7 +145,7 @@ class Bench:
                     f"{name} = {wanted[name]!r} would have no effect: experiment "
                     f"{self.experiment!r} sets it to {made[0][name]!r}; leave it out"
                 )
-        return found
+        return tuple(case.aligned(self.step, self.record) for case in found)
 
     def runs(self) -> dict[str, Run]:
         """Return the runs by label, for ensembles and sensitivities.
@@ -160,151 +153,10 @@ class Bench:
         Their time starts with the experiment's settling, ``Case.settle`` before its zero.
         """
         return {
-            case.label: as_run(case, self.step, self.record, (self.seed, number))
+            case.label: as_run(case, self.step, seed=(self.seed, number))
             for number, case in enumerate(self.cases())
         }
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
         """Return this bench with further parameters changed."""
         return replace(self, overrides={**self.overrides, **overrides})
-
-
-@dataclass(frozen=True)
-class Result:
-    """What a bench gave.
-
-    Parameters
-    ----------
-    recordings
-        One dataset per run of the experiment, by label.
-    status
-        ``passed``, ``failed`` (a requirement was not met) or ``interrupted``.
-    """
-
-    bench: Bench
-    recordings: Mapping[str, xr.Dataset]
-    kpis: tuple[Kpi, ...]
-    verdicts: tuple[Verdict, ...]
-    status: str
-
-    @property
-    def recording(self) -> xr.Dataset:
-        """The recording of an experiment that makes one run."""
-        if len(self.recordings) != 1:
-            labels = ", ".join(self.recordings)
-            raise ParameterError(f"this experiment made several recordings: take one of {labels}")
-        return next(iter(self.recordings.values()))
-
-    def kpi(self, name: str) -> Kpi:
-        """Return one KPI by name.
-
-        Raises
-        ------
-        UnknownNameError
-            With the nearest known names.
-        """
-        by_name = {kpi.name: kpi for kpi in self.kpis}
-        if name not in by_name:
-            raise unknown_name("KPI", name, by_name)
-        return by_name[name]
-
-    @property
-    def warnings(self) -> list[str]:
-        """What the user should know of the runs."""
-        return [
-            f"{label}: {text}" if len(self.recordings) > 1 else text
-            for label, recording in self.recordings.items()
-            for text in str(recording.attrs.get("warnings", "")).split("; ")
-            if text
-        ]
-
-
-def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") -> Result:
-    """Make all runs of a bench, and judge them.
-
-    Parameters
-    ----------
-    progress
-        Called with the run's label and its finished share, 0 to 1.
-    engine
-        ``auto``, ``compiled`` or ``virtual-machine``.
-
-    Raises
-    ------
-    InputError
-        When the experiment cannot be set up.
-    RunError
-        When a run fails.
-    """
-    definition, options = bench.definition, bench.chosen_options
-    recordings: dict[str, xr.Dataset] = {}
-    if definition.static is not None:
-        recordings |= definition.static(bench.par, options)
-    try:
-        for number, case in enumerate(bench.cases()):
-            recording = _recorded(bench, case, number, progress, engine)
-            is_complete = recording.attrs["status"] != "interrupted"
-            if is_complete or recording.sizes["time"] > 1:
-                finish = definition.finish or _as_it_is
-                recordings[case.label] = finish(recording, options)
-            if not is_complete:
-                raise KeyboardInterrupt
-    except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
-        return Result(bench, recordings, (), (), "interrupted")
-    kpis = definition.judge(recordings, options)
-    verdicts = judge(bench.requirements, kpis)
-    status = "passed" if all(v.met for v in verdicts) else "failed"
-    return Result(bench, recordings, kpis, verdicts, status)
-
-
-def _as_it_is(recording: xr.Dataset, _: Any) -> xr.Dataset:
-    return recording
-
-
-def _recorded(
-    bench: Bench, case: Case, number: int, progress: Progress | None, engine: str
-) -> xr.Dataset:
-    made = as_run(case, bench.step, bench.record, (bench.seed, number))
-    check_extent(case, made)
-    report = None if progress is None else (lambda share: progress(case.label, share))
-    trajectory = simulate(made, engine=engine, progress=report)
-    notes = {
-        "experiment": bench.experiment,
-        "case": case.label,
-        "parameter_set": bench.parameters,
-        "seed": bench.seed,
-    }
-    return record(made, trajectory, case.settle, case.keep, notes)
-
-
-def as_run(
-    case: Case, step: float, interval: float | None = None, seed: tuple[int, ...] = (0,)
-) -> Run:
-    """Return the engine's description of a case.
-
-    The run begins at -settle on the recording's axis. Signals of the stimulus named ``noise_*``
-    are standard normal, drawn from the seed.
-    """
-    fields = case.model.Stimulus._fields
-
-    def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
-        given = case.stimulus(t - case.settle)
-        noise = np.random.default_rng(seed)
-        rows = np.zeros((t.size, len(fields)))
-        for k, name in enumerate(fields):
-            if name.startswith("noise_"):
-                rows[:, k] = noise.standard_normal(t.size)
-            elif name in given:
-                rows[:, k] = given[name]
-        return rows
-
-    return Run(
-        model=case.model,
-        par=case.par,
-        state=case.state,
-        memory=case.memory,
-        stimulus=stimulus,
-        duration=case.settle + case.duration,
-        step=step,
-        record=case.record if interval is None else interval,
-    )

@@ -11,6 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
+from bywire.bench.registry import find_experiment
+from bywire.bench.stimuli import registry as stimuli
+from bywire.bench.values import parsed, require_unit, require_units
+from bywire.catalog.registry import entry
 from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
 
 _SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
@@ -68,6 +72,7 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     for key in ("experiment", "parameters"):
         if key not in content:
             raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")
+    _require_units(content)
     options = _located(flattened(content.get("options", {})), "trace", folder)
     bench = Bench(
         experiment=content["experiment"],
@@ -168,6 +173,24 @@ def _require_shape(content: Mapping[str, Any]) -> None:
     for key in _KEYS:
         if not isinstance(content.get(key, ""), str):
             raise ParameterError(f"{key} = {quoted(content[key])}: write it in quotation marks")
+
+
+def _require_units(content: Mapping[str, Any]) -> None:
+    """Refuse plain numbers where a unit is wanted: 37 is not 37 bar, and hardly 37 Pa."""
+    definition = find_experiment(content["experiment"])
+    options = flattened(content.get("options", {}))
+    require_units(definition.options, options)
+    overrides = flattened(content.get("set", {}))
+    require_units(type(entry(content["parameters"]).parameters()), overrides)
+    simulation, stimulus = content.get("simulation", {}), content.get("stimulus", {})
+    for key in ("step", "record"):
+        require_unit(simulation.get(key), "s", f"simulation.{key}")
+    require_unit(stimulus.get("max_gap"), "s", "stimulus.max_gap")
+    kind = stimulus.get("kind")
+    if definition.driven_unit is not None and isinstance(kind, str):
+        values = parsed(definition.options, options, f"option of {definition.name}")
+        unit = definition.driven_unit(definition.defaults.replace(values))
+        require_units(stimuli.entry(kind).parameter_class, stimulus, unit)
 
 
 def _simulation(section: Mapping[str, Any]) -> dict[str, Any]:

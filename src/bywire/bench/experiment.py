@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.simulation.schedule import plan
 
 Recordings = Mapping[str, xr.Dataset]
 
@@ -55,6 +57,35 @@ class Case:
     keep: float = 0.0
     record: float = 1e-3
 
+    def aligned(self, step: float, interval: float | None = None) -> Case:
+        """Return the case with a settling time after which all ticks and a row fall on zero.
+
+        It is rounded up to a common multiple of the sample times and the recording interval, so
+        that what happens at zero happens on a tick and is recorded there.
+
+        Parameters
+        ----------
+        step
+            Substep [s].
+        interval
+            Recording interval [s]; None for the case's own.
+
+        Raises
+        ------
+        StepError
+            When the step does not divide a sample time or the recording interval.
+        """
+        record = self.record if interval is None else interval
+        periods = {task.name: task.period for task in self.model.tasks(self.par)}
+        schedule = plan(self.settle + self.duration, step, periods, record)
+        common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
+        settle = math.ceil(self.settle / common - 1e-9) * common
+        return replace(self, settle=float(f"{settle:.12g}"), record=record)
+
+
+Cases = Callable[[Any, Any, Stimulus | None], tuple[Case, ...]]
+"""``cases(par, options, stimulus)``"""
+
 
 @dataclass(frozen=True)
 class Experiment:
@@ -90,6 +121,12 @@ class Experiment:
     driven_unit
         ``driven_unit(options)``: SI unit of what a ``[stimulus]`` section drives; None where
         the experiment brings its own stimulus.
+    following
+        ``following(par)``: options that follow the parameters unless they are given.
+    preview
+        ``cases`` with any start, for checks alone; where those have to compute runs first.
+    without
+        ``without(options)``: key figures that some options leave out.
     """
 
     name: str
@@ -97,7 +134,7 @@ class Experiment:
     summary: str
     options: type[ParameterSet]
     defaults: ParameterSet
-    cases: Callable[[Any, Any, Stimulus | None], tuple[Case, ...]]
+    cases: Cases
     judge: Callable[[Recordings, Any], tuple[Kpi, ...]]
     kpis: Mapping[str, str]
     figures: tuple[str, ...]
@@ -105,6 +142,14 @@ class Experiment:
     step: Callable[[Any], step_response.Setting] | None = None
     static: Callable[[Any, Any], dict[str, xr.Dataset]] | None = None
     driven_unit: Callable[[Any], str] | None = None
+    following: Callable[[Any], Mapping[str, Any]] | None = None
+    preview: Cases | None = None
+    without: Callable[[Any], tuple[str, ...]] | None = None
+
+    def kpis_with(self, options: Any) -> dict[str, str]:
+        """Return the unit of every key figure by name, those that the options leave out apart."""
+        left_out = () if self.without is None else self.without(options)
+        return {name: unit for name, unit in self.kpis.items() if name not in left_out}
 
 
 def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]]:

@@ -57,3 +57,8 @@ def step_at_zero(
 ) -> Callable[[NDArray[np.float64]], Signals]:
     """Return the stimulus that steps one signal at t = 0."""
     return lambda t: {name: np.where(t < -1e-9, before, after)}
+
+
+def smoothing(par: MotorcycleParameters) -> dict[str, float]:
+    """Return the option ``smoothing`` as it is unless given: one dither period [s]."""
+    return {"smoothing": 1.0 / par.ecu.dither.f_dit}

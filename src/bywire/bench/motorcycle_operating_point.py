@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
@@ -9,10 +11,13 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at
 from bywire.bench.extent import check_memory
 from bywire.core.errors import SolverError
+from bywire.core.interrupts import interrupts_deferred
+from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, simulate
 
 _ROUNDS, _TOLERANCE = 12, 2e-3
 _WINDOW = 0.2  # of the settling time: the mean is taken over it
+_SUBSTEPS, _LONGEST = 50, 20e-6  # substeps per sample time at least, and their longest length [s]
 
 
 def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
@@ -59,8 +64,13 @@ def _settled(start: float, par: MotorcycleParameters, settle: float) -> float:
         rows[:, fields.index("i_set")] = i
         return rows
 
-    run = Run(MotorcycleBrake(), own, state_at(start, own), memory_at(start, own), stimulus, settle)
+    T = own.ecu.T_s
+    step = T / max(_SUBSTEPS, math.ceil(T / _LONGEST - 1e-9))
+    x, m = state_at(start, own), memory_at(start, own)
+    run = Run(MotorcycleBrake(), own, x, m, stimulus, settle, step=step, record=T)
     check_memory(run, 1)
+    with interrupts_deferred():
+        prepare(run.model, run.par).engine()
     trajectory = simulate(run, ("p_mc",))
     if trajectory.status == "interrupted":
         raise KeyboardInterrupt

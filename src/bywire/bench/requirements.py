@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.values import number
 from bywire.core import units
 from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 
@@ -95,7 +96,7 @@ def _bound(name: str, text: Any, unit: str) -> tuple[str, float]:
         )
     limit = written.removeprefix(compare)
     if unit != "%":
-        return compare, units.parse(limit, unit, f"requirement {name}")
+        return compare, number(limit, unit, f"requirement {name}")
     if not limit.endswith("%"):  # 15 would be a share of 1500 %, which nobody means
         raise UnitError(
             f"requirement {name} = {quoted(text)} is no limit in percent: "

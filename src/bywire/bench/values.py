@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any, get_origin
 
 from bywire.core import units
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
+
+_ZERO = re.compile(r"\s*[+-]?(?:0+\.?0*|\.0+)\s*")
 
 
 def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dict[str, Any]:
@@ -45,10 +49,10 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
 
 
 def number(value: Any, symbol: str, name: str) -> float:
-    """Return one value in an SI unit; see :func:`bywire.core.units.parse`."""
+    """Return one value in an SI unit; see `bywire.core.units.parse`. Zero needs no unit."""
     if isinstance(value, (Mapping, Sequence)) and not isinstance(value, str):
         raise ParameterError(f"{name} = {quoted(value)}: one value is wanted, not several")
-    return units.parse(value, symbol, name)
+    return _quantity(value, symbol, name)
 
 
 def nodes(value: Any, symbol: str, name: str) -> tuple[float, ...]:
@@ -64,9 +68,53 @@ def nodes(value: Any, symbol: str, name: str) -> tuple[float, ...]:
     several = isinstance(value, Sequence)
     found = value if several else (value,)
     return tuple(
-        units.parse(node, symbol, f"{name}.{k}" if several else name)
-        for k, node in enumerate(found)
+        _quantity(node, symbol, f"{name}.{k}" if several else name) for k, node in enumerate(found)
     )
+
+
+def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit: str = "") -> None:
+    """Refuse plain numbers, as a file holds them, where a unit is wanted; zero needs none.
+
+    Parameters
+    ----------
+    cls
+        Class of the parameter set that the values are for.
+    values
+        Values by dotted name; unknown names and what is no number are left to others.
+    level_unit
+        What stands for the unit ``level`` of a stimulus.
+
+    Raises
+    ------
+    UnitError
+        The one that the same number as a text gets.
+    """
+    leaves = leaf_fields(cls)
+    for name in values.keys() & leaves.keys():
+        value, symbol = values[name], leaves[name].unit.symbol.replace("level", level_unit)
+        if isinstance(value, list) and _is_table(cls, name):
+            for k, node in enumerate(value):
+                require_unit(node, symbol, f"{name}.{k}")
+        else:
+            require_unit(value, symbol, name)
+
+
+def require_unit(value: Any, symbol: str, name: str) -> None:
+    """Refuse a plain number where a unit is wanted; see `require_units`."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return
+    try:
+        is_plain = math.isfinite(value) and value != 0
+    except OverflowError:  # a whole number of 309 digits or more
+        return
+    if is_plain:
+        units.parse(repr(value), symbol, name)
+
+
+def _quantity(value: Any, symbol: str, name: str) -> float:
+    if isinstance(value, str) and _ZERO.fullmatch(value):
+        return 0.0
+    return units.parse(value, symbol, name)
 
 
 def _is_table(cls: type[ParameterSet], name: str) -> bool:

@@ -263,8 +263,8 @@ static void tick(const Plant *k, Saved *z, const double *u)
     const double code_i = floor((z->s.yi + noise * u[U_noise_i]) * codes + 0.5);
     const double p_low = p[P_pressure_sensor_p_low], p_span = p[P_pressure_sensor_p_high] - p_low;
     const double i_low = p[P_current_sensor_i_low], i_span = p[P_current_sensor_i_high] - i_low;
-    const double p_meas = p_low + clip(code_p / codes, 0.0, 1.0) * p_span - p[P_ecu_p_atm];
-    const double i_meas = i_low + clip(code_i / codes, 0.0, 1.0) * i_span;
+    const double p_meas = p_low + clip(code_p, 0.0, codes - 1.0) / codes * p_span - p[P_ecu_p_atm];
+    const double i_meas = i_low + clip(code_i, 0.0, codes - 1.0) / codes * i_span;
     const double p_ref = u[U_p_set], i_max = p[P_ecu_pressure_i_max];
     const double signal = p[P_ecu_pressure_c] * p_ref - p_meas, tau_d = p[P_ecu_pressure_tau_d];
     const double slope = (tau_d * m[M_pid_slope] + p[P_ecu_pressure_k_d] * (signal - m[M_pid_last]))
@@ -279,20 +279,20 @@ static void tick(const Plant *k, Saved *z, const double *u)
     const double i_brk = p[P_ecu_est_par_k_brk_p] * believed / p[P_ecu_est_par_K_e];
     const double i_dit = p[P_ecu_dither_gain] * i_brk * sin(2.0 * PI * m[M_dit_phase]);
     const double phase = m[M_dit_phase] + p[P_ecu_dither_f_dit] * T;
-    m[M_dit_phase] = phase - floor(phase);
+    m[M_dit_phase] = phase - floor(phase + 1e-9);
     const double band = k->lp_a * (m[M_lp_s1] + k->lp_g * (i_star + i_dit - m[M_lp_s2]));
     const double i_ref = m[M_lp_s2] + k->lp_g * band;
     m[M_lp_s1] = 2.0 * band - m[M_lp_s1], m[M_lp_s2] = 2.0 * i_ref - m[M_lp_s2];
 
-    const double error = i_ref - i_meas, D_ecu = p[P_ecu_current_D_max];
+    const double error = i_ref - i_meas, D_max = p[P_ecu_current_D_max];
+    const double limit = min2(D_max, p[P_bridge_D_max]);
     const double wanted = p[P_ecu_current_k_p] * error + m[M_pi_integral];
-    const double asked = clip(wanted, -D_ecu, D_ecu);
-    m[M_duty] = clip(asked, -p[P_bridge_D_max], p[P_bridge_D_max]);
-    const double unwind = (asked - wanted) / p[P_ecu_current_T_t];
+    m[M_duty] = clip(wanted, -limit, limit);
+    const double unwind = (m[M_duty] - wanted) / p[P_ecu_current_T_t];
     m[M_pi_integral] += T * (p[P_ecu_current_k_i] * error + unwind);
     m[M_p_meas] = p_meas, m[M_i_meas] = i_meas, m[M_pid_slope] = slope, m[M_pid_last] = signal;
     m[M_p_ref] = p_ref, m[M_i_star] = i_star, m[M_i_dit] = i_dit, m[M_i_ref] = i_ref;
-    m[M_sat_current] = fabs(i_star) >= i_max, m[M_sat_duty] = fabs(m[M_duty]) >= D_ecu;
+    m[M_sat_current] = fabs(i_star) >= i_max, m[M_sat_duty] = fabs(m[M_duty]) >= limit;
 }
 
 /* Integral of the flow energy over pressure, 0 to q: beta times the energy stored per volume. */

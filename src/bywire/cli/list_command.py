@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
+from textwrap import wrap
 
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.registry import all_experiments
@@ -10,15 +12,19 @@ from bywire.bench.stimuli.registry import entries as stimuli
 from bywire.catalog.registry import entries
 from bywire.cli.output import result
 
+_WIDTH = 100  # characters of a line
+
 
 def execute(as_text: bool) -> None:
     """Print what there is."""
+    experiments = all_experiments()
     found = {
         "assemblies": sorted({e.assembly for e in entries().values()}),
         "parameter_sets": {e.name: e.summary for e in entries().values()},
-        "experiments": {e.name: e.summary for e in all_experiments().values()},
+        "experiments": {e.name: e.summary for e in experiments.values()},
         "stimuli": {e.kind: e.summary for e in stimuli().values()},
         "kpis": {m.name: m.definition for m in definitions().values()},
+        "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments.values()},
     }
     if as_text:
         result(json.dumps(found))
@@ -27,6 +33,14 @@ def execute(as_text: bool) -> None:
     for title, content in found.items():
         lines.append(title.replace("_", " "))
         pairs = content.items() if isinstance(content, dict) else ((name, "") for name in content)
-        lines += [f"  {name:<24}{summary}".rstrip() for name, summary in pairs]
+        for name, about in pairs:
+            lines += _entry(name, about)
         lines.append("")
     result("\n".join(lines))
+
+
+def _entry(name: str, about: str | Iterable[str]) -> list[str]:
+    """Return the lines of an entry: its summary, or names broken over several lines."""
+    if isinstance(about, str):
+        return [f"  {name:<24}{about}".rstrip()]
+    return wrap(f"  {name:<24}{', '.join(about)}", _WIDTH, subsequent_indent=" " * 26)

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from bywire.cli.output import flush, message, open_streams, result
+from bywire.cli.output_folder import folder
 from bywire.core.errors import BywireError, ParameterError
 
 INTERRUPTED = 130
@@ -26,7 +27,13 @@ app = typer.Typer(
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 OutFolder = Annotated[
-    Path | None, typer.Option("--out", help="Folder for recordings, figures and the report.")
+    Path | None,
+    typer.Option(
+        "--out",
+        help="Folder for recordings, figures and the report.",
+        parser=folder,
+        metavar="PATH",
+    ),
 ]
 
 

@@ -8,6 +8,19 @@ from tempfile import TemporaryFile
 from bywire.core.errors import FileError
 
 
+def folder(text: str) -> Path:
+    """Return the path that ``--out`` names; nothing is no path, and never the current folder.
+
+    Raises
+    ------
+    FileError
+        When it names nothing.
+    """
+    if not text.strip():
+        raise FileError("--out '': name a folder; '.' is the one that you are in")
+    return Path(text)
+
+
 def require_folder(out: Path) -> None:
     """Make the output folder, so that nothing is computed for one that cannot be written.
 

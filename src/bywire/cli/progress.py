@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from bywire.bench.bench import Progress
+from bywire.bench.running import Progress
 
 
 @contextmanager

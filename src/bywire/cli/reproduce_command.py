@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 from bywire.cli import output
@@ -11,23 +12,30 @@ from bywire.cli.progress import progress_bar
 from bywire.core.errors import FileError
 
 
-def execute(source: str, out: Path | None, as_text: bool) -> None:
+def execute(source: str, out: Path | None, as_json_object: bool) -> None:
     """Reproduce a source; a known disagreement is no error."""
-    from bywire.report.table_text import table_text
     from bywire.reproduction.registry import find_source
-    from bywire.reproduction.results import as_json, as_table, write
+    from bywire.reproduction.results import as_json, write
+    from bywire.reproduction.terminal_text import terminal_text
 
     chosen = find_source(source)
     if out is not None:
         require_folder(out)
     with progress_bar() as progress:
         found = chosen.reproduce(progress)
+    report = f"Report with notes, tolerances and figures: bywire reproduce {source} --out FOLDER"
     trouble: FileError | None = None
     if out is not None:
         try:
-            output.message(f"report: {write(found, out)[0]}")
+            report = f"report: {write(found, out)[0]}"
         except FileError as error:  # a full disk must not cost the numbers too
             trouble = error
-    output.result(json.dumps(as_json(found)) if as_text else table_text(as_table(found)))
+    if as_json_object:
+        output.result(json.dumps(as_json(found)))
+    else:
+        width = shutil.get_terminal_size().columns
+        output.result(terminal_text(found, width, report))
     if trouble is not None:
         raise trouble
+    if as_json_object and out is not None:
+        output.message(report)

@@ -7,8 +7,9 @@ import warnings
 from collections.abc import Mapping
 from pathlib import Path
 
-from bywire.bench.bench import Result, run
 from bywire.bench.bench_file import read
+from bywire.bench.result import Result
+from bywire.bench.running import run
 from bywire.cli import output
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from annotated_types import Gt
+from annotated_types import Gt, Le
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, DutyPerCurrent, DutyPerCurrentTime, Fraction
 from bywire.core.signals import Signal
 
+Limit = Annotated[float, Signal("1", "limit that the power stage reports", 0.9), Gt(0), Le(1)]
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 
 
@@ -34,10 +35,11 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Set point and measurement."""
+    """Set point and measurement, and what the power stage can realize."""
 
     i_ref: Annotated[float, Signal("A", "current set point", 5.0)]
     i_meas: Annotated[float, Signal("A", "measured current", 5.0)]
+    D_lim: Limit = 1.0
 
 
 class Output(NamedTuple):
@@ -50,10 +52,14 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     r"""Advance the controller by one sample.
 
     .. math:: D = k_p (i_{ref} - i) + I, \quad
-        I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{lim} - D) / T_t)
+        I_{k+1} = I_k + T (k_i (i_{ref} - i) + (D_{sat} - D) / T_t)
+
+    D_sat is D within the smaller of the two limits, the ECU's own and the power stage's: the
+    integral part follows what reaches the motor, not what was asked for.
     """
     error = u.i_ref - u.i_meas
     wanted = par.k_p * error + x.integral
-    duty = ops.clip(wanted, -par.D_max, par.D_max)
+    limit = ops.fmin(par.D_max, u.D_lim)
+    duty = ops.clip(wanted, -limit, limit)
     growth = par.k_i * error + (duty - wanted) / par.T_t
     return State(integral=x.integral + T * growth), Output(duty=duty)

@@ -46,8 +46,11 @@ class Believed(ParameterSet):
     """breakaway torque over Coulomb torque, apply direction"""
 
 
+_ROUNDING = 1e-9  # share of the period: far above the phase's rounding, far below a sample
+
+
 class State(NamedTuple):
-    """Phase as a share of the period, 0 to 1."""
+    """Phase as a share of the period, from 0 to below 1 but for rounding."""
 
     phase: Annotated[float, Signal("1", "dither phase", 0.5)]
 
@@ -84,6 +87,9 @@ def output(
 ) -> tuple[State, Output]:
     r"""Advance the dither by one sample.
 
+    A phase that differs from the end of a period or of a half of it by rounding alone counts as
+    that end: the samples of a square wave are then as many above zero as below.
+
     .. math:: i_{dit}(t) = A_{dit} \sin(2 \pi f_{dit} t), \quad A_{dit} = i_{brkf}
 
     References
@@ -93,14 +99,15 @@ def output(
     advanced = x.phase + par.f_dit * T
     amplitude = par.gain * breakaway_current(p, est_par)
     wave = _wave(x.phase, par.waveform)
-    return State(phase=advanced - ops.floor(advanced)), Output(i=amplitude * wave)
+    periods = ops.floor(advanced + _ROUNDING)
+    return State(phase=advanced - periods), Output(i=amplitude * wave)
 
 
 def _wave(phase: float, waveform: str) -> float:
     if waveform == "off":
         return 0.0 * phase
     if waveform == "square":
-        return ops.where(phase < 0.5, 1.0, -1.0)
+        return ops.where(phase < 0.5 - _ROUNDING, 1.0, -1.0)
     if waveform == "triangle":
         return ops.where(
             phase < 0.25, 4.0 * phase, ops.where(phase < 0.75, 2.0 - 4.0 * phase, 4.0 * phase - 4.0)

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
+from annotated_types import Gt
 from pydantic import model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Force, GearRatio, Position
+from bywire.core.quantities import Duration, Force, GearRatio, Position
 from bywire.core.signals import Signal
 
+SampleTime = Annotated[float, Signal("s", "sample time", 2e-4), Gt(0)]
 ScrewTravel = Annotated[float, Signal("m", "offset of each screw", 4e-5)]
 
 
@@ -31,6 +33,8 @@ class Parameters(ParameterSet):
     """actuation force up to which the wedge is preloaded (law "scheduled")"""
     F_high: Force
     """actuation force from which the motors work together (law "scheduled")"""
+    T_change: Duration
+    """time constant with which the offset changes, slow against the position loop"""
     k_hat: GearRatio
     """travel per shaft angle as the controller believes it"""
 
@@ -58,6 +62,15 @@ def offset(
         return par.delta_preload
     nodes = (par.F_low, par.F_high)
     return ops.interpolate(ops.fabs(F_M), nodes, (par.delta_preload, par.delta_together))
+
+
+def advance(delta: ScrewTravel, target: ScrewTravel, T: SampleTime, par: Parameters) -> ScrewTravel:
+    """Return the offset one sample later: it approaches its target as a first-order lag.
+
+    The actuation force is estimated from currents that the offset itself moves: a schedule
+    without this lag chatters.
+    """
+    return delta + T / (T + par.T_change) * (target - delta)
 
 
 def output(

@@ -29,7 +29,15 @@ class Unit:
 
 
 # How the edges (files, command line, figures) show a quantity that is SI inside.
-DISPLAY_UNITS = {"Pa": "bar", "m": "mm", "s": "s", "m**3": "ml", "m**2": "mm**2"}
+DISPLAY_UNITS = {
+    "Pa": "bar",
+    "Pa/A": "bar/A",
+    "A*Pa": "A*bar",
+    "m": "mm",
+    "s": "s",
+    "m**3": "ml",
+    "m**2": "mm**2",
+}
 
 
 def display_unit(symbol: str) -> str:

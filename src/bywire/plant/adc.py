@@ -16,12 +16,17 @@ Noise = Annotated[float, Signal("1", "standard normal noise", 1.0)]
 
 
 class Parameters(ParameterSet):
-    """Uniform quantizer over the sensor's span, rounding to the nearest code."""
+    """Uniform quantizer over the sensor's span, rounding to the nearest code.
+
+    N codes, 0 to N - 1, stand for the readings 0, 1/N, ..., 1 - 1/N: 12 bits are 4096 distinct
+    codes, the middle of the span is code 2048 exactly, and the highest code shows one step less
+    than the end of the span.
+    """
 
     law: Literal["ideal", "quantized"]
     """whether the reading is rounded to whole codes"""
-    codes: Annotated[float, Unit("1", 4096.0), Field(gt=0, allow_inf_nan=False)]
-    """number of codes over the span, 4096 for 12 bits"""
+    codes: Annotated[float, Unit("1", 4096.0), Field(ge=2, allow_inf_nan=False)]
+    """number of distinct codes over the span, 4096 for 12 bits"""
     noise: Annotated[float, Unit("1", 1e-3), Field(ge=0, le=1, allow_inf_nan=False)]
     """standard deviation of the noise at the input, share of the span"""
 
@@ -36,7 +41,16 @@ def sample(reading: Reading, noise: Noise, par: Parameters) -> Reading:
     noise
         A sample of a standard normal variable; the recording keeps its seed.
     """
-    noisy = reading + par.noise * noise
+    return rounded(noisy(reading, noise, par), par)
+
+
+def noisy(reading: Reading, noise: Noise, par: Parameters) -> Reading:
+    """Return the reading with the noise at the converter's input."""
+    return reading + par.noise * noise
+
+
+def rounded(reading: Reading, par: Parameters) -> Reading:
+    """Return the reading of the nearest code."""
     if par.law == "ideal":
-        return noisy
-    return ops.clip(ops.floor(noisy * par.codes + 0.5) / par.codes, 0.0, 1.0)
+        return reading
+    return ops.clip(ops.floor(reading * par.codes + 0.5), 0.0, par.codes - 1.0) / par.codes

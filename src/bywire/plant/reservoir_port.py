@@ -10,27 +10,29 @@ from bywire.core.quantities import Conductance, Length
 from bywire.core.signals import Power, Signal
 from bywire.plant import brake_fluid
 
+Stroke = Annotated[float, Signal("m", "stroke from the retracted end", 1e-3)]
+
 
 class Parameters(ParameterSet):
     """Port between chamber and reservoir.
 
     With either law the cup seal lets fluid in at once when the pressure would fall below
     ambient (the model's one-sided limit). ``law = "dead-stroke"`` also opens an orifice while
-    the piston is behind ``x_port``.
+    the piston has not yet traveled ``x_port`` from its retracted end.
     """
 
     law: Literal["makeup", "dead-stroke"]
     """whether the piston uncovers a port near its retracted end"""
     x_port: Length
-    """travel at which the piston covers the port (law "dead-stroke")"""
+    """stroke from the retracted end in which the piston covers the port (law "dead-stroke")"""
     G_port: Conductance
     """conductance of the fully open port (law "dead-stroke")"""
 
 
 class Input(NamedTuple):
-    """Piston travel and chamber pressure."""
+    """Stroke of the piston from its retracted end, and chamber pressure."""
 
-    x: Annotated[float, Signal("m", "piston travel", 1e-3)]
+    x: Stroke
     p: Annotated[float, Signal("Pa", "master-cylinder pressure", 1e5)]
 
 
@@ -38,6 +40,11 @@ class Output(NamedTuple):
     """Conductance of the port as it stands."""
 
     G: Annotated[float, Signal("m**3/(s*Pa)", "port conductance", 1e-12)]
+
+
+def closed_at(par: Parameters) -> Stroke:
+    """Return the stroke from the retracted end after which a slow piston builds up pressure."""
+    return 0.0 * par.x_port if par.law == "makeup" else par.x_port
 
 
 def output(u: Input, par: Parameters) -> Output:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
-from bywire.bench.bench import Result
+from bywire.bench.result import Result
 from bywire.report.energy_balance import energy_balance
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.step_marks import StepFacts, StepLimits
@@ -70,8 +70,8 @@ def _energy_balance(result: Result) -> list[Shown]:
     return [
         Shown(
             f"energy-balance-{label}" if len(result.recordings) > 1 else "energy-balance",
-            energy_balance(recording),
-            "Where the energy came from and where it went.",
+            energy_balance(recording.sel(time=slice(-1e-9, None))),
+            "Where the energy came from and where it went, from time zero on.",
         )
         for label, recording in result.recordings.items()
     ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from bywire.bench.bench import Result
+from bywire.bench.result import Result
 from bywire.catalog.registry import entry
 from bywire.core.errors import FileError
 from bywire.data.netcdf import write_recording

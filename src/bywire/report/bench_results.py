@@ -6,7 +6,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from bywire.bench.bench import Result
+from bywire.bench.result import Result
 from bywire.report.tables import KpiRow
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import cycle
 from typing import TYPE_CHECKING
 
 from matplotlib.axes import Axes
@@ -31,10 +32,18 @@ BRAKE_SINKS = {
 }
 """energies of the motorcycle brake: integrals over the run, and what is stored"""
 
-COLORS = (
-    style.VERMILLION, style.GREEN, style.ORANGE, style.PURPLE, style.SKY, style.YELLOW,
-    style.GRAY, "#8B5A2B", style.BLUE,
-)
+COLORS = {
+    "E_copper": style.VERMILLION,
+    "E_gear": style.GREEN,
+    "E_seal": style.ORANGE,
+    "E_damping": style.PURPLE,
+    "E_pipeline": style.SKY,
+    "E_supply": style.YELLOW,
+    "E_stop": style.GRAY,
+    "E_port": "#8B5A2B",
+    "E_stored": style.BLUE,
+}
+"""the same energy has the same color in every figure; others take what a figure leaves over"""
 SOURCE_COLOR = "#4A4A4A"
 NEGLIGIBLE = 1e-9
 """share of the energy turned over below which an entry is not drawn"""
@@ -107,14 +116,21 @@ def _sides(
     change = _change(recording, source)
     side = given if change > 0 else taken
     side.append(Entry("source" if change > 0 else "back to the source", abs(change), SOURCE_COLOR))
-    for k, (variable, label) in enumerate(sinks.items()):
+    colors = _colors(sinks)
+    for variable, label in sinks.items():
         if variable not in recording.data_vars:
             continue
         change = _change(recording, variable)
         side = taken if change > 0 else given
         suffix = "" if change > 0 else " (gives)"
-        side.append(Entry(label + suffix, abs(change), COLORS[k % len(COLORS)]))
+        side.append(Entry(label + suffix, abs(change), colors[variable]))
     return given, taken
+
+
+def _colors(sinks: Mapping[str, str]) -> dict[str, str]:
+    """Return a color for every variable; unknown ones take those that are left over."""
+    left = cycle([color for name, color in COLORS.items() if name not in sinks] or [style.BLACK])
+    return {name: COLORS[name] if name in COLORS else next(left) for name in sinks}
 
 
 def _change(recording: xr.Dataset, variable: str) -> float:

@@ -16,6 +16,7 @@ from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import Channel, FloatArray, channel
 from bywire.report.decimation import kept_samples
+from bywire.report.wording import duration
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -62,7 +63,10 @@ def hysteresis_loop(
         turn = _turn(by.values)
         if average > 0:
             kept = np.union1d(kept_samples(x.time, x.values), kept_samples(x.time, y.values))
-            axes.plot(x.values[kept], y.values[kept], color=color, linewidth=0.4, alpha=0.25)
+            axes.plot(
+                x.values[kept], y.values[kept], color=color, linewidth=0.4,
+                alpha=style.PALE_OPACITY,
+            )
             x, y = (replace(v, values=smoothed(v.time, v.values, average)) for v in (x, y))
         _draw_branch(axes, x, y, slice(0, turn + 1), color, "-")
         _draw_branch(axes, x, y, slice(turn, None), color, (0, (4, 2)))
@@ -72,6 +76,12 @@ def hysteresis_loop(
         Line2D([], [], color=style.GRAY, linestyle="-", label="applying"),
         Line2D([], [], color=style.GRAY, linestyle="--", label="releasing"),
     ]
+    if average > 0:
+        label = f"ripple around the average over {duration(average)}"
+        opacity = style.PALE_OPACITY
+        handles.append(
+            Line2D([], [], color=style.GRAY, linewidth=6.0, alpha=opacity, label=label)
+        )
     style.legend_above(axes, handles)
     axes.set_xlabel(style.channel_label(x))
     axes.set_ylabel(style.channel_label(y))

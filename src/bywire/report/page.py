@@ -29,6 +29,13 @@ class Paragraph:
 
 
 @dataclass(frozen=True)
+class Listing:
+    """Plain texts, each with a bullet."""
+
+    texts: Sequence[str]
+
+
+@dataclass(frozen=True)
 class FigureBlock:
     """A figure with its caption; the page numbers it."""
 
@@ -49,10 +56,11 @@ class Details:
     """Blocks that stay folded until the reader opens them."""
 
     title: str
-    blocks: Sequence[Paragraph | FigureBlock | TableBlock]
+    blocks: Sequence[Flat]
 
 
-Block = Paragraph | FigureBlock | TableBlock | Details
+Flat = Paragraph | Listing | FigureBlock | TableBlock
+Block = Flat | Details
 
 
 @dataclass(frozen=True)
@@ -140,7 +148,7 @@ class _Numbered:
         self.table_numbers = count(1)
 
 
-def _flat(blocks: Iterable[Block]) -> Iterator[Paragraph | FigureBlock | TableBlock]:
+def _flat(blocks: Iterable[Block]) -> Iterator[Flat]:
     for block in blocks:
         if isinstance(block, Details):
             yield from block.blocks
@@ -174,6 +182,9 @@ def _section(section: Section, number: int, numbered: _Numbered) -> str:
 def _block(block: Block, numbered: _Numbered) -> str:
     if isinstance(block, Paragraph):
         return f"<p>{_text(block.text)}</p>"
+    if isinstance(block, Listing):
+        entries = "\n".join(f"<li>{_text(text)}</li>" for text in block.texts)
+        return f"<ul>\n{entries}\n</ul>"
     if isinstance(block, Details):
         body = "\n".join(_block(inner, numbered) for inner in block.blocks)
         return f"<details>\n<summary>{_text(block.title)}</summary>\n{body}\n</details>"

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bywire.bench.kpis.smoothing import smoothed
 from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
+from bywire.report.decimation import decimate
 from bywire.report.step_marks import StepFacts, StepLimits, draw_limits
 from bywire.report.style import Role
 from bywire.report.wording import duration
@@ -28,6 +31,7 @@ def step_response(
     limits: StepLimits | None = None,
     facts: StepFacts | None = None,
     measured: xr.Dataset | None = None,
+    smoothing: float = 0.0,
 ) -> Figure:
     """Draw one variable with its set point, tolerance band, overshoot limit, rise and settling.
 
@@ -43,21 +47,32 @@ def step_response(
         KPI values to mark. They are drawn, never computed here.
     measured
         Recording to compare with.
+    smoothing
+        Averaging time [s] of the curve that was judged; that curve is then drawn thin, the raw
+        one pale behind it, and the marks sit on it. 0 where the curve itself was judged.
     """
     shown = channel(recording, variable)
     figure, (axes,) = style.new_figure(3.3)
     if measured is not None:
         style.draw_channel(axes, channel(measured, variable), Role.MEASURED, ", measured")
     compared = measured is not None
-    style.draw_channel(
-        axes, shown, Role.SIMULATED if compared else Role.MAIN, ", simulated" if compared else ""
-    )
+    role, suffix = (Role.SIMULATED, ", simulated") if compared else (Role.MAIN, "")
+    opacity = style.PALE_OPACITY if smoothing > 0 else 1.0
+    style.draw_channel(axes, shown, role, suffix, opacity)
+    judged = shown
+    if smoothing > 0:
+        judged = replace(shown, values=smoothed(shown.time, shown.values, smoothing))
+        scale, _ = style.time_scale(shown.time)
+        axes.plot(
+            *decimate(scale * judged.time, judged.values), linewidth=0.9, zorder=3.3,
+            color=style.STROKES[role].color, label=f"averaged over {duration(smoothing)}",
+        )
     if set_point is not None:
         style.draw_channel(axes, channel(recording, set_point), Role.SET_POINT)
     if limits is not None:
         draw_limits(axes, limits, shown)
     if limits is not None and facts is not None:
-        _mark_facts(axes, shown, limits, facts)
+        _mark_facts(axes, judged, limits, facts)
     axes.margins(x=0.0)
     axes.set_xlabel(f"time [{style.time_scale(shown.time)[1]}]")
     axes.set_ylabel(style.channel_label(shown))

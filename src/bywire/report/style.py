@@ -17,8 +17,9 @@ from matplotlib.ticker import MaxNLocator
 
 from bywire.core.quantities import display_unit
 from bywire.report.channel import Channel, FloatArray
-from bywire.report.decimation import COLUMNS, decimate
-from bywire.report.wording import clean, unit_text
+from bywire.report.decimation import decimate
+from bywire.report.ripple import inside
+from bywire.report.wording import clean, duration, unit_text
 
 # Okabe and Ito, "Color universal design", 2008: told apart with any kind of color vision.
 BLUE = "#0072B2"
@@ -78,6 +79,11 @@ STROKES = {
     Role.LIMIT: Stroke(VERMILLION, ":", 1.2, 2.5),
 }
 
+PALE_OPACITY = 0.3
+"""of a ripple behind its average"""
+BAND_ORDER = 2.4
+"""drawing order of a ripple that fills an area: behind every line"""
+
 
 def new_figure(height: float, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels one above the other that share their abscissa.
@@ -117,7 +123,7 @@ def few_ticks(axes: Axes, count: int) -> None:
     axes.yaxis.set_major_locator(MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]))
 
 
-def plain(text: object, longest: int = 70) -> str:
+def plain(text: object, longest: int = 90) -> str:
     """Return one line that matplotlib draws as it stands: no formulas, no control characters.
 
     Parameters
@@ -163,22 +169,31 @@ def time_scale(time: FloatArray) -> tuple[float, str]:
     return (1e3, "ms") if short else (1.0, "s")
 
 
-def draw_channel(axes: Axes, shown: Channel, role: Role, suffix: str = "") -> None:
+def draw_channel(
+    axes: Axes, shown: Channel, role: Role, suffix: str = "", opacity: float = 1.0
+) -> None:
     """Draw a channel over time, labeled by its name and ``suffix``.
 
-    A ripple too fast to be told apart is drawn as the band that it fills. Such a band must not
-    hide other lines: a set point then lies below them, a simulated line lets a measured one shine
-    through.
+    A ripple too fast to be told apart is drawn as the pale band that it fills, with its moving
+    average on it; the label says so. Of a set point only the average is drawn then, for its band
+    would hide the one that matters.
     """
     scale, _ = time_scale(shown.time)
-    time, values = decimate(scale * shown.time, shown.values)
     look = STROKES[role]
-    band = len(values) > 3 * COLUMNS and len(values) < len(shown.values)
+    label = shown.label + suffix
+    average = inside(shown)
+    if average is not None:
+        if role is not Role.SET_POINT:
+            axes.plot(
+                *decimate(scale * shown.time, shown.values), color=look.color,
+                alpha=opacity * PALE_OPACITY, linewidth=0.8, zorder=BAND_ORDER,
+            )
+        shown, width = average
+        pale = "" if role is Role.SET_POINT else " (pale: ripple)"
+        label = f"{label}, {duration(width)} average{pale}"
     axes.plot(
-        time, values, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
-        zorder=2.6 if band and role is Role.SET_POINT else look.zorder,
-        alpha=0.6 if band and role is Role.SIMULATED else None,
-        label=plain(shown.label + suffix),
+        *decimate(scale * shown.time, shown.values), color=look.color, linestyle=look.linestyle,
+        linewidth=look.linewidth, zorder=look.zorder, alpha=opacity, label=plain(label),
     )
 
 

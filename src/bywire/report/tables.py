@@ -72,11 +72,14 @@ class ReproductionRow:
     unit
         Unit in pint's syntax.
     tolerance
-        Text, or a number in ``unit``; ``None`` for none.
+        Text, or a number in ``unit``; ``None`` for none; ``"<="`` or ``">="`` where the statement
+        is a bound, which is then shown before it.
     agrees
         ``None`` where nothing can be said.
     note
         What a reader should know.
+    kind
+        What kind of statement it is, for instance ``"requirement"``.
     """
 
     id: str
@@ -86,6 +89,12 @@ class ReproductionRow:
     tolerance: float | str | None = None
     agrees: bool | None = None
     note: str = ""
+    kind: str = ""
+
+    @property
+    def bound(self) -> str:
+        """``"<="`` or ``">="`` where the statement is a bound, else empty."""
+        return str(self.tolerance) if self.tolerance in ("<=", ">=") else ""
 
 
 @dataclass(frozen=True)
@@ -136,17 +145,38 @@ def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
     """Return the table of statements of a source beside what we compute."""
     return Table(
         (
-            Column("statement"), Column("stated", numeric=True), Column("computed", numeric=True),
-            Column("tolerance", numeric=True), Column("agrees"), Column("note"),
+            Column("statement"), Column("kind"), Column("stated", numeric=True),
+            Column("computed", numeric=True), Column("tolerance", numeric=True),
+            Column("agrees"), Column("note"),
         ),
         tuple(
             (
                 Cell(clean(row.id)),
-                Cell(amount(row.stated, row.unit)),
+                Cell(clean(row.kind)),
+                Cell(_stated(row)),
                 Cell(amount(row.computed, row.unit)),
                 Cell(_tolerance(row)),
                 _judged(row.agrees, "yes", "no"),
                 Cell(clean(row.note)),
+            )
+            for row in rows
+        ),
+    )
+
+
+def verdict_table(rows: Iterable[ReproductionRow]) -> Table:
+    """Return the same without kinds, tolerances and notes, narrow enough for a terminal."""
+    return Table(
+        (
+            Column("statement"), Column("stated", numeric=True), Column("computed", numeric=True),
+            Column("verdict"),
+        ),
+        tuple(
+            (
+                Cell(clean(row.id)),
+                Cell(_stated(row)),
+                Cell(amount(row.computed, row.unit)),
+                _judged(row.agrees, "agrees", "disagrees"),
             )
             for row in rows
         ),
@@ -187,7 +217,14 @@ def _judged(holds: bool | None, good: str, bad: str) -> Cell:
     return Cell(good, "good") if holds else Cell(bad, "bad")
 
 
+def _stated(row: ReproductionRow) -> str:
+    written = amount(row.stated, row.unit)
+    return f"{row.bound} {written}" if row.bound and row.stated is not None else written
+
+
 def _tolerance(row: ReproductionRow) -> str:
+    if row.bound:
+        return "-"
     if isinstance(row.tolerance, str):
         return clean(row.tolerance) or "-"
     return amount(row.tolerance, row.unit)

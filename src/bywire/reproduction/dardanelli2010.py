@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from bywire.bench.bench import Progress
+from dataclasses import replace
+
+from bywire.bench.running import Progress
 from bywire.reproduction import (
     dardanelli2010_dither,
     dardanelli2010_fig3,
@@ -16,8 +18,10 @@ from bywire.reproduction import (
     dardanelli2010_table3,
     dardanelli2010_table4,
 )
+from bywire.reproduction.dardanelli2010_causes import causes
 from bywire.reproduction.dardanelli2010_facts import CITATION
 from bywire.reproduction.dardanelli2010_runs import MAIN, Runs
+from bywire.reproduction.dardanelli2010_tolerances import ALLOWANCES
 from bywire.reproduction.reproduction import Reproduction, Source
 
 PARTS = {
@@ -33,6 +37,12 @@ PARTS = {
     "Fig. 7": dardanelli2010_fig7.part,
     "gear": dardanelli2010_gear.part,
 }
+
+NAMES = {
+    "": "Calibrated set, and what needs no set",
+    "table1": "Table 1 as printed (ids with @table1)",
+}
+"""parameter sets, by what follows @ in an item's id"""
 
 
 def reproduce(progress: Progress | None = None) -> Reproduction:
@@ -54,7 +64,8 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
         runs.report(label, 0.0)
         parts.append(part(runs))
         runs.report(label, 1.0)
-    return Reproduction(MAIN, CITATION, tuple(parts))
+    found = Reproduction(MAIN, CITATION, tuple(parts), allowances=ALLOWANCES, sets=NAMES)
+    return replace(found, causes=causes(found.items))
 
 
 SOURCE = Source(

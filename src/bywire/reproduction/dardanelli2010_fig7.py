@@ -9,13 +9,14 @@ import numpy as np
 from bywire.analysis.margins import bandwidth
 from bywire.analysis.pressure_loop import BAND, PressureLoop, cancelling_pi
 from bywire.analysis.sine_test import Excitation, SineTest, sine_test
-from bywire.bench.bench import Result
+from bywire.bench.result import Result
 from bywire.report.bode import Response, bode
 from bywire.report.step_marks import StepFacts, StepLimits
 from bywire.report.step_response import step_response
 from bywire.report.tracking import tracking
 from bywire.reproduction import dardanelli2010_facts as facts
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, kpis, parameters
+from bywire.reproduction.dardanelli2010_tolerances import ROUND, STEADY
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 
@@ -26,8 +27,6 @@ AMPLITUDES = (1e5, 3e5)
 FREQUENCIES = (0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 8.0, 10.0, 12.0)
 HUNTING = 20.0
 """time in which the loop without dither shows its limit cycle [s]"""
-STEADY = 0.05
-"""steady-state error that counts as none [bar]: four steps of the 12 bit converter"""
 
 
 def part(runs: Runs) -> Part:
@@ -45,9 +44,8 @@ def part(runs: Runs) -> Part:
         )  # fmt: skip
         items += _tracking(runs.bench("pedal-tracking", name), suffix)
     items.append(
-        compared(
-            "fig7.bandwidth.3bar", facts.BANDWIDTH,
-            _closed_loop(MAIN, AMPLITUDES[1]).bandwidth(of=1.0), ">=",
+        found(
+            "fig7.bandwidth.3bar", "Hz", _closed_loop(MAIN, AMPLITUDES[1]).bandwidth(of=1.0),
             "the same with sines of 3 bar: friction makes it depend on the amplitude",
         )
     )  # fmt: skip
@@ -82,7 +80,7 @@ def _hard_braking(result: Result, suffix: str) -> list[Item]:
         ),
         compared(
             f"fig7.steady_state_error{suffix}", facts.STEADY_STATE,
-            values["steady_state_error"] / BAR, STEADY,
+            values["steady_state_error"] / BAR, STEADY.size,
             "mean of the last 0.24 s of hard braking",
         ),
         found(f"fig7.rise_time{suffix}", "s", values["rise_time"], "10 to 90 %, hard braking"),
@@ -123,7 +121,8 @@ def _linear_loop() -> list[Item]:
     tuned = "gains tuned to it"
     items = [
         compared(
-            "fig7.crossover", facts.BANDWIDTH, medium.margin().crossover, 0.25,
+            "fig7.crossover", facts.BANDWIDTH, medium.margin().crossover,
+            ROUND.around(facts.BANDWIDTH.value),
             f"Table 4, medium; {chain}; {tuned}", tuned="calibrated",
         ),
         compared(
@@ -169,7 +168,9 @@ def _exhibits(runs: Runs, tests: dict[str, SineTest]) -> tuple[Exhibit, ...]:
     return (
         Exhibit(
             "fig7a",
-            step_response(hard.recordings["run"], limits=limits, facts=marks),
+            step_response(hard.recordings["run"], limits=limits, facts=marks,
+                smoothing=options["smoothing"],
+            ),
             "Fig. 7a: hard braking from 6 to 37 bar, calibrated set.",
         ),
         Exhibit(

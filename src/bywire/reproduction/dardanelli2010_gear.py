@@ -73,7 +73,10 @@ def part(runs: Runs) -> Part:
 def _items(release: xr.Dataset, law: str, suffix: str) -> list[Item]:
     """Return what was stored, and what came back."""
     stored, returned = _energies(release)
-    bound = Fact(stored, "J", "section 3.2: gear with an efficiency, hence losses")
+    bound = Fact(
+        stored, "J", "physical bound: no more can return than is stored, by our computation",
+        "physical bound",
+    )  # fmt: skip
     note = f"law '{law}', {'eq. (8)' if law == 'paper' else 'ours'}"
     return [
         found(f"gear.stored.{law}{suffix}", "J", stored, f"at 37 bar, frictionless; {note}"),

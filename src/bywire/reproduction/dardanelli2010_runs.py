@@ -9,7 +9,9 @@ import numpy as np
 import xarray as xr
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.bench.bench import Bench, Progress, Result, run
+from bywire.bench.bench import Bench
+from bywire.bench.result import Result
+from bywire.bench.running import Progress, run
 from bywire.catalog.registry import entry
 
 MAIN = "dardanelli2010"

@@ -9,11 +9,9 @@ from bywire.analysis.rational import Rational
 from bywire.report.bode import Response, bode
 from bywire.reproduction import dardanelli2010_facts as facts
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, PRINTED, SETS, Runs, parameters
+from bywire.reproduction.dardanelli2010_tolerances import PRINTED as DIGITS
 from bywire.reproduction.item import Item, compared
 from bywire.reproduction.reproduction import Exhibit, Part
-
-TOLERANCE = 0.005
-"""share of the printed value"""
 
 
 def numbers(model: Rational) -> dict[str, float]:
@@ -37,7 +35,7 @@ def part(runs: Runs) -> Part:
             note = "s_mc, which moves it, is not printed" if key == "pole3" else ""
             items.append(
                 compared(
-                    f"table2.{key}{suffix}", fact, computed[key], TOLERANCE * fact.value,
+                    f"table2.{key}{suffix}", fact, computed[key], DIGITS.around(fact.value),
                     f"Table 1 in (15){'; ' if note else ''}{note}" if suffix else "",
                     tuned="" if suffix else "calibrated",
                 )

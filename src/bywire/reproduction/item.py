@@ -7,11 +7,14 @@ from dataclasses import dataclass
 from typing import Literal
 
 Tolerance = float | Literal["<=", ">="]
+Kind = Literal["printed", "axis", "requirement", "physical bound", "ours"]
+"""what a statement is: a number in text, table or equation; the end of a figure's axis; a
+requirement on the design; a limit that physics sets and we derive; or nothing but our number"""
 
 
 @dataclass(frozen=True)
 class Fact:
-    """A number that a source states, and where.
+    """A number that a source states, and where; or a bound that physics sets to it.
 
     Parameters
     ----------
@@ -21,11 +24,14 @@ class Fact:
         Unit as the source prints it, in pint's syntax; ``"1"`` for a pure number.
     where
         Place in the source.
+    kind
+        What kind of statement it is.
     """
 
     value: float
     unit: str
     where: str
+    kind: Kind = "printed"
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,8 @@ class Item:
         None where nothing is stated, or where the value was tuned to the statement.
     note
         Where it is stated, and what a reader should know.
+    kind
+        What kind of statement it is.
     """
 
     id: str
@@ -56,6 +64,12 @@ class Item:
     tolerance: Tolerance | None
     agrees: bool | None
     note: str
+    kind: Kind = "ours"
+
+    @property
+    def parameter_set(self) -> str:
+        """What follows ``@`` in the id; empty for the main set."""
+        return self.id.partition("@")[2]
 
 
 def compared(
@@ -86,7 +100,8 @@ def compared(
     """
     agrees = None if tuned or tolerance is None else holds(fact.value, computed, tolerance)
     parts = (fact.where, tuned, note)
-    return Item(name, fact.unit, fact.value, computed, tolerance, agrees, _joined(parts))
+    note = _joined(parts)
+    return Item(name, fact.unit, fact.value, computed, tolerance, agrees, note, fact.kind)
 
 
 def found(name: str, unit: str, computed: float, note: str) -> Item:
@@ -108,7 +123,8 @@ def quoted(name: str, fact: Fact, note: str) -> Item:
     name, fact, note
         As in `compared`.
     """
-    return Item(name, fact.unit, fact.value, None, None, None, _joined((fact.where, note)))
+    note = _joined((fact.where, note))
+    return Item(name, fact.unit, fact.value, None, None, None, note, fact.kind)
 
 
 def holds(stated: float, computed: float, tolerance: Tolerance) -> bool:

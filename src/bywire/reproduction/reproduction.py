@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import xarray as xr
-from matplotlib.figure import Figure
 
-from bywire.bench.bench import Progress
+from bywire.bench.running import Progress
 from bywire.report.tables import Table
 from bywire.reproduction.item import Item
+from bywire.reproduction.root_cause import RootCause
+from bywire.reproduction.tolerance import Allowance
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,11 +67,20 @@ class Reproduction:
         Full citation.
     parts
         Its tables and figures.
+    causes
+        Why statements disagree, the gravest cause first.
+    allowances
+        The tolerances in use, with their reasons.
+    sets
+        What to call the parameter sets, by what follows ``@`` in an item's id.
     """
 
     source: str
     citation: str
     parts: tuple[Part, ...]
+    causes: tuple[RootCause, ...] = ()
+    allowances: tuple[Allowance, ...] = ()
+    sets: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def items(self) -> tuple[Item, ...]:

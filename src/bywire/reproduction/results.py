@@ -5,28 +5,15 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from bywire.core.errors import FileError
 from bywire.data.netcdf import write_recording
-from bywire.report.files import write_bytes
-from bywire.report.page import (
-    Banner,
-    Block,
-    Details,
-    FigureBlock,
-    Paragraph,
-    Section,
-    TableBlock,
-    write_page,
-)
-from bywire.report.tables import ReproductionRow, Table, reproduction_table
-from bywire.reproduction.item import Item
+from bywire.report.files import save_figure, write_bytes
+from bywire.report.tables import Table, verdict_table
+from bywire.reproduction.report_page import reproduction_row, write_report
 from bywire.reproduction.reproduction import Reproduction
-
-_BOUNDS = {"<=": "at most", ">=": "at least"}
 
 
 def as_json(reproduction: Reproduction) -> dict[str, Any]:
@@ -37,7 +24,8 @@ def as_json(reproduction: Reproduction) -> dict[str, Any]:
     dict
         ``{"source", "items": [{"id", "unit", "stated", "computed", "tolerance", "agrees",
         "note"}]}``. What is not stated, not computed or not defined is None; a tolerance is a
-        number in the item's unit, or ``"<="`` or ``">="`` where the statement is a bound.
+        number in the item's unit, or ``"<="`` or ``">="`` where the statement is a bound. The
+        note ends with the kind of statement.
     """
     return {
         "source": reproduction.source,
@@ -51,7 +39,7 @@ def as_json(reproduction: Reproduction) -> dict[str, Any]:
                 if isinstance(item.tolerance, str)
                 else _number(item.tolerance),
                 "agrees": item.agrees,
-                "note": item.note,
+                "note": f"{item.note}; kind: {item.kind}" if item.note else f"kind: {item.kind}",
             }
             for item in reproduction.items
         ],
@@ -59,12 +47,12 @@ def as_json(reproduction: Reproduction) -> dict[str, Any]:
 
 
 def as_table(reproduction: Reproduction) -> Table:
-    """Return all statements as one table."""
-    return _table(reproduction.items)
+    """Return all statements as one table for terminals: numbers and verdicts without notes."""
+    return verdict_table(map(reproduction_row, reproduction.items))
 
 
 def write(reproduction: Reproduction, folder: Path) -> list[Path]:
-    """Write report, results and recordings; each file whole or not at all.
+    """Write report, results, figures and recordings; each file whole or not at all.
 
     Parameters
     ----------
@@ -76,7 +64,7 @@ def write(reproduction: Reproduction, folder: Path) -> list[Path]:
     Returns
     -------
     list of Path
-        The report first, then ``results.json``, then the recordings.
+        The report first, then ``results.json``, then the figures, then the recordings.
 
     Raises
     ------
@@ -89,55 +77,20 @@ def write(reproduction: Reproduction, folder: Path) -> list[Path]:
         reason = error.strerror or str(error)
         raise FileError(f"cannot make the output folder {folder}: {reason}") from None
     text = json.dumps(as_json(reproduction), indent=2, allow_nan=False)
-    report = _page(reproduction, folder / "report.html")
+    report = write_report(reproduction, folder / "report.html")
     results = write_bytes(folder / "results.json", (text + "\n").encode())
+    figures = [save_figure(e.figure, folder / f"{_stem(e.name)}.png") for e in reproduction.figures]
     kept = [
-        write_recording(recording, folder / f"{re.sub(r'[^A-Za-z0-9.-]+', '-', name)}.nc")
+        write_recording(recording, folder / f"{_stem(name)}.nc")
         for name, recording in reproduction.recordings.items()
     ]
-    return [report, results, *kept]
-
-
-def _page(reproduction: Reproduction, path: Path) -> Path:
-    items = reproduction.items
-    apart = [item for item in items if item.agrees is False]
-    agreeing = sum(item.agrees is True for item in items)
-    silent = len(items) - agreeing - len(apart)
-    sections = [Section("Disagreements", [TableBlock(_table(apart))])] if apart else []
-    for part in reproduction.parts:
-        blocks: list[Block] = [Paragraph(part.text)]
-        blocks += [FigureBlock(e.figure, e.caption) for e in part.exhibits]
-        blocks += [TableBlock(_table(part.items))] if part.items else []
-        blocks += [Details(title, [TableBlock(t)]) for title, t in part.appendix.items()]
-        sections.append(Section(part.title, blocks))
-    return write_page(
-        path,
-        f"Reproduction of {reproduction.source}",
-        reproduction.citation,
-        sections,
-        banner=Banner(
-            f"{agreeing} statements agree, {len(apart)} disagree; {silent} numbers are ours, "
-            "quoted without a counterpart, or calibrated to the statement"
-        ),
-    )
-
-
-def _table(items: Sequence[Item]) -> Table:
-    return reproduction_table(
-        ReproductionRow(
-            id=item.id,
-            stated=item.stated,
-            computed=item.computed,
-            unit=item.unit,
-            tolerance=_BOUNDS.get(item.tolerance, "")
-            if isinstance(item.tolerance, str)
-            else item.tolerance,
-            agrees=item.agrees,
-            note=item.note,
-        )
-        for item in items
-    )
+    return [report, results, *figures, *kept]
 
 
 def _number(value: float | None) -> float | None:
     return value if value is not None and math.isfinite(value) else None
+
+
+def _stem(name: str) -> str:
+    """Return the name of a file, without what file systems dislike."""
+    return re.sub(r"[^A-Za-z0-9.-]+", "-", name)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, unknown_name
+from bywire.core.interrupts import interrupts_deferred
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.compiler import find_compiler
@@ -97,7 +98,8 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
     key = (type(model), own, type(par), structure)
     with _LOCK:
         if key not in _PREPARED:
-            _PREPARED[key] = Prepared(model, par)
+            with interrupts_deferred():
+                _PREPARED[key] = Prepared(model, par)
         return _PREPARED[key]
 
 

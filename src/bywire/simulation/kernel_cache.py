@@ -65,7 +65,7 @@ def intact(library: Path, digest: Path) -> bool:
     """Return whether a library is the one that its digest was made of."""
     try:
         return sha256(library) == digest.read_text()
-    except OSError:
+    except (OSError, ValueError):  # missing, or no text at all
         return False
 
 

@@ -12,7 +12,7 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import hysteresis, occupation
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.motorcycle_case import case_from_rest, smoothing
 from bywire.bench.stimuli import ramp
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
@@ -31,7 +31,7 @@ class Options(ParameterSet):
     f_filter: Frequency
     """cut-off of the first-order low-pass on the measured current"""
     smoothing: TimeConstant
-    """moving average for the loop's KPIs, one dither period; 0 for the raw signals"""
+    """moving average for the loop's KPIs; one dither period unless given, 0 for the raw signals"""
 
 
 def cases(
@@ -106,4 +106,5 @@ EXPERIMENT = Experiment(
     | {"loop_area_ratio": "1"},
     figures=("hysteresis-loop", "time-traces"),
     finish=finish,
+    following=smoothing,
 )

@@ -7,7 +7,7 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
+from bywire.bench.motorcycle_case import case_from_rest, smoothing, step_at_zero
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure, TimeConstant
@@ -25,7 +25,7 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before the step in which dither and loop settle"""
     smoothing: TimeConstant
-    """moving average for the step's KPIs, one dither period; 0 for the raw pressure"""
+    """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
 
 
 def cases(
@@ -68,4 +68,5 @@ EXPERIMENT = Experiment(
     kpis=units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
     figures=("step-response", "time-traces", "energy-balance"),
     step=step,
+    following=smoothing,
 )

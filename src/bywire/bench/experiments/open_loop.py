@@ -1,12 +1,13 @@
-"""Open loop: an ideal current or voltage source at the motor, with any stimulus."""
+"""Open loop: any stimulus at the motor, from an ideal source, or through the ECU."""
 
 from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import xarray as xr
 from pydantic import Field
 
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_parameters import DriveMode, MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
@@ -18,14 +19,26 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 
+_SOURCES: dict[str, tuple[DriveMode, str, str]] = {
+    "current": ("current-source", "i_set", "A"),
+    "voltage": ("voltage-source", "v_set", "V"),
+    "current-loop": ("current", "i_set", "A"),
+    "current-direct": ("current-direct", "i_set", "A"),
+    "pressure": ("pressure", "p_set", "Pa"),
+}  # drive mode, driven signal and its unit
+_IDEAL = ("current", "voltage")
+# What only the ECU gives a meaning.
+_SIGNALS = ("p_ref", "duty", "i_star", "i_dit", "sat_current", "sat_duty")
+_KPIS = ("share_sat_current", "share_sat_duty")
+
 
 class Options(ParameterSet):
     """The source."""
 
-    source: Literal["current", "voltage"]
-    """what the stimulus drives"""
+    source: Literal["current", "voltage", "current-loop", "current-direct", "pressure"]
+    """what is driven: an ideal source, or a demand to the ECU; -direct is without dither"""
     add_holding: bool
-    """whether what holds p_start is added to the stimulus"""
+    """whether what holds p_start is added to the stimulus: current, voltage, or p_start itself"""
     p_start: Annotated[float, Unit("Pa", 2e6), Field(ge=0, allow_inf_nan=False)]
     """pressure from whose equilibrium the run starts"""
     duration: Duration
@@ -45,15 +58,15 @@ def cases(
             "open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine or "
             "table, with its parameters"
         )
-    current = options.source == "current"
-    i = holding_current(options.p_start, par) if options.add_holding else 0.0
-    offset = i if current else par.motor.R_m * i
-    name = "i_set" if current else "v_set"
+    mode, name, unit = _SOURCES[options.source]
+    i = holding_current(options.p_start, par)
+    holding = {"A": i, "V": par.motor.R_m * i, "Pa": options.p_start}[unit]
+    offset = holding if options.add_holding else 0.0
     return (
         case_from_rest(
             "run",
             par,
-            "current-source" if current else "voltage-source",
+            mode,
             options.p_start,
             lambda t: {name: offset + stimulus.sample(t)},
             options.duration,
@@ -63,19 +76,29 @@ def cases(
     )
 
 
+def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
+    """Leave out what has no meaning without the ECU."""
+    return recording.drop_vars(_SIGNALS) if options.source in _IDEAL else recording
+
+
+def without(options: Options) -> tuple[str, ...]:
+    """Return the KPIs that have no meaning without the ECU."""
+    return _KPIS if options.source in _IDEAL else ()
+
+
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return effort and occupation."""
     run = recordings["run"]
     found = evaluate("effort", run, effort.Setting())
     found |= evaluate("occupation", run, occupation.Setting())
     peak = Kpi("p_max", float(run["p_mc"].max()), "Pa", "Largest master-cylinder pressure.")
-    return (*found.values(), peak)
+    return (*(kpi for name, kpi in found.items() if name not in without(options)), peak)
 
 
 EXPERIMENT = Experiment(
     name="open-loop",
     assembly="motorcycle-brake",
-    summary="ideal current or voltage source at the motor, any stimulus",
+    summary="any stimulus, as ideal current or voltage, or as a demand to the ECU",
     options=Options,
     defaults=Options(
         source="current", add_holding=False, p_start=0.0, duration=1.0, record=1e-3, settle=0.0
@@ -84,5 +107,7 @@ EXPERIMENT = Experiment(
     judge=judge,
     kpis={**units_of("effort", "occupation"), "p_max": "Pa"},
     figures=("time-traces", "energy-balance"),
-    driven_unit=lambda options: "A" if options.source == "current" else "V",
+    finish=finish,
+    driven_unit=lambda options: _SOURCES[options.source][2],
+    without=without,
 )

@@ -14,12 +14,13 @@ from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.smoothing import smoothed, treatment
-from bywire.bench.motorcycle_case import case_from_rest
+from bywire.bench.motorcycle_case import case_from_rest, smoothing
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.control import pedal_map
-from bywire.core.errors import FileError, quoted
+from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
+from bywire.core.units import shown
 from bywire.data.trace import column_names, read_trace
 from bywire.plant import pedal
 
@@ -28,6 +29,8 @@ _COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the bes
 # modulated one, and a hold; the map makes 5 to 30 bar of it, the range of Fig. 7b.
 _TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
 _TRAVELS = (9, 9, 26, 26, 12, 12, 33, 33, 16, 16, 36, 36, 30, 37, 31, 37, 12, 12)
+
+_LONGEST_LAG = 0.3  # s: longer delays are not looked for
 
 
 class Options(ParameterSet):
@@ -38,7 +41,7 @@ class Options(ParameterSet):
     max_gap: TimeConstant
     """longest gap of the file that is bridged by a straight line"""
     smoothing: TimeConstant
-    """moving average for the tracking KPIs, one dither period; 0 for the raw pressure"""
+    """moving average for the tracking KPIs; one dither period unless given, 0 for raw ones"""
 
 
 def cases(
@@ -64,8 +67,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     t, p_ref = run["time"].values, run["p_ref"].values
     p = smoothed(t, run["p_mc"].values, options.smoothing)
     note = treatment(options.smoothing)
-    lag = _lag(t, p_ref, p)
-    shifted = np.interp(t - (0.0 if np.isnan(lag) else lag), t, p_ref)
+    lag, reason = _lag(t, p_ref, p)
+    shifted = np.interp(t - lag, t, p_ref)
     own = (
         Kpi("tracking_rms", float(np.sqrt(np.mean((p - p_ref) ** 2))), "Pa",
             "Root mean square of pressure less set point.", note),
@@ -73,9 +76,9 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
             "Largest magnitude of pressure less set point.", note),
         Kpi("tracking_lag", lag, "s",
             "Delay of the set point that fits the pressure best, in the mean square.",
-            note if not np.isnan(lag) else "the set point does not move"),
+            reason or note),
         Kpi("tracking_rms_without_lag", float(np.sqrt(np.mean((p - shifted) ** 2))), "Pa",
-            "Root mean square of pressure less the delayed set point.", note),
+            "Root mean square of pressure less the delayed set point.", reason or note),
     )  # fmt: skip
     found = evaluate("effort", run, effort.Setting())
     found |= evaluate("occupation", run, occupation.Setting())
@@ -100,9 +103,23 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
             )
         wanted = {chosen: _COLUMNS[chosen]}
         ride = read_trace(options.trace, wanted, max_gap=max(options.max_gap, 1e-9))
+    _require_within_stop(ride, par, options.trace or "the built-in ride")
     if "pedal" not in ride:
         return ride
     return ride.assign(force=pedal.force_at(ride["pedal"], par.pedal))  # type: ignore[arg-type]
+
+
+def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: str) -> None:
+    """Refuse a ride that the pedal's stop would cut off."""
+    x_max = par.pedal.x_max
+    limits = {"pedal": (x_max, "m"), "force": (pedal.force_at(x_max, par.pedal), "N")}
+    for name, (limit, unit) in limits.items():
+        largest = float(ride[name].max()) if name in ride else 0.0
+        if largest > limit * (1.0 + 1e-9):
+            raise ParameterError(
+                f"{source}: {name} goes up to {shown(largest, unit)}, but the pedal meets its stop "
+                f"at {shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them"
+            )
 
 
 def _set_point(force: float, par: MotorcycleParameters) -> float:
@@ -110,21 +127,27 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
     return pedal_map.output(voltage, par.ecu.pedal_map)
 
 
-def _lag(t: NDArray[np.float64], demand: NDArray[np.float64], p: NDArray[np.float64]) -> float:
+def _lag(
+    t: NDArray[np.float64], demand: NDArray[np.float64], p: NDArray[np.float64]
+) -> tuple[float, str]:
+    """Return the delay of the demand [s] that fits best, or NaN and why there is none."""
     from scipy import optimize  # slow to load, and only this experiment needs it
 
     if np.ptp(demand) == 0.0:
-        return float("nan")
+        return float("nan"), "the set point does not move"
 
     def misfit(delay: float) -> float:
         return float(np.mean((p - np.interp(t - delay, t, demand)) ** 2))
 
-    delays = np.arange(0.0, 0.3, 0.005)
-    best = delays[int(np.argmin([misfit(d) for d in delays]))]
-    fine = optimize.minimize_scalar(
-        misfit, bounds=(max(best - 0.005, 0.0), best + 0.005), method="bounded"
-    )
-    return float(fine.x)
+    delays = np.linspace(0.0, _LONGEST_LAG, 61)
+    best = float(delays[int(np.argmin([misfit(d) for d in delays]))])
+    bounds = (max(best - delays[1], 0.0), min(best + delays[1], _LONGEST_LAG))
+    fine = optimize.minimize_scalar(misfit, bounds=bounds, method="bounded")
+    if misfit(0.0) <= fine.fun:
+        return float("nan"), "no delay fits better than none"
+    if misfit(_LONGEST_LAG) <= fine.fun:
+        return float("nan"), f"the delay that fits best is not below {_LONGEST_LAG:g} s"
+    return float(fine.x), ""
 
 
 EXPERIMENT = Experiment(
@@ -143,4 +166,5 @@ EXPERIMENT = Experiment(
         **units_of("effort", "occupation"),
     },
     figures=("tracking", "time-traces"),
+    following=smoothing,
 )

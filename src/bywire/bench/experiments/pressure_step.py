@@ -10,7 +10,7 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.motorcycle_case import case_from_rest, step_at_zero
+from bywire.bench.motorcycle_case import case_from_rest, smoothing, step_at_zero
 from bywire.bench.motorcycle_operating_point import settled_start
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
@@ -31,7 +31,7 @@ class Options(ParameterSet):
     settle: TimeConstant
     """time before the step in which the dithered pressure settles"""
     smoothing: TimeConstant
-    """moving average for the step's KPIs, one dither period; 0 for the raw pressure"""
+    """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
 
 
 def cases(
@@ -41,6 +41,17 @@ def cases(
     p = options.p_start
     if options.start == "settled" and options.settle > 0:
         p = settled_start(p, par, options.settle)
+    return _from(p, par, options)
+
+
+def preview(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the run as if the pressure settled at the equilibrium without friction."""
+    return _from(options.p_start, par, options)
+
+
+def _from(p: float, par: MotorcycleParameters, options: Options) -> tuple[Case, ...]:
     i = holding_current(p, par)
     stimulus = step_at_zero("i_set", i, i + options.i_step)
     return (
@@ -90,4 +101,6 @@ EXPERIMENT = Experiment(
     },
     figures=("step-response", "time-traces"),
     step=step,
+    following=smoothing,
+    preview=preview,
 )

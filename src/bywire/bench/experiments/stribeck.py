@@ -70,7 +70,8 @@ def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the breakaway torques at the highest pressure."""
-    torque = recordings["curve"]["T_fr"].values[-1]
+    curve = recordings["curve"]
+    torque = curve["T_fr"].values[int(np.argmax(curve["p_mc"].values))]
     return (
         Kpi("breakaway_apply", float(torque.max()), "N*m",
             "Largest friction torque while applying, at the highest pressure."),

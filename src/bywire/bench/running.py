@@ -1,0 +1,137 @@
+"""Benches and their cases as runs of the engine."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.experiment import Case
+from bywire.bench.extent import check_extent
+from bywire.bench.recording import record
+from bywire.bench.requirements import judge
+from bywire.bench.result import Result
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.errors import ParameterError
+from bywire.core.interrupts import interrupts_deferred
+from bywire.simulation.engine import prepare
+from bywire.simulation.run import Run, simulate
+
+if TYPE_CHECKING:
+    from bywire.bench.bench import Bench
+
+Progress = Callable[[str, float], None]
+
+
+def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") -> Result:
+    """Make all runs of a bench, and judge them.
+
+    Parameters
+    ----------
+    bench
+        What is tested; `bywire.load` makes one of a bench file.
+    progress
+        Called with the run's label and its finished share, 0 to 1.
+    engine
+        ``auto``, ``compiled`` or ``virtual-machine``.
+
+    Raises
+    ------
+    InputError
+        When the experiment cannot be set up.
+    RunError
+        When a run fails.
+    """
+    if isinstance(bench, (str, Path)):
+        raise ParameterError(f"bywire.run takes a Bench: bywire.load({str(bench)!r}) makes one")
+    definition, options = bench.definition, bench.chosen_options
+    recordings: dict[str, xr.Dataset] = {}
+    if definition.static is not None:
+        recordings |= definition.static(bench.par, options)
+    try:
+        for number, case in enumerate(bench.cases()):
+            recording = _recorded(bench, case, number, progress, engine)
+            is_complete = recording.attrs["status"] != "interrupted"
+            if is_complete or recording.sizes["time"] > 1:
+                finish = definition.finish or _as_it_is
+                recordings[case.label] = finish(recording, options)
+            if not is_complete:
+                raise KeyboardInterrupt
+    except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
+        return Result(bench, recordings, (), (), "interrupted")
+    kpis = definition.judge(recordings, options)
+    verdicts = judge(bench.requirements, kpis)
+    status = "passed" if all(v.met for v in verdicts) else "failed"
+    return Result(bench, recordings, kpis, verdicts, status)
+
+
+def _as_it_is(recording: xr.Dataset, _: Any) -> xr.Dataset:
+    return recording
+
+
+def _recorded(
+    bench: Bench, case: Case, number: int, progress: Progress | None, engine: str
+) -> xr.Dataset:
+    made = as_run(case, bench.step, seed=(bench.seed, number))
+    check_extent(case, made)
+    report = None if progress is None else (lambda share: progress(case.label, share))
+    with interrupts_deferred():
+        prepare(made.model, made.par).engine(engine)
+    trajectory = simulate(made, engine=engine, progress=report)
+    notes = {
+        "experiment": bench.experiment,
+        "case": case.label,
+        "parameter_set": bench.parameters,
+        "seed": bench.seed,
+        "options": bench.chosen_options.model_dump_json(),
+        "stimulus": json.dumps(_described(bench.chosen_stimulus)),
+    }
+    return record(made, trajectory, case.settle, case.keep, notes)
+
+
+def _described(stimulus: Stimulus | None) -> dict[str, Any]:
+    """Return a stimulus as a ``[stimulus]`` section in SI; empty where none is given."""
+    if stimulus is None:
+        return {}
+    return {"kind": stimulus.kind, **stimulus.parameters.model_dump(mode="json")}
+
+
+def as_run(
+    case: Case, step: float, interval: float | None = None, seed: tuple[int, ...] = (0,)
+) -> Run:
+    """Return the engine's description of a case.
+
+    The run begins at -settle on the recording's axis, the settling time rounded up as
+    `Case.aligned` says. Signals of the stimulus named ``noise_*`` are standard normal, each
+    drawn from a generator of its own, so that a longer run begins with the same samples.
+    """
+    own = case.aligned(step, interval)
+    fields = own.model.Stimulus._fields
+    noises = [k for k, name in enumerate(fields) if name.startswith("noise_")]
+
+    def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        given = own.stimulus(t - own.settle)
+        rows = np.zeros((t.size, len(fields)))
+        for k, name in enumerate(fields):
+            if name in given:
+                rows[:, k] = given[name]
+        children = np.random.SeedSequence(seed).spawn(len(noises))
+        for k, child in zip(noises, children, strict=True):
+            rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
+        return rows
+
+    return Run(
+        model=own.model,
+        par=own.par,
+        state=own.state,
+        memory=own.memory,
+        stimulus=stimulus,
+        duration=own.settle + own.duration,
+        step=step,
+        record=own.record,
+    )

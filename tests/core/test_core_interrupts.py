@@ -1,0 +1,82 @@
+"""Ctrl-C is kept back for the length of a block, and never lost."""
+
+from __future__ import annotations
+
+import signal
+import threading
+
+import pytest
+
+from bywire.core.interrupts import interrupts_deferred
+
+
+@pytest.fixture(autouse=True)
+def handler():
+    """Leave the process' handler as it was."""
+    before = signal.getsignal(signal.SIGINT)
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_nothing_happens_without_an_interrupt():
+    with interrupts_deferred():
+        pass
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_interrupt_comes_when_the_block_has_ended():
+    steps = []
+
+    def work() -> None:
+        signal.raise_signal(signal.SIGINT)
+        steps.append("after the signal")
+        signal.raise_signal(signal.SIGINT)
+        steps.append("at the end")
+
+    with pytest.raises(KeyboardInterrupt), interrupts_deferred():
+        work()
+    assert steps == ["after the signal", "at the end"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_error_of_the_block_passes():
+    with pytest.raises(ValueError, match="own"), interrupts_deferred():
+        raise ValueError("own")
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_interrupt_comes_before_the_error_that_it_may_have_caused():
+    """A compiler in the same terminal gets the Ctrl-C as well, and fails."""
+
+    def work() -> None:
+        signal.raise_signal(signal.SIGINT)
+        raise ValueError("killed")
+
+    with pytest.raises(KeyboardInterrupt), interrupts_deferred():
+        work()
+
+
+def test_blocks_may_be_nested():
+    with pytest.raises(KeyboardInterrupt), interrupts_deferred(), interrupts_deferred():
+        signal.raise_signal(signal.SIGINT)
+
+
+def test_ignored_interrupts_stay_ignored():
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with interrupts_deferred():
+        signal.raise_signal(signal.SIGINT)
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
+
+
+def test_other_threads_are_left_alone():
+    found = []
+
+    def work():
+        with interrupts_deferred():
+            found.append(signal.getsignal(signal.SIGINT))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    assert found == [signal.default_int_handler]
