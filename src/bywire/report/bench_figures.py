@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
 from matplotlib.figure import Figure
 
 from bywire.bench.result import Result
+from bywire.core.errors import ParameterError
 from bywire.report.energy_balance import energy_balance
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.step_marks import StepFacts, StepLimits
@@ -50,7 +52,14 @@ def _step_response(result: Result) -> list[Shown]:
             overshoot=kpis["overshoot"] / 100.0 if "overshoot" in kpis else None,
         )
     demand = {"p_mc": "p_ref", "i": "i_ref"}[setting.signal] if limits is not None else None
-    figure = step_response(recording, setting.signal, demand, limits=limits, facts=facts)
+    figure = step_response(
+        recording,
+        setting.signal,
+        demand,
+        limits=limits,
+        facts=facts,
+        smoothing=setting.smoothing,
+    )
     return [Shown("step-response", figure, "Step response with its 2 % band.")]
 
 
@@ -67,14 +76,14 @@ def _time_traces(result: Result) -> list[Shown]:
 
 
 def _energy_balance(result: Result) -> list[Shown]:
-    return [
-        Shown(
-            f"energy-balance-{label}" if len(result.recordings) > 1 else "energy-balance",
-            energy_balance(recording.sel(time=slice(-1e-9, None))),
-            "Where the energy came from and where it went, from time zero on.",
-        )
-        for label, recording in result.recordings.items()
-    ]
+    caption = "Where the energy came from and where it went, from time zero on."
+    shown = []
+    for label, recording in result.recordings.items():
+        name = f"energy-balance-{label}" if len(result.recordings) > 1 else "energy-balance"
+        with contextlib.suppress(ParameterError):  # a brake at rest turns over no energy
+            figure = energy_balance(recording.sel(time=slice(-1e-9, None)))
+            shown.append(Shown(name, figure, caption))
+    return shown
 
 
 def _hysteresis_loop(result: Result) -> list[Shown]:
