@@ -13,7 +13,7 @@ import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
 
@@ -93,23 +93,26 @@ class ParameterSet(BaseModel):
 
     def leaves(self) -> dict[str, float]:
         """Return the numbers by dotted name, tables spread as ``name.0``, ``name.1``, ..."""
-        numbers: dict[str, float] = {}
-        for name, value in _walk(self, ""):
-            if isinstance(value, tuple):
-                numbers |= {f"{name}.{k}": float(v) for k, v in enumerate(value)}
-            elif _is_number(value):
-                numbers[name] = float(value)
-        return numbers
+        return dict(self.numbers_and_choices[0])
 
     def choices(self) -> dict[str, Any]:
         """Return the structural choices by dotted name, with the length of every table."""
-        found: dict[str, Any] = {}
+        return dict(self.numbers_and_choices[1])
+
+    @cached_property
+    def numbers_and_choices(self) -> tuple[dict[str, float], dict[str, Any]]:
+        """Leaves and choices, looked up once: a set never changes."""
+        numbers: dict[str, float] = {}
+        choices: dict[str, Any] = {}
         for name, value in _walk(self, ""):
             if isinstance(value, tuple):
-                found[name] = len(value)
-            elif not _is_number(value):
-                found[name] = value
-        return found
+                numbers |= {f"{name}.{k}": float(v) for k, v in enumerate(value)}
+                choices[name] = len(value)
+            elif _is_number(value):
+                numbers[name] = float(value)
+            else:
+                choices[name] = value
+        return numbers, choices
 
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure that carries other objects as its numbers.
