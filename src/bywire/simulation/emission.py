@@ -41,6 +41,11 @@ def unread(stages: Stages) -> frozenset[str]:
     )
 
 
+def leaf_count(stages: Stages, kind: str) -> int:
+    """Return how many inputs of a kind there are, for instance ``"u"`` for the stimulus."""
+    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == kind)
+
+
 def layout_of(stages: Stages) -> Layout:
     """Return the layout of a model's state vector."""
     length = {kind: len(stages.fast[kind]) for kind in STATE}

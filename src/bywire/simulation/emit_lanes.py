@@ -11,6 +11,7 @@ from bywire.simulation.emission import (
     exact_pass,
     indented,
     layout_of,
+    leaf_count,
     leaf_namer,
     unread,
 )
@@ -96,7 +97,7 @@ def emit_lanes(stages: Stages) -> str:
         f"q{j} += {' + '.join(f'{t.number(c)} * s{k}' for c, k in pairs) or 'SET(0.0)'};"
         for j, pairs in enumerate(stages.quadrature.combinations)
     ]
-    parameters, stimuli = _count(stages, "p"), _count(stages, "u")
+    parameters, stimuli = leaf_count(stages, "p"), leaf_count(stages, "u")
     return f"""{LANES}{exact_pass(stages)}
 {_settle_lanes(t, parameters)}
 {SIGNATURE} {{
@@ -140,10 +141,6 @@ def _names(layout: Layout) -> list[str]:
     """Return the names of all entries of the state vector, in order."""
     entries = [f"{kind}{k}" for kind, count in layout.length.items() for k in range(count)]
     return [*entries, "failures", "repeats"]
-
-
-def _count(stages: Stages, kind: str) -> int:
-    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == kind)
 
 
 def _ticks(t: _Lanes) -> list[str]:

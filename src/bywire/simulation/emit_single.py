@@ -9,6 +9,7 @@ from bywire.simulation.emission import (
     exact_pass,
     indented,
     layout_of,
+    leaf_count,
     leaf_namer,
     unread,
 )
@@ -80,7 +81,7 @@ def emit_single(stages: Stages) -> str:
   {indented(_loads(layout), 2)}
   {indented(block(hoisted), 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
-    const double *restrict uk = u + (f / stim) * {_stimuli(stages)};
+    const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
     (void)uk;
     {indented(ticks, 4)}
     if (f % every == 0) {{
@@ -107,10 +108,6 @@ def emit_single(stages: Stages) -> str:
   state[{counters + 1}] = repeats;
 }}
 """
-
-
-def _stimuli(stages: Stages) -> int:
-    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == "u")
 
 
 def _entries(layout: Layout) -> list[tuple[str, int]]:

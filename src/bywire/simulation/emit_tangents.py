@@ -11,6 +11,7 @@ from bywire.simulation.emission import (
     exact_pass,
     indented,
     layout_of,
+    leaf_count,
     leaf_namer,
     statements,
 )
@@ -119,7 +120,7 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
     {indented(t.lines(t.once, True), 4)}
   }}
   for (int64_t f = begin; f < end + last; ++f) {{
-    const double *restrict uk = u + (f / stim) * {_stimuli(stages)};
+    const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
     (void)uk;
     {indented(_ticks(t), 4)}
     if (f % every == 0) {{
@@ -152,10 +153,6 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
   state[{start["counters"] + 1}] = repeats;
 }}
 """
-
-
-def _stimuli(stages: Stages) -> int:
-    return sum(1 for op in stages.graph.nodes if op.op == "leaf" and op.args[0] == "u")
 
 
 def _ticks(t: _Tangents) -> list[str]:
