@@ -20,6 +20,7 @@ from bywire.bench.kpis.registry import families
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
 from bywire.catalog.registry import entries as parameter_sets
+from bywire.core.field_notes import field_notes
 from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import Signal, signals_of
@@ -66,7 +67,7 @@ def parameter_rows(
     cls: type[ParameterSet], defaults: Mapping[str, Any] | None = None, prefix: str = ""
 ) -> Iterator[tuple[str, ...]]:
     """Yield symbol, name, unit, default, range and meaning of numbers and choices."""
-    leaves = leaf_fields(cls)
+    leaves, notes = leaf_fields(cls), field_notes(cls)
     for name, info in cls.model_fields.items():
         dotted = f"{prefix}{name}"
         kind = info.annotation
@@ -78,13 +79,13 @@ def parameter_rows(
         if leaf is None:
             known = ("true", "false") if kind is bool else typing.get_args(kind)
             choices = ", ".join(f"`{c}`" for c in known)
-            yield "", f"`{dotted}`", "", default, choices, info.description or ""
+            yield "", f"`{dotted}`", "", default, choices, notes[name]
             continue
         limits = interval(leaf)
         if defaults is not None:
             default, limits = shown(defaults[dotted], leaf.unit.symbol), range_text(leaf)
         unit = unit_text(leaf.unit.symbol) or "1"
-        yield symbol(dotted), f"`{dotted}`", unit, default, limits, leaf.description
+        yield symbol(dotted), f"`{dotted}`", unit, default, limits, notes[name]
 
 
 def interval(leaf: Leaf) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 from dataclasses import replace
 from typing import get_args
@@ -32,7 +33,7 @@ def check_provenance(found: Entry) -> None:
 
 def check_coverage(found: Entry) -> None:
     """Refuse an entry that leaves a parameter out, or has one too many."""
-    fields = leaf_fields(found.parameter_class).keys() | choice_fields(found.parameter_class).keys()
+    fields = {*leaf_fields(found.parameter_class), *choice_fields(found.parameter_class)}
     assert found.values.keys() == fields
 
 
@@ -98,3 +99,9 @@ def test_kinds_of_provenance():
     made = [paper(1, "a"), derived(1, "a"), chosen(1, "a"), calibrated(1, "a")]
     assert [cited.kind for cited in made] == ["paper", "derived", "chosen", "calibrated"]
     assert set(get_args(Kind)) == {cited.kind for cited in made}
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_begins_with_its_module(name):
+    module = importlib.import_module(f"bywire.catalog.{name.partition('-')[0]}")
+    assert entries()[name] in module.ENTRIES

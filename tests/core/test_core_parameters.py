@@ -10,6 +10,7 @@ import pytest
 from pydantic import Field, model_validator
 
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.field_notes import field_notes
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 from bywire.core.quantities import Fraction, Length, Resistance, Unit
 
@@ -173,13 +174,15 @@ def test_fields_know_unit_range_and_description():
     leaves = leaf_fields(Outer)
     assert list(leaves) == ["inner.R", "share", "table", "n", "long", "short"]
     assert leaves["inner.R"].unit.symbol == "ohm"
-    assert leaves["inner.R"].description == "resistance"
+    assert field_notes(Outer)["inner.R"] == "resistance"
     assert leaves["inner.R"].range_text == "> 0 ohm"
     assert leaves["share"].range_text == "> 0 and <= 1"
     assert leaves["table"].range_text == ">= 0 Pa"
-    assert choice_fields(Outer) == {
-        "inner.law": "which equations", "on": "whether", "note": "what about it",
-    }  # fmt: skip
+    assert choice_fields(Outer) == ("inner.law", "on", "note")
+    notes = field_notes(Outer)
+    assert [notes[name] for name in choice_fields(Outer)] == [
+        "which equations", "whether", "what about it",
+    ]  # fmt: skip
 
 
 def test_fields_cannot_be_changed_by_who_reads_them():

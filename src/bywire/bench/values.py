@@ -44,7 +44,7 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
         elif name in choices:
             found[name] = value
         else:
-            raise unknown_name(kind, name, leaves.keys() | choices.keys())
+            raise unknown_name(kind, name, (*leaves, *choices))
     return found
 
 

@@ -49,12 +49,17 @@ class Entry:
 @cache
 def entries() -> Mapping[str, Entry]:
     """Return every entry of the catalog: all ``ENTRIES`` of the modules in this folder."""
-    found: dict[str, Entry] = {}
-    for module in pkgutil.iter_modules(catalog.__path__):
-        loaded = importlib.import_module(f"{catalog.__name__}.{module.name}")
-        for entry in getattr(loaded, "ENTRIES", ()):
-            found[entry.name] = entry
-    return found
+    return {name: one for module in _modules() for name, one in _of_module(module).items()}
+
+
+def _modules() -> list[str]:
+    return [module.name for module in pkgutil.iter_modules(catalog.__path__)]
+
+
+@cache
+def _of_module(module: str) -> Mapping[str, Entry]:
+    loaded = importlib.import_module(f"{catalog.__name__}.{module}")
+    return {one.name: one for one in getattr(loaded, "ENTRIES", ())}
 
 
 def entry(name: str) -> Entry:
@@ -65,7 +70,10 @@ def entry(name: str) -> Entry:
     UnknownNameError
         With the nearest known names.
     """
-    known = entries()
+    module = name.partition("-")[0]  # a name begins with its module: one import instead of all
+    known = _of_module(module) if module in _modules() else {}
+    if name not in known:
+        known = entries()
     if name not in known:
         raise unknown_name("parameter set", name, known)
     return known[name]

@@ -37,7 +37,6 @@ class Leaf:
     high: float
     low_open: bool
     high_open: bool
-    description: str
 
     @property
     def range_text(self) -> str:
@@ -57,7 +56,6 @@ class ParameterSet(BaseModel):
     model_config = ConfigDict(
         frozen=True,
         extra="forbid",
-        use_attribute_docstrings=True,
         validate_default=True,
         ser_json_inf_nan="constants",
     )
@@ -140,17 +138,17 @@ def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, Leaf]
 
 
 @cache
-def choice_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
-    """Return the description of every structural choice of a class, by dotted name."""
-    found: dict[str, str] = {}
+def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
+    """Return the dotted names of all structural choices of a class."""
+    found: list[str] = []
     for name, info in cls.model_fields.items():
         dotted = f"{prefix}{name}"
         inner = info.annotation
         if isinstance(inner, type) and issubclass(inner, ParameterSet):
-            found |= choice_fields(inner, f"{dotted}.")
+            found += choice_fields(inner, f"{dotted}.")
         elif not any(isinstance(m, Unit) for m in info.metadata):
-            found[dotted] = info.description or ""
-    return MappingProxyType(found)
+            found.append(dotted)
+    return tuple(found)
 
 
 def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
@@ -164,7 +162,7 @@ def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:
             high, high_open = float(cast(float, note.lt)), True
         elif isinstance(note, Le):
             high = float(cast(float, note.le))
-    return Leaf(dotted, unit, low, high, low_open, high_open, info.description or "")
+    return Leaf(dotted, unit, low, high, low_open, high_open)
 
 
 def _node_notes(annotation: Any) -> Iterator[Any]:
@@ -204,7 +202,7 @@ def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Para
 def _require_known(cls: type[ParameterSet], name: str) -> None:
     leaves, choices = leaf_fields(cls), choice_fields(cls)
     if name not in leaves and name not in choices:
-        raise unknown_name("parameter", name, leaves.keys() | choices.keys())
+        raise unknown_name("parameter", name, (*leaves, *choices))
 
 
 def _validated(cls: type[T], tree: Mapping[str, Any]) -> T:

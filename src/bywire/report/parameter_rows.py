@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bywire.catalog.provenance import Cited
-from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
+from bywire.core.field_notes import field_notes
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.report.tables import ParameterRow
 from bywire.report.wording import range_text
 
@@ -27,7 +28,7 @@ def parameter_rows(
         override and the cited one is named.
     """
     leaves = leaf_fields(type(parameters))
-    choices = choice_fields(type(parameters))
+    notes = field_notes(type(parameters))
     rows = []
     for name, value in parameters.flat().items():
         leaf = leaves.get(name)
@@ -37,7 +38,7 @@ def parameter_rows(
                 name=name,
                 value=value,
                 unit="1" if leaf is None else leaf.unit.symbol,
-                range=choices.get(name, "") if leaf is None else range_text(leaf),
+                range=notes[name] if leaf is None else range_text(leaf),
                 kind=kind,
                 where=where,
             )
