@@ -173,10 +173,12 @@ INLINE void commit(const Plant *k, Sim *s, Pass q)
     s->yp += k->lag * (p_share - s->yp), s->yi += k->lag * (i_share - s->yi);
     const double two_i = s->i + q.i, two_om = s->om + q.om;
     const double pm = s->pm + 0.5 * q.dpm, pd = s->pd + 0.5 * q.dpd;
+#ifndef WITHOUT_SUMS /* compiled out for who records no energy */
     s->sum.i += two_i, s->sum.ii += two_i * two_i, s->sum.io += two_i * two_om;
     s->sum.oo += two_om * two_om, s->sum.fo += q.impulse * two_om;
     s->sum.pipe += (pm - pd) * (pm - pd) * pipe_loss(k, pm, pd);
     s->sum.stuck += two_om == 0.0 ? 1.0 : 0.0;
+#endif
     predict(k, s, q);
     s->impulse = q.impulse, s->i = q.i;
     s->th += k->half * two_om;

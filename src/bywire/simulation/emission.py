@@ -32,12 +32,19 @@ class Layout:
 
 
 def unread(stages: Stages) -> frozenset[str]:
-    """Return the half increments that no stage reads: they need not be kept."""
-    graph = stages.graph
-    used = {a for node in range(len(graph.nodes)) for a in graph.arguments(node)}
-    used |= {node for kind in STATE for node in (*stages.fast[kind], *stages.exact[kind])}
+    """Return the half increments, reactions and contacts that no stage reads.
+
+    They need not be kept.
+    """
+    roots = [node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values()
+             for node in nodes]  # fmt: skip
+    roots += [node for tick in stages.ticks for node in tick] + stages.output
+    read = stages.graph.read_by(roots)
     return frozenset(
-        f"d{k}" for k in range(len(stages.fast["d"])) if graph.leaf("d", k) not in used
+        f"{kind}{k}"
+        for kind in ("d", "r", "F")
+        for k in range(len(stages.fast[kind]))
+        if stages.graph.leaf(kind, k) not in read
     )
 
 

@@ -22,13 +22,12 @@ from bywire.simulation.stages import STATE, Stages
 SIGNATURE = """int bw_lanes(void) { return W; }
 
 void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
-    double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
-    double *restrict rec)"""
+    double *restrict state, const int64_t *restrict plan, double *restrict rec)"""
 
 # As for a single run; then whether each lane has a stimulus of its own, and the distance between
 # the recordings of two lanes.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
-  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];
+  const int64_t stim = plan[4], every = plan[5], row0 = plan[6];
   const int64_t own = plan[{at}], apart = plan[{at} + 1];"""
 
 
@@ -160,8 +159,8 @@ def _record(t: _Lanes) -> list[str]:
         f"V o[{max(len(roots), 1)}];",
         *(f"o[{j}] = {t.number(n)};" for j, n in enumerate(roots)),
         "for (int l = 0; l < W; ++l) {",
-        "  double *row = rec + l * apart + (f / every - row0) * chosen;",
-        "  for (int64_t j = 0; j < chosen; ++j) row[j] = o[selection[j]][l];",
+        f"  double *row = rec + l * apart + (f / every - row0) * {len(roots)};",
+        f"  for (int j = 0; j < {len(roots)}; ++j) row[j] = o[j][l];",
         "}",
     ]
 

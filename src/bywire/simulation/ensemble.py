@@ -61,10 +61,17 @@ class Ensemble:
 
 
 class LaneKernel:
-    """Compiled kernel for a group of cases."""
+    """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
 
-    def __init__(self, program: Program, compiler: Compiler) -> None:
-        stages = build_stages(program)
+    Parameters
+    ----------
+    selection
+        Indices of the outputs to record.
+    """
+
+    def __init__(self, program: Program, compiler: Compiler, selection: tuple[int, ...]) -> None:
+        stages = build_stages(program, outputs=selection)
+        self._signals = len(selection)
         self.layout: Layout = layout_of(stages)
         library = ctypes.CDLL(
             str(compile_library(emit_lanes(stages), vector_flags(compiler), compiler))
@@ -80,7 +87,6 @@ class LaneKernel:
         parameters: Array,
         stimulus: Array,
         vector: Array,
-        selection: NDArray[np.int32],
         rows: Array,
     ) -> None:
         """Run one group to its end; renews ``vector`` and fills ``rows``.
@@ -99,7 +105,7 @@ class LaneKernel:
         own = stimulus.ndim == 3
         plan = np.concatenate(
             (
-                plan_array(schedule, 0, schedule.frames, selection.size),
+                plan_array(schedule, 0, schedule.frames, self._signals),
                 [int(own), rows.strides[0] // rows.itemsize],
             )
         ).astype(np.int64)
@@ -109,7 +115,6 @@ class LaneKernel:
             pointer(stimulus),
             pointer(vector),
             pointer(plan),
-            pointer(selection),
             pointer(rows),
         )
 
@@ -151,10 +156,10 @@ def simulate_ensemble(
     compiler = find_compiler()
     if compiler is None:
         return _one_by_one(run, variations, tuple(signals))
-    kernel = _lane_kernel(program, compiler)
-    schedule, outputs = run.schedule(), tuple(program.outputs)
+    selection = selected(tuple(program.outputs), signals)
+    kernel = _lane_kernel(program, compiler, tuple(selection.tolist()))
+    schedule = run.schedule()
     stimulus = sampled_stimulus(run, schedule)
-    selection = selected(outputs, signals)
     count = matrix.shape[1]
     padded = -(-count // kernel.lanes) * kernel.lanes
     values = np.empty((padded, schedule.rows, len(signals)))
@@ -166,7 +171,7 @@ def simulate_ensemble(
         vector = np.repeat(start[:, None], kernel.lanes, axis=1)
         # Lanes beyond the last case repeat it.
         columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
-        kernel.run(schedule, columns, stimulus, vector, selection, values[cases[0] : cases[-1] + 1])
+        kernel.run(schedule, columns, stimulus, vector, values[cases[0] : cases[-1] + 1])
         last = min(cases[-1], count - 1)
         require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
@@ -184,8 +189,10 @@ def simulate_ensemble(
 
 
 @cache
-def _lane_kernel(program: Program, compiler: Compiler) -> LaneKernel:
-    return LaneKernel(program, compiler)
+def _lane_kernel(
+    program: Program, compiler: Compiler, selection: tuple[int, ...]
+) -> LaneKernel:
+    return LaneKernel(program, compiler, selection)
 
 
 def _one_by_one(run: Run, variations: Variations, signals: tuple[str, ...]) -> Ensemble:

@@ -7,7 +7,7 @@ becomes a times a reciprocal that others can share, and paired selections become
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from typing import Any
@@ -133,6 +133,17 @@ class Graph:
         """Return the nodes that a node is computed from."""
         operation = self.nodes[node]
         return () if operation.op in ("leaf", "const") else operation.args
+
+    def read_by(self, roots: Iterable[Node]) -> frozenset[Node]:
+        """Return all nodes, leaves and constants too, that values are computed from."""
+        seen: set[Node] = set()
+        stack = list(roots)
+        while stack:
+            node = stack.pop()
+            if node not in seen:
+                seen.add(node)
+                stack.extend(self.arguments(node))
+        return frozenset(seen)
 
     def intern(self, operation: Operation) -> Node:
         """Return the node of an operation as it stands."""

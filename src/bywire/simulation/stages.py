@@ -66,7 +66,9 @@ class Stages:
         return found
 
 
-def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
+def build_stages(
+    program: Program, directions: Sequence[int] = (), outputs: Sequence[int] | None = None
+) -> Stages:
     """Put all functions of a program into one graph.
 
     Parameters
@@ -75,6 +77,9 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         The symbolic functions.
     directions
         Indices of the parameters that tangents are taken along; empty for none.
+    outputs
+        Indices of the signals to compute; all by default. Integrals that none of them reads
+        stay zero.
     """
     n = program.sizes
     ranges = {("p", k): Interval(*r) for k, r in enumerate(program.parameter_ranges.values())}
@@ -104,7 +109,16 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         return graph.add_function(seeded, inputs)
 
     parts = ("x", "d", "r", "F", "q", "flag")
+    output = add(program.output, "xmprFqh")[0]
+    output = output if outputs is None else [output[k] for k in outputs]
     fast = dict(zip(parts, add(program.fast, "xdmph"), strict=True))
+    if outputs is not None:
+        read = graph.read_by(output)
+        zero = graph.constant(0.0)
+        fast["q"] = [
+            node if leaf in read else zero
+            for node, leaf in zip(fast["q"], leaves["q"], strict=True)
+        ]
     level = Levels(graph, LEVEL)
     substep = frozenset(needed(graph, _all_but(fast, "q"), lambda _: False))
     quadrature = factored(graph, fast["q"], substep, level)
@@ -115,7 +129,7 @@ def build_stages(program: Program, directions: Sequence[int] = ()) -> Stages:
         quadrature=quadrature,
         exact=dict(zip(parts, add(program.exact, "xdmph"), strict=True)),
         ticks=[add(tick, "xmup")[0] for tick in program.ticks],
-        output=add(program.output, "xmprFqh")[0],
+        output=output,
         fast_t=dict(zip(parts, tangent(program.fast, "xdmph"), strict=True)),
         exact_t=dict(zip(parts, tangent(program.exact, "xdmph"), strict=True)),
         ticks_t=[tangent(tick, "xmup")[0] for tick in program.ticks],

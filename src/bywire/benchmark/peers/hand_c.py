@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 SOURCE = Path(__file__).parents[1] / "hand_written.c"
 THREADS = ("-O2", "-fopenmp")
+WITHOUT_SUMS = ("-DWITHOUT_SUMS",)
+"""leaves out the energies, whose outputs then mean nothing: where none of them is recorded"""
 OUTPUTS = Output._fields
 CHOICES = {
     "gear.law": "paper",
@@ -127,8 +129,8 @@ class HandWritten:
     par
         Any parameter set of the structure that it covers.
     flags
-        ``PLAIN`` for single runs, ``THREADS`` for ensembles; both on top of the flags that all
-        kernels of bywire get, so that code is compared and not compiler settings.
+        ``PLAIN`` for single runs, ``THREADS`` for ensembles, ``WITHOUT_SUMS`` beside either; on top of
+        the flags that all kernels of bywire get, so that code is compared and not settings.
 
     Raises
     ------
