@@ -129,8 +129,8 @@ class HandWritten:
     par
         Any parameter set of the structure that it covers.
     flags
-        ``PLAIN`` for single runs, ``THREADS`` for ensembles, ``WITHOUT_SUMS`` beside either; on top of
-        the flags that all kernels of bywire get, so that code is compared and not settings.
+        ``PLAIN`` for single runs, ``THREADS`` for ensembles, ``WITHOUT_SUMS`` beside either; on
+        top of the flags that all kernels get, so that code is compared and not settings.
 
     Raises
     ------
