@@ -136,3 +136,21 @@ def test_warnings_of_a_library_come_as_messages(bywire, bench, monkeypatch):
     monkeypatch.setattr("bywire.cli.run_command.run", noisy)
     outcome = bywire("run", bench(), "--json")
     assert (outcome.status, outcome.lines) == (0, ["bywire: warning: seeded"])
+
+
+@pytest.mark.parametrize("name", ["hard-braking", "moment-ramp"])
+def test_an_experiment_runs_by_its_name(bywire, name):
+    outcome = bywire("run", name, "--json", "--set", "simulation.seed=1")
+    assert outcome.status == 0
+    assert outcome.object["bench"] == name
+    assert outcome.object["kpis"]
+
+
+def test_a_file_comes_before_an_experiment_of_its_name(bywire, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "hard-braking").write_text("nothing = 1")
+    refused(bywire("run", "hard-braking"), "unknown key 'nothing'")
+
+
+def test_misspelled_experiment(bywire):
+    refused(bywire("run", "moment-pulse"), "did you mean moment-pulses?")

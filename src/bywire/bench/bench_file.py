@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.registry import find_experiment
+from bywire.bench.registry import all_experiments, find_experiment
 from bywire.bench.stimuli import registry as stimuli
 from bywire.bench.values import parsed, require_unit, require_units
-from bywire.catalog.registry import entry
+from bywire.catalog.registry import entry, main_set
 from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
 
 _SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
@@ -25,6 +25,7 @@ LARGEST = 1_000_000
 
 # The time to read a dotted key grows with the square of its parts, so long ones are not read.
 _KEY_PARTS = 16
+_NAME = re.compile(r"[a-z][a-z0-9-]*")
 _PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
 _LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_KEY_PARTS}}}")
 
@@ -53,12 +54,15 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
 
     Parameters
     ----------
+    path
+        Bench file; or the bare name of an experiment, which is then run with its defaults and
+        the main parameter set of its brake.
     changes
         ``options.NAME``, ``stimulus.NAME``, ``simulation.NAME``, ``requirements.NAME``,
         ``experiment``, ``parameters``, or the dotted name of a parameter.
     """
     file = Path(path)
-    content = _parsed(file)
+    content = _of_experiment(file) or _parsed(file)
     try:
         _require_shape(content)
         return from_mapping(_changed(content, changes), file.parent, _printable(file.stem))
@@ -112,6 +116,15 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def _of_experiment(file: Path) -> dict[str, Any]:
+    """Return the shortest bench file of an experiment; nothing where there is a file instead."""
+    name = str(file)
+    if not _NAME.fullmatch(name) or file.exists() or name not in all_experiments():
+        return {}
+    assembly = find_experiment(name).assembly
+    return {"experiment": name, "parameters": main_set(assembly)}
+
+
 def _parsed(file: Path) -> dict[str, Any]:
     text = _text(file)
     try:
@@ -152,9 +165,10 @@ def _nearest(file: Path) -> str:
     with contextlib.suppress(OSError):
         there = [path.name for path in file.parent.glob("*.toml")]
         near = get_close_matches(file.name, there, n=1, cutoff=0.5)
+        near += get_close_matches(str(file), all_experiments(), n=1, cutoff=0.7)
         if near:
             return f"did you mean {file.with_name(near[0])}?"
-    return "check the path"
+    return "check the path, or name an experiment of 'bywire list'"
 
 
 def _printable(name: str) -> str:

@@ -79,6 +79,11 @@ def entry(name: str) -> Entry:
     return known[name]
 
 
+def main_set(assembly: str) -> str:
+    """Return the name of the first parameter set that the catalog has for an assembly."""
+    return next(name for name, one in entries().items() if one.assembly == assembly)
+
+
 def parameters(name: str) -> ParameterSet:
     """Return the parameters of a set of the catalog, validated.
 

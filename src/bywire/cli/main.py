@@ -54,7 +54,7 @@ def list_command(json: JsonFlag = False) -> None:
 
 @app.command()
 def run(
-    bench: Annotated[Path, typer.Argument(help="Bench file (TOML).", show_default=False)],
+    bench: Annotated[Path, typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False)],
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
@@ -62,7 +62,7 @@ def run(
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
-    """Run a bench file; exit status 1 when a requirement is not met."""
+    """Run a bench file or an experiment; exit status 1 when a requirement is not met."""
     raise typer.Exit(_execute("run_command", bench, _changes(set_ or []), out, json))
 
 
