@@ -104,9 +104,42 @@ def test_operating_points_that_have_no_slope_are_refused() -> None:
     options: dict[str, Any] = {"inputs": ("i_source",), "outputs": ("p_mc",)}
     with pytest.raises(ParameterError, match="at rest"):
         linearize(MotorcycleBrake(), par, state, memory, friction="sliding", **options)
-    with pytest.raises(ParameterError, match="closed"):
-        linearize(MotorcycleBrake(), par, state._replace(theta=0.0), memory, **options)
+    touching = state._replace(theta=par.master_cylinder.x_rest / par.gear.k_g)
+    with pytest.raises(ParameterError, match="just touches"):
+        linearize(MotorcycleBrake(), par, touching, memory, **options)
+    moving = state._replace(omega=1e-3)
+    with pytest.raises(ParameterError, match="not stuck"):
+        linearize(MotorcycleBrake(), par, moving, memory, friction="stuck", **options)
     with pytest.raises(UnknownNameError, match="i_sorce"):
         linearize(MotorcycleBrake(), par, state, memory, inputs=("i_sorce",), outputs=("p_mc",))
     with pytest.raises(UnknownNameError, match="p_cm"):
         linearize(MotorcycleBrake(), par, state, memory, inputs=("i_source",), outputs=("p_cm",))
+
+
+def test_closed_contact_acts_with_its_stiffness_and_damping() -> None:
+    par = brake("dardanelli2010")
+    free = state_at(P, par)
+    pressed = free._replace(theta=(par.master_cylinder.x_rest - 1e-5) / par.gear.k_g)
+    memory = memory_at(P, par)
+    options: dict[str, Any] = {"inputs": ("i_source",), "outputs": ("p_mc",)}
+    model, apart = (
+        linearize(MotorcycleBrake(), par, state, memory, **options) for state in (pressed, free)
+    )
+    row, angle = (model.states.index(name) for name in ("omega", "theta"))
+    inertia = par.gear.eta_g * par.gear.J_mot + par.gear.k_g**2 * par.gear.M_mc
+    stiffness = par.gear.k_g**2 * par.stop.k_stop / inertia
+    assert model.A[row, angle] - apart.A[row, angle] == pytest.approx(-stiffness, rel=1e-9)
+    damping = stiffness * par.stop.tau_stop
+    assert model.A[row, row] - apart.A[row, row] == pytest.approx(-damping, rel=1e-6)
+
+
+def test_stuck_velocity_stays_zero() -> None:
+    par = brake("dardanelli2010", **{"seal.T_pr": 2e-3})
+    model = linearize(
+        MotorcycleBrake(), par, state_at(P, par), memory_at(P, par),
+        inputs=("i_source",), outputs=("p_mc",), friction="stuck",
+    )  # fmt: skip
+    row = model.states.index("omega")
+    assert not model.A[row].any()
+    assert not model.B[row].any()
+    assert model.A[model.states.index("p_mc")].any()

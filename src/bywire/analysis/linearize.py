@@ -12,8 +12,10 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of, zeros
+from bywire.simulation.contacts import active_set
 
-Friction = Literal["removed", "sliding"]
+Friction = Literal["removed", "sliding", "stuck"]
+_TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
 
 
 def linearize(
@@ -31,8 +33,9 @@ def linearize(
     .. math:: m_k(x) \dot x_k = f_k(x, u) \;\Rightarrow\;
         A_{kj} = \partial (f_k / m_k) / \partial x_j
 
-    Valid for small motions between the contacts and off the one-sided limits. Dry friction is
-    set-valued and has no derivative at rest.
+    Valid for small motions in which no contact opens or closes, and off the one-sided limits.
+    Closed contacts act with their stiffness and damping. Dry friction is set-valued and has no
+    derivative at rest.
 
     Parameters
     ----------
@@ -47,13 +50,15 @@ def linearize(
     friction
         ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
         force of the sliding direction with its slope; every friction's velocity must be nonzero.
+        ``"stuck"``: every velocity with friction stays zero.
 
     Raises
     ------
     UnknownNameError
         When an input or output is unknown.
     ParameterError
-        When a contact is closed, or a friction at rest with ``friction="sliding"``.
+        When a contact just touches, a friction is at rest with ``friction="sliding"``, or moves
+        with ``"stuck"``.
 
     Notes
     -----
@@ -61,7 +66,6 @@ def linearize(
     """
     _require_known("input", inputs, model.Memory._fields)
     _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
-    _require_open(model, par, state)
     A, B, C, D, rate = _jacobians(model, par, state, memory, inputs, outputs, friction)
     states, held = signals_of(model.State), signals_of(model.Memory)
     known = states | signals_of(model.Output)
@@ -109,8 +113,7 @@ def _smooth(
     """Return rates and outputs as symbols."""
     import casadi as ca
 
-    groups = model.gap(state, state, par)
-    contact = (0.0,) * sum(len(group) for group in groups)
+    contact = _contact_forces(model, par, state, x)
     force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
     reaction = [0.0] * (len(model.frictions) + len(model.limits))
     if friction == "sliding":
@@ -118,6 +121,10 @@ def _smooth(
         for k, (name, (low, high)) in enumerate(zip(model.frictions, bounds, strict=True)):
             reaction[k] = low if _direction(name, state) > 0 else high
             force[name] = force[name] + reaction[k]
+    if friction == "stuck":
+        for name in model.frictions:
+            _require_rest(name, state)
+            force[name] = 0.0 * force[name]
     mass = model.mass(x, par)
     rate = ca.vertcat(*(force[name] / getattr(mass, name) for name in x._fields))
     flow = zeros(cast(Any, model.Flow))
@@ -136,14 +143,34 @@ def _direction(name: str, state: NamedTuple) -> float:
     return speed
 
 
-def _require_open(model: Model, par: ParameterSet, state: NamedTuple) -> None:
-    gaps = [float(d) for group in model.gap(state, state, par) for d in group]
-    closed = [str(k) for k, d in enumerate(gaps) if d > 1e-12]
-    if closed:
-        raise ParameterError(
-            f"{model.name}: contact {', '.join(closed)} is closed at the operating point: choose "
-            "a point between the stops"
-        )
+def _require_rest(name: str, state: NamedTuple) -> None:
+    speed = float(getattr(state, name))
+    if speed != 0.0:
+        raise ParameterError(f"{name} = {speed:g}: what moves is not stuck; use friction='sliding'")
+
+
+def _contact_forces(
+    model: Model, par: ParameterSet, state: NamedTuple, x: Any
+) -> tuple[Any, ...]:
+    """Return the forces of all contacts as symbols, for the contacts closed at ``state``."""
+    import casadi as ca
+
+    forces: list[Any] = []
+    matrices = model.compliance(par)
+    gaps, moving = model.gap(state, state, par), model.gap(x, x, par)
+    for C, d, depth in zip(matrices, gaps, moving, strict=True):
+        stiffness = active_set(ca.SX(ca.DM(C)), ca.SX(ca.DM([float(one) for one in d]))).stiffness
+        K = np.array(ca.DM(ca.evalf(stiffness)))
+        F = K @ np.array(d, dtype=float)
+        left = np.where(F > 0, np.diag(C) * F, np.array(C) @ F - np.array(d, dtype=float))
+        if np.min(left) < _TOUCH:
+            k = len(forces) + int(np.argmin(left))
+            raise ParameterError(
+                f"{model.name}: contact {k} just touches at the operating point: choose a point "
+                "at which it is clearly open or closed"
+            )
+        forces += ca.vertsplit(ca.DM(K) @ ca.vertcat(*depth))
+    return tuple(forces)
 
 
 def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> None:
