@@ -26,6 +26,7 @@ def closed_loop(
     inputs: Sequence[str],
     outputs: Sequence[str],
     locked: Sequence[str] = (),
+    stimulus: NamedTuple | None = None,
 ) -> LinearModel:
     r"""Return a model with its controllers, from one instant at which all of them run to the next.
 
@@ -50,6 +51,9 @@ def closed_loop(
         Fields of Output or State.
     locked
         States held at the operating point, for instance angle and speed of a locked rotor.
+    stimulus
+        Stimulus at the operating point, where a limit of the controller depends on it; zero by
+        default.
 
     Raises
     ------
@@ -69,7 +73,8 @@ def closed_loop(
     kept = [name for name in plant.states if name not in locked]
     frame, every = _frames([task.period for task in tasks])
     plant = plant.reduced(kept, held=bool(locked)).sampled(frame)
-    ticks = [_tick(task, model, state, memory, par, inputs, kept) for task in tasks]
+    at = zeros(cast(Any, model.Stimulus)) if stimulus is None else stimulus
+    ticks = [_tick(task, model, par, (state, memory, at), inputs, kept) for task in tasks]
     common = math.lcm(*every)
     A, B = np.eye(len(kept) + len(fields)), np.zeros((len(kept) + len(fields), len(inputs)))
     for f in range(common):
@@ -115,22 +120,22 @@ def _frame(plant: LinearModel, tick: list[Any]) -> tuple[Any, Any]:
 def _tick(
     task: Task,
     model: Model,
-    state: NamedTuple,
-    memory: NamedTuple,
     par: ParameterSet,
+    point: tuple[Any, Any, Any],
     inputs: Sequence[str],
     kept: Sequence[str],
 ) -> list[Any]:
     """Return the Jacobians of the new memory by kept states, memory and inputs."""
     import casadi as ca
 
+    state, memory, stimulus = point
     sizes = {"x": len(kept), "m": len(memory), "u": len(inputs)}
     x, m, u = (ca.SX.sym(name, size) for name, size in sizes.items())
     at = state._replace(**dict(zip(kept, ca.vertsplit(x), strict=True)))
-    stimulus: Any = zeros(cast(Any, model.Stimulus))
-    stimulus = stimulus._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
+    driven = stimulus._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
     held = cast(Any, model.Memory)(*ca.vertsplit(m))
-    renewed = ca.vertcat(*task.tick(at, held, stimulus, par))
+    renewed = ca.vertcat(*task.tick(at, held, driven, par))
     jacobians = ca.Function("tick", [x, m, u], [ca.jacobian(renewed, v) for v in (x, m, u)])
-    values = jacobians([getattr(state, n) for n in kept], list(memory), np.zeros(len(inputs)))
+    at_x, at_u = [getattr(state, n) for n in kept], [getattr(stimulus, n) for n in inputs]
+    values = jacobians(at_x, list(memory), at_u)
     return [np.array(value, dtype=float) for value in values]

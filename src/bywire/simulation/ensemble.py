@@ -81,15 +81,16 @@ class LaneKernel:
         self._run = library.bw_run_lanes
         self._run.restype = None
 
-    def run(
+    def advance(
         self,
         schedule: Schedule,
         parameters: Array,
         stimulus: Array,
         vector: Array,
         rows: Array,
+        end: int,
     ) -> None:
-        """Run one group to its end; renews ``vector`` and fills ``rows``.
+        """Run the frames of one group up to ``end``; renews ``vector`` and fills ``rows``.
 
         Parameters
         ----------
@@ -105,7 +106,7 @@ class LaneKernel:
         own = stimulus.ndim == 3
         plan = np.concatenate(
             (
-                plan_array(schedule, 0, schedule.frames, self._signals),
+                plan_array(schedule, 0, end, self._signals),
                 [int(own), rows.strides[0] // rows.itemsize],
             )
         ).astype(np.int64)
@@ -157,7 +158,7 @@ def simulate_ensemble(
     if compiler is None:
         return _one_by_one(run, variations, tuple(signals))
     selection = selected(tuple(program.outputs), signals)
-    kernel = _lane_kernel(program, compiler, tuple(selection.tolist()))
+    kernel = lane_kernel(program, compiler, tuple(selection.tolist()))
     schedule = run.schedule()
     stimulus = sampled_stimulus(run, schedule)
     count = matrix.shape[1]
@@ -171,7 +172,8 @@ def simulate_ensemble(
         vector = np.repeat(start[:, None], kernel.lanes, axis=1)
         # Lanes beyond the last case repeat it.
         columns = np.ascontiguousarray(matrix[:, np.minimum(cases, count - 1)])
-        kernel.run(schedule, columns, stimulus, vector, values[cases[0] : cases[-1] + 1])
+        rows = values[cases[0] : cases[-1] + 1]
+        kernel.advance(schedule, columns, stimulus, vector, rows, schedule.frames)
         last = min(cases[-1], count - 1)
         require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
@@ -189,9 +191,8 @@ def simulate_ensemble(
 
 
 @cache
-def _lane_kernel(
-    program: Program, compiler: Compiler, selection: tuple[int, ...]
-) -> LaneKernel:
+def lane_kernel(program: Program, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
+    """Return the kernel that records some outputs; built once."""
     return LaneKernel(program, compiler, selection)
 
 

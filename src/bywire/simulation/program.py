@@ -39,7 +39,7 @@ class Program:
     parameter_ranges
         Names in the order of the parameter vector, each with its admissible range.
     contact_jacobians
-        ``(x, m, p)`` -> Jacobians of dx/dt with contacts open and closed.
+        ``(x, m, p)`` -> Jacobians of dx/dt, see ``stiff_contacts.contact_jacobians``.
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, contact, flow, flag)``, see ``scheme.Pass``.
     ticks

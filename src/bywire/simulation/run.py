@@ -174,8 +174,8 @@ def _doubt(run: Run) -> str:
     if not run.model.compliance(run.par):
         return ""
     p = np.array(list(run.par.leaves().values()))
-    opened, closed = jacobians(np.array(run.state), np.array(run.memory), p)
-    return unresolved(np.array(opened), np.array(closed), run.step)
+    opened, *closed = map(np.array, jacobians(np.array(run.state), np.array(run.memory), p))
+    return unresolved(opened, closed, run.step)
 
 
 def _advance_all(

@@ -112,9 +112,13 @@ def _with_signs(S: Any, c: Any, low: Any, high: Any, signs: tuple[int, ...]) -> 
 
 
 def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
+    # A row is judged by the largest of what it adds up: where forces cancel (a body squeezed from
+    # both sides), what is left of them is rounding.
     worst = ca.SX(0)
-    for k in range(c.shape[0]):
-        scale = ca.fabs(w[k]) + ca.fabs(c[k] / S[k, k]) + 1e-300
+    m = c.shape[0]
+    for k in range(m):
+        parts = sum((ca.fabs(S[k, j] * w[j]) for j in range(m) if j != k), ca.fabs(c[k]))
+        scale = parts / S[k, k] + 1e-300
         worst = ca.fmax(worst, ca.fabs(_row(S, c, low, high, w, k) - w[k]) / scale)
     return worst
 

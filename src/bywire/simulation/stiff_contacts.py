@@ -7,6 +7,7 @@ settles; damping of about half the critical one or more keeps it bounded.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import casadi as ca
@@ -15,13 +16,18 @@ from numpy.typing import NDArray
 
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
+from bywire.simulation.symbols import SX, column, depends, scalars, symbol_tuple
 
 SAFE, DAMPED = 2.0, 0.5  # h omega, and damping ratio
+# What a contact gives may bend with its force: then every slope counts, not only that at the start.
+LOADS = (0.0, *(10.0 ** (0.5 * k) for k in range(-6, 15)))  # N or N m
 
 
 def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -> Any:
-    """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed."""
+    """Return the function (x, m, p) -> Jacobians of dx/dt, contacts open and all closed.
+
+    Where the balance is not linear in the contact forces, closed at each of ``LOADS``.
+    """
     groups = model.compliance(par)
     K = ca.diagcat(*(_stiffness(C) for C in groups)) if groups else SX(0, 0)
     force = SX.sym("contact_", K.shape[0])
@@ -31,23 +37,32 @@ def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -
     rate = f / column(model.mass(state, par))
     opened = ca.substitute(ca.jacobian(rate, x), force, SX.zeros(force.shape[0]))
     through = ca.jacobian(rate, force) @ K @ ca.jacobian(gap, x)
-    return ca.Function("contact_jacobians", [x, m, p], [opened, opened + through])
+    loads = LOADS if depends(through, force) else LOADS[:1]
+    closed = [opened + ca.substitute(through, force, load * SX.ones(force.shape)) for load in loads]
+    return ca.Function("contact_jacobians", [x, m, p], [opened, *closed])
 
 
 def _stiffness(C: Any) -> Any:
     return ca.inv(SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))))
 
 
-def unresolved(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> str:
+def unresolved(
+    opened: NDArray[np.float64], closed: Sequence[NDArray[np.float64]], step: float
+) -> str:
     """Return what is wrong with a step for the closed contacts; empty where nothing is.
 
     Parameters
     ----------
     opened, closed
-        Jacobians of dx/dt [1/s], shape (nx, nx) each.
+        Jacobians of dx/dt [1/s], shape (nx, nx) each, closed at one load or several.
     step
         Substep [s].
     """
+    found = (_too_fast(opened, one, step) for one in closed)
+    return next((text for text in found if text), "")
+
+
+def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> str:
     if not (np.all(np.isfinite(opened)) and np.all(np.isfinite(closed))):
         return ""
     fastest = np.abs(np.linalg.eigvals(opened).imag).max(initial=0.0)

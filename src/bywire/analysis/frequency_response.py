@@ -1,0 +1,169 @@
+"""Frequency response of a nonlinear sampled loop, sine by sine, over frequency and amplitude."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.harmonics import amplitudes as harmonics
+from bywire.analysis.response_dataset import Sweep, as_dataset
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.simulation.repetition import Repeated, repeat
+from bywire.simulation.run import Run
+from bywire.simulation.variations import case_matrix
+
+Array = NDArray[np.float64]
+
+HARMONICS = 9
+"""highest harmonic that counts as distortion"""
+_CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
+
+
+def frequency_response(
+    run: Run, sweep: Sweep, progress: Callable[[str, float], None] | None = None
+) -> xr.Dataset:
+    """Measure the response at every frequency, amplitude and variant.
+
+    Parameters
+    ----------
+    run
+        The loop: model, parameters, start, and the stimulus whose value at time zero is the mean
+        that the sine is added to. Its duration and recording interval are not used.
+    sweep
+        Frequencies, amplitudes, variants.
+    progress
+        Called with ``"frequency response"`` and the finished share, 0 to 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
+        input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``windows``,
+        ``settled`` (0 or 1), and ``share_FLAG`` for every flag. Gain and phase are NaN where the
+        output does not move at all: what sticks has no gain.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is unknown.
+    ParameterError
+        When frequencies or amplitudes are not positive, or a frequency is above half the rate at
+        which the controller samples.
+    SolverError
+        When a trajectory leaves the numbers.
+    """
+    _check(run, sweep)
+    signals = (sweep.output, *sweep.flags)
+    variations = dict(sweep.variations or {})
+    matrix = case_matrix(run, variations) if variations else _own(run)
+    variants, sizes = matrix.shape[1], np.asarray(sweep.amplitudes, dtype=float)
+    plans = [_window(run, f, sweep) for f in sweep.frequencies]
+    cases, each = np.repeat(matrix, sizes.size, axis=1), np.tile(sizes, variants)
+
+    def measure(plan: tuple[float, int]) -> dict[str, Array]:
+        window, periods = plan
+        own = replace(run, duration=window, record=_interval(run))
+        found = _repeated(own, sweep, cases, each, periods, signals)
+        measured = _measured(found, each, periods / window, sweep.flags)
+        return {name: value.reshape(variants, sizes.size) for name, value in measured.items()}
+
+    done: list[dict[str, Array]] = []
+    pool = ThreadPoolExecutor(os.cpu_count() or 1)
+    try:
+        for k, one in enumerate(pool.map(measure, plans)):
+            done.append(one)
+            if progress is not None:
+                progress("frequency response", (k + 1) / len(plans))
+    finally:  # an interrupt waits for what runs, and starts nothing more
+        pool.shutdown(cancel_futures=True)
+    return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
+
+
+def _check(run: Run, sweep: Sweep) -> None:
+    if sweep.input not in run.model.Stimulus._fields:
+        raise unknown_name("signal of the stimulus", sweep.input, run.model.Stimulus._fields)
+    for name in (sweep.output, *sweep.flags):
+        if name not in run.model.Output._fields:
+            raise unknown_name("signal", name, run.model.Output._fields)
+    for kind, values in (("frequencies", sweep.frequencies), ("amplitudes", sweep.amplitudes)):
+        if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
+            raise ParameterError(f"{kind} = {list(values)}: positive numbers are wanted")
+    nyquist = 0.5 / _interval(run)
+    highest = max(sweep.frequencies)
+    if highest >= nyquist:
+        raise ParameterError(
+            f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
+            f"{nyquist:g} Hz: ask for lower frequencies"
+        )
+
+
+def _own(run: Run) -> Array:
+    return np.array(list(run.par.leaves().values()))[:, None]
+
+
+def _interval(run: Run) -> float:
+    """Return the sample time of the fastest task [s]: the sine steps with it."""
+    return min(task.period for task in run.model.tasks(run.par))
+
+
+def _window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
+    """Return length [s] and periods of the window that comes closest to a frequency."""
+    periods = [task.period for task in run.model.tasks(run.par)] + [1.0 / w for w in sweep.whole]
+    step = run.step
+    counts = [round(period / step) for period in periods]
+    common = math.lcm(*counts) * step
+    least = max(sweep.least, math.ceil(sweep.shortest * f))
+    choices = []
+    for n in range(least, least + _CHOICES):
+        length = max(round(n / f / common), 1) * common
+        whole = max(round(f * length), 1)
+        choices.append((abs(whole / length / f - 1.0), length, whole))
+    _, length, whole = min(choices)
+    return length, whole
+
+
+def _repeated(
+    own: Run, sweep: Sweep, matrix: Array, sizes: Array, periods: int, signals: tuple[str, ...]
+) -> Repeated:
+    """Run all amplitudes and variants at one frequency until they repeat."""
+    column = own.model.Stimulus._fields.index(sweep.input)
+    times = own.schedule().stimulus_times[:-1]
+    f = periods / own.duration
+    stimuli = np.repeat(own.stimulus(np.zeros(1)), times.size, axis=0)
+    stimuli = np.repeat(stimuli[None], matrix.shape[1], axis=0)
+    stimuli[:, :, column] += sizes[:, None] * np.sin(2.0 * math.pi * f * times)
+
+    def repeats(before: Array, now: Array) -> NDArray[np.bool_]:
+        t = np.asarray(np.arange(now.shape[1]) * own.record, dtype=np.float64)
+        a, b = (np.array([harmonics(t, y, f, 1)[0] for y in w[:, :, 0]]) for w in (before, now))
+        return np.asarray(np.abs(b - a) <= sweep.tolerance * np.abs(b))
+
+    return repeat(own, matrix, stimuli, signals, repeats, sweep.most)
+
+
+def _measured(
+    found: Repeated, sizes: Array, f: float, flags: Sequence[str]
+) -> dict[str, Array]:
+    """Return the figures of all cases at one frequency, shape (cases,) each."""
+    count = max(min(HARMONICS, int(0.5 / (f * (found.time[1] - found.time[0])))), 1)
+    outputs = found.values[:, :, 0]
+    lines = np.array([harmonics(found.time, y, f, count) for y in outputs])
+    moves = np.ptp(outputs, axis=1) > 0
+    size = np.where(moves, np.abs(lines[:, 0]), np.nan)
+    shown = {
+        "gain": size / sizes,
+        "phase": np.where(moves, np.degrees(np.angle(lines[:, 0])), np.nan),
+        "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / size,
+        "windows": found.windows.astype(float),
+        "settled": found.repeats.astype(float),
+        "unsettled_substeps": found.unsettled.astype(float),
+    }
+    shares = found.values[:, :, 1:].mean(axis=1)
+    return shown | {f"share_{name}": shares[:, k] for k, name in enumerate(flags)}

@@ -1,0 +1,168 @@
+"""Periodic excitation: the same window again and again, until the response repeats itself."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError, StepError
+from bywire.simulation.compiler import find_compiler
+from bywire.simulation.engine import prepare
+from bywire.simulation.ensemble import lane_kernel
+from bywire.simulation.native import Request
+from bywire.simulation.run import Run, initial_vector, require_finite, selected
+from bywire.simulation.schedule import Schedule
+
+Array = NDArray[np.float64]
+Repeats = Callable[[Array, Array], NDArray[np.bool_]]
+
+
+@dataclass(frozen=True)
+class Repeated:
+    """The last window of every case.
+
+    Parameters
+    ----------
+    time, values
+        Shapes (rows,) and (cases, rows, signals); the window's end is not among the rows.
+    windows
+        Windows that each case took, shape (cases,).
+    repeats
+        Whether the last window repeated the one before, shape (cases,).
+    unsettled
+        Substeps of each case that hit the cap of the contact iteration, shape (cases,).
+    """
+
+    time: Array
+    values: Array
+    windows: NDArray[np.int64]
+    repeats: NDArray[np.bool_]
+    unsettled: NDArray[np.int64]
+
+
+def repeat(
+    run: Run,
+    matrix: Array,
+    stimuli: Array,
+    signals: Sequence[str],
+    repeats: Repeats,
+    most: int,
+) -> Repeated:
+    """Run every case window after window until all cases of its group of lanes repeat.
+
+    Parameters
+    ----------
+    run
+        Its duration is one window: whole sample times and recording intervals. Its own stimulus
+        is not used.
+    matrix
+        Parameter vectors, shape (parameters, cases); see ``variations.case_matrix``.
+    stimuli
+        One window of each case, shape (cases, rows, nu), rows at ``schedule.stimulus_times``
+        without the end.
+    signals
+        Outputs to record.
+    repeats
+        ``repeats(before, now) -> bool``, both of shape (n, rows, signals), result (n,).
+    most
+        Windows after which a case is given up, >= 2.
+
+    Raises
+    ------
+    StepError
+        When a window holds no whole number of sample times.
+    ParameterError
+        When the shapes do not fit.
+    SolverError
+        When a trajectory leaves the numbers.
+    """
+    schedule = window_schedule(run)
+    count = matrix.shape[1]
+    rows = schedule.frames // schedule.stimulus_frames
+    if stimuli.shape[:2] != (count, rows):
+        raise ParameterError(f"stimuli: shape ({count}, {rows}, nu) is wanted, got {stimuli.shape}")
+    prepared = prepare(run.model, run.par)
+    selection = selected(tuple(prepared.program.outputs), signals)
+    compiler = find_compiler()
+    # One frame too many: the end of a window is the beginning of the next, and ticks only there.
+    open_end = replace(schedule, frames=schedule.frames + 1)
+    if compiler is None:
+        advance, lanes = _one_by_one(run, open_end, selection), 1
+    else:
+        kernel = lane_kernel(prepared.program, compiler, tuple(selection.tolist()))
+        lanes = kernel.lanes
+
+        def advance(p: Array, u: Array, vector: Array, values: Array) -> None:
+            kernel.advance(open_end, p, u, vector, values, open_end.frames - 1)
+
+    layout = prepared.engine("auto").layout
+    start = initial_vector(layout, run.state, run.memory)
+
+    def group(first: int) -> tuple[Array, int, NDArray[np.bool_], Array]:
+        lane = np.minimum(np.arange(first, first + lanes), count - 1)
+        columns = np.ascontiguousarray(matrix[:, lane])
+        u = np.ascontiguousarray(np.moveaxis(stimuli[lane], 0, 2))
+        vector = np.repeat(start[:, None], lanes, axis=1)
+        shape = (lanes, schedule.frames // schedule.record_frames, len(signals))
+        before, now = np.empty(shape), np.empty(shape)
+        same = np.zeros(lanes, dtype=bool)
+        windows = 0
+        while windows < most and not same.all():
+            before, now = now, before
+            advance(columns, u, vector, now)
+            require_finite(layout, vector, f"one of cases {first} to {lane[-1]} left the numbers")
+            windows += 1
+            if windows > 1:
+                same = repeats(before, now)
+        return now, windows, same, vector[layout.start["counters"]]
+
+    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
+        done = list(pool.map(group, range(0, count, lanes)))
+    times = np.arange(schedule.frames // schedule.record_frames) * schedule.record_frames
+    return Repeated(
+        time=np.asarray(times * schedule.frame, dtype=np.float64),
+        values=np.concatenate([values for values, *_ in done])[:count],
+        windows=np.repeat([windows for _, windows, *_ in done], lanes)[:count],
+        repeats=np.concatenate([same for *_, same, _ in done])[:count],
+        unsettled=np.concatenate([counters for *_, counters in done])[:count].astype(np.int64),
+    )
+
+
+def window_schedule(run: Run) -> Schedule:
+    """Return the plan of one window.
+
+    Raises
+    ------
+    StepError
+        When the window holds no whole number of sample times and recording intervals.
+    """
+    schedule = run.schedule()
+    common = math.lcm(schedule.record_frames, *schedule.task_frames)
+    if schedule.frames % common or abs(schedule.frames * schedule.frame / run.duration - 1) > 1e-9:
+        raise StepError(
+            f"a window of {run.duration:g} s holds no whole number of the common interval of all "
+            f"sample times, {common * schedule.frame:g} s: round it to one"
+        )
+    return schedule
+
+
+def _one_by_one(
+    run: Run, schedule: Schedule, selection: NDArray[np.int32]
+) -> Callable[[Array, Array, Array, Array], None]:
+    """Serve without a compiler: one lane, slowly."""
+    engine = prepare(run.model, run.par).engine("auto")
+
+    def advance(p: Array, u: Array, vector: Array, values: Array) -> None:
+        column = vector[:, 0].copy()
+        stimulus = np.ascontiguousarray(u[:, :, 0])
+        request = Request(schedule, np.ascontiguousarray(p[:, 0]), stimulus, selection)
+        engine.advance(request, column, 0, schedule.frames - 1, values[0])
+        vector[:, 0] = column
+
+    return advance
