@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 Array = NDArray[np.float64]
 Response = Callable[[Array], NDArray[np.complex128]]
 
+_NEARLY_ZERO = 1.0  # phase [degree] at the lower end that still counts as 0: a loop of finite gain
 _POINTS = 4000  # of the grid that brackets the crossings, per call
 
 
@@ -87,5 +88,5 @@ def margin(loop: Response, band: tuple[float, float]) -> Margin:
     crossover = float(brentq(excess, grid[k], grid[k + 1]))
     path = np.append(values[: k + 1], loop(np.array([crossover])))
     phase = np.degrees(np.unwrap(np.angle(path)))
-    turns = 360.0 * math.ceil(phase[0] / 360.0)
+    turns = 360.0 * math.ceil((phase[0] - _NEARLY_ZERO) / 360.0)
     return Margin(crossover, 180.0 + float(phase[-1] - turns))
