@@ -27,7 +27,7 @@ FRICTIONLESS = {
     "flywheel.runout": 0.0, "flywheel.law": "driven", "encoder.law": "ideal",
     "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0,
 }  # fmt: skip
-SWEEP = Sweep("theta_2_set", "theta_2", (1.0, 10.0, 60.0, 150.0), (1e-3,))
+SWEEP = Sweep(("theta_2_set",), "theta_2", (1.0, 10.0, 60.0, 150.0), (1e-3,))
 
 
 def positioned(**changes: float | str) -> Run:
@@ -53,7 +53,7 @@ def deviation(run: Run, sweep: Sweep = SWEEP) -> tuple[Array, Array]:
     assert not found["unsettled_substeps"].values.any()
     stimulus = WedgeBrake.Stimulus(*run.stimulus(np.zeros(1))[0])
     loop = closed_loop(
-        run.model, run.par, run.state, run.memory, inputs=(sweep.input,), outputs=(sweep.output,),  # type: ignore[arg-type]
+        run.model, run.par, run.state, run.memory, inputs=sweep.inputs, outputs=(sweep.output,),  # type: ignore[arg-type]
         stimulus=stimulus,
     )  # fmt: skip
     exact = loop.response(found["frequency"].values)[:, 0, 0]
@@ -125,4 +125,4 @@ def test_bad_sweeps(changes: dict[str, tuple[float, ...]], text: str) -> None:
 
 def test_unknown_signal() -> None:
     with pytest.raises(UnknownNameError, match="theta_2_set"):
-        frequency_response(positioned(), replace(SWEEP, input="theta2_set"))
+        frequency_response(positioned(), replace(SWEEP, inputs=("theta2_set",)))

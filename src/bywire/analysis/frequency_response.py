@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.harmonics import amplitudes as harmonics
+from bywire.analysis.linear_model import LinearModel
 from bywire.analysis.response_dataset import Sweep, as_dataset
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.simulation.repetition import Repeated, repeat
@@ -24,6 +25,24 @@ Array = NDArray[np.float64]
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
 _CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
+
+
+def require_stable(closed: LinearModel) -> None:
+    """Refuse a loop whose response would grow without end.
+
+    Raises
+    ------
+    ParameterError
+        With its poles.
+    """
+    if closed.is_stable:
+        return
+    outside = [z for z in closed.poles() if abs(z) > 1.0]
+    rates = ", ".join(f"{math.log(abs(z)) / closed.period:.3g}" for z in outside)
+    raise ParameterError(
+        f"{closed.name}: the closed loop is unstable and has no frequency response; its poles "
+        f"outside the unit circle grow with {rates} 1/s"
+    )
 
 
 def frequency_response(
@@ -55,7 +74,7 @@ def frequency_response(
         When a signal is unknown.
     ParameterError
         When frequencies or amplitudes are not positive, or a frequency is above half the rate at
-        which the controller samples.
+        which the slowest controller samples.
     SolverError
         When a trajectory leaves the numbers.
     """
@@ -87,15 +106,17 @@ def frequency_response(
 
 
 def _check(run: Run, sweep: Sweep) -> None:
-    if sweep.input not in run.model.Stimulus._fields:
-        raise unknown_name("signal of the stimulus", sweep.input, run.model.Stimulus._fields)
+    for name in sweep.inputs:
+        if name not in run.model.Stimulus._fields:
+            raise unknown_name("signal of the stimulus", name, run.model.Stimulus._fields)
     for name in (sweep.output, *sweep.flags):
         if name not in run.model.Output._fields:
             raise unknown_name("signal", name, run.model.Output._fields)
     for kind, values in (("frequencies", sweep.frequencies), ("amplitudes", sweep.amplitudes)):
         if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
             raise ParameterError(f"{kind} = {list(values)}: positive numbers are wanted")
-    nyquist = 0.5 / _interval(run)
+    # Of the slowest: which controller takes the input is not known here.
+    nyquist = 0.5 / max(task.period for task in run.model.tasks(run.par))
     highest = max(sweep.frequencies)
     if highest >= nyquist:
         raise ParameterError(
@@ -133,12 +154,13 @@ def _repeated(
     own: Run, sweep: Sweep, matrix: Array, sizes: Array, periods: int, signals: tuple[str, ...]
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
-    column = own.model.Stimulus._fields.index(sweep.input)
+    columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
     times = own.schedule().stimulus_times[:-1]
     f = periods / own.duration
     stimuli = np.repeat(own.stimulus(np.zeros(1)), times.size, axis=0)
     stimuli = np.repeat(stimuli[None], matrix.shape[1], axis=0)
-    stimuli[:, :, column] += sizes[:, None] * np.sin(2.0 * math.pi * f * times)
+    sines = sizes[:, None] * np.sin(2.0 * math.pi * f * times)
+    stimuli[:, :, columns] += sines[:, :, None]
 
     def repeats(before: Array, now: Array) -> NDArray[np.bool_]:
         t = np.asarray(np.arange(now.shape[1]) * own.record, dtype=np.float64)

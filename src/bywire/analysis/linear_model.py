@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from bywire.core.errors import ParameterError, unknown_name
 
 Array = NDArray[np.float64]
 
+_ON_BORDER = 1e-6  # poles this close to the border of stability are integrators
 _COUPLED = 1e-9  # of the largest entry of A: below it a dropped state does not act on the others
 
 
@@ -75,6 +76,18 @@ class LinearModel:
         found = np.linalg.eigvals(self.A).astype(np.complex128)
         return found[np.argsort(np.abs(found))]
 
+    @property
+    def is_stable(self) -> bool:
+        """Whether no pole lies outside the unit circle, or right of the imaginary axis.
+
+        Integrators that a loop does not move (a disc's angle, memory that is only recorded) have
+        poles on the border and do not count.
+        """
+        poles = self.poles()
+        if self.period:
+            return bool(np.abs(poles).max() < 1.0 + _ON_BORDER)
+        return bool(poles.real.max() < _ON_BORDER * np.abs(poles).max())
+
     def reduced(self, states: Sequence[str], *, held: bool = False) -> LinearModel:
         """Return the model with some of its states only.
 
@@ -122,6 +135,18 @@ class LinearModel:
             self.output_units,
             self.rate[kept],
             self.period,
+        )
+
+    def together(self, inputs: Sequence[str]) -> LinearModel:
+        """Return the model with some inputs moving as one, named after the first of them."""
+        columns = [self.inputs.index(name) for name in inputs]
+        first = columns[0]
+        return replace(
+            self,
+            B=self.B[:, columns].sum(axis=1, keepdims=True),
+            D=self.D[:, columns].sum(axis=1, keepdims=True),
+            inputs=(self.inputs[first],),
+            input_units=(self.input_units[first],),
         )
 
     def sampled(self, period: float) -> LinearModel:

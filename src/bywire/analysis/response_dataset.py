@@ -24,8 +24,10 @@ class Sweep:
 
     Parameters
     ----------
-    input, output
-        Signal of the Stimulus that is shaken, and of the Output that answers.
+    inputs
+        Signals of the Stimulus that are shaken together; the first gives the unit.
+    output
+        Signal of the Output that answers.
     frequencies
         Wanted frequencies [Hz], ascending; each is rounded so that a window holds whole periods.
     amplitudes
@@ -47,7 +49,7 @@ class Sweep:
         Windows after which a response is given up.
     """
 
-    input: str
+    inputs: Sequence[str]
     output: str
     frequencies: Sequence[float]
     amplitudes: Sequence[float]
@@ -65,7 +67,7 @@ def as_dataset(
 ) -> xr.Dataset:
     """Return the figures of all frequencies, each of shape (variants, amplitudes), as a dataset."""
     stimuli, outputs = signals_of(run.model.Stimulus), signals_of(run.model.Output)
-    ratio = f"({outputs[sweep.output].unit})/({stimuli[sweep.input].unit})"
+    ratio = f"({outputs[sweep.output].unit})/({stimuli[sweep.inputs[0]].unit})"
     units = {"phase": "degree", "gain": ratio}
     stacked = {name: np.stack([one[name] for one in done], axis=2) for name in done[0]}
     stacked["phase"] = _unwrapped(stacked["phase"])
@@ -76,11 +78,11 @@ def as_dataset(
     coordinates: Mapping[str, Any] = {
         "frequency": ("frequency", frequencies, {"units": "Hz"}),
         "amplitude": ("amplitude", np.asarray(sweep.amplitudes, dtype=float),
-                      {"units": stimuli[sweep.input].unit}),
+                      {"units": stimuli[sweep.inputs[0]].unit}),
         **{name: ("variant", np.asarray(values, dtype=float))
            for name, values in (sweep.variations or {}).items()},
     }  # fmt: skip
-    attributes = {"model": run.model.name, "input": sweep.input, "output": sweep.output,
+    attributes = {"model": run.model.name, "inputs": " ".join(sweep.inputs), "output": sweep.output,
                   "step": run.step}  # fmt: skip
     return xr.Dataset(variables, coords=dict(coordinates), attrs=attributes)
 

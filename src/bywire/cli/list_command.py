@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterable
 from textwrap import wrap
 
+from bywire.analysis.loop_registry import all_loops
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
@@ -22,6 +23,7 @@ def execute(as_text: bool) -> None:
         "assemblies": sorted({e.assembly for e in entries().values()}),
         "parameter_sets": {e.name: e.summary for e in entries().values()},
         "experiments": {e.name: e.summary for e in experiments.values()},
+        "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in all_loops().values()},
         "stimuli": {e.kind: e.summary for e in stimuli().values()},
         "kpis": {m.name: m.definition for m in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments.values()},

@@ -37,6 +37,15 @@ OutFolder = Annotated[
 ]
 
 
+LoopName = Annotated[str, typer.Argument(help="Loop, see 'bywire list'.", show_default=False)]
+Parameters = Annotated[str, typer.Option(help="Parameter set, e.g. roberts2003.")]
+At = Annotated[str, typer.Option("--at", help="Operating point, e.g. '20 bar'.")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. wedge.mu_B=0.4."),
+]
+
+
 # Each command loads what it needs when it runs, so that `bywire --help` stays quick.
 def _execute(name: str, *arguments: Any) -> Any:
     try:
@@ -54,7 +63,10 @@ def list_command(json: JsonFlag = False) -> None:
 
 @app.command()
 def run(
-    bench: Annotated[Path, typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False)],
+    bench: Annotated[
+        Path,
+        typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False),
+    ],
     set_: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
@@ -80,6 +92,54 @@ def reproduce(
 def benchmark(json: JsonFlag = False) -> None:
     """Measure speed against hand-written C and what users would pick instead."""
     _execute("benchmark_command", json)
+
+
+@app.command("linearize")
+def linearize_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make the exact linear model of a closed loop: plant, filters, controllers, sampling."""
+    _execute("linearize_command", loop, parameters, at, _changes(set_ or []), out, json)
+
+
+@app.command("frequency-response")
+def frequency_response_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    frequencies: Annotated[
+        str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:40', or a list.")
+    ] = "",
+    amplitudes: Annotated[str, typer.Option(help="Amplitudes, e.g. '0.5 rad, 1 rad'.")] = "",
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Measure a closed loop's response by amplitude: friction, limits and sampling included."""
+    _execute(
+        "frequency_response_command", loop, parameters, at, _changes(set_ or []), frequencies,
+        amplitudes, out, json,
+    )  # fmt: skip
+
+
+@app.command("margins")
+def margins_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    over: Annotated[
+        str, typer.Option(help="Range of a parameter, e.g. wedge.mu_B=0.2:0.6:9.")
+    ] = "",
+    json: JsonFlag = False,
+) -> None:
+    """Show margins and bandwidth of a loop as it is sampled, and the worst case over a range."""
+    _execute("margins_command", loop, parameters, at, _changes(set_ or []), over, json)
 
 
 @app.callback(invoke_without_command=True)

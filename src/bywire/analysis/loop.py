@@ -1,0 +1,129 @@
+"""A control loop of a brake: where it works, what shakes it, where it can be cut open."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bywire.analysis.closed_loop import closed_loop
+from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.open_loop import open_loop
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.run import Run
+
+
+@dataclass(frozen=True)
+class Point:
+    """An operating point, ready to run and to linearize.
+
+    Parameters
+    ----------
+    model, par
+        The system; the parameters close this loop and no outer one.
+    state, memory, stimulus
+        Equilibrium without dry friction.
+    """
+
+    model: Model
+    par: ParameterSet
+    state: NamedTuple
+    memory: NamedTuple
+    stimulus: NamedTuple
+
+    def run(self, step: float = 20e-6) -> Run:
+        """Return a run that rests at the point."""
+        row = [float(value) for value in self.stimulus]
+        return Run(
+            self.model, self.par, self.state, self.memory,
+            lambda t: np.repeat([row], t.size, axis=0), 1.0, step, 1e-3,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What an operating point is given by.
+
+    Parameters
+    ----------
+    name, unit
+        For instance ``"pressure"`` in ``"Pa"``.
+    default
+        Where the loop is usually looked at.
+    """
+
+    name: str
+    unit: str
+    default: float
+
+
+@dataclass(frozen=True)
+class Loop:
+    """A control loop.
+
+    Parameters
+    ----------
+    name
+        What the command line calls it.
+    assembly
+        What it is a loop of.
+    summary
+        One line for listings.
+    at
+        What its operating point is given by.
+    inputs
+        Signals of the stimulus that are shaken together; the first gives the unit.
+    output
+        Signal that answers.
+    cut
+        Where the loop is cut open for margins: a state that its controller reads, or a value
+        that it hands on.
+    point
+        ``point(par, value) -> Point``.
+    causes
+        What makes it nonlinear: name -> parameters that switch it off.
+    band
+        Frequencies usually looked at [Hz].
+    amplitudes
+        Amplitudes usually looked at, SI; the first one is small.
+    whole
+        ``whole(par)``: other frequencies [Hz] of which a window must hold whole periods.
+    """
+
+    name: str
+    assembly: str
+    summary: str
+    at: Quantity
+    inputs: tuple[str, ...]
+    output: str
+    cut: str
+    point: Callable[[ParameterSet, float], Point]
+    causes: Mapping[str, Mapping[str, Any]]
+    band: tuple[float, float]
+    amplitudes: tuple[float, ...]
+    whole: Callable[[ParameterSet], Sequence[float]] = field(default=lambda _: ())
+
+    def smooth(self, par: ParameterSet, leave: str = "") -> ParameterSet:
+        """Return parameters without anything that makes the loop nonlinear, except one cause."""
+        changes: dict[str, Any] = {}
+        for cause, off in self.causes.items():
+            if cause != leave:
+                changes |= off
+        return par.replace(changes)
+
+    def closed(self, par: ParameterSet, value: float) -> LinearModel:
+        """Return the exact linear model from the input to the output at an operating point."""
+        p = self.point(self.smooth(par), value)
+        model = closed_loop(
+            p.model, p.par, p.state, p.memory,
+            inputs=self.inputs, outputs=(self.output,), stimulus=p.stimulus,
+        )  # fmt: skip
+        return model.together(self.inputs)
+
+    def gain(self, par: ParameterSet, value: float) -> LinearModel:
+        """Return the exact loop gain at an operating point."""
+        p = self.point(self.smooth(par), value)
+        return open_loop(p.model, p.par, p.state, p.memory, cut=self.cut, stimulus=p.stimulus)

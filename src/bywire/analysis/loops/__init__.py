@@ -1,0 +1,1 @@
+"""Control loops of the brakes, one file each."""

@@ -1,0 +1,36 @@
+"""Current loop of the motorcycle brake's ECU."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis.loops.motorcycle_causes import CAUSES
+from bywire.assemblies.motorcycle_brake import MotorcycleBrake
+from bywire.assemblies.motorcycle_ecu import Stimulus
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_trim import memory_at, state_at
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+
+
+def point(par: ParameterSet, value: float) -> Point:
+    """Return the brake held at a pressure [Pa] by its current."""
+    own = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
+    state, memory = state_at(value, own), memory_at(value, own)
+    return Point(MotorcycleBrake(), own, state, memory, zeros(Stimulus)._replace(i_set=state.i))
+
+
+LOOP = Loop(
+    name="current",
+    assembly="motorcycle-brake",
+    summary="current control, 1 kHz, rotor free",
+    at=Quantity("pressure", "Pa", 20e5),
+    inputs=("i_set",),
+    output="i",
+    cut="duty",
+    point=point,
+    causes=CAUSES,
+    band=(1.0, 400.0),
+    amplitudes=(1e-2, 1.0),
+)

@@ -1,0 +1,66 @@
+"""Moment loop of the wedge brake, around position and current loops."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis.loops.wedge_causes import CAUSES
+from bywire.assemblies.wedge_brake import WedgeBrake
+from bywire.assemblies.wedge_control import Stimulus
+from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.assemblies.wedge_start import force_for, memory_at, state_at, travel_for
+from bywire.control import moment_control
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+from bywire.plant import roller_screw, wedge
+
+
+def point(par: ParameterSet, value: float) -> Point:
+    """Return the brake that holds a moment [N m].
+
+    Screws and references stand where the wedge is in balance: the actuation force presses both
+    contacts of the heart, and the currents carry it.
+
+    Raises
+    ------
+    ParameterError
+        When the moment is beyond the wedge's travel or the drives' current.
+    """
+    own = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
+    x = travel_for(force_for(value, own), own)
+    _require_reachable(value, x, own)
+    memory = memory_at(x, own)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
+    state = state_at(x, own)._replace(y_M=value)
+    return Point(WedgeBrake(), own, state, memory, zeros(Stimulus)._replace(M_set=value))
+
+
+def _require_reachable(value: float, x: float, par: WedgeParameters) -> None:
+    if not 0.0 < x < par.wedge.x_stop:
+        raise ParameterError(
+            f"moment = {value:g} N*m needs {x * 1e3:.3g} mm of wedge travel: it must be above 0 "
+            f"and below wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm"
+        )
+    force = abs(wedge.slope(par.wedge) - par.wedge.mu_B) * force_for(value, par)
+    i = 0.5 * force * roller_screw.slope(par.screw) / par.motor_1.K_ref
+    if i > par.drive.i_max:
+        raise ParameterError(
+            f"moment = {value:g} N*m needs {i:.3g} A in each motor even without friction: "
+            f"drive.i_max = {par.drive.i_max:g} A"
+        )
+
+
+LOOP = Loop(
+    name="moment",
+    assembly="wedge-brake",
+    summary="moment control, 1 kHz around 5 kHz",
+    at=Quantity("moment", "N*m", 200.0),
+    inputs=("M_set",),
+    output="y_M",
+    cut="rate",
+    point=point,
+    causes=CAUSES,
+    band=(0.5, 100.0),
+    amplitudes=(0.5, 20.0),
+)

@@ -1,0 +1,39 @@
+"""Position loop of the assembled wedge: both motors follow one reference."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis.loops.wedge_causes import CAUSES
+from bywire.assemblies.wedge_brake import WedgeBrake
+from bywire.assemblies.wedge_control import Stimulus
+from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.assemblies.wedge_start import memory_at, state_at
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+
+
+def point(par: ParameterSet, value: float) -> Point:
+    """Return the wedge at a travel [m] within the clearance, preloaded between the screws."""
+    own = cast(WedgeParameters, par.replace({"command.mode": "position"}))
+    memory = memory_at(value, own)
+    stimulus = zeros(Stimulus)._replace(
+        theta_1_set=memory.theta_1_ref, theta_2_set=memory.theta_2_ref
+    )
+    return Point(WedgeBrake(), own, state_at(value, own), memory, stimulus)
+
+
+LOOP = Loop(
+    name="position",
+    assembly="wedge-brake",
+    summary="position control of the assembled wedge in its clearance, 5 kHz",
+    at=Quantity("wedge travel", "m", 0.0),
+    inputs=("theta_1_set", "theta_2_set"),
+    output="theta_2",
+    cut="i_2_ref",
+    point=point,
+    causes=CAUSES,
+    band=(1.0, 150.0),
+    amplitudes=(1e-3, 0.25, 0.5, 1.0),
+)

@@ -1,0 +1,17 @@
+"""What makes the loops of the wedge brake nonlinear, and how each of it is switched off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+CAUSES: Mapping[str, Mapping[str, Any]] = {
+    "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,
+                         "bearing.T_nu": 0.0},
+    "screw efficiency": {"screw.eta_f": 1.0, "screw.eta_b": 1.0},
+    "wedge friction": {"wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0},
+    "cogging": {"motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0},
+    "encoder": {"encoder.law": "ideal"},
+    "run-out, disc slowing": {"flywheel.runout": 0.0, "flywheel.law": "driven"},
+}  # fmt: skip
+"""cause -> parameters without it"""

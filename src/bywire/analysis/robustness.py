@@ -1,0 +1,143 @@
+"""Margins of a loop over a range of a parameter: the worst case, and where it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.loop import Loop
+from bywire.analysis.margins import bandwidth, margin
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.parameters import ParameterSet
+
+Array = NDArray[np.float64]
+SENSES = {
+    "gain": 1, "phase": 1, "delay": 1, "disk": 1, "bandwidth": 1,
+    "sensitivity": -1, "complementary": -1,
+}  # fmt: skip
+"""figures of `LoopMargins`: 1 where more is better, -1 where less is"""
+_POINTS = 2000
+_LOWEST = 1e-2  # lower end of what is searched, Hz
+
+
+@dataclass(frozen=True)
+class LoopMargins:
+    """Margins of a sampled loop as it is, with its delays and filters.
+
+    Parameters
+    ----------
+    gain
+        Smallest factor above 1 by which the loop gain may grow; inf where none makes it unstable.
+    phase, crossover
+        Phase margin [degree] at the highest gain crossover [Hz].
+    delay
+        Additional dead time that the phase margin allows [s].
+    disk
+        Disk-based margin (symmetric, skew 0): S - T of this size stays away from -1 in gain and
+        phase at once; 0 to 2.
+    sensitivity, complementary
+        Largest magnitudes of S = 1/(1 + L) and T = L/(1 + L).
+    bandwidth
+        Frequency at which the closed loop has fallen to -3 dB [Hz].
+    stable
+        Whether the closed loop is stable.
+    """
+
+    gain: float
+    phase: float
+    crossover: float
+    delay: float
+    disk: float
+    sensitivity: float
+    complementary: float
+    bandwidth: float
+    stable: bool
+
+
+def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
+    """Return the margins of a loop at an operating point, dry friction removed.
+
+    Raises
+    ------
+    InputError
+        When the operating point does not exist.
+    """
+    gain, closed = loop.gain(par, value), loop.closed(par, value)
+    highest = 0.499 / gain.period
+    band = (_LOWEST, highest)
+
+    def response(f: Array) -> NDArray[np.complex128]:
+        return gain.response(f)[:, 0, 0]
+
+    f = np.geomspace(*band, _POINTS)
+    L = response(f)
+    S = 1.0 / (1.0 + L)
+    found = margin(response, band)
+    delay = math.nan
+    if math.isfinite(found.crossover):
+        delay = found.phase / (360.0 * found.crossover)
+    return LoopMargins(
+        gain=_gain_margin(gain, L),
+        phase=found.phase,
+        crossover=found.crossover,
+        delay=delay,
+        disk=2.0 / float(np.max(np.abs(S - L * S))),
+        sensitivity=float(np.max(np.abs(S))),
+        complementary=float(np.max(np.abs(L * S))),
+        bandwidth=bandwidth(lambda g: closed.response(g)[:, 0, 0], band),
+        stable=closed.is_stable,
+    )  # fmt: skip
+
+
+def over(
+    loop: Loop, par: ParameterSet, value: float, name: str, values: Sequence[float]
+) -> list[LoopMargins]:
+    """Return the margins for several values of a parameter, or of the operating point.
+
+    Parameters
+    ----------
+    name
+        Dotted name of a parameter, or that of the loop's operating quantity.
+    values
+        Its values, SI.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no such number.
+    """
+    if name == loop.at.name:
+        return [margins(loop, par, one) for one in values]
+    if name not in par.leaves():
+        raise unknown_name("parameter", name, [loop.at.name, *par.leaves()])
+    return [margins(loop, par.replace({name: one}), value) for one in values]
+
+
+def worst(
+    found: Sequence[LoopMargins], values: Sequence[float]
+) -> Mapping[str, tuple[float, float]]:
+    """Return the worst of each margin, and the value at which it occurs."""
+    if not found:
+        raise ParameterError("no margins to choose from: give at least one value")
+    result: dict[str, tuple[float, float]] = {}
+    for field, sign in SENSES.items():
+        sizes = [sign * getattr(one, field) for one in found]
+        k = int(np.nanargmin(sizes)) if not all(map(math.isnan, sizes)) else 0
+        result[field] = (getattr(found[k], field), float(values[k]))
+    return result
+
+
+def _gain_margin(gain: LinearModel, L: NDArray[np.complex128]) -> float:
+    """Return the smallest factor above 1 at which the response passes through -1."""
+    crossings = np.flatnonzero(np.diff(np.signbit(L.imag)) & (L.real[:-1] < 0))
+    sizes = []
+    for k in crossings:
+        share = L.imag[k] / (L.imag[k] - L.imag[k + 1])
+        sizes.append(float(abs(L.real[k] + share * (L.real[k + 1] - L.real[k]))))
+    factors = [1.0 / size for size in sizes if 0.0 < size < 1.0]
+    return min(factors, default=math.inf)

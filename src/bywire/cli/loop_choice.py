@@ -1,0 +1,103 @@
+"""What the commands on loops have in common: loop, parameters, operating point, ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from bywire.analysis.loop import Loop
+from bywire.analysis.loop_registry import find_loop
+from bywire.bench.values import number, parsed
+from bywire.catalog.registry import entry, main_set
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet, leaf_fields
+
+_MOST = 10_000
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A loop with the parameters and the operating point that a user asked for."""
+
+    loop: Loop
+    name: str
+    par: ParameterSet
+    value: float
+
+
+def choose(name: str, parameters: str, at: str, changes: Mapping[str, str]) -> Chosen:
+    """Return what the command line asks for.
+
+    Parameters
+    ----------
+    name
+        Loop.
+    parameters
+        Parameter set; empty for the main one of the loop's brake.
+    at
+        Operating point with its unit; empty for the loop's own.
+    changes
+        Parameters by dotted name, with units.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, and sets of another brake.
+    """
+    loop = find_loop(name)
+    found = entry(parameters or main_set(loop.assembly))
+    if found.assembly != loop.assembly:
+        raise ParameterError(
+            f"loop {loop.name!r} is one of a {loop.assembly}, but parameter set {found.name!r} is "
+            f"for a {found.assembly}"
+        )
+    base = found.parameters()
+    par = base.replace(parsed(type(base), changes, "parameter"))
+    value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
+    return Chosen(loop, found.name, par, value)
+
+
+def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> list[float]:
+    """Return the values of ``low:high:count``, or of a list with commas; each with its unit.
+
+    Raises
+    ------
+    ParameterError
+        When it is neither.
+    UnitError
+        When a value has no unit or a wrong one.
+    """
+    parts = [part.strip() for part in text.split(":")]
+    if len(parts) == 1:
+        return [number(part.strip(), unit, name) for part in text.split(",")]
+    if len(parts) != 3 or not parts[2].isdecimal() or not 2 <= int(parts[2]) <= _MOST:
+        raise ParameterError(
+            f"{name} = {text!r}: write LOW:HIGH:COUNT with 2 to {_MOST} values, or values with "
+            "commas"
+        )
+    low, high = (number(part, unit, name) for part in parts[:2])
+    if not low < high or (logarithmic and low <= 0):
+        raise ParameterError(f"{name} = {text!r}: the first value must be below the second")
+    between = np.geomspace if logarithmic else np.linspace
+    return [float(one) for one in between(low, high, int(parts[2]))]
+
+
+def over_range(text: str, chosen: Chosen) -> tuple[str, str, list[float]]:
+    """Return name, unit and values of ``NAME=LOW:HIGH:COUNT``.
+
+    Raises
+    ------
+    InputError
+        As `spread`, and for a name that is neither a parameter nor the operating quantity.
+    """
+    name, equals, values = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise ParameterError(f"--over {text}: write NAME=LOW:HIGH:COUNT")
+    quantity = chosen.loop.at
+    if name == quantity.name:
+        return name, quantity.unit, spread(values, quantity.unit, name)
+    leaves = leaf_fields(type(chosen.par))
+    unit = leaves[name].unit.symbol if name in leaves else "1"
+    return name, unit, spread(values, unit, name)

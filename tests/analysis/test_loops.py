@@ -1,0 +1,98 @@
+"""Every loop: linear and nonlinear response agree, margins agree with a library's, worst cases."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+
+from bywire.analysis.agreement import agreement
+from bywire.analysis.loop_registry import all_loops, find_loop
+from bywire.analysis.robustness import margins, over, worst
+from bywire.catalog.registry import main_set, parameters
+from bywire.core.errors import ParameterError, UnknownNameError
+
+LOOPS = sorted(all_loops())
+# The current loop wants a step of at most 1/(100 f).
+STEPS = {"current": 10e-6}
+
+
+def of(name: str):
+    loop = find_loop(name)
+    return loop, parameters(main_set(loop.assembly))
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_nonlinear_response_is_the_linear_one_without_its_causes(name: str) -> None:
+    loop, par = of(name)
+    low, high = loop.band
+    frequencies = (max(low, 2.0), math.sqrt(max(low, 2.0) * high), high)
+    found = agreement(
+        replace(loop, causes={}), loop.smooth(par), loop.at.default, frequencies,
+        (loop.amplitudes[0], loop.amplitudes[0]), STEPS.get(name, 20e-6),
+    )  # fmt: skip
+    assert found.holds
+    assert np.abs(found.gain[""]).max() < 0.01
+    assert np.abs(found.phase[""]).max() < 0.1
+
+
+def test_agreement_shows_what_breaks_it() -> None:
+    loop, par = of("position")
+    one = replace(loop, causes={k: loop.causes[k] for k in ("encoder", "bearing friction")})
+    rest = {k: v for c, off in loop.causes.items() if c not in one.causes for k, v in off.items()}
+    found = agreement(one, par.replace(rest), 0.0, (5.0,), (1e-3, 0.25))
+    assert found.holds
+    assert abs(found.phase["bearing friction"][0]) > 1.0
+    assert abs(found.phase["encoder"][0]) < 0.5
+    rubbing = {"": found.gain["bearing friction"]}, {"": found.phase["bearing friction"]}
+    assert not replace(found, gain=rubbing[0], phase=rubbing[1]).holds
+
+
+@pytest.mark.parametrize("name", LOOPS)
+def test_margins_are_those_of_the_library(name: str) -> None:
+    loop, par = of(name)
+    found = margins(loop, par, loop.at.default)
+    gain = loop.gain(par, loop.at.default)
+    omega = 2.0 * math.pi * np.geomspace(0.01, 0.499 / gain.period, 2000)
+    response = control.frd(gain.response(omega / 2.0 / math.pi)[:, 0, 0], omega)
+    _, phase, _, _, crossover, _ = control.stability_margins(response, returnall=True)
+    k = int(np.argmin(np.abs(crossover - 2.0 * math.pi * found.crossover)))
+    assert found.phase == pytest.approx(float(phase[k]), abs=0.2)
+    disk, _, _ = control.disk_margins(gain.state_space(), omega)
+    assert found.disk == pytest.approx(float(disk), rel=1e-3)
+    assert found.stable
+
+
+@pytest.mark.parametrize("name", ["moment", "pressure"])
+def test_the_gain_margin_is_where_the_loop_becomes_unstable(name: str) -> None:
+    loop, par = of(name)
+    factor = margins(loop, par, loop.at.default).gain
+    gain = loop.gain(par, loop.at.default)
+    for scale, stable in ((0.98, True), (1.02, False)):
+        closed = replace(gain, A=gain.A - scale * factor * gain.B @ gain.C)
+        assert closed.is_stable == stable
+
+
+def test_worst_case_over_the_friction_coefficient() -> None:
+    loop, par = of("moment")
+    values = [0.2, 0.35, 0.6]
+    found = worst(over(loop, par, 200.0, "wedge.mu_B", values), values)
+    assert found["phase"][1] == 0.6
+    assert found["bandwidth"][1] == 0.2
+    with pytest.raises(UnknownNameError, match=r"wedge\.mu_B"):
+        over(loop, par, 200.0, "wedge.mu_b", values)
+
+
+def test_operating_points_that_do_not_exist() -> None:
+    loop, par = of("moment")
+    with pytest.raises(ParameterError, match="wedge travel"):
+        loop.closed(par, 5e3)
+    weak = par.replace({"drive.i_max": 0.2, "wedge.mu_B": 0.2})
+    with pytest.raises(ParameterError, match="A in each motor"):
+        loop.closed(weak, 900.0)
+    pressure, par = of("pressure")
+    with pytest.raises(ParameterError):
+        pressure.closed(par, 900e5)
