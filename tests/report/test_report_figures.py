@@ -17,10 +17,11 @@ from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import energy_balance
 from bywire.report.files import figure_bytes
 from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.panels import Panel, Trace
 from bywire.report.step_marks import StepFacts, StepLimits
 from bywire.report.step_response import step_response
 from bywire.report.stribeck_curve import stribeck_curve
-from bywire.report.time_traces import Panel, Trace, time_traces
+from bywire.report.time_traces import time_traces
 from bywire.report.tracking import tracking
 
 LIMITS = StepLimits(start=0.1, before=6e5, after=37e5, overshoot=0.15)

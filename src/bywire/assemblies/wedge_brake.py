@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from bywire.assemblies import drive_train
 from bywire.assemblies import wedge_control as control
 from bywire.assemblies import wedge_energy as energy
 from bywire.assemblies import wedge_output as recording
@@ -16,13 +17,10 @@ from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.model import Bounds, Matrix, Task
 from bywire.plant import (
     brake_heart,
-    current_drive,
     drive_supply,
     end_stop,
     flywheel,
     moment_sensor,
-    roller_screw,
-    servo_motor,
     shaft_encoder,
     wedge,
     wedge_caliper,
@@ -77,7 +75,7 @@ class WedgeBrake:
         """Return inductances, inertias and masses."""
         rows: list[float] = []
         for motor in (par.motor_1, par.motor_2):
-            rows += (1.0, 1.0, 1.0, *servo_motor.mass(motor))
+            rows += drive_train.mass(motor)
         body, disc = wedge.mass(par.wedge), flywheel.mass(par.flywheel)
         return plant.State._make((*rows, *body, *disc, 1.0, 1.0))
 
@@ -93,11 +91,7 @@ class WedgeBrake:
         w = plant.wires(xe, par, contact)
         rows: list[float] = []
         for s, force in zip(plant.sides(x, xe, m, par), (w.F_1, w.F_2), strict=True):
-            seen = plant.drive_input(s, m)
-            load = roller_screw.load_torque(roller_screw.Input(force, 0.0), par.screw)
-            v = current_drive.output(s.drive, seen, par.drive).v
-            rows += current_drive.rate(s.drive, seen, par.drive)
-            rows += servo_motor.balance(s.motor, servo_motor.Input(v, load, 0.0), s.par)
+            rows += drive_train.balance(s, m.on, force, par)
         body = wedge.balance(wedge.State(x.x, x.v), plant.wedge_input(w, 0.0), par.wedge)
         disc = flywheel.balance(flywheel.State(x.Omega, x.phi), flywheel.Input(0.0), par.flywheel)
         # Value-only: the brake does not feel the measurement of its power.
@@ -118,8 +112,7 @@ class WedgeBrake:
         w = plant.wires(xe, par, contact)
         found: list[Bounds] = []
         for s, force in zip(plant.sides(x, xe, m, par), (w.F_1, w.F_2), strict=True):
-            bearing, screw = plant.shaft_friction(s, force, par)
-            found.append((-(bearing + screw.T_p), bearing + screw.T_n))
+            found.append(drive_train.bounds(s, force, par))
         sliding = plant.wedge_bound(w, par)
         moment = wedge_caliper.moment(w.F_N, par.wedge.mu_B, 1.0, par.caliper)
         return (*found, (-sliding, sliding), (-moment, moment))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from bywire.assemblies import drive_train
 from bywire.assemblies.wedge_control import Memory
 from bywire.assemblies.wedge_energy import Flow, elastic, stored
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_plant import State, Wires, motor_power, sides, voltage, wires
+from bywire.assemblies.wedge_plant import State, Wires, motor_power, sides, wires
 from bywire.core import ops
 from bywire.core.signals import Signal
 from bywire.plant import drive_supply
@@ -98,8 +99,8 @@ def instant(
     still = ops.fabs(x.omega_1) + ops.fabs(x.omega_2)
     still = ops.where(still == 0, 1.0, 0.0) * ops.where(x.v == 0, 1.0, 0.0)
     own = {
-        "voltage_1": voltage(both[0], m, par),
-        "voltage_2": voltage(both[1], m, par),
+        "voltage_1": drive_train.voltage(both[0], m.on, par),
+        "voltage_2": drive_train.voltage(both[1], m.on, par),
         "T_fr_1": -reaction[0],
         "T_fr_2": -reaction[1],
         "F_fr": -reaction[2],

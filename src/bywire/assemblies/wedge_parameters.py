@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Literal
 
+from bywire.assemblies import rig_parameters
 from bywire.control import moment_control, position_pd, screw_offset
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
@@ -66,3 +67,4 @@ class WedgeParameters(ParameterSet):
     encoder: shaft_encoder.Parameters
     control: ControlParameters
     command: CommandParameters
+    rig: rig_parameters.Parameters

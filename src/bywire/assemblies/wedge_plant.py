@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from bywire.assemblies import drive_train
+from bywire.assemblies.drive_train import Side
 from bywire.assemblies.wedge_control import Memory
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.signals import Signal
 from bywire.plant import (
-    axial_bearing,
     brake_heart,
     current_drive,
     end_stop,
@@ -47,15 +48,6 @@ class State(NamedTuple):
     y_P: Annotated[float, Signal("W", "input power, filtered", 50.0)]
 
 
-class Side(NamedTuple):
-    """What belongs to one motor."""
-
-    drive: current_drive.State
-    motor: servo_motor.State
-    i_ref: Annotated[float, Signal("A", "current demand", 5.0)]
-    par: servo_motor.Parameters
-
-
 class Wires(NamedTuple):
     """What the mechanical elements exchange."""
 
@@ -88,20 +80,9 @@ def sides(x: State, xe: State, m: Memory, par: Par) -> tuple[Side, Side]:
     )
 
 
-def drive_input(s: Side, m: Memory) -> current_drive.Input:
-    """Return what a drive sees."""
-    emf = servo_motor.torque_constant(s.par) * s.motor.omega
-    return current_drive.Input(i_ref=s.i_ref, i=s.motor.i, emf=emf, on=m.on)
-
-
-def voltage(s: Side, m: Memory, par: Par) -> float:
-    """Return a motor's voltage [V]."""
-    return current_drive.output(s.drive, drive_input(s, m), par.drive).v
-
-
 def motor_power(x: State, m: Memory, par: Par) -> float:
     """Return the electrical power of both motors [W]."""
-    return sum((voltage(s, m, par) * s.motor.i for s in sides(x, x, m, par)), 0.0)
+    return sum((drive_train.power(s, m.on, par) for s in sides(x, x, m, par)), 0.0)
 
 
 def wires(xe: State, par: Par, contact: tuple[float, ...]) -> Wires:
@@ -113,7 +94,7 @@ def wires(xe: State, par: Par, contact: tuple[float, ...]) -> Wires:
         Forces of the heart's three contacts, the caliper, the near and the far end stop [N].
     """
     heart = brake_heart.output(brake_heart.Forces(*contact[:HEART]))
-    F_N = contact[HEART]
+    F_N = wedge_caliper.normal_force(contact[HEART], par.caliper)
     turning = flywheel.turning(flywheel.State(xe.Omega, xe.phi), par.flywheel)
     return Wires(
         **heart._asdict(),
@@ -154,13 +135,6 @@ def caliper_input(x: State, xe: State, par: Par) -> wedge_caliper.Input:
 def stop_input(x: State, par: Par) -> end_stop.Input:
     """Return what the wedge's end stops see."""
     return end_stop.Input(x=x.x, v=x.v, x_rest=-par.wedge.x_stop, x_end=par.wedge.x_stop)
-
-
-def shaft_friction(s: Side, force: float, par: Par) -> tuple[float, roller_screw.Output]:
-    """Return the bearing's and the screw's friction torques [N m] on one shaft."""
-    torque = servo_motor.torque_constant(s.par) * s.motor.i
-    bearing = axial_bearing.friction(axial_bearing.Input(force, s.motor.omega), par.bearing)
-    return bearing, roller_screw.friction(roller_screw.Input(force, torque), par.screw)
 
 
 def wedge_bound(w: Wires, par: Par) -> float:

@@ -14,7 +14,7 @@ Par = WedgeParameters
 
 def travel_for(F_N: float, par: Par) -> float:
     """Return the wedge travel [m] at a normal force [N], run-out left out."""
-    return (par.caliper.clearance + F_N / par.caliper.K_cal) / wedge.slope(par.wedge)
+    return (par.caliper.clearance + wedge_caliper.travel(F_N, par.caliper)) / wedge.slope(par.wedge)
 
 
 def force_for(moment: float, par: Par) -> float:

@@ -127,6 +127,9 @@ class Experiment:
         ``cases`` with any start, for checks alone; where those have to compute runs first.
     without
         ``without(options)``: key figures that some options leave out.
+    named
+        ``named(options)``: unit of every key figure by name, where a table among the options
+        decides which there are; ``kpis`` then holds those of the defaults.
     """
 
     name: str
@@ -145,11 +148,13 @@ class Experiment:
     following: Callable[[Any], Mapping[str, Any]] | None = None
     preview: Cases | None = None
     without: Callable[[Any], tuple[str, ...]] | None = None
+    named: Callable[[Any], Mapping[str, str]] | None = None
 
     def kpis_with(self, options: Any) -> dict[str, str]:
         """Return the unit of every key figure by name, those that the options leave out apart."""
         left_out = () if self.without is None else self.without(options)
-        return {name: unit for name, unit in self.kpis.items() if name not in left_out}
+        kpis = self.kpis if self.named is None else self.named(options)
+        return {name: unit for name, unit in kpis.items() if name not in left_out}
 
 
 def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]]:

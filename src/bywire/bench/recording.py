@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire import __version__
+from bywire.bench.wedge_watch import watch_wedge
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.simulation.run import Run, Trajectory
@@ -89,8 +90,10 @@ def watch(recording: xr.Dataset, par: ParameterSet, trajectory: Trajectory) -> l
         if far.any():
             first = float(recording["time"].values[int(np.argmax(far))])
             found.append(f"the piston reached its end stop at t = {first:.4g} s")
-    found += _pressed_back(recording, par.flat()) + _beyond_sensors(recording, par.flat())
-    limit = par.flat().get("pipeline.Re_max")
+    known = par.flat()
+    found += _pressed_back(recording, known) + _beyond_sensors(recording, known)
+    found += watch_wedge(recording, known)
+    limit = known.get("pipeline.Re_max")
     if limit is not None and "Re" in recording:
         highest = float(recording["Re"].max())
         if highest > limit:

@@ -16,6 +16,8 @@ from bywire.assemblies.wedge_start import memory_at, state_at
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import energy_residual
+from bywire.control.moment_control import PARKED
+from bywire.plant import wedge
 
 Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
@@ -42,6 +44,7 @@ def case_from_parked(
     stimulus: Callable[[Array], Signals],
     duration: float,
     changes: Mapping[str, Any] | None = None,
+    label: str = "run",
     **timing: float,
 ) -> Case:
     """Return the run of an experiment that starts parked, preloaded, without current.
@@ -49,13 +52,13 @@ def case_from_parked(
     Parameters
     ----------
     changes
-        Parameters that the experiment sets.
+        Parameters that the experiment sets; the command mode is "moment" unless given.
     timing
         ``settle``, ``keep`` and ``record`` of the case [s].
     """
     own = par.replace({"command.mode": "moment", **(changes or {})})
     return Case(
-        label="run",
+        label=label,
         model=WedgeBrake(),
         par=own,
         state=state_at(0.0, own),
@@ -109,6 +112,41 @@ def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
                         "Largest residual of the energy balance: the step's error."),
     }  # fmt: skip
     return tuple(_kpi(name, *texts[name]) for name in UNITS)
+
+
+def parameters_of(run: xr.Dataset) -> WedgeParameters:
+    """Return the parameters with which a recording was made."""
+    return WedgeParameters.model_validate_json(run.attrs["parameters"])
+
+
+def clearance(x: float, par: WedgeParameters) -> float:
+    """Return the clearance of the pads [m] at a wedge travel [m], run-out left out."""
+    return par.caliper.clearance - abs(x) * wedge.slope(par.wedge)
+
+
+def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> Kpi:
+    """Return the time from the end of the demand [s] until the pads leave the disc for good."""
+    after = run.sel(time=slice(begin - 1e-9, None))
+    pressing = np.flatnonzero(after["F_N"].values > 0)
+    value, note = math.nan, ""
+    if not pressing.size:
+        note = "the pads do not press when the demand falls"
+    elif pressing[-1] + 1 == after.sizes["time"]:
+        note = "the pads press until the end of the recording"
+    else:
+        value = float(after["time"].values[pressing[-1]]) - begin
+    text = "Time from the end of the demand until the pads have left the disc."
+    return Kpi(name, value, "s", text, note)
+
+
+def parking_time(run: xr.Dataset, begin: float, name: str = "parking_time") -> Kpi:
+    """Return the time from the end of the demand [s] until the brake is parked."""
+    after = run.sel(time=slice(begin - 1e-9, None))
+    parked = np.flatnonzero(after["mode"].values == PARKED)
+    value, note = math.nan, "not parked until the end of the recording"
+    if parked.size:
+        value, note = float(after["time"].values[parked[0]]) - begin, ""
+    return Kpi(name, value, "s", "Time from the end of the demand until the brake is parked.", note)
 
 
 def first(run: xr.Dataset, name: str, level: float) -> float:

@@ -64,7 +64,7 @@ def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
     ideal = replace(run, par=par.replace({"adc.law": "ideal"}))
     seconds = interleaved(
         {
-            "bywire": _kernel(run),
+            "bywire": kernel(run),
             "hand": HandWritten(par).single(run),
             "plain": timed(partial(simulate, ideal, ("p_mc", "omega"))),
             "tangents": timed(
@@ -85,7 +85,7 @@ def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
     ]  # fmt: skip
 
 
-def _kernel(run: Run) -> Work:
+def kernel(run: Run) -> Work:
     """Return one call of the compiled kernel with everything prepared, as its opponent has it."""
     engine = prepare(run.model, run.par).engine("compiled")
     request = request_for(run)

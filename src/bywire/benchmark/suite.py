@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.benchmark import wedge_brake
 from bywire.benchmark.engine import ensemble, single_and_sensitivities
 from bywire.benchmark.others import others
 from bywire.benchmark.processes import processes
@@ -35,12 +37,14 @@ def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
     """
     if find_compiler() is None:
         raise CompilerError("the benchmark compares compiled C: install a C compiler")
-    par = parameters("dardanelli2010")
+    par, wedge = parameters("dardanelli2010"), parameters("roberts2003")
     assert isinstance(par, MotorcycleParameters)
+    assert isinstance(wedge, WedgeParameters)
     parts: dict[str, Callable[[], list[Result]]] = {
         "single run": lambda: single_and_sensitivities(par),
         "ensemble": lambda: ensemble(par),
         "other simulators": lambda: others(par),
+        "wedge brake": lambda: wedge_brake.measured(wedge),
         "start-up": processes,
     }
     here = machine()

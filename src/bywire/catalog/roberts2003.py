@@ -8,9 +8,11 @@ that statement is no evidence any more, and the value says so.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.catalog.provenance import calibrated, chosen, derived, paper
+from bywire.catalog.provenance import Cited, calibrated, chosen, derived, paper
 from bywire.catalog.registry import Entry
 
 SOURCE = (
@@ -25,6 +27,15 @@ _DEGREE, _MICRO = math.pi / 180.0, 1e-6
 _ALPHA, _MU_B, _K_CAL, _R_B, _LEAD = 20.0 * _DEGREE, 0.35, 30e6, 0.125, 2e-3
 _R, _L, _V, _LOOP_RATE = 0.45, 0.2e-3, 48.0, 2.0 * math.pi * 1200.0
 _SLOPE = _LEAD / (2.0 * math.pi)
+_MU_B_HIGH, _ALPHA_STEEP = 0.45, 24.5 * _DEGREE
+
+
+def _moment_slope(mu_B: float, alpha: float) -> Cited:
+    """Return moment per angle in contact, which the moment controller knows."""
+    slope = 2.0 * mu_B * _R_B * _K_CAL * math.tan(alpha) * _SLOPE
+    return derived(slope, "2 mu_B r_B K_CAL tan(alpha) L/2pi")
+
+
 
 _MOTOR = {
     "R_ref": chosen(_R, _CLASS),
@@ -86,6 +97,9 @@ _MECHANICAL = {
     "wedge_friction.stopped_disc": paper("drop", "section 'Wedge and calliper': pad term dropped"),
     "stop.k_stop": chosen(2e7, "stiff against the caliper's share, slow against the step"),
     "stop.tau_stop": chosen(1e-4, "a stop without rebound of note"),
+    "caliper.law": chosen("linear", "the paper prints no curve"),
+    "caliper.n_table": chosen((), "no measured curve"),
+    "caliper.F_table": chosen((), "no measured curve"),
     "caliper.K_cal": chosen(_K_CAL, _LITERATURE + ", 6.8 to 44.8 N/um"),
     "caliper.tau_cal": chosen(20 * _MICRO, "light damping"),
     "caliper.clearance": chosen(0.2e-3, "usual running clearance"),
@@ -122,9 +136,7 @@ _CONTROL = {
     "control.offset.F_high": chosen(1000.0, "twice F_low"),
     "control.offset.k_hat": derived(_SLOPE, "lead over 2 pi"),
     "control.moment.f_c": chosen(8.0, "slow against the position loop"),
-    "control.moment.slope_hat": derived(
-        2.0 * _MU_B * _R_B * _K_CAL * math.tan(_ALPHA) * _SLOPE, "2 mu_B r_B K_CAL tan(alpha) L/2pi"
-    ),
+    "control.moment.slope_hat": _moment_slope(_MU_B, _ALPHA),
     "control.moment.rate_max": calibrated(60.0, "tuned so that Fig. 9 needs about 60 W"),
     "control.moment.omega_gap": chosen(120.0, "the gap in some 35 ms"),
     "control.moment.a_gap": chosen(6e3, "a third of the peak torque"),
@@ -135,21 +147,65 @@ _CONTROL = {
     "command.mode": chosen("moment", "the experiment decides"),
 }
 
+_RIG = {
+    "rig.mode_1": chosen("position", "the experiment decides"),
+    "rig.mode_2": chosen("position", "the experiment decides"),
+    "rig.load": chosen("screw", "the experiment decides"),
+    "rig.clamp": chosen("open", "the experiment decides"),
+    "rig.J_dummy": chosen(2e-5, "a steel shaft of 20 mm, 160 mm long"),
+    "rig.F_0": chosen(200.0, "a tenth of the screw's force at half the peak current"),
+    "rig.T_clamp": chosen(20.0, "ten times the motor's peak torque"),
+    "rig.sensor.K_F": chosen(100e6, "strain-gauge sensors of some 5 kN with their adapters"),
+    "rig.sensor.tau_F": chosen(15 * _MICRO, "light damping, as in the brake heart"),
+    "rig.sensor.f_F": chosen(1e3, "usual carrier-frequency amplifiers"),
+}
+
 _VALUES = {
     **{f"motor_{k}.{name}": value for k in (1, 2) for name, value in _MOTOR.items()},
     **_ELECTRICAL,
     **_MECHANICAL,
     **_STAND,
     **_CONTROL,
+    **_RIG,
 }
 
-ENTRIES = (
-    Entry(
-        name="roberts2003",
+# Both keep what was calibrated with the first set: it belongs to motors and electronics.
+_UNSTABLE = {
+    "wedge.mu_B": chosen(_MU_B_HIGH, "above tan(alpha) = 0.364; friction holds it without power"),
+    "control.moment.slope_hat": _moment_slope(_MU_B_HIGH, _ALPHA),
+}
+_STEEP = {
+    "wedge.alpha": chosen(_ALPHA_STEEP, _LITERATURE + ", the steep end: stable up to mu_B = 0.456"),
+    "wedge.x_stop": chosen(2.5e-3, "twice the travel of 1.23 mm at 950 N m"),
+    "control.offset.law": chosen("scheduled", "far from the neutral point both motors push"),
+    "control.moment.slope_hat": _moment_slope(_MU_B, _ALPHA_STEEP),
+}
+
+
+def _entry(name: str, summary: str, changes: Mapping[str, Cited] = MappingProxyType({})) -> Entry:
+    """Return an entry with some values of the first set changed."""
+    return Entry(
+        name=name,
         assembly="wedge-brake",
         source=SOURCE,
-        summary="self-reinforcing wedge brake with two motors, near its neutral point",
+        summary=summary,
         parameter_class=WedgeParameters,
-        values=_VALUES,
+        values={**_VALUES, **changes},
+    )
+
+
+ENTRIES = (
+    _entry(
+        "roberts2003", "self-reinforcing wedge brake with two motors, near its neutral point"
+    ),
+    _entry(
+        "roberts2003-unstable",
+        "the same with pad friction 0.45 above tan(alpha): unstable without control",
+        _UNSTABLE,
+    ),
+    _entry(
+        "roberts2003-steep",
+        "the same with a wedge of 24.5 degrees: always pushed, the motors share the load",
+        _STEEP,
     ),
 )

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+import math
+from typing import Annotated, Any, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, field_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Gain, Length, Mass, Unit
 from bywire.core.signals import Energy, Power, Signal
 
-WedgeAngle = Annotated[float, Unit("rad", 0.35), Field(gt=0, lt=1.5, allow_inf_nan=False)]
+WedgeAngle = Annotated[float, Unit("rad", 0.35), Field(gt=0, lt=0.5 * math.pi, allow_inf_nan=False)]
 SpringRate = Annotated[float, Unit("N/m", 1e4), Field(ge=0, allow_inf_nan=False)]
 
 
@@ -28,6 +29,17 @@ class Parameters(ParameterSet):
     """return spring toward the middle; 0 for none"""
     x_stop: Length
     """travel at which the end stops stand, on either side"""
+
+    @field_validator("alpha", mode="before")
+    @classmethod
+    def _acute(cls, alpha: Any) -> Any:
+        """Refuse what is no wedge, in degrees too, as drawings have them."""
+        if isinstance(alpha, (int, float)) and not 0 < alpha < 0.5 * math.pi:
+            raise ValueError(
+                f"{alpha} rad, {math.degrees(alpha):g} degrees, is not admissible: it must be "
+                "> 0 rad and < 1.5708 rad, between 0 and 90 degrees"
+            )
+        return alpha
 
 
 class State(NamedTuple):

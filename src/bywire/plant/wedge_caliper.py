@@ -1,10 +1,12 @@
-"""Floating caliper over the wedge: clearance, run-out of the disc, linear stiffness."""
+"""Floating caliper over the wedge: clearance, run-out of the disc, stiffness or force table."""
 
 from __future__ import annotations
 
-from typing import Annotated, NamedTuple
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
@@ -12,19 +14,61 @@ from bywire.core.quantities import Length, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Power, Signal
 
 Clearance = Annotated[float, Unit("m", 2e-4), Field(ge=0, allow_inf_nan=False)]
+Table = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
+NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
 
 
 class Parameters(ParameterSet):
-    """Pads, disc and caliper as one spring that presses and never pulls."""
+    """Pads, disc and caliper as one spring that presses and never pulls.
 
+    ``law``: ``"linear"`` is the stiffness; ``"table"`` interpolates a measured curve of force and
+    travel and goes on beyond its end with its last slope.
+    """
+
+    law: Literal["linear", "table"]
+    """which relation of travel and force holds"""
     K_cal: Stiffness
-    """stiffness of caliper and pads"""
+    """stiffness of caliper and pads; used by law "linear" only"""
+    n_table: Annotated[Table, Unit("m", 1e-4)]
+    """travels of the pads after contact, from 0, increasing; used by law "table" only"""
+    F_table: Annotated[Table, Unit("N", 3e3)]
+    """normal forces of the table, from 0, increasing; used by law "table" only"""
     tau_cal: TimeConstant
     """damping over stiffness"""
     clearance: Clearance
     """running clearance, both sides of the disc together"""
     r_B: Length
     """effective radius of the pads"""
+
+    @model_validator(mode="after")
+    def _table_is_a_curve(self) -> Parameters:
+        n, F = self.n_table, self.F_table
+        for name, unit, nodes in (("n_table", "m", n), ("F_table", "N", F)):
+            _require_rising(name, unit, nodes)
+        if len(n) != len(F):
+            raise ValueError(
+                f"n_table has {len(n)} nodes and F_table {len(F)}: give one force for each travel"
+            )
+        if self.law == "table" and not n:
+            raise ValueError(
+                "law = 'table' needs 2 nodes or more in n_table [m] and F_table [N], which are "
+                "empty: give both, or take law = 'linear'"
+            )
+        return self
+
+
+def _require_rising(name: str, unit: str, nodes: Table) -> None:
+    if not nodes:
+        return
+    wanted = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"
+    if len(nodes) < 2 or nodes[0] != 0.0:
+        raise ValueError(f"{wanted}: it holds {len(nodes)}, the first is {nodes[0]:g} {unit}")
+    for k, (a, b) in enumerate(pairwise(nodes), 1):
+        if b <= a:
+            raise ValueError(
+                f"{wanted}, but node {k} is {b:g} {unit} after {a:g} {unit}: sort the nodes, and "
+                "leave out those where the curve does not rise"
+            )
 
 
 class Input(NamedTuple):
@@ -50,7 +94,7 @@ class InputRate(NamedTuple):
 class Forces(NamedTuple):
     """Normal force, >= 0."""
 
-    F_N: Annotated[float, Signal("N", "normal force", 3e3)]
+    F_N: NormalForce
 
 
 def depth(u: Input, par: Parameters) -> Overlap:
@@ -69,22 +113,54 @@ def overlap(u: Input, par: Parameters) -> Overlap:
 
 
 def compliance(par: Parameters) -> ContactCompliance:
-    """Return the compliance of caliper and pads."""
+    """Return the compliance of caliper and pads; of the first piece of a table."""
+    if par.law == "table":
+        return par.n_table[1] / par.F_table[1]
     return 1.0 / par.K_cal
 
 
+def normal_force(
+    f: Annotated[float, Signal("N", "contact force", 3e3)], par: Parameters
+) -> NormalForce:
+    r"""Return the normal force that belongs to a contact force of constant compliance.
+
+    .. math:: F_N = f + \sum_k (K_k - K_{k-1}) \max(0, C f - n_k)
+
+    with the stiffness K_k from node n_k on and the compliance C = 1/K_0 of :func:`compliance`.
+
+    Notes
+    -----
+    Contacts have constant compliances, which decides on touching. The table bends what they give:
+    C f is the overlap, damped, so that the damping takes tau times the slope of the curve at small
+    rates, never pulls, and never gives energy, for the curve rises.
+    """
+    if par.law == "linear":
+        return f
+    return f + _bent(f * compliance(par), par)
+
+
 def forces(u: Input, par: Parameters) -> Forces:
-    r"""Return the normal force, :math:`F_N = K_{CAL} \max(0, n + \tau \dot n)`.
+    r"""Return the normal force, :math:`F_N = K_{CAL} \max(0, n + \tau \dot n)`, or by the table.
 
     References
     ----------
     Roberts et al. (2003), section "Wedge and calliper", with clearance, run-out and damping.
     """
-    return Forces(F_N=par.K_cal * ops.fmax(overlap(u, par), 0.0))
+    return Forces(F_N=_elastic_force(ops.fmax(overlap(u, par), 0.0), par))
+
+
+def travel(F_N: NormalForce, par: Parameters) -> Overlap:
+    """Return the overlap at rest that gives a normal force >= 0."""
+    if par.law == "linear":
+        return F_N / par.K_cal
+    n = F_N * compliance(par)
+    for (_, F), before, after in _bends(par):
+        n = n + (1.0 / after - 1.0 / before) * ops.fmax(F_N - F, 0.0)
+    return n
 
 
 def moment(
-    F_N: Annotated[float, Signal("N", "normal force", 3e3)],
+    F_N: NormalForce,
     mu_B: Annotated[float, Signal("1", "friction of the pads", 0.35)],
     turning: Annotated[float, Signal("1", "direction of the disc, 0 when stopped")],
     par: Parameters,
@@ -101,7 +177,13 @@ def input_rate(u: Input) -> InputRate:
 def energy(u: Input, par: Parameters) -> Energy:
     """Return the elastic energy."""
     n = ops.fmax(depth(u, par), 0.0)
-    return 0.5 * par.K_cal * n * n
+    if par.law == "linear":
+        return 0.5 * par.K_cal * n * n
+    stored = 0.5 * n * n / compliance(par)
+    for (n_k, _), before, after in _bends(par):
+        more = ops.fmax(n - n_k, 0.0)
+        stored = stored + 0.5 * (after - before) * more * more
+    return stored
 
 
 def power_in(u: Input, f: Forces) -> Power:
@@ -111,4 +193,26 @@ def power_in(u: Input, f: Forces) -> Power:
 
 def power_loss(u: Input, f: Forces, par: Parameters) -> Power:
     """Return what the damping takes, >= 0."""
-    return (f.F_N - par.K_cal * ops.fmax(depth(u, par), 0.0)) * closing(u)
+    return (f.F_N - _elastic_force(ops.fmax(depth(u, par), 0.0), par)) * closing(u)
+
+
+def _elastic_force(n: float, par: Parameters) -> float:
+    """Return the normal force [N] of an overlap >= 0 [m]."""
+    if par.law == "linear":
+        return par.K_cal * n
+    return n / compliance(par) + _bent(n, par)
+
+
+def _bent(n: float, par: Parameters) -> float:
+    """Return what the table gives beyond its first slope [N]."""
+    force = 0.0 * n / compliance(par)
+    for (n_k, _), before, after in _bends(par):
+        force = force + (after - before) * ops.fmax(n - n_k, 0.0)
+    return force
+
+
+def _bends(par: Parameters) -> Iterator[tuple[tuple[float, float], float, float]]:
+    """Yield each inner node (travel, force) with the stiffnesses [N/m] before and after it."""
+    nodes = list(zip(par.n_table, par.F_table, strict=True))
+    slopes = [(F1 - F0) / (n1 - n0) for (n0, F0), (n1, F1) in pairwise(nodes)]
+    yield from zip(nodes[1:-1], slopes[:-1], slopes[1:], strict=True)

@@ -6,12 +6,14 @@ import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import xarray as xr
 from matplotlib.figure import Figure
 
 from bywire.bench.result import Result
 from bywire.core.errors import ParameterError
 from bywire.report.energy_balance import energy_balance
 from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.report.overlaid_traces import overlaid_traces
 from bywire.report.step_marks import StepFacts, StepLimits
 from bywire.report.step_response import step_response
 from bywire.report.stribeck_curve import stribeck_curve
@@ -75,6 +77,22 @@ def _time_traces(result: Result) -> list[Shown]:
     ]
 
 
+def _overlaid_traces(result: Result) -> list[Shown]:
+    """Return a figure for all recordings that differ in the first part of their labels alone."""
+    groups: dict[str, dict[str, xr.Dataset]] = {}
+    for label, recording in result.recordings.items():
+        line, _, group = label.partition("-")
+        groups.setdefault(group, {})[line] = recording
+    return [
+        Shown(
+            f"overlaid-traces-{group}" if group else "overlaid-traces",
+            overlaid_traces(recordings),
+            f"{', '.join(recordings)}{f': {group}' if group else ''}.",
+        )
+        for group, recordings in groups.items()
+    ]
+
+
 def _energy_balance(result: Result) -> list[Shown]:
     caption = "Where the energy came from and where it went, from time zero on."
     shown = []
@@ -105,6 +123,7 @@ def _tracking(result: Result) -> list[Shown]:
 _KINDS: dict[str, Callable[[Result], list[Shown]]] = {
     "step-response": _step_response,
     "time-traces": _time_traces,
+    "overlaid-traces": _overlaid_traces,
     "energy-balance": _energy_balance,
     "hysteresis-loop": _hysteresis_loop,
     "stribeck-curve": _stribeck_curve,

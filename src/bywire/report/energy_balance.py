@@ -18,7 +18,7 @@ from bywire.report.wording import amount
 if TYPE_CHECKING:
     import xarray as xr
 
-BRAKE_SOURCE = "E_source"
+BRAKE_SOURCE = {"E_source": "source"}
 BRAKE_SINKS = {
     "E_copper": "copper",
     "E_gear": "gear and screw",
@@ -32,6 +32,24 @@ BRAKE_SINKS = {
 }
 """energies of the motorcycle brake: integrals over the run, and what is stored"""
 
+WEDGE_SOURCE = {
+    "W_electric": "electrical",
+    "W_disc": "disc on wedge",
+    "W_runout": "run-out",
+}
+WEDGE_SINKS = {
+    "E_copper": "copper",
+    "E_shaft": "bearings and screws",
+    "E_wedge": "friction on the wedge",
+    "E_damping": "motor damping",
+    "E_heart": "brake heart",
+    "E_caliper": "caliper damping",
+    "E_line": "damping of screws and sensor",
+    "E_stop": "end stops",
+    "E_stored": "stored",
+}
+"""energies of the wedge brake and its rigs; of the brake the disc gives most, so it stands apart"""
+
 COLORS = {
     "E_copper": style.VERMILLION,
     "E_gear": style.GREEN,
@@ -41,12 +59,20 @@ COLORS = {
     "E_supply": style.YELLOW,
     "E_stop": style.GRAY,
     "E_port": "#8B5A2B",
+    "E_shaft": style.GREEN,
+    "E_wedge": style.ORANGE,
+    "E_heart": style.SKY,
+    "E_caliper": style.YELLOW,
+    "E_line": style.SKY,
     "E_stored": style.BLUE,
 }
 """the same energy has the same color in every figure; others take what a figure leaves over"""
-SOURCE_COLOR = "#4A4A4A"
+SOURCE_COLORS = ("#4A4A4A", "#9A9A9A", "#C4C4C4")
+SMALL = 1e-3
+"""share of the energy turned over below which entries are drawn together as the rest"""
 NEGLIGIBLE = 1e-9
-"""share of the energy turned over below which an entry is not drawn"""
+"""share below which even the rest is not drawn"""
+REST_COLOR = "#E4E4E4"
 
 
 @dataclass(frozen=True)
@@ -61,7 +87,7 @@ class Entry:
 def energy_balance(
     recording: xr.Dataset,
     *,
-    source: str = BRAKE_SOURCE,
+    source: str | Mapping[str, str] | None = None,
     sinks: Mapping[str, str] | None = None,
 ) -> Figure:
     """Draw two stacked bars of equal length: where energy came from and where it went.
@@ -75,9 +101,10 @@ def energy_balance(
     recording
         Recording with energies [J]; of each the difference between end and start counts.
     source
-        Variable with the energy that came from the source.
+        Variable with the energy that came from the source; or label by variable of several
+        sources; by default what the recording's brake has.
     sinks
-        Label by variable of every place where energy went; by default those of the motorcycle
+        Label by variable of every place where energy went; by default those of the recording's
         brake. Variables a recording lacks are left out.
 
     Raises
@@ -85,15 +112,18 @@ def energy_balance(
     ParameterError
         When no energy was turned over.
     """
-    given, taken = _sides(recording, source, BRAKE_SINKS if sinks is None else sinks)
+    if source is None:
+        source = WEDGE_SOURCE if "W_disc" in recording.data_vars else BRAKE_SOURCE
+    named = {source: "source"} if isinstance(source, str) else source
+    if sinks is None:
+        sinks = WEDGE_SINKS if "E_shaft" in recording.data_vars else BRAKE_SINKS
+    given, taken = _sides(recording, named, sinks)
     total = max(sum(e.energy for e in given), sum(e.energy for e in taken))
     if not total > 0:
         raise ParameterError("energy_balance: the recording turned over no energy")
-    given = [entry for entry in given if entry.energy > NEGLIGIBLE * total]
-    taken = [entry for entry in taken if entry.energy > NEGLIGIBLE * total]
     figure, (axes,) = style.new_figure(2.9)
-    _stack(axes, 1.0, given, total)
-    _stack(axes, 0.0, taken, total)
+    _stack(axes, 1.0, _gathered(given, total), total)
+    _stack(axes, 0.0, _gathered(taken, total), total)
     missing = sum(e.energy for e in given) - sum(e.energy for e in taken)
     _draw_missing(axes, missing, total)
     axes.set_yticks([1.0, 0.0], ["came from", "went to"])
@@ -108,14 +138,16 @@ def energy_balance(
 
 
 def _sides(
-    recording: xr.Dataset, source: str, sinks: Mapping[str, str]
+    recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]
 ) -> tuple[list[Entry], list[Entry]]:
     """Return the givers and the receivers of energy."""
     given: list[Entry] = []
     taken: list[Entry] = []
-    change = _change(recording, source)
-    side = given if change > 0 else taken
-    side.append(Entry("source" if change > 0 else "back to the source", abs(change), SOURCE_COLOR))
+    for (variable, label), color in zip(sources.items(), cycle(SOURCE_COLORS)):
+        change = _change(recording, variable)
+        back = "back to the source" if len(sources) == 1 else f"{label} (takes)"
+        side = given if change > 0 else taken
+        side.append(Entry(label if change > 0 else back, abs(change), color))
     colors = _colors(sinks)
     for variable, label in sinks.items():
         if variable not in recording.data_vars:
@@ -125,6 +157,15 @@ def _sides(
         suffix = "" if change > 0 else " (gives)"
         side.append(Entry(label + suffix, abs(change), colors[variable]))
     return given, taken
+
+
+def _gathered(entries: list[Entry], total: float) -> list[Entry]:
+    """Return the entries worth a place in the legend, small ones gathered into one."""
+    large = [entry for entry in entries if entry.energy >= SMALL * total]
+    small = [e for e in entries if NEGLIGIBLE * total < e.energy < SMALL * total]
+    if len(small) < 2:
+        return large + small
+    return [*large, Entry("rest", sum(entry.energy for entry in small), REST_COLOR)]
 
 
 def _colors(sinks: Mapping[str, str]) -> dict[str, str]:

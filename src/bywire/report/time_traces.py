@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,9 +11,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError
+from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
 from bywire.report.decimation import phases
+from bywire.report.panels import KINDS, Panel, Trace
 from bywire.report.step_marks import StepLimits, draw_limits
 from bywire.report.style import Role
 
@@ -21,85 +23,50 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-@dataclass(frozen=True)
-class Trace:
-    """A variable and what its line means."""
-
-    variable: str
-    role: Role = Role.MAIN
-
-
-@dataclass(frozen=True)
-class Panel:
-    """One panel of stacked time traces.
-
-    Parameters
-    ----------
-    quantity
-        What the ordinate says, without its unit; short, for low panels.
-    traces
-        Lines of one unit, the judged one first; variables a recording lacks are left out.
-    saturation
-        Variable that is 1 while the quantity is saturated.
-    height
-        Relative height.
-    """
-
-    quantity: str
-    traces: tuple[Trace, ...]
-    saturation: str | None = None
-    height: float = 1.0
-
-
-BRAKE_PANELS = (
-    Panel(
-        "pressure",
-        (Trace("p_mc"), Trace("p_pd", Role.SECOND), Trace("p_ref", Role.SET_POINT)),
-        height=1.8,
-    ),
-    Panel("current", (Trace("i"), Trace("i_ref", Role.SET_POINT)), saturation="sat_current"),
-    Panel("speed", (Trace("omega"),)),
-    Panel("duty cycle", (Trace("duty"),), saturation="sat_duty"),
-    Panel("power", (Trace("P_el"),)),
-)
-"""panels of the motorcycle brake"""
+NEAR = 0.5
+"""share of a limit from which its lines are drawn"""
 
 
 def time_traces(
     recording: xr.Dataset,
     *,
-    panels: Sequence[Panel] = BRAKE_PANELS,
+    panels: Sequence[Panel] | None = None,
     limits: StepLimits | None = None,
     measured: xr.Dataset | None = None,
     stuck: str = "stuck",
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
-    Phases in which the shaft sticks are shaded; saturation is a bar along the upper edge.
+    Phases in which all that has dry friction sticks are shaded; saturation is a bar along the
+    upper edge.
 
     Parameters
     ----------
     recording
         Recording to draw.
     panels
-        What to draw; panels without any variable in the recording are left out.
+        What to draw; by default the panels of the brake or rig that the recording shows most of.
+        Those without any variable in the recording are left out, and those that stay at zero
+        unless all do.
     limits
         Step by which the first trace of the first panel is judged: its band and limit are drawn.
     measured
-        Recording to compare with: solid blue, ``recording`` dashed red on top. Of every panel
-        then only the first trace and the set points are drawn.
+        Recording to compare with, for instance of a test rig, with the names and units of
+        ``recording``; it may lack variables, and may have samples of its own. It is solid blue,
+        ``recording`` dashed red on top. Of every panel then only the first trace and the set
+        points are drawn.
     stuck
-        Variable that is 1 while the shaft sticks.
+        Variable that is 1 while shafts and pistons stick.
 
     Raises
     ------
     ParameterError
         When the recording has none of the variables, or a panel mixes units.
     """
-    present = [(panel, _present(panel, recording)) for panel in panels]
-    present = [(panel, traces) for panel, traces in present if traces]
+    present = _chosen(recording) if panels is None else _drawable(recording, panels)
     if not present:
-        wanted = ", ".join(trace.variable for panel in panels for trace in panel.traces)
+        known = [p for kind in KINDS for p in kind] if panels is None else panels
+        wanted = ", ".join(trace.variable for panel in known for trace in panel.traces)
         raise ParameterError(f"the recording has none of the variables {wanted}")
     heights = [panel.height for panel, _ in present]
     figure, rows = style.new_figure(0.5 + 1.15 * sum(heights), heights)
@@ -109,13 +76,34 @@ def time_traces(
             draw_limits(axes, limits, first)
         _shade_stuck(axes, recording, stuck, named=axes is rows[0])
         _mark_saturation(axes, panel, recording)
+        _mark_limit(axes, panel, recording, first)
         axes.margins(x=0.0)
-        style.few_ticks(axes, 5 if panel.height < 1.5 else 7)
-        style.legend_above(axes)
+        _set_ticks(axes, panel, first)
+        if not panel.levels:  # a mode's ticks say all that its legend would
+            style.legend_above(axes)
     _, unit = style.time_scale(first.time)
     rows[-1].set_xlabel(f"time [{unit}]")
     figure.align_ylabels(rows)
     return figure
+
+
+def _chosen(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
+    """Return the panels of that kind of which the recording shows most."""
+    return max((_drawable(recording, kind) for kind in KINDS), key=len)
+
+
+def _drawable(
+    recording: xr.Dataset, panels: Sequence[Panel]
+) -> list[tuple[Panel, list[Trace]]]:
+    """Return the panels that show something, with their traces."""
+    present = [(panel, _present(panel, recording)) for panel in panels]
+    present = [(panel, traces) for panel, traces in present if traces]
+    moving = [
+        (panel, traces)
+        for panel, traces in present
+        if any(bool(np.any(recording[trace.variable].values)) for trace in traces)
+    ]
+    return moving or present
 
 
 def _present(panel: Panel, recording: xr.Dataset) -> list[Trace]:
@@ -161,7 +149,8 @@ def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: boo
     if spans:
         axes.broken_barh(
             spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), facecolor=style.SHADE,
-            alpha=0.7, linewidth=0, zorder=0.4, label="shaft stuck" if named else None,
+            alpha=0.7, linewidth=0, zorder=0.4,
+            label=style.plain(channel(recording, variable).label) if named else None,
         )
 
 
@@ -171,8 +160,41 @@ def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
         axes.broken_barh(
             spans, (0.96, 0.04), transform=axes.get_xaxis_transform(),
             facecolor=style.VERMILLION, edgecolor=style.VERMILLION, linewidth=0.8, zorder=2.0,
-            label="saturated",
+            label=panel.saturated,
         )
+
+
+def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
+    """Draw the limits of a panel's first trace where it comes near; far away they say nothing."""
+    level = _parameter(recording, panel.limit) if panel.limit is not None else None
+    if level is None:
+        return
+    level *= convert(1.0, first.symbol, first.unit)
+    look = style.STROKES[Role.LIMIT]
+    sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= NEAR * level]
+    for k, side in enumerate(sides):
+        axes.axhline(
+            side * level, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
+            zorder=look.zorder, label="limit" if k == 0 else None,
+        )
+
+
+def _parameter(recording: xr.Dataset, path: str) -> float | None:
+    """Return a parameter with which a recording was made; None where it says none."""
+    found = json.loads(str(recording.attrs.get("parameters", "{}")))
+    for name in path.split("."):
+        found = found.get(name) if isinstance(found, dict) else None
+    return float(found) if isinstance(found, (int, float)) else None
+
+
+def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
+    """Set the ticks of an ordinate: few numbers, or the names of a mode."""
+    if not panel.levels:
+        style.few_ticks(axes, 5 if panel.height < 1.5 else 7)
+        return
+    axes.set_yticks(range(len(panel.levels)), panel.levels)
+    axes.set_ylim(-0.3, len(panel.levels) - 0.7)
+    axes.set_ylabel(panel.quantity)
 
 
 def _spans(recording: xr.Dataset, variable: str) -> list[tuple[float, float]]:

@@ -13,10 +13,11 @@ from bywire.analysis.margins import bandwidth
 from bywire.bench.result import Result
 from bywire.report.step_response import step_response
 from bywire.reproduction import dardanelli2010_facts as facts
-from bywire.reproduction.dardanelli2010_runs import MAIN, PRINTED, Runs, kpis, parameters
+from bywire.reproduction.dardanelli2010_runs import MAIN, PRINTED, Runs, parameters
 from bywire.reproduction.dardanelli2010_tolerances import ROUND
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import kpis
 
 LOCKED = {"seal.T_pr": 10.0}
 """overrides that lock the rotor: no torque of this motor overcomes 10 N m"""

@@ -17,19 +17,11 @@ from bywire.bench.result import Result
 from bywire.bench.running import as_run
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.reproduction import dardanelli2010_facts as facts
-from bywire.reproduction.dardanelli2010_runs import (
-    BAR,
-    MAIN,
-    SETS,
-    Runs,
-    kpis,
-    parameters,
-    peak,
-    selected,
-)
+from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.reproduction.dardanelli2010_tolerances import LEVEL, LOOP
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import kpis, peak, selected
 from bywire.simulation.run import simulate
 
 WITHOUT, WITH = "without-dither", "with-dither"

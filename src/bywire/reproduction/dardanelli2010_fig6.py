@@ -9,22 +9,15 @@ from bywire.analysis.motorcycle_linear import theoretical
 from bywire.analysis.rational import Rational
 from bywire.bench.kpis import step_response
 from bywire.bench.result import Result
+from bywire.report.panels import Panel, Trace
 from bywire.report.style import Role
-from bywire.report.time_traces import Panel, Trace, time_traces
+from bywire.report.time_traces import time_traces
 from bywire.reproduction import dardanelli2010_facts as facts
-from bywire.reproduction.dardanelli2010_runs import (
-    BAR,
-    MAIN,
-    SETS,
-    Runs,
-    before,
-    kpis,
-    parameters,
-    selected,
-)
+from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.reproduction.dardanelli2010_table4 import step_peak
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import kpis, selected
 
 HEIGHT = facts.FIG6_STEP.value
 START = facts.FIG6_START.value * BAR

@@ -15,10 +15,11 @@ from bywire.report.step_marks import StepFacts, StepLimits
 from bywire.report.step_response import step_response
 from bywire.report.tracking import tracking
 from bywire.reproduction import dardanelli2010_facts as facts
-from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, kpis, parameters
+from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.reproduction.dardanelli2010_tolerances import ROUND, STEADY
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import kpis
 
 P_MEAN = 25e5
 """mean pressure of the sine tests [Pa], medium"""

@@ -7,16 +7,10 @@ import xarray as xr
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.report.energy_balance import energy_balance
-from bywire.reproduction.dardanelli2010_runs import (
-    FRICTIONLESS,
-    MAIN,
-    SETS,
-    Runs,
-    parameters,
-    selected,
-)
+from bywire.reproduction.dardanelli2010_runs import FRICTIONLESS, MAIN, SETS, Runs, parameters
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import selected
 
 P_FROM = 37e5
 """pressure from which the brake is released [Pa], that of Fig. 7a"""

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast
-
-import numpy as np
-import xarray as xr
+from typing import cast
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.bench.bench import Bench
 from bywire.bench.result import Result
-from bywire.bench.running import Progress, run
 from bywire.catalog.registry import entry
+from bywire.reproduction import runs
 
 MAIN = "dardanelli2010"
 PRINTED = "dardanelli2010-table1"
@@ -34,56 +29,8 @@ def parameters(name: str) -> MotorcycleParameters:
     return cast(MotorcycleParameters, entry(name).parameters())
 
 
-class Runs:
-    """Bench results, each computed once.
-
-    Parameters
-    ----------
-    progress
-        Called with the label of a piece of work and its finished share, 0 to 1.
-    """
-
-    def __init__(self, progress: Progress | None = None) -> None:
-        self._progress = progress
-        self._known: dict[str, Result] = {}
-
-    def report(self, label: str, share: float) -> None:
-        """Tell how far a piece of work is."""
-        if self._progress is not None:
-            self._progress(label, share)
-
-    def bench(
-        self,
-        experiment: str,
-        name: str,
-        overrides: Mapping[str, Any] | None = None,
-        options: Mapping[str, Any] | None = None,
-        stimulus: Mapping[str, Any] | None = None,
-    ) -> Result:
-        """Return the result of an experiment with a parameter set.
-
-        Parameters
-        ----------
-        experiment, name
-            Names of experiment and parameter set.
-        overrides, options, stimulus
-            As in `Bench`.
-
-        Raises
-        ------
-        RunError
-            When a run fails.
-        KeyboardInterrupt
-            When the user stopped a run: half a reproduction is none.
-        """
-        bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
-        key = repr(bench)
-        if key not in self._known:
-            result = run(bench)
-            if result.status == "interrupted":
-                raise KeyboardInterrupt
-            self._known[key] = result
-        return self._known[key]
+class Runs(runs.Runs):
+    """Bench results, each computed once; see `bywire.reproduction.runs.Runs`."""
 
     def settled_step(self, name: str, p: float, i_step: float) -> Result:
         """Return a current step that begins where the dithered pressure has settled at ``p``.
@@ -104,18 +51,3 @@ def before(step: Result) -> float:
     """Return the mean pressure before a step [Pa]."""
     recording = step.recordings["run"]
     return float(recording["p_mc"].sel(time=slice(None, -1e-9)).mean())
-
-
-def kpis(result: Result) -> dict[str, float]:
-    """Return the KPIs of a result by name, SI."""
-    return {kpi.name: kpi.value for kpi in result.kpis}
-
-
-def selected(recording: xr.Dataset, *names: str) -> xr.Dataset:
-    """Return a recording with some of its variables, those that it has."""
-    return recording[[name for name in names if name in recording]]
-
-
-def peak(recording: xr.Dataset, name: str) -> float:
-    """Return the largest value of a signal."""
-    return float(np.max(recording[name].values))

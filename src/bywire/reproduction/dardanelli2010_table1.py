@@ -7,10 +7,11 @@ from bywire.catalog.registry import entry
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.tables import parameter_table
 from bywire.reproduction import dardanelli2010_facts as facts
-from bywire.reproduction.dardanelli2010_runs import SETS, Runs, parameters, peak
+from bywire.reproduction.dardanelli2010_runs import SETS, Runs, parameters
 from bywire.reproduction.dardanelli2010_tolerances import PRINTED
 from bywire.reproduction.item import Item, compared
 from bywire.reproduction.reproduction import Part
+from bywire.reproduction.runs import peak
 
 P_NOMINAL = 20e5
 """pressure taken for the nominal position x_mc [Pa]; the paper names none"""

@@ -10,18 +10,11 @@ from bywire.analysis.sine_test import Excitation, SineTest, sine_test
 from bywire.assemblies.motorcycle_trim import holding_current, travel_at
 from bywire.report.bode import Response, bode
 from bywire.reproduction import dardanelli2010_facts as facts
-from bywire.reproduction.dardanelli2010_runs import (
-    BAR,
-    MAIN,
-    SETS,
-    Runs,
-    before,
-    kpis,
-    parameters,
-)
+from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.reproduction.dardanelli2010_tolerances import CORNER, GAIN, OVERSHOOT
 from bywire.reproduction.item import Fact, Item, compared, found, quoted
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import kpis
 
 EQ22 = "eq. (22) with the numbers of Table 4, medium"
 FREQUENCIES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0)

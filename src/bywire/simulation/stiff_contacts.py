@@ -1,8 +1,9 @@
 """Whether the step resolves the contacts: stiff, lightly damped ones give wrong rebounds silently.
 
-A contact that swings at omega on its bodies is safe for h omega <= 2. Beyond, the rebound from a
-contact without damping can be several times faster than the approach, though every substep
-settles; damping of about half the critical one or more keeps it bounded.
+Contact begins and ends with a substep, each time a little early or late. For a contact without
+damping that swings at omega on its bodies, the rebound is then up to 3 % faster or slower than the
+approach at h omega = 0.5, 11 % at 1, 25 % at 1.5, and 2.2 times faster at 4, though every substep
+settles. Damping of about half the critical one or more keeps it bounded.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.symbols import SX, column, depends, scalars, symbol_tuple
 
-SAFE, DAMPED = 2.0, 0.5  # h omega, and damping ratio
+SAFE, DAMPED = 1.0, 0.5  # h omega, and damping ratio
 # What a contact gives may bend with its force: then every slope counts, not only that at the start.
 LOADS = (0.0, *(10.0 ** (0.5 * k) for k in range(-6, 15)))  # N or N m
 

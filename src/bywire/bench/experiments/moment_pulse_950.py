@@ -76,5 +76,5 @@ EXPERIMENT = Experiment(
     judge=judge,
     kpis=UNITS
     | {"peak_moment": "N*m", "peak_angle": "rad", "release_time": "s", "parking_time": "s"},
-    figures=("energy-balance",),
+    figures=("time-traces", "energy-balance"),
 )

@@ -95,5 +95,5 @@ EXPERIMENT = Experiment(
         "brake_power": "W",
         "pulse_moment": "N*m",
     },
-    figures=("energy-balance",),
+    figures=("time-traces", "energy-balance"),
 )

@@ -80,5 +80,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=UNITS | {"ramp_error_mean": "N*m", "ramp_error_rms": "N*m", "ramp_slope": "N*m/s"},
-    figures=("energy-balance",),
+    figures=("time-traces", "energy-balance"),
 )

@@ -80,5 +80,5 @@ EXPERIMENT = Experiment(
         "preload_end": "N",
         "end_stop_force": "N",
     },
-    figures=("energy-balance",),
+    figures=("time-traces", "energy-balance"),
 )

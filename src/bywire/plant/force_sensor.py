@@ -1,0 +1,95 @@
+"""Force sensor between two screws: both screws and the sensor as one spring, and its reading."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Frequency, Stiffness, TimeConstant
+from bywire.core.signals import ContactCompliance, Energy, Power, Signal
+
+AxialForce = Annotated[float, Signal("N", "compression of the sensor", 1000.0)]
+
+
+class Parameters(ParameterSet):
+    """Bolted to both screws: it takes compression and tension. No mass, calibrated."""
+
+    K_F: Stiffness
+    """stiffness of the sensor with its adapters"""
+    tau_F: TimeConstant
+    """damping over stiffness of sensor and screws"""
+    f_F: Frequency
+    """corner of its amplifier's filter"""
+
+
+class Input(NamedTuple):
+    """Travels and velocities of both nuts, and the compliance of both screws together."""
+
+    X_1: Annotated[float, Signal("m", "travel of screw 1", 1e-4)]
+    X_2: Annotated[float, Signal("m", "travel of screw 2", 1e-4)]
+    V_1: Annotated[float, Signal("m/s", "velocity of screw 1", 0.02)]
+    V_2: Annotated[float, Signal("m/s", "velocity of screw 2", 0.02)]
+    c: ContactCompliance
+
+
+class InputRate(NamedTuple):
+    """Derivatives of what the stored energy depends on; the compliance stands still."""
+
+    X_1: Annotated[float, Signal("m/s", "velocity of screw 1", 0.02)]
+    X_2: Annotated[float, Signal("m/s", "velocity of screw 2", 0.02)]
+    c: Annotated[float, Signal("m/(N*s)", "rate of the compliance")]
+
+
+def stiffness(u: Input, par: Parameters) -> Annotated[float, Signal("N/m", "stiffness", 2e7)]:
+    r"""Return the stiffness of the line, :math:`K = 1 / (c + 1/K_F)`."""
+    return 1.0 / (u.c + 1.0 / par.K_F)
+
+
+def compression(u: Input) -> Annotated[float, Signal("m", "compression of the line", 1e-4)]:
+    """Return how much closer the nuts are than without force; negative in tension."""
+    return u.X_1 - u.X_2
+
+
+def closing(u: Input) -> Annotated[float, Signal("m/s", "rate of the compression", 0.02)]:
+    """Return the rate of the compression."""
+    return u.V_1 - u.V_2
+
+
+def force(u: Input, par: Parameters) -> AxialForce:
+    r"""Return the force in the line, :math:`F = K (d + \tau \dot d)`, compression positive.
+
+    References
+    ----------
+    Roberts et al. (2003), section "Drive train stiffnesses": sensor between the roller screws.
+    """
+    return stiffness(u, par) * (compression(u) + par.tau_F * closing(u))
+
+
+def rate(
+    shown: AxialForce, actual: AxialForce, par: Parameters
+) -> Annotated[float, Signal("N/s", "rate of the shown force", 1e5)]:
+    r"""Return the derivative of the shown force, :math:`2 \pi f_F (F - y_F)`."""
+    return 2.0 * math.pi * par.f_F * (actual - shown)
+
+
+def input_rate(u: Input) -> InputRate:
+    """Return how the nuts move: the line stores energy, and they are its ports."""
+    return InputRate(X_1=u.V_1, X_2=u.V_2, c=0.0)
+
+
+def energy(u: Input, par: Parameters) -> Energy:
+    """Return the elastic energy of the line."""
+    d = compression(u)
+    return 0.5 * stiffness(u, par) * d * d
+
+
+def power_in(u: Input, par: Parameters) -> Power:
+    """Return the work of both screws on the line."""
+    return force(u, par) * closing(u)
+
+
+def power_loss(u: Input, par: Parameters) -> Power:
+    """Return what the damping takes, >= 0."""
+    rate_d = closing(u)
+    return stiffness(u, par) * par.tau_F * rate_d * rate_d

@@ -1,0 +1,209 @@
+"""Acceptance: Roberts, Schautt, Hartmann, Gombert (2003), figure by figure and rig by rig."""
+
+from __future__ import annotations
+
+import copy
+import json
+import math
+import re
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from bywire.reproduction.reproduction import Reproduction
+from bywire.reproduction.results import as_json, write
+from bywire.reproduction.roberts2003 import PARTS, reproduce
+
+Items = Mapping[str, dict[str, Any]]
+TAN_ALPHA = math.tan(math.radians(20.0))
+REQUIRED = {
+    *(f"fig7.{key}" for key in (
+        "hold_moment", "pulse_moment", "ripple_order", "ripple_without_runout", "power_peak_time",
+        "hold_power", "standby", "contact_time", "time_to_90", "brake_power", "energy_left",
+    )),
+    *(f"fig8.{key}" for key in ("low_moment", "final_moment", "ramp_slope", "ramp_error")),
+    *(f"fig9.{key}" for key in (
+        "peak_moment", "power", "rate_limited", "limits_dominate", "friction_dominates",
+        "no_initial_peak", "lowest_power", "power_reduces", "tail_shift", "disc_share",
+    )),
+    *(f"efficiency.{key}" for key in ("driving", "recovered", "raw", "back_driven")),
+    *(f"stiffness.{key}" for key in ("K_S", "K_W", "free_play", "compression", "tension")),
+    *(f"force_fight.{key}" for key in ("equal", "step", "ramp", "sine", "speed")),
+    *(f"hold.{key}" for key in ("neutral", "drift", "standing", "together")),
+    *(f"stability.{key}" for key in (
+        "C.mu20", "C.mu35", "C.mu60", "F_M.neutral", "runaway", "runaway.friction", "unstable",
+        "unstable.frictionless", "contact_changes", "contact_changes.free_play",
+    )),
+}  # fmt: skip
+DISAGREEMENTS = {
+    "stability.runaway.friction",  # the paper leaves friction out
+    "fig9.lowest_power",  # the length of the pulse is not printed
+    "efficiency.raw",  # bearings are in it
+}
+BY_CONSTRUCTION = re.compile(r"fig9\.power|fig7\.standby|efficiency\.driving")
+"""tuned to the statement, or an input: no evidence"""
+STAGES: list[tuple[str, float]] = []
+LONGEST = 60.0
+"""time that all of it may take [s]"""
+
+
+@pytest.fixture(scope="module")
+def timed() -> tuple[Reproduction, float]:
+    begin = time.process_time()
+    found = reproduce(lambda label, share: STAGES.append((label, share)))
+    return found, time.process_time() - begin
+
+
+@pytest.fixture(scope="module")
+def reproduction(timed: tuple[Reproduction, float]) -> Reproduction:
+    return timed[0]
+
+
+@pytest.fixture(scope="module")
+def items(reproduction: Reproduction) -> Items:
+    return by_id(as_json(reproduction)["items"])
+
+
+def by_id(listed: Iterable[dict[str, Any]]) -> Items:
+    return {item["id"]: item for item in listed}
+
+
+def flaws(items: Items) -> list[str]:
+    """Return everything that the acceptance of this source does not admit."""
+    wrong = [f"{name} is missing" for name in sorted(REQUIRED - items.keys())]
+    wrong += [
+        f"{name} is not flagged"
+        for name in sorted(DISAGREEMENTS)
+        if name not in items or items[name]["agrees"] is not False
+    ]
+    wrong += [
+        f"{name} disagrees"
+        for name in sorted(REQUIRED - DISAGREEMENTS)
+        if name in items and items[name]["agrees"] is False
+    ]
+    wrong += [f"{name} computes nothing" for name, i in items.items() if i["computed"] is None]
+    wrong += [
+        f"{name} counts as evidence"
+        for name, item in items.items()
+        if BY_CONSTRUCTION.fullmatch(name)
+        and (item["agrees"] is not None or not re.search("calibrated|an input", item["note"]))
+    ]
+    return wrong
+
+
+def test_every_required_statement_is_there_and_judged(items: Items) -> None:
+    assert flaws(items) == []
+
+
+def test_the_gate_can_fail(items: Items) -> None:
+    """Each kind of flaw is found when it is made."""
+    for change, expected in (
+        (lambda d: d.pop("hold.drift"), "hold.drift is missing"),
+        (lambda d: d["efficiency.raw"].update(agrees=True), "efficiency.raw is not"),
+        (lambda d: d["stiffness.K_W"].update(agrees=False), "stiffness.K_W disagrees"),
+        (lambda d: d["fig9.power"].update(agrees=True), "fig9.power counts"),
+        (lambda d: d["fig9.power"].update(note="Fig. 9"), "fig9.power counts"),
+        (lambda d: d["fig7.time_to_90"].update(computed=None), "fig7.time_to_90 computes nothing"),
+    ):
+        spoiled = copy.deepcopy(dict(items))
+        change(spoiled)
+        assert any(flaw.startswith(expected) for flaw in flaws(spoiled))
+
+
+def test_identifiers_are_unique(reproduction: Reproduction) -> None:
+    names = [item.id for item in reproduction.items]
+    assert len(names) == len(set(names))
+
+
+def test_every_disagreement_has_one_root_cause(reproduction: Reproduction) -> None:
+    explained = [i.id for c in reproduction.causes for i in c.explained(reproduction.items)]
+    assert sorted(explained) == sorted(i.id for i in reproduction.items if i.agrees is False)
+    assert all(cause.explained(reproduction.items) for cause in reproduction.causes)
+    assert all(re.search(r"\d", cause.text) for cause in reproduction.causes)
+
+
+def test_only_statements_of_the_paper_and_bounds_are_judged(reproduction: Reproduction) -> None:
+    for item in reproduction.items:
+        if item.kind == "ours":
+            assert (item.stated, item.agrees) == (None, None), item.id
+        else:
+            assert item.stated is not None, item.id
+            assert re.match(r"section '|physical bound", item.note), item.id
+        if item.kind == "physical bound":
+            assert item.note.startswith("physical bound"), item.id
+        if item.tolerance in ("<=", ">=") and item.kind == "printed":
+            assert "read as" in item.note, item.id
+
+
+def test_numeric_tolerances_are_those_with_a_reason(reproduction: Reproduction) -> None:
+    for item in reproduction.items:
+        if isinstance(item.tolerance, float) and item.stated is not None:
+            sizes = [allowance.around(item.stated) for allowance in reproduction.allowances]
+            assert any(item.tolerance == pytest.approx(abs(size)) for size in sizes), item.id
+
+
+def test_closed_forms(items: Items) -> None:
+    for name, mu_B in (("mu20", 0.2), ("mu35", 0.35), ("mu60", 0.6)):
+        C = 2.0 * mu_B / (TAN_ALPHA - mu_B)
+        assert items[f"stability.C.{name}"]["stated"] == pytest.approx(C, rel=1e-9)
+        assert items[f"stability.C.{name}"]["computed"] == pytest.approx(C, rel=1e-6)
+    assert items["stability.runaway"]["stated"] == pytest.approx(TAN_ALPHA, rel=1e-12)
+    assert items["fig7.ripple_passive"]["computed"] == pytest.approx(21.0, rel=1e-9)
+
+
+def test_numbers_within_what_is_left_open(items: Items) -> None:
+    """Wide enough for another choice of gains, too narrow for another kind of brake."""
+    ranges = {
+        "fig7.contact_time": (0.03, 0.05),
+        "fig7.time_to_90": (0.06, 0.1),
+        "fig7.hold_power_watt": (2.0, 8.0),
+        "fig7.brake_power": (10e3, 13e3),
+        "fig7.ripple": (21.0, 45.0),
+        "fig9.power": (50.0, 75.0),
+        "fig9.disc_share": (93.0, 98.0),
+        "fig9.caliper_energy": (1.9, 2.2),
+        "fig9.tail_shift": (0.005, 0.06),
+        "stability.neutral.falling": (0.34, TAN_ALPHA),
+        "stability.neutral.rising": (TAN_ALPHA, 0.39),
+        "stability.overshoot": (0.0, 15.0),
+        "efficiency.both": (29.0, 31.0),
+    }
+    for name, (low, high) in ranges.items():
+        assert low <= items[name]["computed"] <= high, name
+
+
+def test_friction_holds_less_under_more_load(items: Items) -> None:
+    free, at_500, at_950 = (
+        items[f"stability.runaway{name}"]["computed"] for name in ("", ".friction", ".friction.950")
+    )
+    assert free < at_950 < at_500
+
+
+def test_what_the_paper_explains_changes_when_its_cause_does(items: Items) -> None:
+    """Free-play without preload, a pulse that ends at once, a disc that sticks to the pads."""
+    free_play = items["stability.contact_changes.free_play"]["computed"]
+    assert free_play > 3.0 * (items["stability.contact_changes"]["computed"] + 1.0)
+    assert items["fig9.lowest_power.short"]["computed"] > items["fig9.lowest_power"]["stated"]
+    assert items["hold.standing.stick"]["computed"] > 0.5 > items["hold.standing"]["computed"]
+    assert items["hold.far"]["computed"] < 90.0 < items["hold.neutral"]["computed"]
+    assert items["fig7.ripple_without_runout"]["computed"] < 5.0
+
+
+def test_it_is_quick_enough(timed: tuple[Reproduction, float]) -> None:
+    assert timed[1] < LONGEST
+
+
+def test_report_opens_with_causes_and_shows_every_figure(
+    reproduction: Reproduction, tmp_path: Path
+) -> None:
+    names = {exhibit.name for exhibit in reproduction.figures}
+    assert names >= {"fig7", "fig8", "fig9", "brake-factor", "power-off-hold", "force-fight"}
+    paths = write(reproduction, tmp_path)
+    html = paths[0].read_text(encoding="utf-8")
+    assert html.count("<figcaption>Figure") == len(reproduction.figures)
+    assert html.index("leaves friction out") < html.index("<figcaption>Figure")
+    assert json.loads(paths[1].read_text()) == as_json(reproduction)
+    assert [label for label, share in STAGES if share == 1.0] == list(PARTS)

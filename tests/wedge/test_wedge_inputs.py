@@ -1,0 +1,134 @@
+"""Bad values of the wedge brake get one clear line; what a run shows is said."""
+
+from __future__ import annotations
+
+import re
+import sys
+
+import numpy as np
+import pytest
+from wedge_runs import brake, drive
+
+import bywire
+from bywire.cli.main import main
+
+BAD = [
+    ("heart.g_1=-20um", "heart.g_1 = -2e-05 m is not admissible: it must be >= 0 m"),
+    ("heart.g_12=-1um", "heart.g_12 = -1e-06 m is not admissible: it must be >= 0 m"),
+    ("wedge.alpha=0", "wedge.alpha: 0.0 rad, 0 degrees, is not admissible"),
+    ("wedge.alpha=-5deg", "-5 degrees, is not admissible"),
+    ("wedge.alpha=90deg", "90 degrees, is not admissible: it must be > 0 rad and < 1.5708 rad"),
+    ("wedge.alpha=110deg", "between 0 and 90 degrees"),
+    ("wedge.alpha=20mm", "mm cannot be rad"),
+    ("screw.eta_f=0", "screw.eta_f = 0.0 is not admissible: it must be > 0 and <= 1"),
+    ("screw.eta_f=1.01", "screw.eta_f = 1.01 is not admissible: it must be > 0 and <= 1"),
+    ("screw.eta_b=-0.1", "screw.eta_b = -0.1 is not admissible: it must be >= 0 and <= 1"),
+    ("screw.eta_b=1.1", "screw.eta_b = 1.1 is not admissible"),
+    ("wedge.mu_B=-0.1", "wedge.mu_B = -0.1 is not admissible: it must be >= 0"),
+    ("wedge_friction.stopped_disc=stuck", "did you mean 'stick'?"),
+    ("options.M_high=-200Nm", "M_high = -200.0 N*m is not admissible: it must be > 0 N*m"),
+]
+
+
+@pytest.mark.parametrize(("change", "text"), BAD)
+def test_bad_value_gets_one_clear_line(change, text, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["bywire", "run", "moment-pulses", "--set", change])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    out, err = capsys.readouterr()
+    assert ended.value.code == 2
+    assert out == ""
+    assert len(err.strip().splitlines()) == 1
+    assert text in err
+
+
+@pytest.mark.parametrize(
+    ("mu_B", "text"),
+    [
+        ("0.2, 0.2", "mu_B: 0.2 stands there twice"),
+        ("0.2, 0", "mu_B.1 = 0.0 is not admissible: it must be > 0 and <= 2"),
+        ((), "mu_B: at least 1 wanted"),
+    ],
+)
+def test_bad_table_of_coefficients(mu_B, text):
+    with pytest.raises(bywire.BywireError, match=re.escape(text)):
+        bywire.Bench("friction-sweep", "roberts2003", options={"mu_B": mu_B})
+
+
+def test_override_that_a_sweep_replaces_is_refused():
+    with pytest.raises(bywire.BywireError, match=r"wedge\.mu_B = 0\.33 would have no effect"):
+        bywire.Bench("friction-sweep", "roberts2003", overrides={"wedge.mu_B": 0.33})
+
+
+def test_steep_angle_in_degrees_is_taken(monkeypatch, capsys):
+    arguments = ["--set", "wedge.alpha=24.5 deg", "--set", "screw.eta_f=1"]
+    monkeypatch.setattr(sys, "argv", ["bywire", "run", "moment-pulses", *arguments])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code in (0, None)
+    assert "hold_moment" in capsys.readouterr().out
+
+
+# What a run shows
+
+
+def warnings(name, options=None, **overrides):
+    changes = {key.replace("__", "."): value for key, value in overrides.items()}
+    return bywire.run(bywire.Bench(name, "roberts2003", changes, options or {})).warnings
+
+
+def test_moment_out_of_reach_is_said_with_numbers():
+    """The number is what both motors can push, crept up to: their momentum would add to it."""
+    slow = {"control__moment__rate_max": 5.0, "flywheel__runout": 0.0}
+    (text,) = warnings(
+        "moment-pulse-950", {"t_pulse": 1.0, "omega_gap": 10.0},
+        wedge__mu_B=0.2, control__position__i_max=2.5, **slow,
+    )  # fmt: skip
+    found = re.fullmatch(
+        r"the motors cannot reach the demanded 950 N\*m: on the current limit of 2\.5 A from "
+        r"t = ([\d.]+) s to ([\d.]+) s, the moment stays at ([\d.]+) N\*m at most",
+        text,
+    )
+    assert found is not None, text
+    begin, end, most = map(float, found.groups())
+    assert 0.1 < begin < 0.3
+    assert end == pytest.approx(1.0, abs=0.002)
+    par = brake(mu_B=0.2)
+    torque = 2.0 * (2.5 * par.motor_1.K_ref - par.bearing.C_0)
+    force = torque * 2.0 * np.pi / par.screw.lead * par.screw.eta_f
+    able = 2.0 * 0.2 * par.caliper.r_B * force / (np.tan(par.wedge.alpha) - 0.2)
+    assert most == pytest.approx(able, rel=0.05)
+
+
+def test_limit_of_the_drive_counts_too():
+    (text,) = warnings("moment-pulse-950", {"t_pulse": 0.4}, wedge__mu_B=0.2, drive__i_max=2.5)
+    assert "950 N*m: on the current limit of 2.5 A" in text
+
+
+def test_current_limit_in_passing_is_said():
+    (text,) = warnings("moment-release", control__position__i_max=10.0)
+    assert re.fullmatch(r"the current limit of 10 A was reached at t = [\d.]+ s", text)
+    # Under position control the demands are the test's own, and its figures have the share.
+    assert warnings("position-step", control__position__i_max=5.0) == []
+
+
+def test_end_stop_is_said():
+    end, limit = warnings("moment-pulse-950", {"M_high": 3000.0, "t_pulse": 0.4})
+    assert re.match(r"the wedge reached its end stop at t = 0\.1\d+ s, x = 2\.5\d* mm", end)
+    assert "cannot reach the demanded 3000 N*m" in limit
+
+
+@pytest.mark.parametrize("eta_b", [0.0, 2.0 - 1.0 / 0.65])
+def test_screw_that_holds_is_allowed_and_said(eta_b):
+    """At mu_B 0.2 the wedge pushes out: only a screw that cannot be driven back stays."""
+    texts = warnings("power-off-hold", wedge__mu_B=0.2, screw__eta_b=eta_b)
+    assert texts == (
+        ["screw.eta_b = 0: no load drives these screws back, so that the brake keeps its moment "
+         "when the power goes off"] if eta_b == 0.0 else []
+    )  # fmt: skip
+    run = drive(
+        brake({"screw.eta_b": eta_b, "flywheel.runout": 0.0}, mu_B=0.2), 1.6,
+        M_set=lambda t: 700.0 + 0.0 * t, power_off=lambda t: np.where(t > 0.8 - 1e-9, 1.0, 0.0),
+    )  # fmt: skip
+    kept = run["M_B"][-1] / run["M_B"][run.time < 0.8][-1]
+    assert (kept > 0.98) == (eta_b == 0.0)
