@@ -134,8 +134,8 @@ def test_only_statements_of_the_paper_and_bounds_are_judged(reproduction: Reprod
             assert re.match(r"section '|physical bound", item.note), item.id
         if item.kind == "physical bound":
             assert item.note.startswith("physical bound"), item.id
-        if item.tolerance in ("<=", ">=") and item.kind == "printed":
-            assert "read as" in item.note, item.id
+        assert (item.kind == "printed") <= (item.tolerance not in ("<=", ">=")), item.id
+        assert (item.kind == "reading") <= ("read as" in item.note), item.id
 
 
 def test_numeric_tolerances_are_those_with_a_reason(reproduction: Reproduction) -> None:

@@ -27,7 +27,7 @@ FRICTIONLESS = {
     "flywheel.runout": 0.0, "flywheel.law": "driven", "encoder.law": "ideal",
     "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0,
 }  # fmt: skip
-SWEEP = Sweep(("theta_2_set",), "theta_2", (1.0, 10.0, 60.0, 150.0), (1e-3,))
+SWEEP = Sweep(("theta_2_set",), "theta_2", (1.0, 10.0, 60.0, 150.0), (1e-3,), tolerance=1e-4)
 
 
 def positioned(**changes: float | str) -> Run:

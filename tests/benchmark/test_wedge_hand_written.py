@@ -1,8 +1,8 @@
 """The hand-written C of the wedge brake against bywire's own runs.
 
-Both schemes are implicit midpoint with set-valued friction, of second order; bywire takes bounds and
-contacts at the predicted midpoint once, the C iterates them. What they differ by falls with the
-square of the step, and at 20 us it is far below what either differs from the exact solution.
+Both schemes are implicit midpoint with set-valued friction, of second order; bywire takes bounds
+and contacts at the predicted midpoint once, the C iterates them. What they differ by falls with the
+square of the step, and at 20 us it is 1/100 of what either differs from the exact solution.
 """
 
 from __future__ import annotations
@@ -45,9 +45,12 @@ def brake(changes: Mapping[str, Any] | None = None) -> WedgeParameters:
 
 
 def from_parked(
-    changes: Mapping[str, Any], moments: Mapping[float, float], off: float = 9.0, step: float = 20e-6
+    changes: Mapping[str, Any],
+    moments: Mapping[float, float],
+    off: float = 9.0,
+    step: float = 20e-6,
 ) -> Run:
-    """Return half a second with moment demands [N m] from instants [s] on, the power off at last."""
+    """Return half a second with moment demands [N m] from instants [s] on, then the power off."""
     par, fields = brake(IDEAL | dict(changes)), WedgeBrake.Stimulus._fields
 
     def stimulus(t: Array) -> Array:

@@ -82,7 +82,8 @@ def agreement(
     for k, (cause, own) in enumerate(left.items()):
         sweep = Sweep(
             loop.inputs, loop.output, frequencies, (amplitudes[1 if cause else 0],), flags=(),
-            whole=loop.whole(own), most=60 if not cause else _PATIENCE,
+            whole=loop.whole(own), tolerance=1e-3 if cause else 1e-4,
+            most=_PATIENCE if cause else 60,
         )  # fmt: skip
         found = frequency_response(loop.point(own, value).run(step), sweep)
         gain[cause], phase[cause] = _difference(found, linear.response(found["frequency"].values))

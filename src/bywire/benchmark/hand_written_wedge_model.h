@@ -1,8 +1,8 @@
 /* The wedge brake but for its time stepping: constants, contacts, frictions, controllers and what
- * is recorded, for its default choices (peers/hand_wedge.py lists them). Shared by the hand-written
- * C of the implicit scheme and by the explicit one with regularized friction.
+ * is recorded, for its default choices (peers/hand_wedge.py lists them). Shared by the implicit
+ * scheme and by the explicit one with regularized friction.
  *
- * Motor, screw and shaft k push: screw 2 toward clamping, screw 1 back; see plant/brake_heart.py. */
+ * Screw 2 pushes the wedge toward clamping, screw 1 back; see plant/brake_heart.py. */
 #include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
@@ -13,7 +13,7 @@
 #define DECAYED 40.0 /* exp(-40) no longer shows beside 1 */
 #define INLINE static inline __attribute__((always_inline))
 
-/* One motor with what belongs to its shaft; D_M, and resistance and constant when warm. */
+/* One motor with its rotor; resistance and torque constant when warm. */
 typedef struct { double R, L, K, J, D, T_cog, N_cog; } MotorPar;
 
 /* Factors that depend on parameters and step only. */
@@ -24,7 +24,7 @@ typedef struct {
     double w_d, w_s, G, i_max, k_p, k_i, T_t, V, R_off; /* drive */
     double lead, opposing, aiding;                   /* screw: m/rad; friction per axial force */
     double C_0, C_1, C_2, T_nu, k_nu, per_speed, G_S, decay, creep; /* bearing; creep: at rest */
-    double W, s_w, q[3], g_1, g_2, g_12, tau;        /* heart, see pressed() */
+    double W, s, q[3], g_1, g_2, g_12, tau;          /* heart, see pressed() */
     double tan, M_W, mu_B, k_return, x_stop, mu_int, mu_R, k_stop, tau_stop; /* wedge */
     double K_cal, tau_cal, clear, per_F_N, J_F, Om_still, runout; /* caliper, disc */
     double w_M, standby, tau_P;                      /* measurements */
@@ -76,7 +76,7 @@ static Plant plant_of(const double *p, double h)
     k.G_S = p[P_bearing_G_S], k.decay = p[P_bearing_k_S] / p[P_bearing_omega_S];
     const double s = 1.0 / p[P_heart_K_S], w = s + 1.0 / p[P_heart_K_W];
     const double t = 2.0 * s + 1.0 / p[P_heart_K_C];
-    k.W = 1.0 / w, k.s_w = s;
+    k.W = 1.0 / w, k.s = s;
     for (int n = 0; n < 3; n++)
         k.q[n] = 1.0 / (t - n * s * s / w);
     k.g_1 = p[P_heart_g_1], k.g_2 = p[P_heart_g_2], k.g_12 = p[P_heart_g_12];
@@ -93,16 +93,16 @@ static Plant plant_of(const double *p, double h)
     return k;
 }
 
-/* Forces of the heart's contacts at overlaps d: f_j = max(0, W (d_j + s f_12)) for the two contacts
+/* Forces of the heart's contacts at overlaps d: f_j = W max(0, d_j + s f_12) for the two contacts
  * of the wedge; what is left is piecewise linear in f_12, and its root the largest candidate. */
 INLINE Heart pressed(const Plant *k, double d_1, double d_2, double d_12)
 {
-    const double share = k->s_w * k->W;
+    const double share = k->s * k->W;
     const double one = k->q[1] * (d_12 + share * max2(d_1, d_2));
     const double both = k->q[2] * (d_12 + share * (d_1 + d_2));
     const double tips = max2(max2(k->q[0] * d_12, 0.0), max2(one, both));
-    return (Heart){.f_1 = k->W * max2(d_1 + k->s_w * tips, 0.0),
-                   .f_2 = k->W * max2(d_2 + k->s_w * tips, 0.0), .f_12 = tips};
+    return (Heart){.f_1 = k->W * max2(d_1 + k->s * tips, 0.0),
+                   .f_2 = k->W * max2(d_2 + k->s * tips, 0.0), .f_12 = tips};
 }
 
 /* Largest friction torque of bearings and screw on a shaft, for motion forward and back. */
@@ -117,7 +117,8 @@ INLINE Grip shaft_grip(const Plant *k, double force, double om)
     const double peak = far == 0.0 ? 1.0 : far < DECAYED ? exp(-far) : 0.0;
     const double bearing = axial * (1.0 + k->G_S * peak) + viscous;
     const double opposing = bearing + k->opposing * load, aiding = bearing + k->aiding * load;
-    return (Grip){.forward = force < 0.0 ? opposing : aiding, .back = force > 0.0 ? opposing : aiding};
+    return (Grip){.forward = force < 0.0 ? opposing : aiding,
+                  .back = force > 0.0 ? opposing : aiding};
 }
 
 INLINE double direction_of(const Plant *k, double Om)
@@ -249,7 +250,8 @@ static void record_energies(const Plant *k, const Saved *z, double *o)
     const double heart = 0.5 * (f.f_1 * d_1 + f.f_2 * d_2 + f.f_12 * d_12);
     const double caliper = 0.5 * k->K_cal * n * n;
     const double stop = 0.5 * k->k_stop * (near * near + far * far);
-    double stored = 0.5 * (k->M_W * b->v * b->v + k->k_return * b->x * b->x) + heart + caliper + stop;
+    double stored = 0.5 * (k->M_W * b->v * b->v + k->k_return * b->x * b->x);
+    stored += heart + caliper + stop;
     for (int j = 0; j < 2; j++) {
         const Motor *s = b->motor + j;
         const MotorPar *q = k->motor + j;

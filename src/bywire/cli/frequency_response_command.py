@@ -81,8 +81,9 @@ def _warnings(found: xr.Dataset, unit: str) -> list[str]:
             texts.append(f"{label}: the output sticks at {int(still.sum())} frequencies: no gain")
         if (restless & ~still).any():
             texts.append(
-                f"{label}: the response never repeats itself at {int((restless & ~still).sum())} "
-                "frequencies (a limit cycle or a drift): what is shown is the last window"
+                f"{label}: the response does not repeat itself within 0.1 % at "
+                f"{int((restless & ~still).sum())} frequencies (a limit cycle, a drift, or the "
+                "encoder's resolution): what is shown is the last window"
             )
     if found["unsettled_substeps"].values.any():
         texts.append("some substeps hit the cap of the contact iteration: take a smaller step")

@@ -10,7 +10,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from bywire.bench.result import Result
+from bywire.bench.wedge_series import tag
 from bywire.core.errors import ParameterError
+from bywire.report.brake_factor import WedgeForces, brake_factor
 from bywire.report.energy_balance import energy_balance
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.overlaid_traces import overlaid_traces
@@ -93,6 +95,21 @@ def _overlaid_traces(result: Result) -> list[Shown]:
     ]
 
 
+def _brake_factor(result: Result) -> list[Shown]:
+    """Return the figure of a static test of the wedge brake, from its key figures."""
+    kpis = {kpi.name: kpi.value for kpi in result.kpis}
+    tried = sorted(result.bench.chosen_options.flat()["mu_B"])
+    r_B = result.bench.par.flat()["caliper.r_B"]
+    moment = float(result.bench.chosen_options.flat()["M_hold"])
+    free, rising, falling = (
+        [kpis[f"{name}_{tag(mu_B)}"] * 2.0 * mu_B * r_B / moment for mu_B in tried]
+        for name in ("F_M", "F_M_rising", "F_M_falling")
+    )
+    figure = brake_factor(WedgeForces(tried, free, rising, falling), kpis["neutral_mu_closed"])
+    caption = "Actuation force over normal force, and brake factor, over the pads' friction."
+    return [Shown("brake-factor", figure, caption)]
+
+
 def _energy_balance(result: Result) -> list[Shown]:
     caption = "Where the energy came from and where it went, from time zero on."
     shown = []
@@ -124,6 +141,7 @@ _KINDS: dict[str, Callable[[Result], list[Shown]]] = {
     "step-response": _step_response,
     "time-traces": _time_traces,
     "overlaid-traces": _overlaid_traces,
+    "brake-factor": _brake_factor,
     "energy-balance": _energy_balance,
     "hysteresis-loop": _hysteresis_loop,
     "stribeck-curve": _stribeck_curve,

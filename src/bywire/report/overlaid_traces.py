@@ -23,6 +23,7 @@ VARIABLES: Mapping[str, str] = MappingProxyType(
 )
 """what is compared of wedge brakes, and what a low panel calls it"""
 
+_ROOM = "  "  # short labels of wide letters need more than the legend's mean width of a letter
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))
 
 
@@ -78,7 +79,7 @@ def _draw(axes: Axes, recordings: Mapping[str, xr.Dataset], name: str) -> str:
         axes.plot(
             *decimate(scale * line.time, line.values), linewidth=1.1,
             color=style.SEQUENCE[k % len(style.SEQUENCE)],
-            linestyle=_DASHES[turn % len(_DASHES)], label=style.plain(label),
+            linestyle=_DASHES[turn % len(_DASHES)], label=style.plain(label) + _ROOM,
         )
         unit = line.symbol
     return unit

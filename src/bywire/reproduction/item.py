@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 Tolerance = float | Literal["<=", ">="]
-Kind = Literal["printed", "axis", "requirement", "physical bound", "ours"]
-"""what a statement is: a number in text, table or equation; the end of a figure's axis; a
-requirement on the design; a limit that physics sets and we derive; or nothing but our number"""
+Kind = Literal["printed", "reading", "axis", "requirement", "physical bound", "ours"]
+"""what a statement is: a number in text, table or equation; a sentence that we put as a number;
+the end of a figure's axis; a requirement on the design; a limit that physics sets and we derive;
+or nothing but our number"""
 
 
 @dataclass(frozen=True)

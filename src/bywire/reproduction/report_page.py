@@ -26,8 +26,9 @@ from bywire.reproduction.tolerance import SHARE, Allowance
 
 KINDS = (
     "Kinds of statements: 'printed' stands in the source's text, tables or equations, or follows "
-    "from printed numbers by an equation that the note names; 'axis' is the end of a figure's "
-    "axis, beyond which the source shows nothing; 'requirement' is one on the design; 'physical "
+    "from printed numbers by an equation that the note names; 'reading' is a sentence of the "
+    "source that we put as a number, as its note says; 'axis' is the end of a figure's axis, "
+    "beyond which the source shows nothing; 'requirement' is one on the design; 'physical "
     "bound' is a limit that we derive; 'ours' is a number without a counterpart. No verdict is "
     "given where nothing is stated, where a value was tuned to the statement, where it went in "
     "as an input, or where another statement is judged instead."

@@ -41,7 +41,7 @@ def _items(result: Result) -> list[Item]:
     end = lowered + o["t_ramp"] + o["t_end"]
     slope = Fact(
         (o["M_high"] - o["M_low"]) / o["t_ramp"], "N*m/s",
-        f"{facts.RAMPED.where}; its length of {o['t_ramp']:g} s is ours",
+        f"{facts.RAMPED.where}; read as: within {o['t_ramp']:g} s", "reading",
     )  # fmt: skip
     return [
         compared("fig8.low_moment", facts.LOWERED, settled(run, "M_B", lowered),

@@ -39,16 +39,16 @@ def efficiency(runs: Runs) -> Part:
     """Return the screw's efficiency as the rig measures it."""
     result = runs.bench("screw-efficiency", MAIN)
     values = {name: 100.0 * value for name, value in kpis(result).items()}
-    put_in = Fact(values["eta_f_true"], "%", facts.MEASURABLE)
+    put_in = Fact(values["eta_f_true"], "%", facts.MEASURABLE, "reading")
     allowed = RECOVERED.around(put_in.value)
     bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
     items = [
         compared("efficiency.driving", facts.ETA, values["eta_f"], None,
                  "as the rig measures it", tuned="an input"),
         compared("efficiency.recovered", put_in, values["eta_f"], allowed,
-                 f"what was put in; with the bearing's torque without load, {bearing}, taken off"),
+                 f"with the bearing's torque without load, {bearing}, taken off"),
         compared("efficiency.raw", put_in, values["eta_f_raw"], allowed,
-                 "what was put in; motor torque and force alone"),
+                 "motor torque and force alone"),
         found("efficiency.back_driven", "%", values["eta_b"],
               f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in"),
         found("efficiency.back_driven.raw", "%", values["eta_b_raw"],
@@ -96,16 +96,15 @@ def _recovered(
     name: str, where: str, values: dict[str, float], key: str, unit: str, size: float
 ) -> Item:
     """Return a quantity as measured beside what was put in, in a unit of its own."""
-    put_in = Fact(values[f"{key}_true"] / size, unit, where)
-    return compared(name, put_in, values[key] / size, RECOVERED.around(put_in.value),
-                    "what was put in")  # fmt: skip
+    put_in = Fact(values[f"{key}_true"] / size, unit, where, "reading")
+    return compared(name, put_in, values[key] / size, RECOVERED.around(put_in.value))
 
 
 def _directions(values: dict[str, float]) -> list[Item]:
     """Return how compression and tension compare."""
     K_F = parameters().rig.sensor.K_F
     line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
-    same = Fact(line / MICRON, "N/um", facts.SAME_COMPRESSION)
+    same = Fact(line / MICRON, "N/um", facts.SAME_COMPRESSION, "reading")
     compression = values["K_heart_compression"]
     return [
         compared("stiffness.compression", same, compression / MICRON,

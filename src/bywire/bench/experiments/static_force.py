@@ -218,6 +218,6 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=named(_DEFAULTS),
-    figures=("overlaid-traces",),
+    figures=("brake-factor", "overlaid-traces"),
     named=named,
 )
