@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire import assemblies, control, plant
+from bywire.analysis.loop_registry import all_loops
 from bywire.bench.kpis.registry import families
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
@@ -158,12 +159,14 @@ def notation() -> str:
     ]  # fmt: skip
     for model in models():
         known = [e for e in parameter_sets().values() if e.assembly == model.name]
-        cls = known[0].parameter_class
-        sets = ", ".join(f"`{e.name}`" for e in known)
-        lines += [f"## Parameters of {model.name}", "", f"Parameter sets: {sets}.", ""]
-        titles = ("symbol", "name", "unit", "", "range or choices", "meaning")
-        lines += table(titles, parameter_rows(cls))
+        if known:
+            sets = ", ".join(f"`{e.name}`" for e in known)
+            lines += [f"## Parameters of {model.name}", "", f"Parameter sets: {sets}.", ""]
+            titles = ("symbol", "name", "unit", "", "range or choices", "meaning")
+            lines += table(titles, parameter_rows(known[0].parameter_class))
         lines += [f"## Signals of {model.name}", ""]
+        if not known:
+            lines += ["A rig: its parameters are those of the brake that it tests.", ""]
         places = {
             "recording": model.Output, "state": model.State, "memory": model.Memory,
             "stimulus": model.Stimulus, "integral": model.Flow,
@@ -190,6 +193,13 @@ def bench_reference() -> str:
         lines += table(titles, ((*row[:2], "", *row[3:]) for row in rows))
         figures = (f"`{name}`{bracketed(unit)}" for name, unit in e.kpis.items())
         lines += [f"Key figures: {', '.join(figures)}.", ""]
+    lines += ["## Loops", "", "What `linearize`, `frequency-response` and `margins` know.", ""]
+    rows = (
+        (f"`{one.name}`", one.summary, one.assembly, f"{one.at.name} [{unit_text(one.at.unit)}]",
+         ", ".join(f"`{name}`" for name in one.inputs), f"`{one.output}`", f"`{one.cut}`")
+        for one in all_loops().values()
+    )  # fmt: skip
+    lines += table(("loop", "meaning", "of", "at", "from", "to", "cut at"), rows)
     lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]
     for s in stimuli().values():
         lines += [f"### {s.kind}", "", s.summary, ""]

@@ -27,14 +27,14 @@ def slope(steps: tuple[float, ...], errors: list[float]) -> float:
     return float(np.polyfit(np.log(steps), np.log(errors), 1)[0])
 
 
-@pytest.mark.parametrize("signal", ["x", "v", "theta_1", "omega_1", "i_1", "Omega", "y_M"])
+@pytest.mark.parametrize("signal", ["x", "v", "omega_1", "i_1", "y_M"])
 def test_second_order_against_the_reference(signal: str) -> None:
     exact = reference(NAME, step=0.5e-6)
     errors = [rms(package(NAME, step), exact, signal) for step in STEPS]
     assert slope(STEPS, errors) == pytest.approx(2.0, abs=0.1)
 
 
-@pytest.mark.parametrize("signal", ["x", "omega_1", "i_1"])
+@pytest.mark.parametrize("signal", ["x", "v", "omega_1", "i_1"])
 def test_second_order_in_itself(signal: str) -> None:
     runs = [package(NAME, step) for step in STEPS]
     changes = [rms(coarse, fine, signal) for coarse, fine in pairwise(runs)]

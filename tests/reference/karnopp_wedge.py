@@ -102,9 +102,9 @@ def run(
         raise ValueError(f"early = {early:g} s must be whole steps of {step:g} s")
     T, T_slow = numbers["control_T_fast"], numbers["control_T_slow"]
     ticks, substeps, ratio = round(duration / T), round(T / step), round(T_slow / T)
-    t = T * np.arange(ticks + 1)
+    t = T * np.arange(ticks + 1, dtype=np.float64)
     travel = numbers["screw_lead"] / (2.0 * math.pi)
-    bands = band * np.array([1.0, 1.0, travel, DISC])
+    bands = np.array([band, band, band * travel, band * DISC])
     rows = np.empty((ticks + 1, len(SIGNALS)))
     arrays = [np.array(list(numbers.values())), bands]
     arrays += [np.ascontiguousarray(s(t), dtype=np.float64) for s in (M_set, power_off)]

@@ -1,4 +1,4 @@
-"""The wedge brake and its rigs in figures: panels, limits, modes, and where the energy came from."""
+"""Figures of the wedge brake and its rigs: panels, limits, modes, and where energy came from."""
 
 from __future__ import annotations
 
