@@ -35,7 +35,8 @@ REQUIRED = {
     *(f"hold.{key}" for key in ("neutral", "drift", "standing", "together")),
     *(f"stability.{key}" for key in (
         "C.mu20", "C.mu35", "C.mu60", "F_M.neutral", "runaway", "runaway.friction", "unstable",
-        "unstable.frictionless", "contact_changes", "contact_changes.free_play",
+        "unstable.frictionless", "pole.neutral", "pole.above", "pole.below", "contact_changes",
+        "contact_changes.free_play",
     )),
 }  # fmt: skip
 DISAGREEMENTS = {
@@ -151,6 +152,11 @@ def test_closed_forms(items: Items) -> None:
         assert items[f"stability.C.{name}"]["stated"] == pytest.approx(C, rel=1e-9)
         assert items[f"stability.C.{name}"]["computed"] == pytest.approx(C, rel=1e-6)
     assert items["stability.runaway"]["stated"] == pytest.approx(TAN_ALPHA, rel=1e-12)
+    # Slow poles of the rigid closed form, two rotors and the wedge; 2 % off at finite stiffness.
+    M = 0.6 + 2.0 * 1.2e-4 * (2.0 * math.pi / 2e-3) ** 2
+    for name, mu_B in (("pole.above", 0.5), ("swing.below", 0.2)):
+        rate = math.sqrt(30e6 * TAN_ALPHA * abs(mu_B - TAN_ALPHA) / M)
+        assert items[f"stability.{name}"]["computed"] == pytest.approx(rate, rel=0.04)
     assert items["fig7.ripple_passive"]["computed"] == pytest.approx(21.0, rel=1e-9)
 
 

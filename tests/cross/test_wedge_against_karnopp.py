@@ -4,10 +4,12 @@ Root mean squares of the wedge's position [nm], package at 20 us less reference 
 
     moment pulses 0.23, power-off hold 0.14, release 0.42, other direction 0.17, uneven motors
     0.18, screw friction by torque 0.14, driven disc 0.16, weak pads 0.93, beyond the neutral
-    point 0.31, scheduled offset 2.7, disc stops 63 (pads dropped) and 0.16 (pads stick),
-    runaway to the end stop 17
+    point 0.31, scheduled offset 2.7, disc stops 64 (pads dropped) and 0.16 (pads stick),
+    runaway to the end stop 21
 
-They fall with the square of the step but where contacts or the disc's stop fall within a substep.
+They fall with the square of the step, but for contacts that begin or end and for a disc that
+stops: the package does not locate these within a substep. Where the pads' pull on the wedge
+drops out with the disc's rotation, by 1.1 kN, some 10 us of delay ring with up to 1.1 um.
 """
 
 from __future__ import annotations
@@ -27,21 +29,21 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 NANOMETER, STEP = 1e-9, 20e-6
 LIMITS = {
-    "moment pulses": 0.3,
-    "power-off hold": 0.2,
-    "release": 0.6,
-    "other direction": 0.25,
-    "uneven motors": 0.25,
-    "screw friction by torque": 0.2,
-    "driven disc": 0.25,
-    "weak pads": 1.2,
-    "beyond the neutral point": 0.4,
-    "scheduled offset": 4.0,
-    "disc stops, pads dropped": 80.0,
-    "disc stops, pads stick": 0.25,
-    "runaway to the end stop": 25.0,
+    "moment pulses": (0.3, 0.01),
+    "power-off hold": (0.2, 0.01),
+    "release": (0.6, 0.02),
+    "other direction": (0.25, 0.01),
+    "uneven motors": (0.25, 0.01),
+    "screw friction by torque": (0.2, 0.01),
+    "driven disc": (0.25, 0.01),
+    "weak pads": (1.2, 0.03),
+    "beyond the neutral point": (0.4, 0.01),
+    "scheduled offset": (4.0, 0.1),
+    "disc stops, pads dropped": (80.0, 2.0),
+    "disc stops, pads stick": (0.25, 0.01),
+    "runaway to the end stop": (30.0, 0.6),
 }
-"""of the position's root mean square [nm] at 20 us"""
+"""of the root mean squares of the position [nm] and of the heart's forces [N] at 20 us"""
 SMOOTH = (
     "moment pulses",
     "power-off hold",
@@ -59,7 +61,8 @@ RESTING = ("moment pulses", "power-off hold", "other direction", "uneven motors"
 def compare(name: str, other: Mapping[str, NDArray[np.float64]], step: float = STEP) -> None:
     """Position within its limit, forces by as much as the position moves them, currents, speeds."""
     run, par = package(name, step), brake(mu_B=SCENARIOS[name].mu_B)
-    x = LIMITS[name] * NANOMETER * (step / STEP) ** 2
+    finer = (step / STEP) ** 2
+    x, f = LIMITS[name][0] * NANOMETER * finer, LIMITS[name][1] * finer
     F_N = par.caliper.K_cal * TAN_ALPHA * x
     hits_the_stop = name == "runaway to the end stop"
     limits = {
@@ -68,8 +71,8 @@ def compare(name: str, other: Mapping[str, NDArray[np.float64]], step: float = S
         "M_B": 2.0 * par.wedge.mu_B * par.caliper.r_B * F_N,
         "i_1": 5e-4,
         "omega_1": 1e-2 if hits_the_stop else 5e-4,
-        "f_1": 0.05,
-        "f_2": 0.05,
+        "f_1": f,
+        "f_2": f,
     }
     found = {signal: rms(run, other, signal) for signal in COMPARED}
     assert all(found[signal] < limits[signal] for signal in COMPARED), found
@@ -117,6 +120,13 @@ def test_a_brake_without_power_rests() -> None:
     for run in (package("power-off hold"), reference("power-off hold")):
         assert np.ptp(run["x"][-500:]) == 0.0
         assert run["M_B"][-1] == pytest.approx(500.0, abs=20.0)
+
+
+def test_the_reference_refuses_what_it_does_not_know() -> None:
+    with pytest.raises(ValueError, match="'quantized': the reference knows 'ideal' only"):
+        simulated(Scenario(200.0, 200.0, 0.0, 0.01, changes={"encoder.law": "quantized"}))
+    with pytest.raises(ValueError, match="whole steps"):
+        simulated(Scenario(200.0, 200.0, 0.0, 0.01), early=2.5e-6, step=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple, cast
+from itertools import combinations
+from typing import Literal, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.smooth_functions import SmoothFunctions, smooth_functions, vector
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import signals_of, zeros
-from bywire.simulation.contacts import active_set
+from bywire.core.signals import signals_of
+
+Array = NDArray[np.float64]
 
 Friction = Literal["removed", "sliding", "stuck"]
 _TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
@@ -66,7 +72,14 @@ def linearize(
     """
     _require_known("input", inputs, model.Memory._fields)
     _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
-    A, B, C, D, rate = _jacobians(model, par, state, memory, inputs, outputs, friction)
+    functions = smooth_functions(model, par)
+    K = _stiffness(model, functions, state, vector(par))
+    directions, moving = _frictions(model, state, friction)
+    values = functions.plant(list(state), list(memory), vector(par), K, directions, moving)
+    A, B, C, D, rate = (np.array(value, dtype=float) for value in values)
+    C, D = _rows(model, outputs, C, D)
+    columns = [model.Memory._fields.index(name) for name in inputs]
+    B, D = B[:, columns], D[:, columns]
     states, held = signals_of(model.State), signals_of(model.Memory)
     known = states | signals_of(model.Output)
     return LinearModel(
@@ -79,58 +92,31 @@ def linearize(
     )  # fmt: skip
 
 
-def _jacobians(
-    model: Model,
-    par: ParameterSet,
-    state: NamedTuple,
-    memory: NamedTuple,
-    inputs: Sequence[str],
-    outputs: Sequence[str],
-    friction: Friction,
-) -> list[Any]:
-    """Return A, B, C, D, and the rate as a column."""
-    import casadi as ca
-
-    x, u = ca.SX.sym("x", len(state)), ca.SX.sym("u", len(inputs))
-    held = memory._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
-    at = cast(Any, model.State)(*ca.vertsplit(x))
-    rate, y = _smooth(model, par, at, held, outputs, state, friction)
-    parts = [ca.jacobian(a, b) for a in (rate, y) for b in (x, u)]
-    jacobians = ca.Function("jacobians", [x, u], [*parts, rate])
-    values = jacobians(list(state), [getattr(memory, name) for name in inputs])
-    return [np.array(value, dtype=float) for value in values]
+def _rows(model: Model, outputs: Sequence[str], C: Array, D: Array) -> tuple[Array, Array]:
+    """Return the rows of the outputs; a state that is not recorded is its own output."""
+    recorded, states = model.Output._fields, model.State._fields
+    rows, direct = np.zeros((len(outputs), len(states))), np.zeros((len(outputs), D.shape[1]))
+    for k, name in enumerate(outputs):
+        if name in recorded:
+            rows[k], direct[k] = C[recorded.index(name)], D[recorded.index(name)]
+        else:
+            rows[k, states.index(name)] = 1.0
+    return rows, direct
 
 
-def _smooth(
-    model: Model,
-    par: ParameterSet,
-    x: Any,
-    held: Any,
-    outputs: Sequence[str],
-    state: NamedTuple,
-    friction: Friction,
-) -> tuple[Any, Any]:
-    """Return rates and outputs as symbols."""
-    import casadi as ca
-
-    contact = _contact_forces(model, par, state, x)
-    force = dict(zip(x._fields, model.balance(x, x, held, par, contact), strict=True))
-    reaction = [0.0] * (len(model.frictions) + len(model.limits))
+def _frictions(
+    model: Model, state: NamedTuple, friction: Friction
+) -> tuple[list[float], list[float]]:
+    """Return the direction of every friction, 0 where removed, and 0 for velocities that stick."""
     if friction == "sliding":
-        bounds = model.bounds(x, x, held, par, contact)
-        for k, (name, (low, high)) in enumerate(zip(model.frictions, bounds, strict=True)):
-            reaction[k] = low if _direction(name, state) > 0 else high
-            force[name] = force[name] + reaction[k]
+        return [math.copysign(1.0, _direction(n, state)) for n in model.frictions], [
+            1.0 for _ in model.frictions
+        ]
     if friction == "stuck":
         for name in model.frictions:
             _require_rest(name, state)
-            force[name] = 0.0 * force[name]
-    mass = model.mass(x, par)
-    rate = ca.vertcat(*(force[name] / getattr(mass, name) for name in x._fields))
-    flow = zeros(cast(Any, model.Flow))
-    out = model.output(x, held, par, contact, tuple(reaction), flow)
-    y = [getattr(out if name in out._fields else x, name) for name in outputs]
-    return rate, ca.vertcat(*y)
+    moving = 0.0 if friction == "stuck" else 1.0
+    return [0.0 for _ in model.frictions], [moving for _ in model.frictions]
 
 
 def _direction(name: str, state: NamedTuple) -> float:
@@ -149,28 +135,45 @@ def _require_rest(name: str, state: NamedTuple) -> None:
         raise ParameterError(f"{name} = {speed:g}: what moves is not stuck; use friction='sliding'")
 
 
-def _contact_forces(
-    model: Model, par: ParameterSet, state: NamedTuple, x: Any
-) -> tuple[Any, ...]:
-    """Return the forces of all contacts as symbols, for the contacts closed at ``state``."""
-    import casadi as ca
-
-    forces: list[Any] = []
-    matrices = model.compliance(par)
-    gaps, moving = model.gap(state, state, par), model.gap(x, x, par)
-    for C, d, depth in zip(matrices, gaps, moving, strict=True):
-        stiffness = active_set(ca.SX(ca.DM(C)), ca.SX(ca.DM([float(one) for one in d]))).stiffness
-        K = np.array(ca.DM(ca.evalf(stiffness)))
-        F = K @ np.array(d, dtype=float)
-        left = np.where(F > 0, np.diag(C) * F, np.array(C) @ F - np.array(d, dtype=float))
-        if np.min(left) < _TOUCH:
-            k = len(forces) + int(np.argmin(left))
+def _stiffness(
+    model: Model, functions: SmoothFunctions, state: NamedTuple, p: list[float]
+) -> Array:
+    """Return the stiffness of the contacts that are closed at a state, zero for open ones."""
+    found = functions.contacts(list(state), p)
+    *matrices, gaps = map(np.array, found if isinstance(found, tuple) else (found,))
+    blocks, at = [], 0
+    for C in matrices:
+        d = gaps[at : at + len(C), 0]
+        closed, left = _active_set(C, d)
+        if left < _TOUCH:
             raise ParameterError(
-                f"{model.name}: contact {k} just touches at the operating point: choose a point "
-                "at which it is clearly open or closed"
+                f"{model.name}: contact {at + int(np.argmin(_slack(C, d, closed)))} just touches "
+                "at the operating point: choose a point at which it is clearly open or closed"
             )
-        forces += ca.vertsplit(ca.DM(K) @ ca.vertcat(*depth))
-    return tuple(forces)
+        blocks.append(_embedded(C, closed))
+        at += len(C)
+    return block_diag(*blocks) if blocks else np.zeros((0, 0))
+
+
+def _active_set(C: Array, d: Array) -> tuple[list[int], float]:
+    """Return the closed contacts of a group: the subset whose smallest slack is largest."""
+    subsets = (list(s) for n in range(len(d) + 1) for s in combinations(range(len(d)), n))
+    found = [(float(_slack(C, d, subset).min()), subset) for subset in subsets]
+    left, closed = max(found)
+    return closed, left
+
+
+def _slack(C: Array, d: Array, closed: list[int]) -> Array:
+    """Return by how much each contact is closed or open [m]."""
+    F = _embedded(C, closed) @ d
+    return np.where(np.isin(np.arange(len(d)), closed), np.diag(C) * F, C @ F - d)
+
+
+def _embedded(C: Array, closed: list[int]) -> Array:
+    K = np.zeros_like(C)
+    rows = np.ix_(closed, closed)
+    K[rows] = np.linalg.inv(C[rows])
+    return K
 
 
 def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> None:

@@ -12,8 +12,9 @@ import numpy as np
 
 from bywire.analysis.linear_model import LinearModel
 from bywire.analysis.linearize import linearize
+from bywire.analysis.smooth_functions import smooth_functions, vector
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.model import Model, Task
+from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
@@ -105,7 +106,7 @@ def sampled_system(
     return SampledSystem(
         plant=plant.reduced(kept, held=bool(locked)).sampled(frame),
         names=tuple(task.name for task in tasks),
-        ticks=tuple(_tick(task, model, par, (state, memory, at), inputs, kept) for task in tasks),
+        ticks=_ticks(model, par, (state, memory, at), inputs, kept),
         every=tuple(every),
         frame=frame,
     )
@@ -120,25 +121,20 @@ def _frames(periods: Sequence[float]) -> tuple[float, list[int]]:
     return frame / whole, [tick // frame for tick in ticks]
 
 
-def _tick(
-    task: Task,
+def _ticks(
     model: Model,
     par: ParameterSet,
     point: tuple[Any, Any, Any],
     inputs: Sequence[str],
     kept: Sequence[str],
-) -> list[Any]:
-    """Return the Jacobians of the new memory by kept states, memory and inputs."""
-    import casadi as ca
-
+) -> tuple[Jacobians, ...]:
+    """Return the Jacobians of every task's new memory by kept states, memory and inputs."""
+    rows = [model.State._fields.index(name) for name in kept]
+    columns = [model.Stimulus._fields.index(name) for name in inputs]
     state, memory, stimulus = point
-    sizes = {"x": len(kept), "m": len(memory), "u": len(inputs)}
-    x, m, u = (ca.SX.sym(name, size) for name, size in sizes.items())
-    at = state._replace(**dict(zip(kept, ca.vertsplit(x), strict=True)))
-    driven = stimulus._replace(**dict(zip(inputs, ca.vertsplit(u), strict=True)))
-    held = cast(Any, model.Memory)(*ca.vertsplit(m))
-    renewed = ca.vertcat(*task.tick(at, held, driven, par))
-    jacobians = ca.Function("tick", [x, m, u], [ca.jacobian(renewed, v) for v in (x, m, u)])
-    at_x, at_u = [getattr(state, n) for n in kept], [getattr(stimulus, n) for n in inputs]
-    values = jacobians(at_x, list(memory), at_u)
-    return [np.array(value, dtype=float) for value in values]
+    found = []
+    for tick in smooth_functions(model, par).ticks:
+        values = tick(list(state), list(memory), list(stimulus), vector(par))
+        M_x, M_m, M_u = (np.array(value, dtype=float) for value in values)
+        found.append([M_x[:, rows], M_m, M_u[:, columns]])
+    return tuple(found)

@@ -122,7 +122,7 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
     """Return the memory with the references of both shafts renewed."""
     if par.command.mode == "position":
         return m._replace(theta_1_ref=u.theta_1_set, theta_2_ref=u.theta_2_set)
-    advanced = m.theta_ref + m.direction * m.rate * par.control.T_fast
+    advanced = m.theta_ref + _allowed(m, par) * par.control.T_fast
     # While the power is off the reference follows the shafts, so that nothing jumps afterwards.
     common = ops.where(m.on > 0.5, advanced, 0.5 * (r.theta_1 + r.theta_2))
     position, offset = par.control.position, par.control.offset
@@ -133,3 +133,14 @@ def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Me
     return m._replace(
         theta_ref=common, delta=delta, theta_1_ref=both.theta_1, theta_2_ref=both.theta_2
     )
+
+
+def _allowed(m: Memory, par: WedgeParameters) -> float:
+    """Return the speed of the common reference [rad/s]: 0 where both motors are on their limit.
+
+    Anti-wind-up: a reference that went on would have to come all the way back at a release.
+    """
+    limit, speed = par.control.position.i_max, m.direction * m.rate
+    push = ops.where(speed < 0, -1.0, 1.0)
+    least = ops.fmin(push * m.i_1_ref, push * m.i_2_ref)
+    return ops.where(least < limit, speed, 0.0 * speed)

@@ -96,6 +96,20 @@ REMAINS = Fact(
     100.0, "%",
     "section 'Introduction': at the neutral point a wedge position remains, and its moment",
 )  # fmt: skip
+NEUTRAL_POLE = Fact(
+    0.0, "s**-1", "section 'Introduction': a point of neutral stability at mu_B = tan(alpha)"
+)
+UNSTABLE_POLE = Fact(
+    0.0, "s**-1",
+    "section 'Introduction': the wedge becomes unstable as mu_B increases; read as: a perturbation "
+    "grows",
+    "reading",
+)  # fmt: skip
+STABLE_POLE = Fact(
+    0.0, "s**-1",
+    "section 'Introduction': a steady pushing force at low mu_B; read as: a perturbation decays",
+    "reading",
+)  # fmt: skip
 STABLE = Fact(
     0.0, "1",
     "section 'Introduction': a controller must be robust to mu_B, else instability; read as: no "

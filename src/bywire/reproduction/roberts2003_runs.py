@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.wedge_series import FRICTIONLESS
@@ -16,6 +15,9 @@ from bywire.catalog.registry import entry
 from bywire.plant import wedge
 from bywire.report.panels import WEDGE_PANELS
 from bywire.report.time_traces import time_traces
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 MAIN = "roberts2003"
 

@@ -13,6 +13,7 @@ from bywire.report.brake_factor import WedgeForces, brake_factor
 from bywire.reproduction import roberts2003_facts as facts
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.roberts2003_poles import poles
 from bywire.reproduction.roberts2003_runs import IDEAL, MAIN, parameters, stacked, tan_alpha
 from bywire.reproduction.roberts2003_tolerances import FEW, FORCE, FORMULA, GRID
 from bywire.reproduction.runs import Runs, kpis
@@ -36,7 +37,7 @@ HOLD = (0.1, 0.5)
 
 def part(runs: Runs) -> Part:
     """Return the statements on brake factor, neutral point and instability."""
-    items = [*_static(runs), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
+    items = [*_static(runs), *poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
     text = (
         "The paper derives the brake factor and the neutral point without friction. Without "
         "friction the model obeys both. With it the neutral point is a band: what friction holds "

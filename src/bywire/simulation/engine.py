@@ -92,15 +92,20 @@ _LOCK = threading.RLock()
 
 def prepare(model: Model, par: ParameterSet) -> Prepared:
     """Return what is built for a model of this structure; the numbers of ``par`` do not matter."""
-    structure = tuple(sorted((k, str(v)) for k, v in par.choices().items()))
-    fields = sorted(getattr(model, "__dict__", {}).items())
-    own = tuple((name, _fingerprint(value)) for name, value in fields)
-    key = (type(model), own, type(par), structure)
+    key = structure_of(model, par)
     with _LOCK:
         if key not in _PREPARED:
             with interrupts_deferred():
                 _PREPARED[key] = Prepared(model, par)
         return _PREPARED[key]
+
+
+def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
+    """Return what tells models of different structure apart: type, own fields, choices."""
+    structure = tuple(sorted((k, str(v)) for k, v in par.choices().items()))
+    fields = sorted(getattr(model, "__dict__", {}).items())
+    own = tuple((name, _fingerprint(value)) for name, value in fields)
+    return (type(model), own, type(par), structure)
 
 
 def _fingerprint(value: object) -> object:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import cast
+from collections.abc import Mapping
+from typing import Any, cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.assemblies.shaft_rig import ShaftRig
@@ -11,7 +12,7 @@ from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
-CAUSES = {
+CAUSES: Mapping[str, Mapping[str, Any]] = {
     "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,
                          "bearing.T_nu": 0.0},
     "screw efficiency": {"screw.eta_f": 1.0, "screw.eta_b": 1.0},
