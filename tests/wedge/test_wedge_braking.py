@@ -122,3 +122,14 @@ def test_motors_share_the_load_where_they_work_together():
         power.append(run["P_in"][late].mean())
         assert (run["f_12"][late].max() > 0.0) == (law == "scheduled")
     assert power[1] < 0.8 * power[0]
+
+
+def test_reference_waits_while_the_motors_cannot_follow():
+    """A demand out of reach winds nothing up: the release is as quick as any."""
+    limits = {"drive.i_max": 1.5, "control.position.i_max": 1.5}
+    run = drive(brake(limits, mu_B=0.2), 1.5, M_set=lambda t: np.where(t < 1.0, 900.0, 0.0))
+    before = run.time < 1.0
+    assert run["y_M"][before][-1] < 0.2 * 900.0
+    assert np.abs(run["theta_ref"] - run["theta_1"])[before].max() < 1.0
+    parked = run.time[(run.time > 1.0) & (run["mode"] == PARKED)]
+    assert parked[0] - 1.0 < 0.25
