@@ -37,6 +37,18 @@ def pressure_demand(ecu: EcuParameters) -> LinearModel:
     return _linear("pressure-demand", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
 
 
+def pressure_control(ecu: EcuParameters) -> LinearModel:
+    """Return the PID from set point and measured pressure [Pa] to the current demand [A]."""
+
+    def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
+        signals = pressure_pid.Input(p_ref=u[0], p_meas=u[1])
+        state, out = pressure_pid.output(x, signals, ecu.T_s, ecu.pressure)
+        return state, out.i
+
+    units, inputs = ("Pa", "A"), ("p_ref", "p_meas")
+    return _linear("pressure-control", law, pressure_pid.State, ecu.T_s, units, inputs)
+
+
 def current_control(ecu: EcuParameters) -> LinearModel:
     """Return the current PI from the current error [A] to the duty cycle."""
 
@@ -59,20 +71,25 @@ def demand_filter(ecu: EcuParameters) -> LinearModel:
 
 
 def _linear(
-    name: str, law: Law, state_type: Any, period: float, units: tuple[str, str]
+    name: str,
+    law: Law,
+    state_type: Any,
+    period: float,
+    units: tuple[str, str],
+    inputs: tuple[str, ...] = ("in",),
 ) -> LinearModel:
     """Return a law's Jacobians at zero, inside all limits."""
     import casadi as ca
 
     signals = signals_of(state_type)
-    x, u = ca.SX.sym("x", len(signals)), ca.SX.sym("u")
+    x, u = ca.SX.sym("x", len(signals)), ca.SX.sym("u", len(inputs))
     renewed, out = law(state_type(*ca.vertsplit(x)), u)
     after = ca.vertcat(*renewed)
     parts = [ca.jacobian(a, b) for a in (after, out) for b in (x, u)]
     values = ca.Function("law", [x, u], parts)(list(zeros(state_type)), 0.0)
     A, B, C, D = (np.array(value, dtype=float) for value in values)
     return LinearModel(
-        name, A, B, C, D, tuple(signals), ("in",), ("out",),
-        tuple(s.unit for s in signals.values()), units[:1], units[1:],
+        name, A, B, C, D, tuple(signals), inputs, ("out",),
+        tuple(s.unit for s in signals.values()), units[:1] * len(inputs), units[1:],
         np.zeros(len(signals)), period,
     )  # fmt: skip

@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 from bywire.analysis.harmonics import amplitudes as harmonics
 from bywire.analysis.linear_model import LinearModel
 from bywire.analysis.response_dataset import Sweep, as_dataset
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.analysis.response_window import interval, require_measurable, sine_window
+from bywire.analysis.window_scatter import spread_of
+from bywire.core.errors import ParameterError
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 from bywire.simulation.variations import case_matrix
@@ -24,7 +26,6 @@ Array = NDArray[np.float64]
 
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
-_CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
 
 
 def require_stable(closed: LinearModel) -> None:
@@ -64,9 +65,11 @@ def frequency_response(
     -------
     xarray.Dataset
         Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
-        input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``windows``,
-        ``settled`` (0 or 1), and ``share_FLAG`` for every flag. Gain and phase are NaN where the
-        output does not move at all: what sticks has no gain.
+        input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
+        (share of the output's power, its mean left out, at the excited line), ``scatter`` (of the
+        complex amplitude, see ``window_scatter``), ``windows``, ``settled`` (0 or 1), and
+        ``share_FLAG`` for every flag. Gain and phase are NaN where the output does not move at
+        all: what sticks has no gain. Where it never repeats, they are means of the last windows.
 
     Raises
     ------
@@ -78,17 +81,17 @@ def frequency_response(
     SolverError
         When a trajectory leaves the numbers.
     """
-    _check(run, sweep)
+    require_measurable(run, sweep)
     signals = (sweep.output, *sweep.flags)
     variations = dict(sweep.variations or {})
     matrix = case_matrix(run, variations) if variations else _own(run)
     variants, sizes = matrix.shape[1], np.asarray(sweep.amplitudes, dtype=float)
-    plans = [_window(run, f, sweep) for f in sweep.frequencies]
+    plans = [sine_window(run, f, sweep) for f in sweep.frequencies]
     cases, each = np.repeat(matrix, sizes.size, axis=1), np.tile(sizes, variants)
 
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
-        own = replace(run, duration=window, record=_interval(run))
+        own = replace(run, duration=window, record=interval(run))
         found = _repeated(own, sweep, cases, each, periods, signals)
         measured = _measured(found, each, periods / window, sweep.flags)
         return {name: value.reshape(variants, sizes.size) for name, value in measured.items()}
@@ -105,49 +108,8 @@ def frequency_response(
     return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
 
 
-def _check(run: Run, sweep: Sweep) -> None:
-    for name in sweep.inputs:
-        if name not in run.model.Stimulus._fields:
-            raise unknown_name("signal of the stimulus", name, run.model.Stimulus._fields)
-    for name in (sweep.output, *sweep.flags):
-        if name not in run.model.Output._fields:
-            raise unknown_name("signal", name, run.model.Output._fields)
-    for kind, values in (("frequencies", sweep.frequencies), ("amplitudes", sweep.amplitudes)):
-        if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
-            raise ParameterError(f"{kind} = {list(values)}: positive numbers are wanted")
-    # Of the slowest: which controller takes the input is not known here.
-    nyquist = 0.5 / max(task.period for task in run.model.tasks(run.par))
-    highest = max(sweep.frequencies)
-    if highest >= nyquist:
-        raise ParameterError(
-            f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
-            f"{nyquist:g} Hz: ask for lower frequencies"
-        )
-
-
 def _own(run: Run) -> Array:
     return np.array(list(run.par.leaves().values()))[:, None]
-
-
-def _interval(run: Run) -> float:
-    """Return the sample time of the fastest task [s]: the sine steps with it."""
-    return min(task.period for task in run.model.tasks(run.par))
-
-
-def _window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
-    """Return length [s] and periods of the window that comes closest to a frequency."""
-    periods = [task.period for task in run.model.tasks(run.par)] + [1.0 / w for w in sweep.whole]
-    step = run.step
-    counts = [round(period / step) for period in periods]
-    common = math.lcm(*counts) * step
-    least = max(sweep.least, math.ceil(sweep.shortest * f))
-    choices = []
-    for n in range(least, least + _CHOICES):
-        length = max(round(n / f / common), 1) * common
-        whole = max(round(f * length), 1)
-        choices.append((abs(whole / length / f - 1.0), length, whole))
-    _, length, whole = min(choices)
-    return length, whole
 
 
 def _repeated(
@@ -162,12 +124,11 @@ def _repeated(
     sines = sizes[:, None] * np.sin(2.0 * math.pi * f * times)
     stimuli[:, :, columns] += sines[:, :, None]
 
-    def repeats(before: Array, now: Array) -> NDArray[np.bool_]:
-        t = np.asarray(np.arange(now.shape[1]) * own.record, dtype=np.float64)
-        a, b = (np.array([harmonics(t, y, f, 1)[0] for y in w[:, :, 0]]) for w in (before, now))
-        return np.asarray(np.abs(b - a) <= sweep.tolerance * np.abs(b))
+    def figures(window: Array) -> NDArray[np.complex128]:
+        t = np.asarray(np.arange(window.shape[1]) * own.record, dtype=np.float64)
+        return np.array([harmonics(t, y, f, 1) for y in window[:, :, 0]])
 
-    return repeat(own, matrix, stimuli, signals, repeats, sweep.most)
+    return repeat(own, matrix, stimuli, signals, figures, sweep.tolerance, sweep.most)
 
 
 def _measured(
@@ -178,11 +139,14 @@ def _measured(
     outputs = found.values[:, :, 0]
     lines = np.array([harmonics(found.time, y, f, count) for y in outputs])
     moves = np.ptp(outputs, axis=1) > 0
-    size = np.where(moves, np.abs(lines[:, 0]), np.nan)
+    last = np.where(moves, np.abs(lines[:, 0]), np.nan)
+    value, scatter = (one[:, 0] for one in spread_of(found.figures, found.repeats))
     shown = {
-        "gain": size / sizes,
-        "phase": np.where(moves, np.degrees(np.angle(lines[:, 0])), np.nan),
-        "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / size,
+        "gain": np.where(moves, np.abs(value), np.nan) / sizes,
+        "phase": np.where(moves, np.degrees(np.angle(value)), np.nan),
+        "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / last,
+        "coherence": 0.5 * last**2 / np.where(moves, np.var(outputs, axis=1), np.nan),
+        "scatter": np.where(moves, scatter, np.nan),
         "windows": found.windows.astype(float),
         "settled": found.repeats.astype(float),
         "unsettled_substeps": found.unsettled.astype(float),

@@ -196,12 +196,12 @@ class LinearModel:
         """
         s = 2j * np.pi * np.asarray(frequencies, dtype=float)
         z = np.exp(s * self.period) if self.period else s
-        k = self._between()
+        k = self.effective()
         eye, A, B = np.eye(len(k)), self.A[np.ix_(k, k)], self.B[k].astype(complex)
         inner = np.linalg.solve(z[:, None, None] * eye - A, B)
         return np.asarray(self.C[:, k] @ inner + self.D)
 
-    def _between(self) -> list[int]:
+    def effective(self) -> list[int]:
         """Return the states that inputs reach and that reach outputs: the others cost time only."""
         forward, backward = self.B.any(axis=1), self.C.any(axis=0)
         coupled = self.A != 0

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.analysis.closed_loop import closed_loop
 from bywire.analysis.linear_model import LinearModel
@@ -14,6 +15,9 @@ from bywire.analysis.open_loop import open_loop
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.run import Run
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
@@ -91,6 +95,14 @@ class Loop:
         Amplitudes usually looked at, SI; the first one is small.
     whole
         ``whole(par)``: other frequencies [Hz] of which a window must hold whole periods.
+    tunables
+        What a design may choose: dotted name -> lowest and highest value [SI] worth a try.
+    proof
+        Experiment in which the whole brake shows what the loop is worth.
+    laws
+        ``laws(par, frequencies [Hz])``: responses of the controller to its set point and to a
+        fall of the output, sensor and filters included, of shape (n,) each; None where the loop
+        is not that simple.
     """
 
     name: str
@@ -105,6 +117,9 @@ class Loop:
     band: tuple[float, float]
     amplitudes: tuple[float, ...]
     whole: Callable[[ParameterSet], Sequence[float]] = field(default=lambda _: ())
+    tunables: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    proof: str = ""
+    laws: Callable[[ParameterSet, Array], tuple[Complex, Complex]] | None = None
 
     def smooth(self, par: ParameterSet, leave: str = "") -> ParameterSet:
         """Return parameters without anything that makes the loop nonlinear, except one cause."""

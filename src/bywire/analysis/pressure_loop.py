@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,25 @@ class PressureLoop:
         drive = self._law("pressure_demand", frequencies)
         return drive * self._inner(frequencies, 1) / (1.0 + self.open(frequencies))
 
+    def models(self) -> tuple[LinearModel, LinearModel]:
+        """Return loop gain (cut at the measured pressure) and closed loop, one model each."""
+        import control
+
+        def block(made: LinearModel) -> Any:
+            return control.ss(made.A, made.B, made.C, made.D, made.period)
+
+        ecu, T = self.par.ecu, self.plant.period
+        current = control.ss([], [], [], [[1.0, 0.0, 0.0]], T)
+        inner = control.feedback(block(self.plant) * block(control_laws.current_control(ecu)),
+                                 current)  # fmt: skip
+        path = inner * block(control_laws.demand_filter(ecu))
+        gain = path[2, 0] * block(control_laws.pressure_feedback(ecu))
+        # The measured pressure goes back into the second input of the pressure control.
+        ahead = path * block(control_laws.pressure_control(ecu))
+        back = control.ss([], [], [], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], T)
+        closed = control.feedback(ahead, back, sign=1)[1, 0]
+        return _single(gain, "p_meas"), _single(closed, "p")
+
     def margin(self) -> Margin:
         """Return crossover and phase margin."""
         return margin(self.open, BAND)
@@ -102,6 +122,15 @@ def cancelling_pi(loop: PressureLoop, T: float, crossover: float) -> PressureLoo
     k_p = 1e-5 / gain
     tuned = unit.replace({"ecu.pressure.k_p": k_p, "ecu.pressure.k_i": k_p / T})
     return PressureLoop(tuned, loop.brake, loop.p)
+
+
+def _single(block: Any, output: str) -> LinearModel:
+    """Return a block with one pressure in and one out as a plain model."""
+    states = tuple(f"x{k}" for k in range(block.nstates))
+    return LinearModel(
+        "pressure-loop", block.A, block.B, block.C, block.D, states, ("p_ref",), (output,),
+        tuple("1" for _ in states), ("Pa",), ("Pa",), np.zeros(len(states)), float(block.dt),
+    )  # fmt: skip
 
 
 def _cascade(motor: LinearModel, brake: Rational, f_aa: float) -> LinearModel:

@@ -139,5 +139,7 @@ def _gain_margin(gain: LinearModel, L: NDArray[np.complex128]) -> float:
     for k in crossings:
         share = L.imag[k] / (L.imag[k] - L.imag[k + 1])
         sizes.append(float(abs(L.real[k] + share * (L.real[k + 1] - L.real[k]))))
+    # Half the sampling frequency, where the response is real, lies beyond the grid.
+    sizes.append(-float(gain.response(np.array([0.5 / gain.period]))[0, 0, 0].real))
     factors = [1.0 / size for size in sizes if 0.0 < size < 1.0]
     return min(factors, default=math.inf)

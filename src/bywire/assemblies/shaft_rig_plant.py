@@ -63,6 +63,7 @@ class Output(NamedTuple):
     omega_1: Annotated[float, Signal("rad/s", "motor speed 1", 50.0)]
     i_1_ref: Annotated[float, Signal("A", "current demand 1", 5.0)]
     i_1: Annotated[float, Signal("A", "current 1", 5.0)]
+    sat_current: Annotated[float, Signal("1", "current demand saturated")]
     voltage_1: Annotated[float, Signal("V", "motor voltage 1", 10.0)]
     T_fr_1: Annotated[float, Signal("N*m", "friction torque 1", 0.1)]
     stuck: Annotated[float, Signal("1", "shaft stuck")]
@@ -111,6 +112,13 @@ def friction(s: Side, par: Par) -> Bounds:
     return (-T_p, T_n)
 
 
+def current_limit(par: Par) -> float:
+    """Return the limit [A] of the current demand: the drive's, or a lower one of the control."""
+    if par.rig.mode_1 == "position":
+        return ops.fmin(par.control.position.i_max, par.drive.i_max)
+    return par.drive.i_max
+
+
 def rates(x: State, m: Memory, par: Par, reaction: float) -> Flow:
     """Return the powers at the midpoint of a substep.
 
@@ -142,6 +150,7 @@ def instant(x: State, m: Memory, par: Par, reaction: float, flow: Flow) -> Outpu
     s = side(x, x, m, par)
     own = {
         "q_1": shaft_encoder.reading(x.theta_1, par.encoder),
+        "sat_current": ops.where(ops.fabs(m.i_1_ref) >= current_limit(par), 1.0, 0.0),
         "voltage_1": drive_train.voltage(s, ON, par),
         "T_fr_1": -reaction,
         "stuck": ops.where(x.omega_1 == 0, 1.0, 0.0),

@@ -214,7 +214,12 @@ static void position_tick(const Plant *k, Saved *z, const double *u)
     const double theta_1 = encoder(k, z->b.motor[0].th), theta_2 = encoder(k, z->b.motor[1].th);
     const double rate = m[M_direction] * m[M_rate];
     m[M_on] = 1.0 - u[U_power_off];
-    m[M_theta_ref] = m[M_on] > 0.5 ? m[M_theta_ref] + rate * T : 0.5 * (theta_1 + theta_2);
+    /* The reference waits while both motors are on their limit. */
+    const double push = rate < 0.0 ? -1.0 : 1.0;
+    const bool waits = min2(push * m[M_i_1_ref], push * m[M_i_2_ref])
+                       >= p[P_control_position_i_max];
+    const double next = m[M_theta_ref] + (waits ? 0.0 : rate * T);
+    m[M_theta_ref] = m[M_on] > 0.5 ? next : 0.5 * (theta_1 + theta_2);
     m[M_delta] += T / (T + p[P_control_offset_T_change])
                   * (p[P_control_offset_delta_preload] - m[M_delta]);
     const double apart = m[M_delta] / p[P_control_offset_k_hat];

@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
 
+from bywire.analysis.broadband import Broadband, broadband_response
 from bywire.analysis.frequency_response import frequency_response, require_stable
 from bywire.analysis.response_dataset import Sweep
 from bywire.cli import output
 from bywire.cli.loop_choice import Chosen, choose, spread
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
+from bywire.core.errors import unknown_name
 from bywire.core.signals import signals_of
 from bywire.report.wording import amount
+from bywire.simulation.run import Run
 
 _POINTS = 20
+_EXCITATIONS = ("sine", "multisine", "chirp")
 
 
 def execute(
@@ -30,10 +34,13 @@ def execute(
     changes: Mapping[str, str],
     frequencies: str,
     amplitudes: str,
+    excitation: str,
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Measure a loop's response sine by sine, beside that of its linear model."""
+    """Measure a loop's response to sines, or to all frequencies at once, beside the linear one."""
+    if excitation not in _EXCITATIONS:
+        raise unknown_name("excitation", excitation, _EXCITATIONS)
     if out is not None:
         require_folder(out)
     chosen = choose(loop, parameters, at, changes)
@@ -52,10 +59,10 @@ def execute(
              if name in point.model.Output._fields]  # fmt: skip
     sweep = Sweep(own.inputs, own.output, wanted, sizes, flags=flags, whole=own.whole(point.par))
     with progress_bar() as progress:
-        found = frequency_response(point.run(), sweep, progress)
+        found = _measured(point.run(), sweep, excitation, progress)
     response = linear.response(found["frequency"].values)[:, 0, 0]
     files = [] if out is None else _written(chosen, found, response, out)
-    for text in _warnings(found, unit):
+    for text in _warnings(found, unit, sweep.tolerance):
         output.message(f"warning: {text}")
     if as_json:
         output.result(json.dumps(_as_object(chosen, found, response, files)))
@@ -65,12 +72,20 @@ def execute(
         output.message(f"written: {path}")
 
 
+def _measured(
+    run: Run, sweep: Sweep, excitation: str, progress: Callable[[str, float], None]
+) -> xr.Dataset:
+    if excitation == "sine":
+        return frequency_response(run, sweep, progress).assign_attrs(excitation=excitation)
+    return broadband_response(run, sweep, Broadband(cast(Any, excitation)), progress)
+
+
 def _input_unit(chosen: Chosen) -> str:
     point = chosen.loop.point(chosen.par, chosen.value)
     return signals_of(point.model.Stimulus)[chosen.loop.inputs[0]].unit
 
 
-def _warnings(found: xr.Dataset, unit: str) -> list[str]:
+def _warnings(found: xr.Dataset, unit: str, tolerance: float) -> list[str]:
     """Return what the user should know: what stuck, and what never repeated."""
     texts = []
     for k, size in enumerate(found["amplitude"].values):
@@ -79,11 +94,14 @@ def _warnings(found: xr.Dataset, unit: str) -> list[str]:
         label = f"amplitude {amount(float(size), unit, 3)}"
         if still.any():
             texts.append(f"{label}: the output sticks at {int(still.sum())} frequencies: no gain")
-        if (restless & ~still).any():
+        shaken = restless & ~still
+        if shaken.any():
+            scatter = float(np.nanmax(one["scatter"].values[shaken]))
             texts.append(
-                f"{label}: the response does not repeat itself within 0.1 % at "
-                f"{int((restless & ~still).sum())} frequencies (a limit cycle, a drift, or the "
-                "encoder's resolution): what is shown is the last window"
+                f"{label}: the response does not repeat itself within {100 * tolerance:g} % at "
+                f"{int(shaken.sum())} frequencies (a limit cycle, a drift, or the encoder's "
+                f"resolution): shown are means of the last windows, which scatter by up to "
+                f"{100 * scatter:.2g} %"
             )
     if found["unsettled_substeps"].values.any():
         texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
@@ -119,6 +137,7 @@ def _as_object(chosen: Chosen, found: xr.Dataset, linear: Any, files: list[Path]
         "loop": chosen.loop.name,
         "parameters": chosen.name,
         "operating_point": {chosen.loop.at.name: chosen.value, "unit": chosen.loop.at.unit},
+        "excitation": found.attrs["excitation"],
         "inputs": list(chosen.loop.inputs),
         "output": chosen.loop.output,
         "frequency": found["frequency"].values.tolist(),
@@ -152,6 +171,8 @@ def _text(chosen: Chosen, found: xr.Dataset, linear: Any, unit: str) -> str:
         f"closed loop {chosen.loop.name} of {chosen.name} at {at.name} = "
         f"{amount(chosen.value, at.unit)}: gain and phase by amplitude\n"
     )
+    if found.attrs["excitation"] != "sine":
+        head += f"excitation: {found.attrs['excitation']}, amplitudes are its peaks\n"
     return head + table_text(text_table(heading, rows))
 
 

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from textwrap import wrap
 
 from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.study_registry import all_studies
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
@@ -24,6 +25,7 @@ def execute(as_text: bool) -> None:
         "parameter_sets": {e.name: e.summary for e in entries().values()},
         "experiments": {e.name: e.summary for e in experiments.values()},
         "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in all_loops().values()},
+        "studies": {one.name: f"{one.summary} ({one.assembly})" for one in all_studies().values()},
         "stimuli": {e.kind: e.summary for e in stimuli().values()},
         "kpis": {m.name: m.definition for m in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments.values()},

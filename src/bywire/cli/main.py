@@ -117,13 +117,16 @@ def frequency_response_command(
         str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:40', or a list.")
     ] = "",
     amplitudes: Annotated[str, typer.Option(help="Amplitudes, e.g. '0.5 rad, 1 rad'.")] = "",
+    excitation: Annotated[
+        str, typer.Option(help="sine (one frequency at a time), multisine, or chirp.")
+    ] = "sine",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Measure a closed loop's response by amplitude: friction, limits and sampling included."""
     _execute(
         "frequency_response_command", loop, parameters, at, _changes(set_ or []), frequencies,
-        amplitudes, out, json,
+        amplitudes, excitation, out, json,
     )  # fmt: skip
 
 
@@ -140,6 +143,25 @@ def margins_command(
 ) -> None:
     """Show margins and bandwidth of a loop as it is sampled, and the worst case over a range."""
     _execute("margins_command", loop, parameters, at, _changes(set_ or []), over, json)
+
+
+@app.command("study")
+def study_command(
+    name: Annotated[
+        str, typer.Argument(help="Sizing study, see 'bywire list'.", show_default=False)
+    ],
+    parameters: Parameters = "",
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change an option or a parameter, e.g. t_90=120ms."
+        ),
+    ] = None,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Compare designs of a brake at equal demands: the best, what limits it, at what price."""
+    _execute("study_command", name, parameters, _changes(set_ or []), out, json)
 
 
 @app.callback(invoke_without_command=True)

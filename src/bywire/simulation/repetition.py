@@ -20,7 +20,11 @@ from bywire.simulation.run import Run, initial_vector, require_finite, selected
 from bywire.simulation.schedule import Schedule
 
 Array = NDArray[np.float64]
-Repeats = Callable[[Array, Array], NDArray[np.bool_]]
+Complex = NDArray[np.complex128]
+Figures = Callable[[Array], Complex]
+
+KEPT = 8
+"""windows whose figures are kept: the last ones"""
 
 
 @dataclass(frozen=True)
@@ -31,6 +35,9 @@ class Repeated:
     ----------
     time, values
         Shapes (rows,) and (cases, rows, signals); the window's end is not among the rows.
+    figures
+        What `repeat` was asked to compare, of the last `KEPT` windows, shape (cases, KEPT, n); NaN
+        in front where a case took fewer.
     windows
         Windows that each case took, shape (cases,).
     repeats
@@ -41,6 +48,7 @@ class Repeated:
 
     time: Array
     values: Array
+    figures: Complex
     windows: NDArray[np.int64]
     repeats: NDArray[np.bool_]
     unsettled: NDArray[np.int64]
@@ -51,7 +59,8 @@ def repeat(
     matrix: Array,
     stimuli: Array,
     signals: Sequence[str],
-    repeats: Repeats,
+    figures: Figures,
+    tolerance: float,
     most: int,
 ) -> Repeated:
     """Run every case window after window until all cases of its group of lanes repeat.
@@ -68,8 +77,12 @@ def repeat(
         without the end.
     signals
         Outputs to record.
-    repeats
-        ``repeats(before, now) -> bool``, both of shape (n, rows, signals), result (n,).
+    figures
+        ``figures(window) -> complex``, shapes (lanes, rows, signals) and (lanes, n): what a window
+        is judged by.
+    tolerance
+        A window repeats the one before when the norm of the difference of their figures is at
+        most this share of the norm of the figures.
     most
         Windows after which a case is given up, >= 2.
 
@@ -104,23 +117,23 @@ def repeat(
     layout = prepared.engine("auto").layout
     start = initial_vector(layout, run.state, run.memory)
 
-    def group(first: int) -> tuple[Array, int, NDArray[np.bool_], Array]:
+    def group(first: int) -> tuple[Array, Complex, int, NDArray[np.bool_], Array]:
         lane = np.minimum(np.arange(first, first + lanes), count - 1)
         columns = np.ascontiguousarray(matrix[:, lane])
         u = np.ascontiguousarray(np.moveaxis(stimuli[lane], 0, 2))
         vector = np.repeat(start[:, None], lanes, axis=1)
         shape = (lanes, schedule.frames // schedule.record_frames, len(signals))
-        before, now = np.empty(shape), np.empty(shape)
+        now, seen = np.empty(shape), list[Complex]()
         same = np.zeros(lanes, dtype=bool)
         windows = 0
         while windows < most and not same.all():
-            before, now = now, before
             advance(columns, u, vector, now)
             require_finite(layout, vector, f"one of cases {first} to {lane[-1]} left the numbers")
             windows += 1
+            seen = [*seen[1 - KEPT :], figures(now)]
             if windows > 1:
-                same = repeats(before, now)
-        return now, windows, same, vector[layout.start["counters"]]
+                same = _same(seen[-2], seen[-1], tolerance)
+        return now, _padded(seen), windows, same, vector[layout.start["counters"]]
 
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         done = list(pool.map(group, range(0, count, lanes)))
@@ -128,10 +141,23 @@ def repeat(
     return Repeated(
         time=np.asarray(times * schedule.frame, dtype=np.float64),
         values=np.concatenate([values for values, *_ in done])[:count],
-        windows=np.repeat([windows for _, windows, *_ in done], lanes)[:count],
+        figures=np.concatenate([seen for _, seen, *_ in done])[:count],
+        windows=np.repeat([windows for _, _, windows, *_ in done], lanes)[:count],
         repeats=np.concatenate([same for *_, same, _ in done])[:count],
         unsettled=np.concatenate([counters for *_, counters in done])[:count].astype(np.int64),
     )
+
+
+def _same(before: Complex, now: Complex, tolerance: float) -> NDArray[np.bool_]:
+    """Return which lanes repeat; what does not move at all repeats."""
+    apart, size = (np.linalg.norm(one, axis=1) for one in (now - before, now))
+    return np.asarray(apart <= tolerance * size)
+
+
+def _padded(seen: list[Complex]) -> Complex:
+    """Return the figures of the last windows, shape (lanes, KEPT, n)."""
+    missing = np.full((KEPT - len(seen), *seen[0].shape), np.nan, dtype=np.complex128)
+    return np.moveaxis(np.concatenate([missing, np.array(seen)]), 0, 1)
 
 
 def window_schedule(run: Run) -> Schedule:

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis import control_laws
+from bywire.analysis.loop import Array, Complex, Loop, Point, Quantity
 from bywire.analysis.loops.motorcycle_causes import CAUSES
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_ecu import Stimulus
@@ -21,6 +22,13 @@ def point(par: ParameterSet, value: float) -> Point:
     return Point(MotorcycleBrake(), own, state, memory, zeros(Stimulus)._replace(i_set=state.i))
 
 
+def laws(par: ParameterSet, frequencies: Array) -> tuple[Complex, Complex]:
+    """Return what the PI makes of set point and current, up to its duty cycle."""
+    own = cast(MotorcycleParameters, par)
+    pi = control_laws.current_control(own.ecu).response(frequencies)[:, 0, 0]
+    return pi, pi / (1.0 + 1j * frequencies / own.anti_alias.f_aa)
+
+
 LOOP = Loop(
     name="current",
     assembly="motorcycle-brake",
@@ -33,4 +41,7 @@ LOOP = Loop(
     causes=CAUSES,
     band=(1.0, 400.0),
     amplitudes=(1e-2, 1.0),
+    tunables={"ecu.current.k_p": (1e-4, 0.1), "ecu.current.k_i": (0.1, 200.0)},
+    proof="current-step",
+    laws=laws,
 )

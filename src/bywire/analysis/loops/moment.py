@@ -63,4 +63,7 @@ LOOP = Loop(
     causes=CAUSES,
     band=(0.5, 100.0),
     amplitudes=(0.5, 20.0),
+    # The law knows f_c over slope_hat alone: one of them is enough.
+    tunables={"control.moment.f_c": (0.3, 60.0)},
+    proof="moment-pulses",
 )

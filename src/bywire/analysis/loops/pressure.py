@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import cast
 
-from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis import control_laws
+from bywire.analysis.loop import Array, Complex, Loop, Point, Quantity
 from bywire.analysis.loops.motorcycle_causes import CAUSES
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_ecu import Stimulus
@@ -28,6 +29,14 @@ def whole(par: ParameterSet) -> Sequence[float]:
     return () if dither.waveform == "off" else (dither.f_dit,)
 
 
+def laws(par: ParameterSet, frequencies: Array) -> tuple[Complex, Complex]:
+    """Return what the PID makes of set point and pressure, up to its current demand."""
+    own = cast(MotorcycleParameters, par)
+    demand = control_laws.pressure_demand(own.ecu).response(frequencies)[:, 0, 0]
+    feedback = control_laws.pressure_feedback(own.ecu).response(frequencies)[:, 0, 0]
+    return demand, feedback / (1.0 + 1j * frequencies / own.anti_alias.f_aa)
+
+
 LOOP = Loop(
     name="pressure",
     assembly="motorcycle-brake",
@@ -41,4 +50,11 @@ LOOP = Loop(
     band=(0.1, 50.0),
     amplitudes=(1e4, 1e5, 3e5),
     whole=whole,
+    tunables={
+        "ecu.pressure.k_p": (5e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3),
+        "ecu.pressure.k_d": (1e-9, 3e-6), "ecu.pressure.tau_d": (3e-4, 1e-2),
+        "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
+    },
+    proof="hard-braking",
+    laws=laws,
 )

@@ -44,4 +44,9 @@ LOOP = Loop(
     causes=CAUSES,
     band=(1.0, 150.0),
     amplitudes=(1e-3, 0.25, 0.5, 1.0, 2.0),
+    tunables={
+        "control.position.f_n": (2.0, 200.0), "control.position.zeta": (0.2, 4.0),
+        "control.position.c": (0.0, 1.0),
+    },
+    proof="screw-position",
 )

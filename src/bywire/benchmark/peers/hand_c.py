@@ -5,7 +5,8 @@ from __future__ import annotations
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_energy import Flow
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters as Par
-from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode, Subject
+from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode
+from bywire.benchmark.peers.hand_source import Subject
 from bywire.simulation.compiler import PLAIN
 
 __all__ = ["OUTPUTS", "SUBJECT", "THREADS", "WITHOUT_SUMS", "HandWritten", "indices"]

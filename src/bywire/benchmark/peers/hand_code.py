@@ -1,17 +1,17 @@
-"""Hand-written C of a brake: its source put together, compiled, loaded, called."""
+"""Hand-written C of a brake: compiled, loaded, called."""
 
 from __future__ import annotations
 
 import ctypes
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.benchmark.peers.hand_source import Subject
 from bywire.core.errors import CompilerError
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
@@ -20,87 +20,10 @@ from bywire.simulation.run import Run
 
 Array = NDArray[np.float64]
 
-FOLDER = Path(__file__).parents[1]
 THREADS = ("-O2", "-fopenmp")
 WITHOUT_SUMS = ("-DWITHOUT_SUMS",)
 """leaves out the energies, whose outputs then mean nothing: where none of them is recorded"""
 _COUNTERS = 2  # the first one: substeps that did not settle
-
-
-@dataclass(frozen=True)
-class Subject:
-    """A brake, and the hand-written C that there is of it.
-
-    Parameters
-    ----------
-    source, indices, shared
-        Files in the benchmark's folder: the scheme; what it includes for the generated indices;
-        what it includes for the parts that it shares with other schemes.
-    model
-        The brake's model, whose signals the indices name.
-    flow
-        NamedTuple of the integrals over the run.
-    choices
-        The choices that the C covers: name of a parameter, its admissible texts.
-    """
-
-    source: str
-    indices: str
-    model: Any
-    flow: Any
-    choices: Mapping[str, tuple[str, ...]]
-    shared: tuple[str, ...] = ()
-
-    @property
-    def outputs(self) -> tuple[str, ...]:
-        """The model's outputs in order."""
-        return tuple(self.model.Output._fields)
-
-    def enums(self, par: ParameterSet) -> str:
-        """Return the C enums that name the entries of the arrays, in the model's own order."""
-        lists: dict[str, Iterable[str]] = {
-            "P": (name.replace(".", "_") for name in par.leaves()),
-            "X": self.model.State._fields,
-            "M": self.model.Memory._fields,
-            "U": self.model.Stimulus._fields,
-            "E": self.flow._fields,
-            "O": self.model.Output._fields,
-        }
-        return "".join(
-            f"enum {{ {', '.join(f'{prefix}_{name}' for name in (*names, 'COUNT'))} }};\n"
-            for prefix, names in lists.items()
-        )
-
-    def text(self, par: ParameterSet, scheme: str | None = None) -> str:
-        """Return the complete C source for the structure of a parameter set.
-
-        Parameters
-        ----------
-        scheme
-            Another file in place of ``source``.
-
-        Raises
-        ------
-        ValueError
-            When the set makes a choice that the hand-written C does not cover.
-        """
-        values = par.flat()
-        for name, covered in self.choices.items():
-            if values[name] not in covered:
-                raise ValueError(
-                    f"{name} = {values[name]!r}: the hand-written C covers "
-                    f"{' and '.join(map(repr, covered))} only"
-                )
-        pieces = {self.indices: self.enums(par)}
-        pieces |= {name: (FOLDER / name).read_text() for name in self.shared}
-        path = FOLDER / (scheme or self.source)
-        text = path.read_text()
-        for name, piece in pieces.items():
-            line = f'#include "{name}"\n'
-            if line not in text:
-                raise ValueError(f"{path} must include {name}")
-            text = text.replace(line, piece)
-        return text
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_energy import Flow
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.benchmark.peers.hand_code import HandCode, Subject
+from bywire.benchmark.peers.hand_code import HandCode
+from bywire.benchmark.peers.hand_source import Subject
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.compiler import PLAIN
 

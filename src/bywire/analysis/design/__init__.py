@@ -1,0 +1,1 @@
+"""Design of control loops: requirements in, gains and what they give out."""

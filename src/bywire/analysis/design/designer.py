@@ -1,0 +1,252 @@
+"""Gains of a loop from requirements, for a set of models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.design.linear_case import LinearCase
+from bywire.analysis.design.optimizer import (
+    KEPT_MISSED,
+    Problem,
+    Progress,
+    Search,
+    confirmed,
+    starts_of,
+)
+from bywire.analysis.design.requirement import FIGURES, Requirement
+from bywire.core.errors import ParameterError
+
+Array = NDArray[np.float64]
+Status = Literal["met", "infeasible", "interrupted"]
+
+_FINE = 4000  # points of the grid for what is reported
+_MISSED = -1e-3  # share of a limit that counts as missed
+_BINDS = 0.01  # slacks this close to the worst one bind
+_ROUNDS, _PAIRED = 8, 3
+
+
+@dataclass(frozen=True)
+class Binding:
+    """A requirement that leaves no room.
+
+    Parameters
+    ----------
+    requirement, case
+        Which one, and for which model.
+    value, slack
+        What was reached, and its distance from the limit as a share of it.
+    """
+
+    requirement: Requirement
+    case: str
+    value: float
+    slack: float
+
+
+@dataclass(frozen=True)
+class Conflict:
+    """What one requirement allows of another.
+
+    Parameters
+    ----------
+    wanted, kept
+        The requirement that was pushed, while the other one held.
+    best
+        The best value of the wanted one.
+    gains
+        Where it was reached.
+    """
+
+    wanted: Requirement
+    kept: Requirement
+    best: float
+    gains: Mapping[str, float]
+
+    @property
+    def excludes(self) -> bool:
+        """Whether the two alone cannot both be met."""
+        return self.wanted.slack(self.best) < _MISSED
+
+
+@dataclass(frozen=True)
+class Design:
+    """Gains and what they give.
+
+    Parameters
+    ----------
+    gains
+        By dotted name [SI].
+    status
+        ``"met"``, ``"infeasible"``, or ``"interrupted"`` with the best until then.
+    nominal
+        All figures of the nominal model.
+    worst
+        Figure -> worst value over all models, and the model's label.
+    binding
+        What leaves no room, the worst first.
+    conflicts
+        For infeasible requirements, what each binding one allows of the others.
+    slack
+        The worst normalized slack.
+    evaluations
+        Loops that were computed.
+    """
+
+    gains: Mapping[str, float]
+    status: Status
+    nominal: Mapping[str, float]
+    worst: Mapping[str, tuple[float, str]]
+    binding: tuple[Binding, ...]
+    conflicts: tuple[Conflict, ...]
+    slack: float
+    evaluations: int
+
+
+def design(
+    tunables: Mapping[str, tuple[float, float]],
+    requirements: Sequence[Requirement],
+    cases: Sequence[LinearCase],
+    start: Mapping[str, float],
+    *,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> Design:
+    """Choose gains that meet requirements for every model with the largest room.
+
+    Models are taken in as they turn out to be the worst; all of them are checked in the end. An
+    interrupt ends the search, and the best so far is returned.
+
+    Parameters
+    ----------
+    tunables
+        Dotted name -> lowest and highest value [SI].
+    requirements
+        See `requirement.read`.
+    cases
+        Models, the nominal one first.
+    start
+        Gains to begin with, besides a sample.
+    seed
+        Of that sample.
+    progress
+        Called with a label and the finished share.
+
+    Raises
+    ------
+    ParameterError
+        When nothing can be tuned, or a bandwidth is beyond half the sampling frequency.
+    """
+    if not tunables:
+        raise ParameterError("nothing is left to tune: set fewer of the loop's parameters")
+    problem = Problem(tunables, tuple(requirements), tuple(cases))
+    _require_sampled(problem, start)
+    first = problem.point(start)
+    search, status = Search(problem, [0]), "met"
+    conflicts: tuple[Conflict, ...] = ()
+    try:
+        _over_all(search, [first], seed, progress)
+        if search.best is not None:
+            search.best = confirmed(search, _FINE)
+        if search.slack < _MISSED:
+            status = "infeasible"
+            conflicts = _conflicts(search, progress)
+    except KeyboardInterrupt:
+        status = status if status == "infeasible" else "interrupted"
+    z = first if search.best is None else search.best
+    return _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)
+
+
+def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
+    period = problem.cases[0].figures(start).gain.period
+    for one in problem.requirements:
+        if one.unit == "Hz" and one.sense > 0 and one.limit >= 0.5 / period:
+            raise ParameterError(
+                f"requirement {one.text!r}: the loop is sampled every {period * 1e3:g} ms; ask "
+                f"for less than {0.5 / period:g} Hz"
+            )
+
+
+def _over_all(
+    search: Search, starts: Sequence[Array], seed: int, progress: Progress | None
+) -> None:
+    """Search over the nominal model, and take in the worst of the others until none is worse."""
+    problem, everything = search.problem, range(len(search.problem.cases))
+    begin = starts_of(problem, starts, seed)
+    for _ in range(_ROUNDS):
+        search.run(begin, progress)
+        if search.best is None:
+            return
+        slacks = problem.slacks(search.best, everything).min(axis=1)
+        worst = int(np.argmin(slacks))
+        if slacks[worst] >= search.slack - 1e-4 or worst in search.cases:
+            return
+        begin = [search.best]
+        search.cases, search.slack, search.seen = [*search.cases, worst], -np.inf, []
+
+
+def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...]:
+    """Return what every binding requirement allows of each other one."""
+    problem = search.problem
+    if search.best is None:
+        return ()
+    slacks = problem.slacks(search.best, search.cases).min(axis=0)
+    bound = [int(k) for k in np.argsort(slacks) if slacks[k] <= slacks.min() + 5 * _BINDS]
+    found = []
+    for a in bound[:_PAIRED]:
+        for b in bound[:_PAIRED]:
+            if a == b:
+                continue
+            own = Search(problem, search.cases, wanted=[a], kept=[b])
+            own.run([search.best], progress)
+            if own.best is not None and own.slack > KEPT_MISSED:
+                gains = problem.gains(own.best)
+                best = _extreme(problem, gains, problem.requirements[a], search.cases)
+                found.append(
+                    Conflict(problem.requirements[a], problem.requirements[b], best, gains)
+                )
+    return tuple(found)
+
+
+def _extreme(
+    problem: Problem, gains: Mapping[str, float], wanted: Requirement, cases: Sequence[int]
+) -> float:
+    values = [getattr(problem.cases[k].figures(gains, _FINE), wanted.figure) for k in cases]
+    return float(min(values) if wanted.sense > 0 else max(values))
+
+
+def _judged(
+    problem: Problem, z: Array, status: Status | None, conflicts: tuple[Conflict, ...]
+) -> Design:
+    """Return the design of a point, all models computed anew on the fine grid."""
+    gains = problem.gains(z)
+    found = {case.label: case.figures(gains, _FINE) for case in problem.cases}
+    rows = {
+        label: {name: float(getattr(one, name)) for name in FIGURES} for label, one in found.items()
+    }
+    stable = all(one.is_stable for one in found.values())
+    bindings = [
+        Binding(one, label, rows[label][one.figure], found[label].slack(one))
+        for label in rows for one in problem.requirements
+    ]  # fmt: skip
+    bindings.sort(key=lambda one: one.slack)
+    slack = bindings[0].slack if stable else -np.inf
+    worst = {}
+    for name in FIGURES:
+        sign = -1.0 if name.endswith(("peak", "error", "time")) or name == "overshoot" else 1.0
+        label = min(rows, key=lambda one: sign * rows[one][name])
+        worst[name] = (rows[label][name], label)
+    return Design(
+        gains=gains,
+        status=status or ("met" if slack >= _MISSED else "infeasible"),
+        nominal=next(iter(rows.values())),
+        worst=worst,
+        binding=tuple(one for one in bindings if one.slack <= bindings[0].slack + _BINDS),
+        conflicts=conflicts,
+        slack=float(slack),
+        evaluations=len(problem._known),
+    )

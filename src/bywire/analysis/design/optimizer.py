@@ -1,0 +1,219 @@
+r"""Gains that keep the worst normalized slack as large as possible.
+
+.. math:: \max_{x, t} t \quad \text{with} \quad s_{jk}(x) \ge t
+
+for every requirement j and model k: the largest of smallest slacks, without the kinks that a plain
+minimum has. Sequential quadratic programming from several starts, then a simplex where it stopped
+at a kink of a figure itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
+from scipy.stats import qmc
+
+from bywire.analysis.design.linear_case import LinearCase
+from bywire.analysis.design.requirement import Requirement
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+_UNSTABLE = -12.0  # slack of an unstable loop, before its growth is counted
+_LEAST, _LARGEST = -10.0, 3.0  # slacks beyond do not count as worse or better
+KEPT_MISSED = -1e3
+"""below this, a search has found nothing that meets the requirements to keep"""
+_STEP = 1e-5  # of differences, share of a range
+_SAMPLES, _STARTS = 64, 3
+_ITERATIONS, _SIMPLEX = 40, 150
+_CONFIRMED, _ALIKE = 40, 1e-3  # points looked at anew, and how far apart
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is chosen, for what, and what it must serve.
+
+    Parameters
+    ----------
+    tunables
+        Dotted name -> lowest and highest value [SI]; searched on a logarithmic scale where the
+        lowest is above zero.
+    requirements
+        What must hold for every case.
+    cases
+        The models, the nominal one first.
+    """
+
+    tunables: Mapping[str, tuple[float, float]]
+    requirements: tuple[Requirement, ...]
+    cases: tuple[LinearCase, ...]
+    _known: dict[tuple[bytes, int], Array] = field(default_factory=dict, repr=False)
+
+    def gains(self, z: Array) -> dict[str, float]:
+        """Return gains by name for a point of the unit cube."""
+        found = {}
+        for share, (name, (low, high)) in zip(z, self.tunables.items(), strict=True):
+            s = min(max(float(share), 0.0), 1.0)
+            found[name] = low * (high / low) ** s if low > 0 else low + (high - low) * s
+        return found
+
+    def point(self, gains: Mapping[str, float]) -> Array:
+        """Return the point of the unit cube for gains, the nearest where they lie outside."""
+        found = []
+        for name, (low, high) in self.tunables.items():
+            value = min(max(gains[name], low), high)
+            share = math.log(value / low, high / low) if low > 0 else (value - low) / (high - low)
+            found.append(share)
+        return np.array(found)
+
+    def slacks(self, z: Array, cases: Sequence[int]) -> Array:
+        """Return the slack of every requirement for some cases, shape (cases, requirements)."""
+        return np.array([self._of(z, k) for k in cases])
+
+    def _of(self, z: Array, k: int) -> Array:
+        key = (np.round(z, 12).tobytes(), k)
+        if key not in self._known:
+            found = self.cases[k].figures(self.gains(z))
+            if found.is_stable:
+                slacks = [found.slack(one) for one in self.requirements]
+                self._known[key] = np.clip(slacks, _LEAST, _LARGEST)
+            else:
+                worse = _UNSTABLE - 10.0 * (found.growth - 1.0)
+                self._known[key] = np.full(len(self.requirements), worse)
+        return self._known[key]
+
+
+@dataclass
+class Search:
+    """A search for the largest worst slack.
+
+    Parameters
+    ----------
+    problem
+        What is searched.
+    cases
+        Models that count.
+    wanted
+        Requirements whose worst slack grows; all by default.
+    kept
+        Requirements that must hold meanwhile.
+    best, slack
+        Best point found so far and its worst slack, also after an interrupt.
+    seen
+        Slack and place of every point that was looked at.
+    """
+
+    problem: Problem
+    cases: Sequence[int]
+    wanted: Sequence[int] | None = None
+    kept: Sequence[int] = ()
+    best: Array | None = None
+    slack: float = -math.inf
+    seen: list[tuple[float, Array]] = field(default_factory=list)
+
+    def run(self, starts: Sequence[Array], progress: Progress | None = None) -> None:
+        """Climb from each start, then from the best with a simplex and once more."""
+        for k, start in enumerate(starts):
+            self._climb(start)
+            if progress is not None:
+                progress("design", (k + 1) / (len(starts) + 2))
+        if self.best is None:
+            return
+        n = self.best.size
+        corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
+                             * np.eye(n)])  # fmt: skip
+        minimize(
+            lambda z: -self._judged(z), self.best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n,
+            options={"maxfev": _SIMPLEX, "initial_simplex": corners, "fatol": 1e-5},
+        )  # fmt: skip
+        self._climb(self.best)
+        if progress is not None:
+            progress("design", 1.0)
+
+    def _chosen(self) -> list[int]:
+        count = len(self.problem.requirements)
+        return list(range(count)) if self.wanted is None else list(self.wanted)
+
+    def _judged(self, z: Array) -> float:
+        """Return the worst wanted slack, or what is missing of the kept ones; note the best."""
+        found = self.problem.slacks(np.clip(z, 0.0, 1.0), self.cases)
+        value = float(found[:, self._chosen()].min())
+        if self.kept:
+            missing = float(found[:, list(self.kept)].min())
+            if missing < -1e-6:
+                value = KEPT_MISSED + missing
+        self.seen.append((value, np.clip(z, 0.0, 1.0)))
+        if value > self.slack:
+            self.slack, self.best = self.seen[-1]
+        return value
+
+    def _climb(self, start: Array) -> None:
+        n = start.size
+
+        def excess(v: Array) -> Array:
+            self._judged(v[:n])
+            found = self.problem.slacks(np.clip(v[:n], 0.0, 1.0), self.cases)
+            wanted = found[:, self._chosen()] - v[n]
+            return np.concatenate([wanted.ravel(), found[:, list(self.kept)].ravel()])
+
+        def slope(v: Array) -> Array:
+            here, columns = excess(v), []
+            for k in range(n):
+                h = _STEP if v[k] < 0.5 else -_STEP
+                moved = v.copy()
+                moved[k] += h
+                columns.append((excess(moved) - here) / h)
+            rate = np.zeros(here.size)
+            rate[: len(self.cases) * len(self._chosen())] = -1.0
+            return np.column_stack([*columns, rate])
+
+        first = self.problem.slacks(start, self.cases)[:, self._chosen()].min()
+        minimize(
+            lambda v: -v[n], np.append(start, max(first, _UNSTABLE)), method="SLSQP",
+            jac=lambda v: np.append(np.zeros(n), -1.0),
+            bounds=[(0.0, 1.0)] * n + [(None, None)],
+            constraints=[{"type": "ineq", "fun": excess, "jac": slope}],
+            options={"maxiter": _ITERATIONS, "ftol": 1e-5},
+        )  # fmt: skip
+
+
+def confirmed(search: Search, points: int) -> Array:
+    """Return the best point on a finer grid of frequencies, all models counted.
+
+    A coarse grid may step over a narrow dip of the closed loop to -3 dB: the best points lie
+    where figures jump.
+    """
+    problem = search.problem
+    best, found = -math.inf, np.asarray(search.best)
+    tried: list[Array] = []
+    for slack, z in sorted(search.seen, key=lambda one: -one[0]):
+        if slack <= best + 1e-4 or len(tried) >= _CONFIRMED:
+            break
+        if any(float(np.max(np.abs(z - other))) < _ALIKE for other in tried):
+            continue
+        tried.append(z)
+        fine = min(_fine_slack(problem, z, k, points) for k in range(len(problem.cases)))
+        if fine > best:
+            best, found = fine, z
+    return found
+
+
+def _fine_slack(problem: Problem, z: Array, k: int, points: int) -> float:
+    found = problem.cases[k].figures(problem.gains(z), points)
+    if not found.is_stable:
+        return _UNSTABLE
+    return min(found.slack(one) for one in problem.requirements)
+
+
+def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array]:
+    """Return where to start: the given points, and the best of a seeded sample of the cube."""
+    n = len(problem.tunables)
+    sample = qmc.Sobol(n, rng=np.random.default_rng(seed)).random(_SAMPLES)
+    worst = [float(problem.slacks(z, [0]).min()) for z in sample]
+    order = np.argsort(worst)[::-1]
+    return [*given, *(sample[k] for k in order[:_STARTS])]

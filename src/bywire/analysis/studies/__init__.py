@@ -1,0 +1,1 @@
+"""Sizing studies of the brakes, one file each."""

@@ -1,0 +1,137 @@
+"""A sizing study: many designs of a brake, compared at equal demands, and the best of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Kpi
+from bywire.core.parameters import ParameterSet
+
+Progress = Callable[[str, float], None]
+"""called with a label and the finished share, 0 to 1"""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A design on a map.
+
+    Parameters
+    ----------
+    label
+        What the legend says.
+    x, y
+        Where it lies, SI.
+    """
+
+    label: str
+    x: float
+    y: float
+
+
+@dataclass(frozen=True)
+class Map:
+    """How a variable of a study's dataset is shown over two of its dimensions.
+
+    Parameters
+    ----------
+    values, x, y
+        Names of the variable and of its coordinates.
+    caption
+        What the figure shows, one sentence.
+    marks
+        Designs to mark; the first is the optimum.
+    limits
+        Label -> variable and the level at which it draws the border of what is possible. Beyond
+        it the variable is larger.
+    """
+
+    values: str
+    x: str
+    y: str
+    caption: str
+    marks: tuple[Mark, ...] = ()
+    limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Rows of the dataset as a table.
+
+    Parameters
+    ----------
+    title
+        What is listed.
+    data
+        Variables over one dimension.
+    columns
+        Names of the columns, the dimension first.
+    """
+
+    title: str
+    data: xr.Dataset
+    columns: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Found:
+    """What a study found.
+
+    Parameters
+    ----------
+    data
+        All designs; variables with ``units`` and ``long_name``.
+    kpis
+        The optimum and what it is compared with.
+    assumptions
+        What is kept equal, and what is left out, a sentence each.
+    maps
+        Name -> map, in the order in which they are shown.
+    cuts
+        Tables.
+    warnings
+        What the user should know.
+    """
+
+    data: xr.Dataset
+    kpis: tuple[Kpi, ...]
+    assumptions: tuple[str, ...]
+    maps: Mapping[str, Map]
+    cuts: tuple[Cut, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Study:
+    """A named study.
+
+    Parameters
+    ----------
+    name
+        What the command line calls it.
+    assembly
+        Name of the brake that it sizes.
+    summary
+        One line for listings.
+    options
+        Class of its options, each with unit and range.
+    defaults
+        Options unless others are given.
+    compute
+        ``compute(par, options, progress) -> Found``.
+    """
+
+    name: str
+    assembly: str
+    summary: str
+    options: type[ParameterSet]
+    defaults: ParameterSet
+    compute: Callable[[Any, Any, Progress], Found]
+
+
+def variable(values: Any, dims: tuple[str, ...], unit: str, label: str) -> xr.Variable:
+    """Return a variable with its unit and label."""
+    return xr.Variable(dims, values, {"units": unit, "long_name": label})

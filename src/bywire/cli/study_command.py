@@ -1,0 +1,148 @@
+"""``bywire study``."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from bywire.analysis.study import Cut, Found, Study
+from bywire.analysis.study_registry import find_study
+from bywire.bench.values import parsed
+from bywire.catalog.registry import entry, main_set
+from bywire.cli import output
+from bywire.cli.output_folder import require_folder
+from bywire.cli.progress import progress_bar
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.parameters import ParameterSet
+
+
+def execute(
+    name: str, parameters: str, changes: Mapping[str, str], out: Path | None, as_json: bool
+) -> None:
+    """Compare designs of a brake, and show the best of them."""
+    study = find_study(name)
+    found_set = entry(parameters or main_set(study.assembly))
+    if found_set.assembly != study.assembly:
+        raise ParameterError(
+            f"study {study.name!r} sizes a {study.assembly}, but parameter set "
+            f"{found_set.name!r} is for a {found_set.assembly}"
+        )
+    par, options = _changed(study, found_set.parameters(), changes)
+    if out is not None:
+        require_folder(out)
+    with progress_bar() as progress:
+        found = study.compute(par, options, progress)
+    files = [] if out is None else _written(study, found, out)
+    for text in found.warnings:
+        output.message(f"warning: {text}")
+    if as_json:
+        shown = _as_object(study, found_set.name, options, found, files)
+        output.result(json.dumps(shown))
+    else:
+        output.result(_text(study, found_set.name, found))
+    for path in files:
+        output.message(f"written: {path}")
+
+
+def _changed(
+    study: Study, par: ParameterSet, changes: Mapping[str, str]
+) -> tuple[ParameterSet, ParameterSet]:
+    """Return parameters and options: names with a dot are the brake's, others the study's."""
+    own = {name: value for name, value in changes.items() if "." not in name}
+    options = study.defaults.flat()
+    for name in own:
+        if name not in options:
+            raise unknown_name("option", name, (*options, *par.flat()))
+    others = {name: value for name, value in changes.items() if "." in name}
+    return (
+        par.replace(parsed(type(par), others, "parameter")),
+        study.defaults.replace(parsed(study.options, own, "option")),
+    )
+
+
+def _written(study: Study, found: Found, out: Path) -> list[Path]:
+    from bywire.data.netcdf import write_recording
+    from bywire.report.contour import contour
+    from bywire.report.files import save_figure
+
+    files = [write_recording(found.data, out / f"{study.name}.nc")]
+    for name, shown in found.maps.items():
+        figure = contour(found.data, shown)
+        files.append(save_figure(figure, out / f"{study.name}-{name}.png"))
+    return files
+
+
+def _as_object(
+    study: Study, parameters: str, options: ParameterSet, found: Found, files: list[Path]
+) -> dict[str, Any]:
+    return {
+        "study": study.name,
+        "parameters": parameters,
+        "options": options.model_dump(mode="json"),
+        "assumptions": list(found.assumptions),
+        "kpis": {
+            one.name: {
+                "value": _finite(one.value),
+                "unit": one.unit,
+                "definition": one.definition,
+                "note": one.note,
+            }
+            for one in found.kpis
+        },
+        "designs": _listed(found.data),
+        "warnings": list(found.warnings),
+        "files": [str(path) for path in files],
+    }
+
+
+def _listed(data: xr.Dataset) -> dict[str, Any]:
+    """Return coordinates and variables with their dimensions and units."""
+    return {
+        str(name): {
+            "dims": [str(dim) for dim in values.dims],
+            "unit": values.attrs["units"],
+            "values": _finite(np.asarray(values.values, dtype=float).tolist()),
+        }
+        for name, values in data.variables.items()
+    }
+
+
+def _finite(value: Any) -> Any:
+    """Return numbers with null for what is infinite or not defined: JSON has no such numbers."""
+    if isinstance(value, list):
+        return [_finite(one) for one in value]
+    return value if math.isfinite(value) else None
+
+
+def _text(study: Study, parameters: str, found: Found) -> str:
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import KpiRow, kpi_table
+
+    rows = [
+        KpiRow(one.name, one.value, one.unit,
+               f"{one.definition} ({one.note})" if one.note else one.definition)
+        for one in found.kpis
+    ]  # fmt: skip
+    parts = [f"study {study.name} of {parameters}: {study.summary}", table_text(kpi_table(rows))]
+    parts += [_table(cut) for cut in found.cuts]
+    parts.append("assumptions\n" + "\n".join(f"- {text}" for text in found.assumptions))
+    return "\n\n".join(parts)
+
+
+def _table(cut: Cut) -> str:
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import text_table
+    from bywire.report.wording import amount
+
+    columns = [cut.data[name] for name in cut.columns]
+    rows = [
+        [amount(float(column.values[k]), str(column.attrs["units"]), 4) for column in columns]
+        for k in range(columns[0].size)
+    ]
+    return f"{cut.title}\n" + table_text(text_table(list(cut.columns), rows))

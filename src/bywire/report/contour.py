@@ -1,0 +1,140 @@
+"""Figure: a quantity over two parameters of a design, with the optimum and what limits it."""
+
+from __future__ import annotations
+
+import math
+
+import matplotlib as mpl
+import numpy as np
+import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.colors import BoundaryNorm
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+from bywire.analysis.study import Map
+from bywire.core.errors import ParameterError
+from bywire.report import style
+from bywire.report.channel import FloatArray
+from bywire.report.wording import in_display_unit
+
+_STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of a decade
+_MOST = 14  # levels; with more the colors cannot be told apart
+_MARKERS = ("*", "o", "s", "D")
+_HATCHES = ("///", "...", "xx")
+_LINES = ("-", "--", ":")
+
+
+def contour(data: xr.Dataset, shown: Map) -> Figure:
+    """Draw a variable as a contour map.
+
+    Parameters
+    ----------
+    data
+        Dataset of a study; variables with ``units`` and ``long_name``. NaN stays white.
+    shown
+        What to draw over what, marks and limits.
+
+    Raises
+    ------
+    ParameterError
+        When no value is known.
+    """
+    x, y = (_displayed(data[name]) for name in (shown.x, shown.y))
+    z = _displayed(data[shown.values].transpose(shown.y, shown.x))
+    known = z[np.isfinite(z)]
+    if not known.size:
+        raise ParameterError(f"contour: {shown.values} holds no number: there is nothing to draw")
+    figure, (axes,) = style.new_figure(4.4)
+    levels = levels_between(float(known.min()), float(known.max()))
+    colors = mpl.colormaps["viridis_r"]
+    filled = axes.contourf(
+        x, y, z, levels=levels, extend="both", cmap=colors,
+        norm=BoundaryNorm(levels, colors.N, extend="both"), alpha=0.75,
+    )  # fmt: skip
+    axes.contour(x, y, z, levels=levels, colors="white", linewidths=0.5)
+    bar = figure.colorbar(filled, ax=axes, ticks=levels, format="%g")
+    bar.ax.tick_params(labelsize=style.TEXT_SIZE)
+    bar.set_label(_label(data[shown.values]), fontsize=style.TEXT_SIZE)
+    handles = [*_limits(axes, data, shown, x, y), *_marks(axes, data, shown)]
+    axes.set_xlabel(_label(data[shown.x]))
+    axes.set_ylabel(_label(data[shown.y]))
+    if handles:
+        style.legend_above(axes, handles)
+    return figure
+
+
+def levels_between(low: float, high: float) -> list[float]:
+    """Return round levels between two numbers: even ones, or even shares above a factor of 3.
+
+    Examples
+    --------
+    >>> levels_between(57.0, 240.0)
+    [60.0, 80.0, 100.0, 120.0, 150.0, 200.0]
+    """
+    if low > 0 and high > 3.0 * low:
+        decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+        every = [step * 10.0**n for n in decades for step in _STEPS]
+        found = [float(f"{level:g}") for level in every if low < level < high]
+        return found[:: math.ceil(len(found) / _MOST)]
+    span = (high - low) or abs(high) or 1.0
+    step = 10.0 ** math.floor(math.log10(span / 5.0))
+    step *= next(f for f in (1.0, 2.0, 5.0, 10.0) if span / (f * step) <= 10.0)
+    first = math.ceil(low / step)
+    return [float(f"{k * step:.6g}") for k in range(first - 1, math.floor(high / step) + 2)]
+
+
+def _limits(
+    axes: Axes, data: xr.Dataset, shown: Map, x: FloatArray, y: FloatArray
+) -> list[Line2D | Patch]:
+    """Draw the borders of what is possible, hatched beyond; return the legend's entries."""
+    handles: list[Line2D | Patch] = []
+    for k, (label, (name, level)) in enumerate(shown.limits.items()):
+        values = np.asarray(data[name].transpose(shown.y, shown.x).values, dtype=float)
+        if not (values > level).any():
+            continue
+        hatch, line = _HATCHES[k % len(_HATCHES)], _LINES[k % len(_LINES)]
+        beyond = [level, max(float(np.nanmax(values)), level) * 2.0 + 1.0]
+        with mpl.rc_context({"hatch.color": style.GRAY, "hatch.linewidth": 0.5}):
+            axes.contourf(x, y, values, levels=beyond, colors="none", hatches=[hatch])
+        axes.contour(
+            x, y, values, levels=[level], colors=style.BLACK, linewidths=1.0, linestyles=line
+        )
+        handles.append(
+            Patch(facecolor="none", edgecolor=style.BLACK, hatch=hatch,
+                  linewidth=0.8, label=style.plain(label))
+        )  # fmt: skip
+    return handles
+
+
+def _marks(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
+    """Draw the marked designs that lie on the map; return the legend's entries."""
+    handles: list[Line2D | Patch] = []
+    for k, mark in enumerate(shown.marks):
+        inside = all(
+            float(data[name].min()) <= value <= float(data[name].max())
+            for name, value in ((shown.x, mark.x), (shown.y, mark.y))
+        )
+        if not inside:
+            continue
+        at = [
+            in_display_unit(value, str(data[name].attrs["units"]))[0]
+            for name, value in ((shown.x, mark.x), (shown.y, mark.y))
+        ]
+        marker = _MARKERS[k % len(_MARKERS)]
+        (handle,) = axes.plot(
+            *at, marker, color=style.VERMILLION, markersize=11 if marker == "*" else 6,
+            markeredgecolor="white", linestyle="none", zorder=5, label=style.plain(mark.label),
+        )  # fmt: skip
+        handles.append(handle)
+    return handles
+
+
+def _displayed(variable: xr.DataArray) -> FloatArray:
+    factor, _ = in_display_unit(1.0, str(variable.attrs["units"]))
+    return factor * np.asarray(variable.values, dtype=float)
+
+
+def _label(variable: xr.DataArray) -> str:
+    return style.axis_label(str(variable.attrs["long_name"]), str(variable.attrs["units"]))
