@@ -93,27 +93,22 @@ def package(name: str, step: float = 20e-6) -> Trajectory:
 def reference(
     name: str,
     band: float = 0.0,
-    seen_by: float = 0.0,
     step: float = REFERENCE_STEP,
     changes: tuple[tuple[str, float], ...] = (),
 ) -> dict[str, Array]:
-    """Return a scenario as the reference computes it, with other parameters if wanted.
-
-    The package records forces of the last substep's middle: ``seen_by`` is that substep [s].
-    """
-    return simulated(SCENARIOS[name], band, 0.5 * seen_by, step, dict(changes))
+    """Return a scenario as the reference computes it, with other parameters if wanted."""
+    return simulated(SCENARIOS[name], band, step, dict(changes))
 
 
 def simulated(
     s: Scenario,
     band: float = 0.0,
-    early: float = 0.0,
     step: float = REFERENCE_STEP,
     changes: Mapping[str, Any] | None = None,
 ) -> dict[str, Array]:
     """Return any scenario as the reference computes it; see ``karnopp_wedge.run``."""
     values = brake(IDEAL | dict(s.changes), s.mu_B).replace(dict(changes or {})).flat()
-    return karnopp_wedge.run(values, s.duration, band, step, s.M_set, s.off, early)
+    return karnopp_wedge.run(values, s.duration, band, step, s.M_set, s.off)
 
 
 def rms(a: Any, b: Any, signal: str) -> float:

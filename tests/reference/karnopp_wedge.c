@@ -180,27 +180,22 @@ static void step(const Par *P, const Control *c, const int way[RUBBING], double 
     for (int j = 0; j < STATES; j++) y[j] += h / 6.0 * (a[j] + 2.0 * (b[j] + d[j]) + e[j]);
 }
 
-/* States and mode at a tick; forces a little earlier, of the state at hand. */
-static void record(const Par *P, const Control *c, const double y[STATES], int tick, double *row)
+/* States, mode and forces at a tick. */
+static void record(const Par *P, const Control *c, const double y[STATES], double *row)
 {
     Forces g;
     double unused[STATES];
-    if (tick) {
-        for (int j = 0; j < STATES; j++) row[j] = y[j];
-        row[STATES] = c->mode;
-        return;
-    }
+    for (int j = 0; j < STATES; j++) *row++ = y[j];
+    *row++ = c->mode;
     forces(P, c, y, unused, &g);
-    row += STATES + 1;
     *row++ = g.F_N;
     *row++ = g.M_B;
     for (int k = 0; k < 3; k++) *row++ = g.f[k];
 }
 
-/* Parked and preloaded at first; a row at each fast tick, after the controllers; forces `early`
- * steps before it. */
+/* Parked and preloaded at first; a row at each fast tick, after the controllers. */
 void karnopp_run(const Par *P, const double band[RUBBING], int ticks, int substeps, int ratio,
-                 int early, const double *M_set, const double *power_off, double *rows)
+                 const double *M_set, const double *power_off, double *rows)
 {
     double apart = P->control_offset_delta_preload * 2.0 * PI / P->screw_lead;
     double y[STATES] = { 0.0 }, before[STATES] = { 0.0 };
@@ -211,17 +206,15 @@ void karnopp_run(const Par *P, const double band[RUBBING], int ticks, int subste
     c.last[0] = y[THETA] = -apart;
     c.last[1] = y[SIDE + THETA] = apart;
     y[OMEGA] = P->flywheel_Omega_0;
-    record(P, &c, y, 0, rows);
     for (int n = 0; n <= ticks; n++, rows += ROW) {
         const double theta[2] = { y[THETA], y[SIDE + THETA] };
         if (n % ratio == 0) control_moment(P, &c, M_set[n], theta[0], theta[1], y[SHOWN], y[OMEGA]);
         control_position(P, &c, power_off[n], theta);
-        record(P, &c, y, 1, rows);
+        record(P, &c, y, rows);
         for (int s = 1; s <= substeps && n < ticks; s++) {
             choose(P, &c, band, before, y, way);
             for (int j = 0; j < STATES; j++) before[j] = y[j];
             step(P, &c, way, P->control_T_fast / substeps, y);
-            if (s == substeps - early) record(P, &c, y, 0, rows + ROW);
         }
     }
 }

@@ -67,7 +67,6 @@ def run(
     step: float,
     M_set: Signal,
     power_off: Signal = np.zeros_like,
-    early: float = 0.0,
 ) -> dict[str, Array]:
     """Simulate from the parking position.
 
@@ -82,8 +81,6 @@ def run(
         leaves what steps across zero.
     M_set, power_off
         Signals of time: moment demand [N m], power stages switched off.
-    early
-        By how much the forces are recorded before the tick [s], whole steps.
 
     Returns
     -------
@@ -93,13 +90,11 @@ def run(
     Raises
     ------
     ValueError
-        Where a choice is not known, or ``early`` is not whole steps.
+        Where a choice is not known.
     CompilerError
         Without a C compiler.
     """
     numbers = _numbers(values)
-    if abs(round(early / step) * step - early) > 1e-12:
-        raise ValueError(f"early = {early:g} s must be whole steps of {step:g} s")
     T, T_slow = numbers["control_T_fast"], numbers["control_T_slow"]
     ticks, substeps, ratio = round(duration / T), round(T / step), round(T_slow / T)
     t = T * np.arange(ticks + 1, dtype=np.float64)
@@ -109,7 +104,7 @@ def run(
     arrays = [np.array(list(numbers.values())), bands]
     arrays += [np.ascontiguousarray(s(t), dtype=np.float64) for s in (M_set, power_off)]
     par, bands_at, *signals, rows_at = (ctypes.c_void_p(a.ctypes.data) for a in (*arrays, rows))
-    counts = map(ctypes.c_int, (ticks, substeps, ratio, round(early / step)))
+    counts = map(ctypes.c_int, (ticks, substeps, ratio))
     _library(tuple(numbers)).karnopp_run(par, bands_at, *counts, *signals, rows_at)
     return {"t": t} | dict(zip(SIGNALS, rows.T, strict=True))
 

@@ -146,13 +146,12 @@ def solve_signs(S: Array, c: Array, low: Array, high: Array) -> tuple[Array, Arr
 
 @dataclass
 class Point:
-    """Where a run stands: state, increment, memory, reactions, contact forces, integrals."""
+    """Where a run stands: state, increment, memory, reactions, integrals."""
 
     x: Array
     d: Array
     m: Any
     r: Array
-    F: Array
     q: Array
     unsettled: int = 0
     repeated: int = 0
@@ -199,7 +198,7 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
     F = np.array(force(middle), dtype=float)
     args = [model.State(*map(float, v)) for v in (middle, d / h)]
     at.q = at.q + np.array(model.powers(*args, at.m, par, tuple(F), tuple(reaction)), dtype=float)
-    at.x, at.d, at.r, at.F = at.x + d, d, reaction, F
+    at.x, at.d, at.r = at.x + d, d, reaction
     at.x[held] = w
 
 
@@ -230,10 +229,9 @@ def simulate(
     every = [(task, round(task.period / step)) for task in model.tasks(par)]
     fastest = min(period for _, period in every)
     recorded, total = round(record / step), round(duration / step)
-    reactions, contacts = len(model.frictions + model.limits), sum(map(len, model.compliance(par)))
+    reactions = np.zeros(len(model.frictions + model.limits))
     x = np.array(start[0], dtype=float)
-    at = Point(x, 0.0 * x, start[1], np.zeros(reactions), np.zeros(contacts), np.zeros(1))
-    at.q = np.zeros(len(model.Flow._fields))
+    at = Point(x, 0.0 * x, start[1], reactions, np.zeros(len(model.Flow._fields)))
     rows = []
     for k in range(total + 1):
         u = stimulus(np.array([k // fastest * fastest * step]))[0]
@@ -243,7 +241,9 @@ def simulate(
                 at.m = task.tick(state, at.m, model.Stimulus(*map(float, u)), par)
         if k % recorded == 0:
             flow = model.Flow(*(step * at.q))
-            out = model.output(state, at.m, par, tuple(at.F), tuple(at.r), flow)
+            gaps = list(chain.from_iterable(model.gap(state, state, par)))
+            F = tuple(_contacts(model, par, at.x)[1] @ np.array(gaps, dtype=float))
+            out = model.output(state, at.m, par, F, tuple(at.r), flow)
             rows.append([float(v) for v in out])
         if k < total:
             substep(model, par, at, step, cap)

@@ -55,7 +55,7 @@ typedef struct { double i, ii, oo, io, fo, pipe, stop, port, stuck; } Sums;
 typedef struct {
     double i, th, om, pm, pd, yp, yi;
     double di, dth, dom, dpm; /* half of the last increment: it predicts the midpoint */
-    double impulse, makeup, near_stop, far_stop; /* impulse: friction torque times h */
+    double impulse, makeup; /* impulse: friction torque times h */
     double unsettled, careful; /* numbers of substeps */
     Sums sum;
 } Sim;
@@ -198,9 +198,7 @@ static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
     const double both = s->om + q.om, v = k->k_g * 0.5 * both;
     const double x = k->k_g * (s->th + k->quarter * both);
     const double near = k->x_rest - x, far = x - k->x_end;
-    s->near_stop = side.k_near * (near - k->tau * v);
-    s->far_stop = side.k_far * (far + k->tau * v);
-    s->sum.stop += (s->far_stop - s->near_stop) * v;
+    s->sum.stop += (side.k_far * (far + k->tau * v) - side.k_near * (near - k->tau * v)) * v;
     /* What the chamber's balance lacks, the reservoir adds. */
     const double P = k->V0 - k->V1 * (s->th + s->dth), pm = s->pm + 0.5 * q.dpm;
     const double lack = P * q.dpm - k->a * both + k->two_g * (s->pm - s->pd);
@@ -251,7 +249,7 @@ static int64_t advance(const Plant *k, const Held *u, Sim *state, int64_t n)
         commit(k, &s, q);
     }
     if (done)
-        s.makeup = s.near_stop = s.far_stop = 0.0;
+        s.makeup = 0.0;
     *state = s;
     return done;
 }
@@ -309,7 +307,9 @@ static void record(const Plant *k, const Saved *z, double *o)
     const double *p = k->raw, *m = z->m, *e = z->e, friction = z->s.impulse / k->h;
     const double i = z->s.i, om = z->s.om, p_mc = z->s.pm, p_pd = z->s.pd, duty = m[M_duty];
     const double x_mc = k->k_g * z->s.th, torque = k->K_e * i;
-    const double q = (p_mc - p_pd) / k->K_lf, F_stop = z->s.far_stop - z->s.near_stop;
+    const double q = (p_mc - p_pd) / k->K_lf, ahead = k->tau * (k->k_g * om);
+    const double F_stop = k->k_stop * (max2(x_mc - k->x_end + ahead, 0.0)
+                                       - max2(k->x_rest - x_mc - ahead, 0.0));
     const double load = k->k_g * (p_mc * k->A + k->k_damp * k->k_g * om + F_stop);
     const double accel = (k->eta * torque - load + friction) / k->M;
     const double near = max2(k->x_rest - x_mc, 0.0), far = max2(x_mc - k->x_end, 0.0);

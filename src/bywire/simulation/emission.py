@@ -18,7 +18,7 @@ CAP = 8  # passes through one substep before it is counted as unsettled
 class Layout:
     """Where the parts of the state vector start.
 
-    The vector holds x, d, r, F, q, the memory m, and two counters: substeps that did not
+    The vector holds x, d, r, q, the memory m, and two counters: substeps that did not
     settle, substeps that were repeated.
     """
 
@@ -32,7 +32,7 @@ class Layout:
 
 
 def unread(stages: Stages) -> frozenset[str]:
-    """Return the half increments, reactions and contacts that no stage reads.
+    """Return the half increments and reactions that no stage reads.
 
     They need not be kept.
     """
@@ -42,7 +42,7 @@ def unread(stages: Stages) -> frozenset[str]:
     read = stages.graph.read_by(roots)
     return frozenset(
         f"{kind}{k}"
-        for kind in ("d", "r", "F")
+        for kind in ("d", "r")
         for k in range(len(stages.fast[kind]))
         if stages.graph.leaf(kind, k) not in read
     )

@@ -40,7 +40,7 @@ class _Lanes:
         skipped = unread(stages)
         self.results = {
             f"{kind}{k}": node
-            for kind in ("x", "d", "r", "F")
+            for kind in ("x", "d", "r")
             for k, node in enumerate(stages.fast[kind])
             if f"{kind}{k}" not in skipped
         }

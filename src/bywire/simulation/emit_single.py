@@ -44,7 +44,7 @@ def emit_single(stages: Stages) -> str:
     skipped = unread(stages)
     results = {
         f"{kind}{k}": node
-        for kind in ("x", "d", "r", "F")
+        for kind in ("x", "d", "r")
         for k, node in enumerate(stages.fast[kind])
         if f"{kind}{k}" not in skipped
     }

@@ -11,7 +11,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
 from bywire.simulation.model_check import check_model
-from bywire.simulation.scheme import Pass, Symbols, build_pass
+from bywire.simulation.scheme import Pass, Symbols, build_pass, contact_forces
 from bywire.simulation.stiff_contacts import contact_jacobians
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
@@ -25,7 +25,6 @@ class Sizes:
     stimulus: int
     parameters: int
     reaction: int
-    contact: int
     flow: int
     output: int
 
@@ -41,11 +40,11 @@ class Program:
     contact_jacobians
         ``(x, m, p)`` -> Jacobians of dx/dt, see ``stiff_contacts.contact_jacobians``.
     fast, exact
-        ``(x, d, m, p, h) -> (x, d, reaction, contact, flow, flag)``, see ``scheme.Pass``.
+        ``(x, d, m, p, h) -> (x, d, reaction, flow, flag)``, see ``scheme.Pass``.
     ticks
         One ``(x, m, u, p) -> m`` per task.
     output
-        ``(x, m, p, reaction, contact, flow, h) -> o``; ``flow`` is the sum of the rates.
+        ``(x, m, p, reaction, flow, h) -> o``; ``flow`` is the sum of the rates.
     """
 
     model: Model
@@ -105,7 +104,6 @@ def build_program(model: Model, par: ParameterSet) -> Program:
             stimulus=u.shape[0],
             parameters=p.shape[0],
             reaction=fast.reaction.shape[0],
-            contact=fast.contact.shape[0],
             flow=fast.flow.shape[0],
             output=len(model.Output._fields),
         ),
@@ -143,20 +141,19 @@ def _ranges(par: ParameterSet, names: tuple[str, ...]) -> dict[str, tuple[float,
 
 
 def _pass_function(name: str, s: Symbols, result: Pass) -> Any:
-    results = [result.x, result.d, result.reaction, result.contact, result.flow, result.flag]
+    results = [result.x, result.d, result.reaction, result.flow, result.flag]
     return ca.Function(name, [s.x, s.d, s.m, s.p, s.h], [ca.densify(SX(r)) for r in results])
 
 
 def _output(model: Model, par: ParameterSet, s: Symbols, shape: Pass) -> Any:
     reaction = SX.sym("r", shape.reaction.shape[0])
-    contact = SX.sym("F", shape.contact.shape[0])
     flow = SX.sym("q", shape.flow.shape[0])
     out = model.output(
         symbol_tuple(model.State, s.x),
         symbol_tuple(model.Memory, s.m),
         par,
-        scalars(contact),
+        scalars(contact_forces(model, par, s.x)),
         scalars(reaction),
         symbol_tuple(model.Flow, s.h * flow),
     )
-    return ca.Function("output", [s.x, s.m, s.p, reaction, contact, flow, s.h], [column(out)])
+    return ca.Function("output", [s.x, s.m, s.p, reaction, flow, s.h], [column(out)])

@@ -49,8 +49,6 @@ class Pass:
         State at the end and half the increment, shape (nx,) each.
     reaction
         Forces of the frictions, then of the limits.
-    contact
-        Contact forces at the midpoint.
     flow
         Rates of the integrals at the midpoint.
     flag
@@ -61,7 +59,6 @@ class Pass:
     x: Any
     d: Any
     reaction: Any
-    contact: Any
     flow: Any
     flag: Any
 
@@ -138,7 +135,16 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     flag = SX(0)
     for doubt in doubts:
         flag = ca.fmax(flag, doubt)
-    return Pass(x, d, reaction, contact, column(flow), flag)
+    return Pass(x, d, reaction, column(flow), flag)
+
+
+def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
+    """Return the forces of all contacts at an instant: what is recorded, not what acts in a step.
+
+    Those of a substep belong to its middle; recorded as they are, they would be half a substep old.
+    """
+    overlap = _gaps(model, par, x, x)
+    return _contact_sets(model, par, overlap, exact=True).stiffness @ overlap
 
 
 def _contact_sets(model: Model, par: ParameterSet, d: Any, exact: bool) -> _ContactSets:

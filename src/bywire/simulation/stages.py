@@ -18,8 +18,8 @@ from bywire.simulation.signs import NOT_NEGATIVE, Interval
 
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
 LEVEL = {"p": 0, "h": 0, "sp": 0, "m": 1, "sm": 1}
-SEEDS = frozenset({"sp", "sm", "sx", "sd", "sr", "sF", "sq"})
-STATE = ("x", "d", "r", "F", "q")  # what a substep renews, in the order of the state vector
+SEEDS = frozenset({"sp", "sm", "sx", "sd", "sr", "sq"})
+STATE = ("x", "d", "r", "q")  # what a substep renews, in the order of the state vector
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class Stages:
     Parameters
     ----------
     fast, exact
-        Nodes per result of a pass: x, d, r (reactions), F (contacts), q (flows), flag.
+        Nodes per result of a pass: x, d, r (reactions), q (flows), flag.
     ticks
         Nodes of the memory after each task.
     output
@@ -86,7 +86,7 @@ def build_stages(
     fixed = frozenset(kind for kind, level in LEVEL.items() if level < 2)
     graph = Graph({**ranges, ("h", 0): NOT_NEGATIVE}, fixed)
     lengths = {
-        "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction, "F": n.contact,
+        "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction,
         "q": n.flow, "p": n.parameters, "h": 1,
     }  # fmt: skip
     leaves = {
@@ -108,8 +108,8 @@ def build_stages(
                 inputs.append([graph.leaf(f"s{kind}", k) for k in range(lengths[kind])])
         return graph.add_function(seeded, inputs)
 
-    parts = ("x", "d", "r", "F", "q", "flag")
-    output = add(program.output, "xmprFqh")[0]
+    parts = ("x", "d", "r", "q", "flag")
+    output = add(program.output, "xmprqh")[0]
     output = output if outputs is None else [output[k] for k in outputs]
     fast = dict(zip(parts, add(program.fast, "xdmph"), strict=True))
     if outputs is not None:
@@ -133,7 +133,7 @@ def build_stages(
         fast_t=dict(zip(parts, tangent(program.fast, "xdmph"), strict=True)),
         exact_t=dict(zip(parts, tangent(program.exact, "xdmph"), strict=True)),
         ticks_t=[tangent(tick, "xmup")[0] for tick in program.ticks],
-        output_t=tangent(program.output, "xmprFqh")[0],
+        output_t=tangent(program.output, "xmprqh")[0],
     )
 
 

@@ -23,7 +23,7 @@ class VirtualMachine:
     def __init__(self, program: Program) -> None:
         n = program.sizes
         lengths = {
-            "x": n.x, "d": n.x, "r": n.reaction, "F": n.contact, "q": n.flow, "m": n.memory,
+            "x": n.x, "d": n.x, "r": n.reaction, "q": n.flow, "m": n.memory,
         }  # fmt: skip
         starts = np.concatenate(([0], np.cumsum(list(lengths.values()))))
         start = dict(zip([*lengths, "counters"], map(int, starts), strict=True))
@@ -54,7 +54,7 @@ class VirtualMachine:
                 if frame % every == 0:
                     part["m"][:] = task(part["x"], part["m"], u, p)[0]
             if frame % schedule.record_frames == 0:
-                o = self._output(part["x"], part["m"], p, part["r"], part["F"], part["q"], h)[0]
+                o = self._output(part["x"], part["m"], p, part["r"], part["q"], h)[0]
                 rows[row] = o[request.selection]
                 row += 1
             if frame < end:
@@ -63,19 +63,19 @@ class VirtualMachine:
 
     def _substep(self, part: dict[str, Array], p: Array, h: Array) -> None:
         result = self._fast(part["x"], part["d"], part["m"], p, h)
-        if result[5][0] != 0.0:
+        if result[4][0] != 0.0:
             guess = part["d"].copy()
             for _ in range(CAP):
                 result = self._exact(part["x"], guess, part["m"], p, h)
-                if result[5][0] == 0.0:
+                if result[4][0] == 0.0:
                     break
                 guess = result[1].copy()
             else:
                 part["counters"][0] += 1.0
             part["counters"][1] += 1.0
-        for kind, value in zip(("x", "d", "r", "F"), result, strict=False):
+        for kind, value in zip(("x", "d", "r"), result, strict=False):
             part[kind][:] = value
-        part["q"] += result[4]
+        part["q"] += result[3]
 
 
 class _Call:
