@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,10 +142,7 @@ def motion(par: Par, course: Course) -> Motion:
     v = (C_mc * course.rate + (course.p - course.p_pd) / K_lf) / cylinder.A_mc
     acceleration = (C_mc * course.bend + q_rate) / (cylinder.A_mc * k_g)
     omega = v / k_g
-    force = master_cylinder.output(
-        master_cylinder.State(course.p), master_cylinder.Input(0.0, v, 0.0), cylinder
-    ).force
-    rubbing = seal.output(seal.Input(omega, course.p), par.seal)
+    force, rubbing = _load(par, course.p, v, omega)
     limits = ball_screw_gear.friction_bounds(rubbing.T_p, rubbing.T_n, force, par.gear)
     friction = np.where(omega > 0, -np.asarray(limits.low), -np.asarray(limits.high))
     friction = np.where(omega == 0, 0.0, friction)
@@ -165,13 +163,10 @@ def motion(par: Par, course: Course) -> Motion:
 
 def breakaway_current(par: Par, p: float) -> float:
     """Return the current [A] that holds a pressure [Pa] and moves the piston on from there."""
-    load = master_cylinder.output(
-        master_cylinder.State(p), master_cylinder.Input(0.0, 0.0, 0.0), par.master_cylinder
-    ).force
-    rest = seal.output(seal.Input(0.0, p), par.seal)
+    load, rest = _load(par, p, 0.0, 0.0)
     limit = ball_screw_gear.friction_bounds(rest.T_p, rest.T_n, load, par.gear)
     efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
-    return (par.gear.k_g * load - limit.low) / (efficiency * par.motor.K_e)
+    return float(par.gear.k_g * load - limit.low) / (efficiency * par.motor.K_e)
 
 
 def geared(par: Par, k_g: float) -> Par:
@@ -191,6 +186,13 @@ def geared(par: Par, k_g: float) -> Par:
     return par.replace({name: values[name] * r**n for name, n in powers.items()} | {
         "gear.k_g": k_g
     })
+
+
+def _load(par: Par, p: Any, v: Any, omega: Any) -> tuple[Any, seal.Output]:
+    """Return the force on the piston and the friction of the seals, of numbers or of arrays."""
+    at = master_cylinder.Input(0.0, v, 0.0)
+    force = master_cylinder.output(master_cylinder.State(p), at, par.master_cylinder).force
+    return force, seal.output(seal.Input(omega, p), par.seal)
 
 
 def _lag(par: Par, p: float) -> float:

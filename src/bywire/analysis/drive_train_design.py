@@ -33,6 +33,7 @@ SIGNALS = (
 _FASTEST = 8.0  # closing speeds are looked for up to so many times the least
 _ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
 _SETTLE, _RECORD = 0.05, 2e-4
+_LAST = 0.8  # of the stop: what follows is its end
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,8 @@ class Answer:
         Largest speed of either motor [rad/s].
     copper, friction
         Energies lost in copper, bearings and screws during the stop [J].
+    held
+        Mean moment in the last fifth of the stop [N m].
     stop
         Largest force on the wedge's end stops [N].
     unsettled
@@ -96,6 +99,7 @@ class Answer:
     speed: Array
     copper: Array
     friction: Array
+    held: Array
     stop: Array
     unsettled: int
 
@@ -208,6 +212,7 @@ def _judged(run: Run, par: WedgeParameters, demand: Demand, factor: float) -> An
         speed=largest("omega_1", "omega_2"),
         copper=gained("E_copper"),
         friction=gained("E_shaft"),
+        held=found["y_M"][:, found.time >= _SETTLE + _LAST * demand.t_hold].mean(axis=1),
         stop=largest("F_end"),
         unsettled=int(found.unsettled.sum()),
     )

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 LATE = 1.02
 """share of the demanded time up to which a design answers equally fast"""
+HELD = 0.95
+"""share of the demand that counts as held"""
 _NEVER = 10.0  # what stands for the lateness of a moment that is never reached
 
 _PER_CASE = {
@@ -28,6 +30,7 @@ _PER_CASE = {
     "speed": ("rad/s", "largest motor speed"),
     "copper": ("J", "copper loss of the stop"),
     "friction": ("J", "friction of bearings and screws"),
+    "held": ("N*m", "mean moment at the end of the stop"),
     "stop": ("N", "force on the end stops"),
 }
 
@@ -54,7 +57,7 @@ def mapped(
     -------
     xarray.Dataset
         Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
-        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``feasible``
+        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
         (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
         ``mu_B_filtered`` and ``mu_B_instantaneous``, where each occurs.
     """
@@ -85,11 +88,12 @@ def _dataset(answers: Sequence[Answer], demand: Demand, shape: tuple[int, int, i
     slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
     in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
-    feasible = in_time & (cases["stop"].max(axis=2) == 0.0)
+    holds = cases["held"].min(axis=2) >= HELD * demand.moment
+    feasible = in_time & holds & (cases["stop"].max(axis=2) == 0.0)
     speeds = np.array([one.closing_speed for one in answers]).reshape(shape[:2])
     found["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
     found["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
-    found["feasible"] = variable(feasible.astype(float), plane, "1", "answers in time")
+    found["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
     for name in ("filtered", "instantaneous"):
         worst = np.where(feasible, cases[name].max(axis=2), np.nan)
         mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]

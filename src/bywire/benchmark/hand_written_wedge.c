@@ -340,7 +340,6 @@ INLINE void commit(const Scheme *s, Sim *z, const Touch *t, const double *w, con
     const double power = k->standby + q[0].v * q[0].i + q[1].v * q[1].i;
     b->y_P += k->h / (k->tau_P + k->half) * (power - b->y_P);
 #endif
-    b->f = t->f, b->F_N = t->F_N, b->near_stop = t->near, b->far_stop = t->far;
     memcpy(b->friction, force, sizeof b->friction);
 }
 

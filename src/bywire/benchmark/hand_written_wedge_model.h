@@ -33,12 +33,11 @@ typedef struct {
 typedef struct { double demand, sensed, integral, i, th, om; } Motor;
 typedef struct { double f_1, f_2, f_12; } Heart;
 
-/* State, forces and frictions of the last substep. */
+/* State, and frictions of the last substep. */
 typedef struct {
     Motor motor[2];
     double x, v, Om, phi, y_M, y_P;
-    Heart f;
-    double F_N, near_stop, far_stop, friction[4];
+    double friction[4];
 } Body;
 
 /* What a run carries from tick to tick: plant, memory of the controllers, energies. */
@@ -272,25 +271,47 @@ static void record_energies(const Plant *k, const Saved *z, double *o)
     o[O_W_brake] = e[E_W_brake], o[O_t_stuck] = e[E_t_stuck];
 }
 
+/* What the contacts carry at an instant. */
+typedef struct { Heart f; double F_N, F_end; } Carried;
+
+static Carried carried(const Plant *k, const Body *b)
+{
+    const Motor *a = b->motor, *c = b->motor + 1;
+    const double X_1 = k->lead * a->th, X_2 = k->lead * c->th;
+    const double r_1 = k->lead * a->om, r_2 = k->lead * c->om;
+    const double climb = b->x < 0.0 ? -k->tan : k->tan, ahead = k->tau_stop * b->v;
+    const double depth = climb * b->x - k->clear + k->runout * sin(b->phi);
+    const double closing = climb * b->v + k->runout * cos(b->phi) * b->Om;
+    return (Carried){
+        .f = pressed(k, b->x - X_1 - k->g_1 + k->tau * (b->v - r_1),
+                     X_2 - b->x - k->g_2 + k->tau * (r_2 - b->v),
+                     X_1 - X_2 - k->g_12 + k->tau * (r_1 - r_2)),
+        .F_N = k->K_cal * max2(depth + k->tau_cal * closing, 0.0),
+        .F_end = k->k_stop * (max2(b->x - k->x_stop + ahead, 0.0)
+                              - max2(-k->x_stop - b->x - ahead, 0.0)),
+    };
+}
+
 static void record(const Plant *k, const Saved *z, double *o)
 {
     const Body *b = &z->b;
+    const Carried t = carried(k, b);
     const double *m = z->m;
     const Motor *a = b->motor, *c = b->motor + 1;
     const bool on = m[M_on] > 0.5;
     const double V_1 = voltage(k, k->motor, a, on), V_2 = voltage(k, k->motor + 1, c, on);
-    o[O_M_set] = m[M_M_set], o[O_M_B] = k->per_F_N * direction_of(k, b->Om) * b->F_N;
+    o[O_M_set] = m[M_M_set], o[O_M_B] = k->per_F_N * direction_of(k, b->Om) * t.F_N;
     o[O_y_M] = b->y_M, o[O_mode] = m[M_mode], o[O_rate] = m[M_rate], o[O_sat_rate] = m[M_sat_rate];
     o[O_theta_c] = m[M_theta_c], o[O_theta_ref] = m[M_theta_ref];
     o[O_theta_1_ref] = m[M_theta_1_ref], o[O_theta_2_ref] = m[M_theta_2_ref];
     o[O_theta_1] = a->th, o[O_theta_2] = c->th, o[O_omega_1] = a->om, o[O_omega_2] = c->om;
     o[O_i_1_ref] = m[M_i_1_ref], o[O_i_2_ref] = m[M_i_2_ref], o[O_i_1] = a->i, o[O_i_2] = c->i;
     o[O_voltage_1] = V_1, o[O_voltage_2] = V_2, o[O_x] = b->x, o[O_v] = b->v;
-    o[O_f_1] = b->f.f_1, o[O_f_2] = b->f.f_2, o[O_f_12] = b->f.f_12;
-    o[O_F_M] = b->f.f_2 - b->f.f_1, o[O_F_N] = b->F_N, o[O_F_end] = b->far_stop - b->near_stop;
+    o[O_f_1] = t.f.f_1, o[O_f_2] = t.f.f_2, o[O_f_12] = t.f.f_12;
+    o[O_F_M] = t.f.f_2 - t.f.f_1, o[O_F_N] = t.F_N, o[O_F_end] = t.F_end;
     o[O_T_fr_1] = -b->friction[0], o[O_T_fr_2] = -b->friction[1], o[O_F_fr] = -b->friction[2];
     o[O_Omega] = b->Om, o[O_phi] = b->phi;
-    o[O_contacts] = (b->f.f_1 > 0.0) + 2.0 * (b->f.f_2 > 0.0) + 4.0 * (b->f.f_12 > 0.0);
+    o[O_contacts] = (t.f.f_1 > 0.0) + 2.0 * (t.f.f_2 > 0.0) + 4.0 * (t.f.f_12 > 0.0);
     o[O_stuck] = a->om == 0.0 && c->om == 0.0 && b->v == 0.0;
     o[O_P_in] = k->standby + V_1 * a->i + V_2 * c->i, o[O_P_meas] = b->y_P;
 #ifndef WITHOUT_SUMS

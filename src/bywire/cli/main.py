@@ -164,6 +164,43 @@ def study_command(
     _execute("study_command", name, parameters, _changes(set_ or []), out, json)
 
 
+@app.command("design")
+def design_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    require: Annotated[
+        list[str] | None,
+        typer.Option(help="Requirement, e.g. 'bandwidth >= 10 Hz'; as often as needed."),
+    ] = None,
+    requirements: Annotated[
+        Path | None, typer.Option(help="TOML file with a section [requirements].")
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(help="Range to serve as well, e.g. wedge.mu_B=0.2:0.6:5; may be repeated."),
+    ] = None,
+    amplitudes: Annotated[
+        str, typer.Option(help="Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.")
+    ] = "",
+    linear_only: Annotated[
+        bool, typer.Option("--linear-only", help="Leave out the nonlinear bench.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the searches.", min=0)] = 0,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Choose a loop's gains from requirements; exit status 1 when they cannot be met."""
+    from bywire.cli.design_command import Wanted
+
+    wanted = Wanted(requirements, require or [], over or [], amplitudes, linear_only, seed)
+    status = _execute(
+        "design_command", loop, parameters, at, _changes(set_ or []), wanted, out, json
+    )  # fmt: skip
+    raise typer.Exit(status)
+
+
 @app.callback(invoke_without_command=True)
 def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,

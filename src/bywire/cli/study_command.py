@@ -138,11 +138,11 @@ def _text(study: Study, parameters: str, found: Found) -> str:
 def _table(cut: Cut) -> str:
     from bywire.report.table_text import table_text
     from bywire.report.tables import text_table
-    from bywire.report.wording import amount
+    from bywire.report.wording import in_display_unit, unit_text
 
-    columns = [cut.data[name] for name in cut.columns]
-    rows = [
-        [amount(float(column.values[k]), str(column.attrs["units"]), 4) for column in columns]
-        for k in range(columns[0].size)
-    ]
-    return f"{cut.title}\n" + table_text(text_table(list(cut.columns), rows))
+    heading, columns = [], []
+    for name in cut.columns:
+        factor, unit = in_display_unit(1.0, str(cut.data[name].attrs["units"]))
+        heading.append(f"{name} [{unit_text(unit) or '-'}]")
+        columns.append([f"{factor * float(value):.4g}" for value in cut.data[name].values])
+    return f"{cut.title}\n" + table_text(text_table(heading, zip(*columns, strict=True)), 140)

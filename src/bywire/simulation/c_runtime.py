@@ -91,12 +91,10 @@ static inline V each(double (*f)(double), V a) {
   for (int l = 0; l < W; ++l) a[l] = f(a[l]);
   return a;
 }
-#define LOG(a) each(log, a)
 #define TAN(a) each(tan, a)
 #define ATAN(a) each(atan, a)
 #define TANH(a) each(tanh, a)
 #define CEIL(a) each(ceil, a)
-static inline V POW(V a, V b) { for (int l = 0; l < W; ++l) a[l] = pow(a[l], b[l]); return a; }
 """
 
 # EXP: x = k ln2 + r, |r| <= ln2/2, Taylor to r^13 (error below 1 ulp), scaled by the exponent
@@ -137,6 +135,45 @@ static inline V turned(V x, int64_t quarter) {
   const I odd = -(n & 1);
   const V y = (V)(((I)c & odd) | ((I)s & ~odd));
   return (V)((I)y ^ ((n & 2) << 62));
+}
+
+/* log a, a > 0, as *low + the result: a = m 2^k, m from sqrt(1/2) to sqrt(2), f = m - 1, and with
+ * s = f/(2 + f): log m = f - f^2/2 + s (f^2/2 + z p(z)), z = s^2, Taylor of atanh to s^21. */
+static inline V log_parts(V a, V *low) {
+  const I e = ((I)a - 0x3FE6A09E667F3BCDLL) >> 52;
+  const V f = (V)((I)a - (e << 52)) - 1.0;
+  const V k = (V)((I)SET(magic) + e) - magic;
+  const V s = f * INVERSE(2.0 + f), z = s * s, z2 = z * z, half = 0.5 * f * f;
+  const V p = (2.0 / 3.0 + z * (2.0 / 5.0)) + z2 * ((2.0 / 7.0 + z * (2.0 / 9.0))
+      + z2 * ((2.0 / 11.0 + z * (2.0 / 13.0)) + z2 * ((2.0 / 15.0 + z * (2.0 / 17.0))
+      + z2 * (2.0 / 19.0 + z * (2.0 / 21.0)))));
+  const V whole = k * 6.93147180369123816490e-01, high = whole + f;
+  *low = (f - (high - whole)) + (s * (half + z * p) + k * 1.90821492927058770002e-10 - half);
+  return high;
+}
+
+static inline V LOG(V a) {
+  V low;
+  const V high = log_parts(a, &low);
+  return high + low;
+}
+
+static inline V upper(V a) { return (V)((I)a & ~0x7FFFFFFLL); }
+
+/* a^b for a >= 0: exp(b log a) with the product to twice the digits; what is next to zero goes lane
+ * by lane. */
+static inline V POW(V a, V b) {
+  if (ANY(LT(a, SET(1e-300)))) {
+    for (int l = 0; l < W; ++l) a[l] = pow(a[l], b[l]);
+    return a;
+  }
+  V low;
+  const V log = log_parts(a, &low), product = b * log, b_h = upper(b), log_h = upper(log);
+  const V b_l = b - b_h, log_l = log - log_h;
+  const V lost = ((b_h * log_h - product) + (b_h * log_l + b_l * log_h)) + b_l * log_l;
+  const V rest = lost + b * low, y = product + rest;
+  const V power = EXP(y);
+  return power + power * (rest - (y - product));
 }
 
 #define SIN(x) turned(x, 0)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
 
@@ -11,26 +10,11 @@ import casadi as ca
 from bywire.simulation.symbols import SX
 
 
-@dataclass(frozen=True)
-class ActiveSet:
-    """Solution of one group.
+def active_stiffness(C: Any, d: Any) -> Any:
+    """Return K of the active subset of a contact group, shape (n, n): forces are K times overlaps.
 
-    Parameters
-    ----------
-    stiffness
-        K, shape (n, n): the contact forces are K times the overlaps; zero rows where inactive.
-    index
-        Number of the active subset, a symbol; equal numbers mean equal subsets.
-    """
-
-    stiffness: Any
-    index: Any
-
-
-def active_set(C: Any, d: Any) -> ActiveSet:
-    """Choose the active subset of a contact group.
-
-    Finds S with F = C_SS^-1 d_S >= 0 and C F - d >= 0 outside S. Among all subsets the one with
+    Rows and columns of inactive contacts are zero. The subset is the S that solves the problem:
+    finds S with F = C_SS^-1 d_S >= 0 and C F - d >= 0 outside S. Among all subsets the one with
     the largest smallest slack is taken: choosing by "slack > 0" loses all force in exact ties.
     The slacks of inactive contacts count in force units (divided by C_kk).
 
@@ -44,11 +28,9 @@ def active_set(C: Any, d: Any) -> ActiveSet:
     n = d.shape[0]
     if n == 1:
         pressed = d[0] > 0
-        return ActiveSet(ca.if_else(pressed, 1.0 / C, 0), ca.if_else(pressed, 1, 0))
+        return ca.if_else(pressed, 1.0 / C, 0)
     cases = []
-    for number, subset in enumerate(
-        s for size in range(n + 1) for s in combinations(range(n), size)
-    ):
+    for subset in (s for size in range(n + 1) for s in combinations(range(n), size)):
         K = _embedded_inverse(C, subset)
         F = K @ d
         outside = C @ F - d
@@ -56,9 +38,8 @@ def active_set(C: Any, d: Any) -> ActiveSet:
         slack = slacks[0]
         for other in slacks[1:]:
             slack = ca.fmin(slack, other)
-        cases.append((slack, ca.vertcat(ca.vec(ca.densify(K)), number)))
-    best = _largest(cases)
-    return ActiveSet(stiffness=ca.reshape(best[:-1], n, n), index=best[-1])
+        cases.append((slack, ca.vec(ca.densify(K))))
+    return ca.reshape(_largest(cases), n, n)
 
 
 def _embedded_inverse(C: Any, subset: tuple[int, ...]) -> Any:

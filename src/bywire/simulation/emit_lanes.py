@@ -13,9 +13,11 @@ from bywire.simulation.emission import (
     layout_of,
     leaf_count,
     leaf_namer,
+    statements,
     unread,
 )
-from bywire.simulation.expressions import VECTOR_C, as_number, needed
+from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
+from bywire.simulation.modes import modes
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
@@ -49,6 +51,7 @@ class _Lanes:
         self.pass_roots = [*self.results.values(), *self.products, self.flag]
         self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
         self.name = leaf_namer(self.graph, self._leaf, lambda n: f"v{n}", "SET({})")
+        self.mode = modes(self.graph, self.pass_roots, self.level)
 
     def _leaf(self, kind: str, index: int) -> str:
         if kind in ("p", "u"):
@@ -79,7 +82,34 @@ class _Lanes:
         """Return the statements of what changes with the ticks."""
         roots = [*self.pass_roots, *self.coefficients]
         order = needed(self.graph, roots, lambda n: self.level[n] == 0)
-        return self.lines([n for n in order if self.level[n] == 1])
+        own = frozenset(self.mode.values)
+        return self.lines([n for n in order if self.level[n] == 1 and n not in own])
+
+    def mode_state(self) -> list[str]:
+        """Return the declarations of what changes with the mode alone, and of the mode."""
+        if not self.mode.atoms:
+            return []
+        values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
+        return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
+
+    def substep(self) -> list[str]:
+        """Return the statements of a substep; what hangs on the mode is renewed with it."""
+        mode = self.mode
+        if not mode.atoms:
+            return self.lines(mode.rest)
+        changed = " | ".join(f"(n{n} ^ b{n})" for n in mode.atoms)
+        truth = [condition(self.graph, n, self.name, VECTOR_C) for n in mode.atoms]
+        renewed = statements(self.graph, mode.values, self.name, "", VECTOR_C)
+        return [
+            *self.lines(mode.first),
+            *(f"const B n{n} = {text};" for n, text in zip(mode.atoms, truth, strict=True)),
+            f"if (__builtin_expect(fresh | ANY({changed}), 0)) {{",
+            "  fresh = 0;",
+            *(f"  b{n} = n{n};" for n in mode.atoms),
+            *(f"  {line}" for line in renewed),
+            "}",
+            *self.lines(mode.rest),
+        ]
 
 
 def emit_lanes(stages: Stages) -> str:
@@ -107,6 +137,7 @@ def emit_lanes(stages: Stages) -> str:
   V U[{max(stimuli, 1)}];
   {indented([f"V {name} = vectors[{k}];" for k, name in enumerate(names)], 2)}
   {indented(t.once(), 2)}
+  {indented(t.mode_state(), 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
     for (int j = 0; j < {stimuli}; ++j) {{
       const double *row = u + (f / stim) * {stimuli} * (own ? W : 1);
@@ -120,7 +151,7 @@ def emit_lanes(stages: Stages) -> str:
     {indented(t.framed(), 4)}
     {indented([f"V {s} = SET(0.0);" for s in sums], 4)}
     for (int64_t s = 0; s < substeps; ++s) {{
-      {indented(t.block(t.pass_roots, 2), 6)}
+      {indented(t.substep(), 6)}
       {indented(new, 6)}
       const B flagged = NE({t.number(t.flag)}, SET(0.0));
       if (__builtin_expect(ANY(flagged), 0)) {{

@@ -11,9 +11,12 @@ from bywire.simulation.emission import (
     layout_of,
     leaf_count,
     leaf_namer,
+    statements,
     unread,
 )
-from bywire.simulation.expressions import Namer, as_number, needed
+from bywire.simulation.expressions import Namer, as_number, condition, needed
+from bywire.simulation.graph import Graph
+from bywire.simulation.modes import Modes, modes
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
@@ -55,12 +58,12 @@ def emit_single(stages: Stages) -> str:
     every_root = pass_roots + coefficients + tick_roots + stages.output
     once = needed(graph, every_root, lambda _: False)
     hoisted = [node for node in once if level[node] == 0]
+    mode = modes(graph, pass_roots, level)
     framed = [
         node
         for node in needed(graph, pass_roots + coefficients, lambda n: level[n] == 0)
-        if level[node] == 1
+        if level[node] == 1 and node not in mode.values
     ]
-    substep = needed(graph, pass_roots, lambda n: level[n] < 2)
 
     def block(order: list[int]) -> list[str]:
         return branching_statements(graph, order, name, "const double ")
@@ -80,6 +83,7 @@ def emit_single(stages: Stages) -> str:
   double failures = state[{counters}], repeats = state[{counters + 1}];
   {indented(_loads(layout), 2)}
   {indented(block(hoisted), 2)}
+  {indented(_mode_state(mode, name), 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
     const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
     (void)uk;
@@ -94,7 +98,9 @@ def emit_single(stages: Stages) -> str:
     {indented(block(framed), 4)}
     {indented([f"double s{k} = 0.0;" for k in range(len(products))], 4)}
     for (int64_t s = 0; s < substeps; ++s) {{
-      {indented(block(substep), 6)}
+      {indented(block(mode.first), 6)}
+      {indented(_mode_change(mode, graph, name), 6)}
+      {indented(block(mode.rest), 6)}
       if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
         {indented(_repeat(layout), 8)}
       }} else {{
@@ -108,6 +114,28 @@ def emit_single(stages: Stages) -> str:
   state[{counters + 1}] = repeats;
 }}
 """
+
+
+def _mode_state(mode: Modes, name: Namer) -> list[str]:
+    """Return the declarations of what changes with the mode alone, and of the mode: unknown."""
+    if not mode.atoms:
+        return []
+    return [*(f"double {name(n)} = 0.0;" for n in mode.values), "uint64_t mode = 0, fresh = 1;"]
+
+
+def _mode_change(mode: Modes, graph: Graph, name: Namer) -> list[str]:
+    """Return the statements that renew it where the mode is another one."""
+    if not mode.atoms:
+        return []
+    bits = [f"(uint64_t){condition(graph, n, name)} << {k}" for k, n in enumerate(mode.atoms)]
+    return [
+        f"const uint64_t now = {' | '.join(bits)};",
+        "if (__builtin_expect((now ^ mode) | fresh, 0)) {",
+        "  mode = now;",
+        "  fresh = 0;",
+        *(f"  {line}" for line in statements(graph, mode.values, name, "")),
+        "}",
+    ]
 
 
 def _entries(layout: Layout) -> list[tuple[str, int]]:

@@ -15,7 +15,7 @@ import casadi as ca
 from bywire.core.errors import SolverError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.contacts import active_set
+from bywire.simulation.contacts import active_stiffness
 from bywire.simulation.elimination import Reduced, eliminate
 from bywire.simulation.linear_form import Form, forms
 from bywire.simulation.set_valued import Projection, project_exact, project_fast
@@ -75,15 +75,6 @@ class _Linearized:
     J: Any
 
 
-@dataclass(frozen=True)
-class _ContactSets:
-    """Block-diagonal stiffness, numbers of the active subsets, overlaps that were left out."""
-
-    stiffness: Any
-    numbers: list[Any]
-    overlaps: list[Any]
-
-
 def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass:
     """Build one pass.
 
@@ -101,8 +92,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
-    before = _contact_sets(model, par, _gaps(model, par, y, y), exact)
-    K = before.stiffness
+    K = _stiffness(model, par, _gaps(model, par, y, y), exact)
     at_y = K @ _gaps(model, par, y, y)
     linear = _linearize(model, par, s, y, K)
     bounds = _bounds(model, par, s, y, at_y)
@@ -127,8 +117,8 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         scalars(contact),
         scalars(reaction),
     )
-    after = _contact_sets(model, par, _gaps(model, par, middle, middle), exact)
-    doubts = [*_differences(before, after), ca.if_else(projection.failed, 1, 0)]
+    doubts = _violations(model, par, overlap, contact, exact)
+    doubts.append(ca.if_else(projection.failed, 1, 0))
     if not exact:
         doubts += [-x[model.State._fields.index(name)] for name in model.limits]
     # A maximum and no logical or: compilers do not vectorize selections between truth values.
@@ -144,27 +134,27 @@ def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
     Those of a substep belong to its middle; recorded as they are, they would be half a substep old.
     """
     overlap = _gaps(model, par, x, x)
-    return _contact_sets(model, par, overlap, exact=True).stiffness @ overlap
+    return _stiffness(model, par, overlap, exact=True) @ overlap
 
 
-def _contact_sets(model: Model, par: ParameterSet, d: Any, exact: bool) -> _ContactSets:
-    """Choose the active subsets of all groups; the fast pass takes rare contacts as open."""
-    blocks, numbers, overlaps, at = [], [], [], 0
-    matrices = model.compliance(par)
+def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
+    """Return compliances, place among all contacts, and whether the pass takes them as open."""
+    matrices, found, at = model.compliance(par), [], 0
     rarely = model.usually_open or (False,) * len(matrices)
     for C, rare in zip(matrices, rarely, strict=True):
-        n = len(C)
-        group = d[at : at + n]
-        at += n
-        if rare and not exact:
-            blocks.append(SX(n, n))
-            overlaps += [group[k] for k in range(n)]
-            continue
         rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
-        chosen = active_set(rows, group)
-        blocks.append(chosen.stiffness)
-        numbers.append(chosen.index)
-    return _ContactSets(ca.diagcat(*blocks) if blocks else SX(0, 0), numbers, overlaps)
+        found.append((rows, slice(at, at + len(C)), rare and not exact))
+        at += len(C)
+    return found
+
+
+def _stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
+    """Return the block-diagonal stiffness of the active subsets of all groups."""
+    blocks = [
+        SX(*rows.shape) if is_open else active_stiffness(rows, d[place])
+        for rows, place, is_open in _groups(model, par, exact)
+    ]
+    return ca.diagcat(*blocks) if blocks else SX(0, 0)
 
 
 def _gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
@@ -251,8 +241,19 @@ def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> Any:
     return column([every[k] for k in range(s.x.shape[0])])
 
 
-def _differences(before: _ContactSets, after: _ContactSets) -> list[Any]:
-    """Return numbers of which one is positive where a contact set is not as it was assumed."""
-    changed = [(a - b) ** 2 for a, b in zip(before.numbers, after.numbers, strict=True)]
-    # A contact that was left out is absent if it is open at the midpoint that came out.
-    return [*after.overlaps, *changed]
+def _violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:
+    """Return what is positive where a contact set does not fit the midpoint that came out.
+
+    Forces of the assumed set that push, and overlaps outside it that they close, are the solution:
+    there is only one. Cheaper than to choose the set once more.
+    """
+    found: list[Any] = []
+    for rows, place, is_open in _groups(model, par, exact):
+        overlap, force = d[place], ca.densify(F[place])
+        closed = rows @ force
+        for k in range(overlap.shape[0]):
+            lack = overlap[k] - closed[k]
+            # Where a force pushes, the lack is zero but for rounding.
+            wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
+            found.append(overlap[k] if is_open else wrong)
+    return found

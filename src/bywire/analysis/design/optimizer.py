@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -127,9 +128,10 @@ class Search:
         n = self.best.size
         corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
                              * np.eye(n)])  # fmt: skip
+        options: Any = {"maxfev": _SIMPLEX, "initial_simplex": corners, "fatol": 1e-5}
         minimize(
             lambda z: -self._judged(z), self.best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n,
-            options={"maxfev": _SIMPLEX, "initial_simplex": corners, "fatol": 1e-5},
+            options=options,
         )  # fmt: skip
         self._climb(self.best)
         if progress is not None:
@@ -173,12 +175,13 @@ class Search:
             return np.column_stack([*columns, rate])
 
         first = self.problem.slacks(start, self.cases)[:, self._chosen()].min()
+        constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
+        options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}
         minimize(
-            lambda v: -v[n], np.append(start, max(first, _UNSTABLE)), method="SLSQP",
+            lambda v: -float(v[n]), np.append(start, max(first, _UNSTABLE)), method="SLSQP",
             jac=lambda v: np.append(np.zeros(n), -1.0),
-            bounds=[(0.0, 1.0)] * n + [(None, None)],
-            constraints=[{"type": "ineq", "fun": excess, "jac": slope}],
-            options={"maxiter": _ITERATIONS, "ftol": 1e-5},
+            bounds=[*[(0.0, 1.0)] * n, (None, None)],
+            constraints=constraints, options=options,
         )  # fmt: skip
 
 

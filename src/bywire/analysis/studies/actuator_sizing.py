@@ -32,7 +32,7 @@ Array = NDArray[np.float64]
 Par = MotorcycleParameters
 Count = Annotated[int, Unit("1", 41.0), Field(ge=3, le=401)]
 
-_BISECTIONS, _SECTIONS = 50, 60
+_BISECTIONS, _SECTIONS, _ROWS = 50, 60, 13
 _GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
 
 ASSUMPTIONS = (
@@ -111,13 +111,8 @@ def compute(par: Par, options: Options, progress: Progress) -> Found:
             f"{highest / 1e5:.4g} bar, where the piston meets its end stop: lower it, or move the "
             "stop (master_cylinder.x_end)"
         )
-    data = mapped(
-        par,
-        options.p_peak,
-        np.geomspace(options.k_g_min, options.k_g_max, options.ratios),
-        np.geomspace(options.f_min, options.f_max, options.frequencies),
-        lambda own, f: course(own, options, f),
-    )
+    data = _mapped(par, options, options.ratios,
+                   np.geomspace(options.f_min, options.f_max, options.frequencies))  # fmt: skip
     k_best = _best_ratio(par, options)
     chosen = geared(par, k_best)
     f, power = options.bandwidth, float(_electrical(chosen, options).max())
@@ -137,7 +132,7 @@ def compute(par: Par, options: Options, progress: Progress) -> Found:
     limits = {"current limit": ("current_share", 1.0), "voltage limit": ("voltage_share", 1.0)}
     caption = f"Electrical power of the motor for a {options.demand}: {power:.3g} W at the optimum."
     maps = {"power": Map("electrical", "k_g", "frequency", caption, marks, limits)}
-    return Found(data, tuple(kpis), ASSUMPTIONS, maps, (_cut(data, f),), warnings)
+    return Found(data, tuple(kpis), ASSUMPTIONS, maps, (_cut(par, options),), warnings)
 
 
 def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, float]:
@@ -207,13 +202,17 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
     ]  # fmt: skip
 
 
-def _cut(data: xr.Dataset, f: float) -> Cut:
-    row = data.sel(frequency=f, method="nearest")
+def _mapped(par: Par, options: Options, ratios: int, frequencies: Array) -> xr.Dataset:
+    k_g = np.geomspace(options.k_g_min, options.k_g_max, ratios)
+    return mapped(par, options.p_peak, k_g, frequencies, lambda own, f: course(own, options, f))
+
+
+def _cut(par: Par, options: Options) -> Cut:
+    """Return what changes along the gear ratio at the bandwidth wanted."""
+    row = _mapped(par, options, _ROWS, np.array([options.bandwidth])).isel(frequency=0)
     names = ("electrical", "mechanical", "torque", "speed", "inertia_share", "current_share",
              "voltage_share")  # fmt: skip
-    step_ = max(row.sizes["k_g"] // 12, 1)
-    shown = row.isel(k_g=slice(None, None, step_))
-    return Cut(f"bandwidth {float(row['frequency']):.3g} Hz", shown, ("k_g", *names))
+    return Cut(f"{options.demand} at a bandwidth of {options.bandwidth:g} Hz", row, ("k_g", *names))
 
 
 def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ...]:

@@ -1,0 +1,191 @@
+"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
+
+Many sets of gains run side by side, in the lanes of one ensemble.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
+from bywire.analysis.frequency_response import frequency_response
+from bywire.analysis.loop import Loop
+from bywire.analysis.response_dataset import Sweep
+from bywire.bench.bench import Bench
+from bywire.bench.kpis.registry import evaluate
+from bywire.bench.running import as_run
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+from bywire.simulation.ensemble import simulate_ensemble
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+_POINTS = 12
+_WINDOWS = 12  # granted to a response: friction and converter may keep it from repeating exactly
+STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
+
+
+@dataclass(frozen=True)
+class Small:
+    """Figures of the loop's answer to sines of one amplitude.
+
+    Parameters
+    ----------
+    amplitude
+        Of the sine, in the input's SI unit.
+    bandwidth
+        Frequency at which it has fallen to -3 dB [Hz]; the highest measured one where it stays
+        above; 0 where it is below, or sticks, from the lowest on.
+    least
+        Smallest gain up to the target; 0 where it sticks.
+    phase_margin, crossover
+        Of the describing function [degree, Hz], see `describing_function.phase_margin`; NaN where
+        laws are not known.
+    peak
+        Largest gain.
+    settled
+        Whether every response repeated itself.
+    """
+
+    amplitude: float
+    bandwidth: float
+    least: float
+    phase_margin: float
+    crossover: float
+    peak: float
+    settled: bool
+
+
+@dataclass(frozen=True)
+class BenchFigures:
+    """One set of gains on the nonlinear bench.
+
+    Parameters
+    ----------
+    small
+        By amplitude.
+    step
+        Overshoot [%], settling time [s] and steady-state error [% of the step] of the loop's
+        experiment; empty where it has no step response. NaN where not defined.
+    """
+
+    small: tuple[Small, ...]
+    step: Mapping[str, float]
+
+
+def bench_figures(
+    loop: Loop,
+    par: ParameterSet,
+    value: float,
+    amplitudes: Sequence[float],
+    gains: Mapping[str, Sequence[float]],
+    bench: Bench | None,
+    target: float,
+    progress: Progress | None = None,
+) -> tuple[BenchFigures, ...]:
+    """Return the figures of several sets of gains.
+
+    Parameters
+    ----------
+    loop, par, value
+        Loop, parameters and operating point, friction, dither and limits on.
+    amplitudes
+        Of the sines, SI.
+    gains
+        Dotted name -> its value in each set [SI].
+    bench
+        The experiment whose step is judged; None for none.
+    target
+        Frequency around which is measured [Hz], from a sixth to three times of it.
+    progress
+        Called with a label and the finished share.
+    """
+    point = loop.point(par, value)
+    top = min(3.0 * target, 0.45 / max(task.period for task in point.model.tasks(point.par)))
+    sweep = Sweep(
+        loop.inputs, loop.output, np.geomspace(target / 6.0, top, _POINTS).tolist(), amplitudes,
+        dict(gains), flags=(), whole=loop.whole(point.par), most=_WINDOWS,
+    )  # fmt: skip
+    found = frequency_response(point.run(), sweep, progress)
+    steps = _steps(bench, gains) if bench is not None else None
+    sets = found.sizes["variant"]
+    rows = []
+    for k in range(sets):
+        own = par.replace({name: float(values[k]) for name, values in gains.items()})
+        small = tuple(
+            _small(loop, own, found.isel(variant=k, amplitude=j), target)
+            for j in range(found.sizes["amplitude"])
+        )  # fmt: skip
+        rows.append(BenchFigures(small, {} if steps is None else steps[k]))
+    return tuple(rows)
+
+
+def has_step(bench: Bench) -> bool:
+    """Return whether an experiment has one run and a step that it is judged by."""
+    return bench.definition.step is not None and len(bench.cases()) == 1
+
+
+def _small(loop: Loop, par: ParameterSet, one: xr.Dataset, target: float) -> Small:
+    closed, f = response_of(one)
+    margin, crossover = math.nan, math.nan
+    gain = loop_gain(loop, par, closed, f) if f.size else None
+    if gain is not None:
+        margin, crossover = phase_margin(gain, f)
+    size, every = np.nan_to_num(one["gain"].values), one["frequency"].values
+    before = np.append(size[every < target], np.interp(target, every, size))
+    return Small(
+        amplitude=float(one["amplitude"]),
+        bandwidth=fallen(size, every),
+        least=float(before.min()),
+        phase_margin=margin,
+        crossover=crossover,
+        peak=float(size.max()),
+        settled=bool(np.all(one["settled"].values > 0)),
+    )
+
+
+def fallen(gain: Array, frequencies: Array) -> float:
+    """Return where a gain that is 1 at standstill has fallen to -3 dB [Hz]; 0: from the start."""
+    size, level = gain, math.sqrt(0.5)
+    below = np.flatnonzero(size < level)
+    if below.size == 0:
+        return float(frequencies[-1])
+    k = int(below[0])
+    if k == 0:
+        return 0.0
+    if size[k] == 0.0:
+        return float(frequencies[k - 1])
+    share = math.log(size[k - 1] / level) / math.log(size[k - 1] / size[k])
+    return float(frequencies[k - 1] * (frequencies[k] / frequencies[k - 1]) ** share)
+
+
+def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str, float]] | None:
+    """Return the step's figures for every set of gains."""
+    definition = bench.definition
+    if definition.step is None or not has_step(bench):
+        return None
+    (case,) = bench.cases()
+    setting = definition.step(bench.chosen_options)
+    run = as_run(case, bench.step, seed=(bench.seed, 0))
+    kept = {name: np.asarray(values, dtype=float) for name, values in gains.items()}
+    found = simulate_ensemble(replace(run), kept, [setting.signal])
+    unit = signals_of(case.model.Output)[setting.signal].unit
+    height = abs((setting.end or 0.0) - (setting.start or 0.0))
+    rows = []
+    for values in found[setting.signal]:
+        recording = xr.Dataset(
+            {setting.signal: ("time", values, {"units": unit})},
+            coords={"time": ("time", found.time - case.settle, {"units": "s"})},
+        )
+        kpis = evaluate("step_response", recording, setting)
+        row = {name: kpis[name].value for name in STEP_FIGURES}
+        row["steady_state_error"] *= 100.0 / height if height else math.nan
+        rows.append(row)
+    return rows
