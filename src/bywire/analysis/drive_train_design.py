@@ -8,14 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.assemblies.wedge_start import force_for, travel_for
-from bywire.bench.experiment import Case
 from bywire.bench.running import as_run
 from bywire.bench.wedge_case import case_from_parked, steps
 from bywire.plant import roller_screw, wedge
@@ -26,13 +25,15 @@ Array = NDArray[np.float64]
 
 SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
+PHASES = tuple(0.5 * math.pi * k for k in range(4))
+"""angles of the disc [rad] at which a run begins"""
 SIGNALS = (
     "y_M", "P_in", "P_meas", "i_1_ref", "i_2_ref", "F_end", "omega_1", "omega_2",
     "E_copper", "E_shaft",
 )  # fmt: skip
 _FASTEST = 8.0  # closing speeds are looked for up to so many times the least
 _ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
-_SETTLE, _RECORD = 0.05, 2e-4
+_SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6
 _LAST = 0.8  # of the stop: what follows is its end
 
 
@@ -46,8 +47,8 @@ class Demand:
         Step of the demand [N m].
     t_90
         Time [s] in which the sensor must show 90 % of it, at every friction coefficient.
-    t_hold
-        Length of the stop [s] in which the power counts.
+    t_hold, t_release
+        Lengths [s] of the demand and of what follows it: in both the power counts.
     mu_B
         Friction coefficients of the pads.
     known
@@ -60,6 +61,7 @@ class Demand:
     moment: float
     t_90: float
     t_hold: float
+    t_release: float
     mu_B: Sequence[float]
     known: bool
     enforced: bool
@@ -67,7 +69,9 @@ class Demand:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a design does, per friction coefficient, shape (cases,).
+    """What a design does, per friction coefficient, shape (cases,); the worst of all phases.
+
+    Where on a revolution the disc's run-out meets the stop is chance: several phases are tried.
 
     Parameters
     ----------
@@ -85,6 +89,8 @@ class Answer:
         Energies lost in copper, bearings and screws during the stop [J].
     held
         Mean moment in the last fifth of the stop [N m].
+    left
+        Moment at the end of the recording [N m].
     stop
         Largest force on the wedge's end stops [N].
     unsettled
@@ -100,6 +106,7 @@ class Answer:
     copper: Array
     friction: Array
     held: Array
+    left: Array
     stop: Array
     unsettled: int
 
@@ -139,34 +146,35 @@ def answer(par: WedgeParameters, demand: Demand) -> Answer:
     that comes closest. Else it is 1.
     """
     own = par.replace({"command.mode": "moment"})
-    run = as_run(_case(own, demand), 20e-6)
     if not demand.enforced:
-        return _judged(run, own, demand, 1.0)
+        return _judged(own, demand, 1.0)
     # The pads cannot be slower than their travel in the time demanded.
     F_N = 0.9 * max(force_for(demand.moment, own.replace({"wedge.mu_B": m})) for m in demand.mu_B)
     least = travel_for(F_N, own) * wedge.slope(own.wedge) / demand.t_90
     factors = least / closing_speed(own) * np.geomspace(1.0, _FASTEST, _TRIED)
     low = high = slow_time = fast_time = math.nan
     for _ in range(_ROUNDS):
-        times = _slowest(run, own, demand, factors)
+        times = _slowest(own, demand, factors)
         fast = np.flatnonzero(times <= demand.t_90)
         k = int(fast[0]) if fast.size else int(np.argmin(times))
         if k == 0 or not fast.size:
-            return _judged(run, own, demand, float(factors[k]))
+            return _judged(own, demand, float(factors[k]))
         low, high = float(factors[k - 1]), float(factors[k])
         slow_time, fast_time = float(times[k - 1]), float(times[k])
         factors = np.geomspace(low, high, _TRIED)
     share = 1.0
     if math.isfinite(slow_time):
         share = (slow_time - demand.t_90) / (slow_time - fast_time)
-    return _judged(run, own, demand, low * (high / low) ** share)
+    return _judged(own, demand, low * (high / low) ** share)
 
 
-def _case(par: WedgeParameters, demand: Demand) -> Case:
-    levels = {0.0: demand.moment}
-    return case_from_parked(
-        par, lambda t: {"M_set": steps(t, levels)}, demand.t_hold, settle=_SETTLE, record=_RECORD
+def _run(par: WedgeParameters, demand: Demand, phase: float, duration: float) -> Run:
+    """Return the stop with the disc at an angle [rad] when the settling begins."""
+    levels = {0.0: demand.moment, demand.t_hold: 0.0}
+    case = case_from_parked(
+        par, lambda t: {"M_set": steps(t, levels)}, duration, settle=_SETTLE, record=_RECORD
     )
+    return as_run(replace(case, state=case.state._replace(phi=phase)), _STEP)
 
 
 def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping[str, Array]:
@@ -182,39 +190,52 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
     return found
 
 
-def _slowest(run: Run, par: WedgeParameters, demand: Demand, factors: Array) -> Array:
+def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
     """Return the time to 90 % of the slowest case [s] for every factor; infinite for none."""
-    found = simulate_ensemble(run, _variations(par, demand, factors), ("y_M",), threads=1)
-    times = _times(found.time, found["y_M"], 0.9 * demand.moment)
-    times = np.where(np.isnan(times), math.inf, times)
-    return np.asarray(times.reshape(len(demand.mu_B), factors.size).max(axis=0))
+    cases, slowest = _variations(par, demand, factors), np.zeros(factors.size)
+    for phase in PHASES:
+        run = _run(par, demand, phase, demand.t_hold)
+        found = simulate_ensemble(run, cases, ("y_M",), threads=1)
+        times = _times(found.time, found["y_M"], 0.9 * demand.moment)
+        times = np.where(np.isnan(times), math.inf, times)
+        slowest = np.maximum(slowest, times.reshape(len(demand.mu_B), -1).max(axis=0))
+    return slowest
 
 
-def _judged(run: Run, par: WedgeParameters, demand: Demand, factor: float) -> Answer:
-    variations = _variations(par, demand, np.array([factor]))
-    found = simulate_ensemble(run, variations, SIGNALS, threads=1)
-    after = found.time >= _SETTLE - 1e-9
+def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
+    cases = _variations(par, demand, np.array([factor]))
+    whole = demand.t_hold + demand.t_release
+    found = [
+        simulate_ensemble(_run(par, demand, phase, whole), cases, SIGNALS, threads=1)
+        for phase in PHASES
+    ]
+    after = found[0].time >= _SETTLE - 1e-9
 
     def largest(*names: str) -> Array:
-        sizes = [np.abs(found[name][:, after]).max(axis=1) for name in names]
+        sizes = [np.abs(one[name][:, after]).max(axis=1) for one in found for name in names]
         return np.asarray(np.max(sizes, axis=0))
 
     def gained(name: str) -> Array:
-        rows = found[name][:, after]
-        return np.asarray(rows[:, -1] - rows[:, 0])
+        rows = [one[name][:, after] for one in found]
+        return np.asarray(np.max([row[:, -1] - row[:, 0] for row in rows], axis=0))
 
+    times = [_times(one.time, one["y_M"], 0.9 * demand.moment) for one in found]
+    at_end = (found[0].time >= _SETTLE + _LAST * demand.t_hold) & (
+        found[0].time < _SETTLE + demand.t_hold
+    )
     return Answer(
         closing_speed=factor * closing_speed(par),
-        t_90=_times(found.time, found["y_M"], 0.9 * demand.moment),
+        t_90=np.max(times, axis=0),
         filtered=largest("P_meas"),
         instantaneous=largest("P_in"),
         current=largest("i_1_ref", "i_2_ref"),
         speed=largest("omega_1", "omega_2"),
         copper=gained("E_copper"),
         friction=gained("E_shaft"),
-        held=found["y_M"][:, found.time >= _SETTLE + _LAST * demand.t_hold].mean(axis=1),
+        held=np.min([one["y_M"][:, at_end].mean(axis=1) for one in found], axis=0),
+        left=np.max([np.abs(one["y_M"][:, -1]) for one in found], axis=0),
         stop=largest("F_end"),
-        unsettled=int(found.unsettled.sum()),
+        unsettled=sum(int(one.unsettled.sum()) for one in found),
     )
 
 

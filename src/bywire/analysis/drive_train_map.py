@@ -20,6 +20,8 @@ LATE = 1.02
 """share of the demanded time up to which a design answers equally fast"""
 HELD = 0.95
 """share of the demand that counts as held"""
+LEFT = 0.05
+"""share of the demand below which the brake counts as released"""
 _NEVER = 10.0  # what stands for the lateness of a moment that is never reached
 
 _PER_CASE = {
@@ -31,6 +33,7 @@ _PER_CASE = {
     "copper": ("J", "copper loss of the stop"),
     "friction": ("J", "friction of bearings and screws"),
     "held": ("N*m", "mean moment at the end of the stop"),
+    "left": ("N*m", "moment left at the end"),
     "stop": ("N", "force on the end stops"),
 }
 
@@ -89,7 +92,8 @@ def _dataset(answers: Sequence[Answer], demand: Demand, shape: tuple[int, int, i
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
     in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
     holds = cases["held"].min(axis=2) >= HELD * demand.moment
-    feasible = in_time & holds & (cases["stop"].max(axis=2) == 0.0)
+    released = cases["left"].max(axis=2) <= LEFT * demand.moment
+    feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
     speeds = np.array([one.closing_speed for one in answers]).reshape(shape[:2])
     found["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
     found["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")

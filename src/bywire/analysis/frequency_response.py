@@ -47,7 +47,11 @@ def require_stable(closed: LinearModel) -> None:
 
 
 def frequency_response(
-    run: Run, sweep: Sweep, progress: Callable[[str, float], None] | None = None
+    run: Run,
+    sweep: Sweep,
+    progress: Callable[[str, float], None] | None = None,
+    *,
+    lanes: bool = True,
 ) -> xr.Dataset:
     """Measure the response at every frequency, amplitude and variant.
 
@@ -60,6 +64,8 @@ def frequency_response(
         Frequencies, amplitudes, variants.
     progress
         Called with ``"frequency response"`` and the finished share, 0 to 1.
+    lanes
+        False: one sine after another on one core, as in a simulator without ensembles.
 
     Returns
     -------
@@ -92,12 +98,12 @@ def frequency_response(
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
         own = replace(run, duration=window, record=interval(run))
-        found = _repeated(own, sweep, cases, each, periods, signals)
+        found = _repeated(own, sweep, cases, each, periods, signals, lanes)
         measured = _measured(found, each, periods / window, sweep.flags)
         return {name: value.reshape(variants, sizes.size) for name, value in measured.items()}
 
     done: list[dict[str, Array]] = []
-    pool = ThreadPoolExecutor(os.cpu_count() or 1)
+    pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
     try:
         for k, one in enumerate(pool.map(measure, plans)):
             done.append(one)
@@ -113,7 +119,13 @@ def _own(run: Run) -> Array:
 
 
 def _repeated(
-    own: Run, sweep: Sweep, matrix: Array, sizes: Array, periods: int, signals: tuple[str, ...]
+    own: Run,
+    sweep: Sweep,
+    matrix: Array,
+    sizes: Array,
+    periods: int,
+    signals: tuple[str, ...],
+    lanes: bool,
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
     columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
@@ -128,7 +140,8 @@ def _repeated(
         t = np.asarray(np.arange(window.shape[1]) * own.record, dtype=np.float64)
         return np.array([harmonics(t, y, f, 1) for y in window[:, :, 0]])
 
-    return repeat(own, matrix, stimuli, signals, figures, sweep.tolerance, sweep.most)
+    tolerance, most = sweep.tolerance, sweep.most
+    return repeat(own, matrix, stimuli, signals, figures, tolerance, most, lanes=lanes)
 
 
 def _measured(

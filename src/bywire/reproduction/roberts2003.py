@@ -1,4 +1,4 @@
-"""Roberts, Schautt, Hartmann, Gombert (2003), reproduced: Figs. 7 to 9, rigs, statements."""
+"""Roberts, Schautt, Hartmann, Gombert (2003), reproduced: Figs. 5 to 9, rigs, statements."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from dataclasses import replace
 
 from bywire.bench.running import Progress
 from bywire.reproduction import (
+    roberts2003_fig5,
+    roberts2003_fig6,
     roberts2003_fig7,
     roberts2003_fig8,
     roberts2003_fig9,
@@ -17,6 +19,7 @@ from bywire.reproduction import (
 from bywire.reproduction.reproduction import Reproduction, Source
 from bywire.reproduction.roberts2003_causes import causes
 from bywire.reproduction.roberts2003_facts import CITATION
+from bywire.reproduction.roberts2003_frequency_causes import causes as frequency_causes
 from bywire.reproduction.roberts2003_runs import MAIN
 from bywire.reproduction.roberts2003_tolerances import ALLOWANCES
 from bywire.reproduction.runs import Runs
@@ -26,6 +29,8 @@ PARTS = {
     "current loop": roberts2003_rigs.current_loop,
     "efficiency": roberts2003_rigs.efficiency,
     "stiffness": roberts2003_rigs.stiffness,
+    "Fig. 5": roberts2003_fig5.part,
+    "Fig. 6": roberts2003_fig6.part,
     "position": roberts2003_motion.position,
     "force fight": roberts2003_motion.force_fight,
     "Fig. 7": roberts2003_fig7.part,
@@ -36,9 +41,7 @@ PARTS = {
 
 
 def reproduce(progress: Progress | None = None) -> Reproduction:
-    """Reproduce the braking tests, the rigs' results and the statements of the text.
-
-    Figs. 5 and 6, position frequency responses, are not among them.
+    """Reproduce frequency responses, braking tests, rigs and the statements of the text.
 
     Parameters
     ----------
@@ -59,7 +62,8 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
     found = Reproduction(
         MAIN, CITATION, tuple(parts), allowances=ALLOWANCES, sets={"": "Our parameter set"}
     )
-    return replace(found, causes=causes(found.items))
+    known = (*causes(found.items), *frequency_causes(found.items))
+    return replace(found, causes=known)
 
 
 SOURCE = Source(

@@ -60,7 +60,7 @@ def friction(controller: str, figure: str) -> list[Item]:
     f = found_["frequency"].values
     linear = frequency.linear(controller, f)
     sizes = frequency.AMPLITUDES[controller]
-    away = 100.0 * abs(frequency.value(found_, controller, sizes[0])[0] - linear[0])
+    away = 100.0 * float(np.abs(frequency.value(found_, controller, sizes[0])[0] - linear[0]))
     items.append(
         compared(f"{figure}.friction", stated.FRICTION_SEEN, away, ">=",
                  f"amplitude {sizes[0]:g} rad")

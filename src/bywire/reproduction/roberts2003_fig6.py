@@ -14,7 +14,7 @@ from bywire.analysis.response_dataset import Sweep
 from bywire.reproduction import roberts2003_facts as facts
 from bywire.reproduction import roberts2003_frequency as frequency
 from bywire.reproduction import roberts2003_frequency_facts as stated
-from bywire.reproduction.item import Item, compared, found, quoted
+from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.roberts2003_fig5 import friction
 from bywire.reproduction.roberts2003_tolerances import ALIKE, SAME_GAIN, SAME_PHASE
@@ -43,12 +43,12 @@ def part(runs: Runs) -> Part:
                  "largest distance of both responses, amplitudes of 0.25, 0.5 and 1 rad"),
         found("fig6.wedge.below_limit", "%", frequency.apart(_HIGH, limited=False),
               "the same where the screw does not reach the current limit"),
-        quoted("fig6.match", stated.MATCH, "the measured curves are not at hand"),
     ]  # fmt: skip
     text = (
         "A controller of 60 Hz on the preloaded screw, at 0.25, 0.5 and 1 rad: all three, and the "
         "bandwidth, are our choice. Every sine starts from rest: where the limit sets in, a sweep "
-        "that comes from higher frequencies may find another response."
+        "that comes from higher frequencies may find another response. Whether theory and practice "
+        "match cannot be judged: the measured curves are not at hand."
     )
     exhibits = (
         Exhibit("fig6", frequency.figure(_HIGH),

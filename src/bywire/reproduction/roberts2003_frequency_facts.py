@@ -40,9 +40,6 @@ KINK = Fact(
     "frequencies the phase falls at least twice as far as that of the linear loop",
     "reading",
 )  # fmt: skip
-MATCH = Fact(
-    1.0, "1", f"{_ALONE}, Figs. 5 and 6: a good match between theory and practice", "reading"
-)
 _SAME = (
     "section 'Comparison with test results': a linear model should give the same frequency "
     "response as the nonlinear one without friction"

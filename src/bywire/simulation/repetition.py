@@ -62,6 +62,8 @@ def repeat(
     figures: Figures,
     tolerance: float,
     most: int,
+    *,
+    lanes: bool = True,
 ) -> Repeated:
     """Run every case window after window until all cases of its group of lanes repeat.
 
@@ -85,6 +87,8 @@ def repeat(
         most this share of the norm of the figures.
     most
         Windows after which a case is given up, >= 2.
+    lanes
+        False: one case after another on one core, as in a simulator without ensembles.
 
     Raises
     ------
@@ -105,11 +109,11 @@ def repeat(
     compiler = find_compiler()
     # One frame too many: the end of a window is the beginning of the next, and ticks only there.
     open_end = replace(schedule, frames=schedule.frames + 1)
-    if compiler is None:
-        advance, lanes = _one_by_one(run, open_end, selection), 1
+    if compiler is None or not lanes:
+        advance, width = _one_by_one(run, open_end, selection), 1
     else:
         kernel = lane_kernel(prepared.program, compiler, tuple(selection.tolist()))
-        lanes = kernel.lanes
+        width = kernel.lanes
 
         def advance(p: Array, u: Array, vector: Array, values: Array) -> None:
             kernel.advance(open_end, p, u, vector, values, open_end.frames - 1)
@@ -118,13 +122,13 @@ def repeat(
     start = initial_vector(layout, run.state, run.memory)
 
     def group(first: int) -> tuple[Array, Complex, int, NDArray[np.bool_], Array]:
-        lane = np.minimum(np.arange(first, first + lanes), count - 1)
+        lane = np.minimum(np.arange(first, first + width), count - 1)
         columns = np.ascontiguousarray(matrix[:, lane])
         u = np.ascontiguousarray(np.moveaxis(stimuli[lane], 0, 2))
-        vector = np.repeat(start[:, None], lanes, axis=1)
-        shape = (lanes, schedule.frames // schedule.record_frames, len(signals))
+        vector = np.repeat(start[:, None], width, axis=1)
+        shape = (width, schedule.frames // schedule.record_frames, len(signals))
         now, seen = np.empty(shape), list[Complex]()
-        same = np.zeros(lanes, dtype=bool)
+        same = np.zeros(width, dtype=bool)
         windows = 0
         while windows < most and not same.all():
             advance(columns, u, vector, now)
@@ -135,14 +139,14 @@ def repeat(
                 same = _same(seen[-2], seen[-1], tolerance)
         return now, _padded(seen), windows, same, vector[layout.start["counters"]]
 
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        done = list(pool.map(group, range(0, count, lanes)))
+    with ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1) as pool:
+        done = list(pool.map(group, range(0, count, width)))
     times = np.arange(schedule.frames // schedule.record_frames) * schedule.record_frames
     return Repeated(
         time=np.asarray(times * schedule.frame, dtype=np.float64),
         values=np.concatenate([values for values, *_ in done])[:count],
         figures=np.concatenate([seen for _, seen, *_ in done])[:count],
-        windows=np.repeat([windows for _, _, windows, *_ in done], lanes)[:count],
+        windows=np.repeat([windows for _, _, windows, *_ in done], width)[:count],
         repeats=np.concatenate([same for *_, same, _ in done])[:count],
         unsettled=np.concatenate([counters for *_, counters in done])[:count].astype(np.int64),
     )

@@ -129,7 +129,8 @@ class Search:
         corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
                              * np.eye(n)])  # fmt: skip
         options: Any = {"maxfev": _SIMPLEX, "initial_simplex": corners, "fatol": 1e-5}
-        minimize(
+        climb: Any = minimize  # its stubs tell the methods' starting points apart
+        climb(
             lambda z: -self._judged(z), self.best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n,
             options=options,
         )  # fmt: skip
@@ -177,7 +178,8 @@ class Search:
         first = self.problem.slacks(start, self.cases)[:, self._chosen()].min()
         constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}
-        minimize(
+        climb: Any = minimize
+        climb(
             lambda v: -float(v[n]), np.append(start, max(first, _UNSTABLE)), method="SLSQP",
             jac=lambda v: np.append(np.zeros(n), -1.0),
             bounds=[*[(0.0, 1.0)] * n, (None, None)],

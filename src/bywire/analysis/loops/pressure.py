@@ -52,7 +52,7 @@ LOOP = Loop(
     whole=whole,
     tunables={
         "ecu.pressure.k_p": (5e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3),
-        "ecu.pressure.k_d": (1e-9, 3e-6), "ecu.pressure.tau_d": (3e-4, 1e-2),
+        "ecu.pressure.k_d": (1e-9, 3e-6), "ecu.pressure.tau_d": (5e-5, 1e-2),
         "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
     },
     proof="hard-braking",

@@ -53,7 +53,9 @@ class Options(ParameterSet):
     t_90: Duration
     """time in which the sensor must show 90 % of it"""
     t_hold: Duration
-    """length of the stop"""
+    """length of the demand"""
+    t_release: Duration
+    """time after it that counts too"""
     omega_gap: SpeedLimit
     """largest speed of the given drive train while crossing the gap, scaled with all others"""
     mu_B: Coefficients
@@ -109,7 +111,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found
         When a design does not exist.
     """
     demand = Demand(
-        options.moment, options.t_90, options.t_hold, options.mu_B,
+        options.moment, options.t_90, options.t_hold, options.t_release, options.mu_B,
         options.believed == "known", options.response == "enforced",
     )  # fmt: skip
     par = par.replace({"control.moment.omega_gap": options.omega_gap})
@@ -242,8 +244,8 @@ STUDY = Study(
     summary="peak power of a large stop over wedge slope and screw lead, at equal response",
     options=Options,
     defaults=Options(
-        moment=950.0, t_90=0.1, t_hold=0.2, omega_gap=60.0, mu_B=(0.25, 0.3, 0.35, 0.4, 0.45),
-        believed="known", response="enforced", power="filtered",
+        moment=950.0, t_90=0.1, t_hold=0.2, t_release=0.2, omega_gap=60.0,
+        mu_B=(0.25, 0.3, 0.35, 0.4, 0.45), believed="known", response="enforced", power="filtered",
         tan_alpha_min=0.2, tan_alpha_max=0.45, slopes=11, lead_min=1e-3, lead_max=8e-3, leads=15,
     ),
     compute=compute,

@@ -1,0 +1,347 @@
+"""Design of loops: requirements read, margins recomputed from simulation, what cannot be met."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from bywire.analysis.design.bench_figures import bench_figures, fallen
+from bywire.analysis.design.bench_text import bench_text
+from bywire.analysis.design.bench_tuning import Candidate, Tuning, bench_slacks
+from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
+from bywire.analysis.design.designer import Design, design
+from bywire.analysis.design.linear_case import NOMINAL, LinearCase, cases_of
+from bywire.analysis.design.loop_figures import LoopFigures
+from bywire.analysis.design.requirement import FIGURES, read
+from bywire.analysis.design.verification import Trial, verify
+from bywire.analysis.frequency_response import frequency_response
+from bywire.analysis.loop_registry import all_loops, find_loop
+from bywire.analysis.pressure_loop import PressureLoop
+from bywire.analysis.rational import first_orders
+from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.robustness import margins
+from bywire.bench.bench import Bench
+from bywire.bench.bench_file import from_mapping
+from bywire.catalog.registry import main_set, parameters
+from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
+from bywire.simulation.run import simulate
+
+MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))
+PI = {"ecu.pressure.k_p": (1e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3)}
+PAPER = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
+         "steady-state error <= 0 %")  # fmt: skip
+
+
+def of(name: str):
+    loop = find_loop(name)
+    return loop, parameters(main_set(loop.assembly))
+
+
+def designed(name: str, texts: tuple[str, ...], over: Any = None, **changes: Any) -> Design:
+    loop, par = of(name)
+    start = {one: par.leaves()[one] for one in loop.tunables}
+    cases = cases_of(loop, par, loop.at.default, over or {})
+    return design(loop.tunables, read(texts), cases, start, **changes)
+
+
+@pytest.mark.parametrize("name", sorted(all_loops()))
+def test_figures_are_those_of_the_margins(name: str) -> None:
+    loop, par = of(name)
+    (case,) = cases_of(loop, par, loop.at.default, {})
+    found, known = case.figures({}), margins(loop, par, loop.at.default)
+    pairs = {
+        "bandwidth": known.bandwidth, "crossover": known.crossover, "phase_margin": known.phase,
+        "gain_margin": known.gain, "delay_margin": known.delay, "disk_margin": known.disk,
+        "sensitivity_peak": known.sensitivity, "complementary_peak": known.complementary,
+    }  # fmt: skip
+    for figure, value in pairs.items():
+        assert getattr(found, figure) == pytest.approx(value, rel=2e-3), figure
+
+
+@pytest.mark.parametrize("name", ["moment", "pressure", "current"])
+def test_margins_of_a_design_are_those_of_simulation(name: str) -> None:
+    """The loop gain made larger by its margin, or late by its delay, is at the edge."""
+    texts = {
+        "moment": ("bandwidth >= 12 Hz", "phase margin >= 60 deg", "gain margin >= 6 dB"),
+        "pressure": ("crossover >= 8 Hz", "phase margin >= 60 deg", "overshoot <= 10 %"),
+        "current": ("bandwidth >= 100 Hz", "phase margin >= 60 deg", "disk margin >= 0.8"),
+    }
+    found = designed(name, texts[name])
+    assert found.status == "met"
+    loop, par = of(name)
+    gain = loop.gain(par.replace(found.gains), loop.at.default)
+    for scale, decays in ((0.97, True), (1.03, False)):
+        assert decay(gain, scale * found.nominal["gain_margin"], 0) == decays
+    samples = found.nominal["delay_margin"] / gain.period
+    assert decay(gain, 1.0, math.floor(samples - 0.1))
+    assert not decay(gain, 1.0, math.ceil(samples + 0.1))
+
+
+def decay(gain: Any, scale: float, late: int) -> bool:
+    """Return whether a disturbance of the loop, closed with a gain and a delay, dies out."""
+    x, line = gain.B[:, 0].copy(), [0.0] * (late + 1)
+    size = []
+    for _ in range(6000):
+        y = float((gain.C @ x)[0])
+        line.append(y)
+        x = gain.A @ x - scale * gain.B[:, 0] * line[-1 - late]
+        size.append(abs(y))
+        if not size[-1] < 1e9:
+            return False
+    return max(size[-1500:]) < 0.5 * max(size[1500:3000])
+
+
+def test_step_figures_are_those_of_the_nonlinear_run_without_friction() -> None:
+    loop, par = of("moment")
+    own = loop.smooth(par)
+    (case,) = cases_of(loop, par, 200.0, {})
+    gains = {"control.moment.f_c": 20.0}
+    figures = case.figures(gains, 4000)
+    point = loop.point(own.replace(gains), 200.0)
+    column, rise = point.model.Stimulus._fields.index("M_set"), 2.0
+
+    def response(more: float) -> Any:
+        held = [float(v) for v in point.stimulus]
+        held[column] += more
+        run = point.run()
+        return simulate(replace(run, stimulus=lambda t: np.repeat([held], t.size, axis=0),
+                                duration=0.6))  # fmt: skip
+
+    # The point rests but for a small transient of the contacts: the difference is the step's.
+    found, rest = response(rise), response(0.0)
+    y = (found["y_M"] - rest["y_M"]) / rise
+    assert figures.overshoot > 10.0
+    assert 100.0 * (y.max() - 1.0) == pytest.approx(figures.overshoot, abs=1e-3)
+    k = int(np.flatnonzero(np.abs(y - 1.0) > 0.02)[-1])
+    assert found.time[k] <= figures.settling_time <= found.time[k + 1]
+    assert 100.0 * abs(1.0 - y[-1]) == pytest.approx(figures.steady_state_error, abs=1e-3)
+
+
+def test_the_worst_model_of_a_range_decides() -> None:
+    texts = ("crossover >= 5 Hz", "phase margin >= 60 deg")
+    found = designed("moment", texts, {"wedge.mu_B": [0.25, 0.35, 0.45]})
+    assert found.status == "met"
+    assert found.worst["crossover"][1] == "wedge.mu_B = 0.25"
+    assert found.worst["phase_margin"][1] == "wedge.mu_B = 0.45"
+    bound = {(one.requirement.figure, one.case) for one in found.binding}
+    assert bound == {("crossover", "wedge.mu_B = 0.25"), ("phase_margin", "wedge.mu_B = 0.45")}
+    loop, par = of("moment")
+    # The law's gain is f_c alone: the best is where both slacks meet, found by bisection here.
+    low, high = 1.0, 30.0
+    for _ in range(40):
+        f_c = math.sqrt(low * high)
+        slow = margins(loop, par.replace({"control.moment.f_c": f_c, "wedge.mu_B": 0.25}), 200.0)
+        fast = margins(loop, par.replace({"control.moment.f_c": f_c, "wedge.mu_B": 0.45}), 200.0)
+        low, high = (f_c, high) if slow.crossover / 5.0 < fast.phase / 60.0 else (low, f_c)
+    assert found.gains["control.moment.f_c"] == pytest.approx(low, rel=2e-3)
+
+
+def identified() -> LinearCase:
+    par: Any = parameters("dardanelli2010").replace({"ecu.pressure.k_d": 0.0})
+    return LinearCase(NOMINAL, lambda gains: PressureLoop(par.replace(gains), MEDIUM).models())
+
+
+def test_models_of_the_pressure_loop_are_its_responses() -> None:
+    par: Any = parameters("dardanelli2010")
+    loop = PressureLoop(par, MEDIUM)
+    gain, closed = loop.models()
+    f = np.array([0.05, 0.5, 2.0, 10.0, 40.0])
+    np.testing.assert_allclose(gain.response(f)[:, 0, 0], loop.open(f), rtol=1e-6)
+    np.testing.assert_allclose(closed.response(f)[:, 0, 0], loop.closed(f), rtol=1e-6)
+
+
+def test_a_pi_on_the_identified_model_reaches_23_degrees_at_10_hz() -> None:
+    found = design(
+        PI, read(["crossover >= 10 Hz", "phase margin >= 60 deg"]), [identified()],
+        {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5},
+    )  # fmt: skip
+    assert found.status == "infeasible"
+    best = {(one.wanted.figure, one.kept.figure): one for one in found.conflicts}
+    margin = best["phase_margin", "crossover"]
+    assert margin.excludes
+    assert margin.best == pytest.approx(23.0, abs=0.7)
+    # All PIs that cross at 10 Hz, one by one.
+    par: Any = parameters("dardanelli2010").replace({"ecu.pressure.k_d": 0.0})
+    seen = []
+    for T in np.geomspace(0.02, 20.0, 12):
+        unit = PressureLoop(
+            par.replace({"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5 / T}), MEDIUM
+        )
+        k_p = 1e-5 / abs(complex(unit.open(np.array([10.0]))[0]))
+        own = par.replace({"ecu.pressure.k_p": k_p, "ecu.pressure.k_i": k_p / T})
+        seen.append(PressureLoop(own, MEDIUM).margin().phase)
+    assert max(seen) == pytest.approx(margin.best, abs=0.3)
+    crossover = best["crossover", "phase_margin"]
+    assert crossover.best < 7.0
+
+
+def test_an_interrupt_leaves_the_best_until_then() -> None:
+    count = [0]
+    inner = identified()
+
+    def build(gains: Any) -> Any:
+        count[0] += 1
+        if count[0] == 90:
+            raise KeyboardInterrupt
+        return inner.build(gains)
+
+    found = design(
+        PI, read(["crossover >= 4 Hz", "phase margin >= 30 deg"]), [LinearCase(NOMINAL, build)],
+        {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5},
+    )  # fmt: skip
+    assert found.status == "interrupted"
+    assert found.slack > -0.5
+
+
+def test_the_same_seed_gives_the_same_gains() -> None:
+    texts = ("bandwidth >= 100 Hz", "phase margin >= 60 deg")
+    first, second = (designed("current", texts, seed=4) for _ in range(2))
+    assert first.gains == second.gains
+
+
+def test_the_loop_gain_behind_a_measured_response() -> None:
+    """Without friction and dither the describing function is the linear loop gain."""
+    loop, par = of("pressure")
+    own = loop.smooth(par)
+    sweep = Sweep(loop.inputs, loop.output, (3.0, 5.0, 7.0, 9.0), (1e4,), tolerance=1e-4)
+    measured = frequency_response(loop.point(own, 20e5).run(), sweep)
+    closed, f = response_of(measured.isel(variant=0, amplitude=0))
+    gain = loop_gain(loop, own, closed, f)
+    assert gain is not None
+    linear = loop.gain(par, 20e5).response(f)[:, 0, 0]
+    np.testing.assert_allclose(np.abs(gain / linear), 1.0, atol=5e-3)
+    np.testing.assert_allclose(np.degrees(np.angle(gain / linear)), 0.0, atol=0.5)
+    known = margins(loop, par, 20e5)
+    assert phase_margin(gain, f)[0] == pytest.approx(known.phase, abs=1.0)
+    assert math.isinf(phase_margin(gain[:2], f[:2])[1])
+
+
+def test_the_dithered_loop_is_slower_and_other_gains_mend_it() -> None:
+    """The catalog's gains reach some 3 Hz at 1 bar with dither, a tuned set 10 Hz."""
+    loop, par = of("pressure")
+    names = ("k_p", "k_i", "k_d", "tau_d", "b", "c")
+    own = [par.leaves()[f"ecu.pressure.{name}"] for name in names]
+    tuned = [1.9e-5, 3e-4, 3e-7, 5e-4, 1.0, 1.0]
+    gains = {f"ecu.pressure.{n}": pair for n, *pair in zip(names, own, tuned, strict=True)}
+    bench = Bench("hard-braking", "dardanelli2010")
+    slow, fast = bench_figures(loop, par, 20e5, (1e5, 3e5), gains, bench, 10.0)
+    assert slow.small[0].bandwidth == pytest.approx(3.3, abs=0.5)
+    assert fast.small[0].bandwidth > 2.0 * slow.small[0].bandwidth
+    # The ensemble's step is that of the bench.
+    from bywire.bench.running import run
+
+    kpis = {one.name: one.value for one in run(bench).kpis}
+    assert slow.step["overshoot"] == pytest.approx(kpis["overshoot"], abs=0.05)
+    height = 31e5
+    error = 100.0 * kpis["steady_state_error"] / height
+    assert slow.step["steady_state_error"] == pytest.approx(error, abs=1e-3)
+
+
+def test_verification_retunes_where_friction_costs_bandwidth() -> None:
+    loop, par = of("pressure")
+    requirements = read(["bandwidth >= 7 Hz", "phase margin >= 45 deg", "overshoot <= 15 %"])
+    cases = cases_of(loop, par, 20e5, {})
+    start = {name: par.leaves()[name] for name in loop.tunables}
+    trial = Trial(loop, par, 20e5, (1e5,), Bench("hard-braking", "dardanelli2010"))
+    found = verify(start, requirements, loop.tunables, cases, trial, generations=12)
+    assert found.linear.slack < -0.1  # 3.3 Hz
+    assert found.tuning is not None
+    assert found.final.slack > 0.5 * found.linear.slack
+    assert found.final.figures.small[0].bandwidth > found.linear.figures.small[0].bandwidth
+    assert {one.name for one in found.kpis} >= {"overshoot", "settling_time"}
+
+
+def test_the_edge_between_two_requirements() -> None:
+    def one(a: float, b: float, rest: float) -> Candidate:
+        return Candidate({}, None, {"a": a, "b": b, "c": rest})  # type: ignore[arg-type]
+
+    tried = (one(0.1, -0.5, 1.0), one(-0.1, 0.2, 1.0), one(-0.2, 0.1, 1.0), one(0.5, 0.5, -1.0))
+    edge = Tuning(tried[0], tried, False).curve("a", "b")
+    assert edge == [(-0.1, 0.2), (0.1, -0.5)]
+
+
+def test_bandwidth_is_where_the_gain_first_falls() -> None:
+    f = np.geomspace(0.1, 100.0, 60)
+    gain = 1.0 / np.sqrt(1.0 + (f / 7.0) ** 2)
+    assert fallen(gain, f) == pytest.approx(7.0, rel=5e-3)
+    assert fallen(np.full(60, 0.9), f) == pytest.approx(100.0)
+    assert fallen(np.full(60, 0.1), f) == 0.0
+
+
+def test_what_the_bench_cannot_show_is_the_linear_models() -> None:
+    from bywire.analysis.design.bench_figures import BenchFigures, Small
+
+    small = Small(1e5, 12.0, 0.9, math.nan, math.inf, 1.1, True)
+    requirements = read(["bandwidth >= 10 Hz", "phase margin >= 60 deg", "disk margin >= 1"])
+    linear = {one.text: 0.3 for one in requirements}
+    found = bench_slacks(requirements, BenchFigures((small,), {}), linear)
+    assert found["bandwidth >= 10 Hz"] == pytest.approx(0.9 * math.sqrt(2.0) - 1.0)
+    assert found["phase_margin >= 60 deg"] < 0.0  # it crosses over beyond what was measured
+    assert found["disk margin >= 1".replace(" m", "_m")] == 0.3
+
+
+def test_a_design_as_a_bench_file() -> None:
+    _, par = of("pressure")
+    gains = {"ecu.pressure.k_p": 1.25e-5, "ecu.pressure.k_i": 2e-4, "ecu.pressure.b": 0.9}
+    changes = {"motor.R_m": "0.4 ohm", "gear.law": "directional"}
+    text = bench_text("title", "hard-braking", "dardanelli2010", changes, par, gains)
+    from pathlib import Path
+
+    bench = from_mapping(tomllib.loads(text), Path(), "design")
+    for name, value in {**gains, "motor.R_m": 0.4}.items():
+        assert bench.par.leaves()[name] == pytest.approx(value, rel=1e-8)
+    assert bench.par.flat()["gear.law"] == "directional"
+
+
+@pytest.mark.parametrize(
+    ("texts", "error", "match"),
+    [
+        (("bandwidth >= 10 Hz", "bandwidth <= 5 Hz"), ParameterError, "contradict"),
+        (("bandwidth >= 10 Hz", "bandwidth >= 5 Hz"), ParameterError, "twice"),
+        (("bandwith >= 10 Hz",), UnknownNameError, "bandwidth"),
+        (("bandwidth >= 10 bar",), UnitError, "Hz"),
+        (("bandwidth >= 10",), UnitError, "Hz"),
+        (("bandwidth 10 Hz",), ParameterError, "cannot be read"),
+        (("phase margin >= 200 deg",), ParameterError, "0 to 180"),
+        (("sensitivity peak <= 0.5",), ParameterError, "above 1"),
+        (("overshoot <= 15",), UnitError, "percent"),
+        ((), ParameterError, "no requirement"),
+    ],
+)
+def test_requirements_that_are_refused(texts: Any, error: type[InputError], match: str) -> None:
+    with pytest.raises(error, match=match):
+        read(texts)
+
+
+def test_limits_in_other_units() -> None:
+    found = read(["gain_margin >= 6 dB", "phase-margin >= 1 rad", "settling time <= 200 ms"])
+    assert [one.limit for one in found] == pytest.approx([10**0.3, math.degrees(1.0), 0.2])
+    assert {one.figure for one in found} <= FIGURES.keys()
+
+
+def test_problems_that_are_refused() -> None:
+    loop, par = of("moment")
+    with pytest.raises(ParameterError, match="cannot also be a range"):
+        cases_of(loop, par, 200.0, {"control.moment.f_c": [5.0]})
+    with pytest.raises(UnknownNameError, match="mu_B"):
+        cases_of(loop, par, 200.0, {"wedge.mu_b": [0.3]})
+    with pytest.raises(ParameterError, match=r"moment = 5000.*travel"):
+        cases_of(loop, par, 200.0, {"moment": [200.0, 5000.0]})
+    with pytest.raises(ParameterError, match="less than 500 Hz"):
+        designed("moment", ("bandwidth >= 600 Hz",))
+    with pytest.raises(ParameterError, match="nothing is left"):
+        design({}, read(["bandwidth >= 5 Hz"]), cases_of(loop, par, 200.0, {}), {})
+
+
+def test_an_unstable_loop_has_no_slack() -> None:
+    loop, par = of("moment")
+    (case,) = cases_of(loop, par, 200.0, {})
+    found = case.figures({"control.moment.f_c": 100.0})
+    assert isinstance(found, LoopFigures)
+    assert not found.is_stable
+    assert found.growth > 1.0
