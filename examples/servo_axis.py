@@ -115,7 +115,7 @@ class ServoAxis(Model):
         """Return the dry friction while turning forward, backward; at rest all between."""
         return ((-par.T_forward, par.T_backward),)
 
-    def powers(self, x, rate, m, par, contact, reaction):
+    def powers(self, x, xe, rate, m, par, contact, reaction):
         """Return the power of the source, and what copper and friction take."""
         copper = dc_motor.power_loss(dc_motor.State(x.i), par.motor)
         return Flow(m.v * x.i, copper + (par.d * x.omega - reaction[0]) * x.omega)

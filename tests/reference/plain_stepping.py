@@ -196,7 +196,7 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
     at.unsettled += int(cap > 1 and _contacts(model, par, middle)[0] != before)
     at.repeated += int(passes > 1)
     F = np.array(force(middle), dtype=float)
-    args = [model.State(*map(float, v)) for v in (middle, d / h)]
+    args = [model.State(*map(float, v)) for v in (middle, y, d / h)]
     at.q = at.q + np.array(model.powers(*args, at.m, par, tuple(F), tuple(reaction)), dtype=float)
     at.x, at.d, at.r = at.x + d, d, reaction
     at.x[held] = w

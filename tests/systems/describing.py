@@ -48,7 +48,7 @@ class System(Model):
 
     State, Memory, Stimulus, Flow, Output = Moving, Held, Held, Nothing, Recorded
 
-    def powers(self, x, rate, m, par, contact, reaction):
+    def powers(self, x, xe, rate, m, par, contact, reaction):
         """Return nothing."""
         return Nothing(0.0 * par.T_s)
 

@@ -76,7 +76,7 @@ class NonlinearDrive(Model):
             m.v - par.R * x.i - par.K * x.omega, x.omega, par.K * x.i - spring - drag
         )
 
-    def powers(self, x, rate, m, par, contact, reaction):
+    def powers(self, x, xe, rate, m, par, contact, reaction):
         """Return the power of the source and the losses."""
         drag = par.d_2 * ops.fabs(x.omega) * x.omega * x.omega
         return Flow(m.v * x.i, par.R * x.i * x.i + drag)

@@ -110,6 +110,7 @@ class Oscillator:
     def powers(
         self,
         x: State,
+        xe: State,
         rate: State,
         m: Memory,
         par: Parameters,

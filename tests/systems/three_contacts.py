@@ -207,6 +207,7 @@ class ThreeContacts:
     def powers(
         self,
         x: State,
+        xe: State,
         rate: State,
         m: Memory,
         par: Parameters,

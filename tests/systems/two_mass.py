@@ -162,6 +162,7 @@ class TwoMass:
     def powers(
         self,
         x: State,
+        xe: State,
         rate: State,
         m: Memory,
         par: Parameters,

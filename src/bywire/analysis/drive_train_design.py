@@ -7,12 +7,13 @@ derived here, and the speeds of the reference are set so that every design answe
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.drive_train_answer import Answer, Demand
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.assemblies.wedge_start import force_for, travel_for
 from bywire.bench.running import as_run
@@ -25,8 +26,6 @@ Array = NDArray[np.float64]
 
 SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
-PHASES = tuple(0.5 * math.pi * k for k in range(4))
-"""angles of the disc [rad] at which a run begins"""
 SIGNALS = (
     "y_M", "P_in", "P_meas", "i_1_ref", "i_2_ref", "F_end", "omega_1", "omega_2",
     "E_copper", "E_shaft",
@@ -34,81 +33,8 @@ SIGNALS = (
 _FASTEST = 8.0  # closing speeds are looked for up to so many times the least
 _ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
 _SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6
-_LAST = 0.8  # of the stop: what follows is its end
-
-
-@dataclass(frozen=True)
-class Demand:
-    """What every design must do.
-
-    Parameters
-    ----------
-    moment
-        Step of the demand [N m].
-    t_90
-        Time [s] in which the sensor must show 90 % of it, at every friction coefficient.
-    t_hold, t_release
-        Lengths [s] of the demand and of what follows it: in both the power counts.
-    mu_B
-        Friction coefficients of the pads.
-    known
-        Whether the moment control knows the coefficient, so that its crossover stays.
-    enforced
-        Whether the time is enforced by the speed of the reference; else the pads' closing speed
-        is that of the given brake.
-    """
-
-    moment: float
-    t_90: float
-    t_hold: float
-    t_release: float
-    mu_B: Sequence[float]
-    known: bool
-    enforced: bool
-
-
-@dataclass(frozen=True)
-class Answer:
-    """What a design does, per friction coefficient, shape (cases,); the worst of all phases.
-
-    Where on a revolution the disc's run-out meets the stop is chance: several phases are tried.
-
-    Parameters
-    ----------
-    closing_speed
-        Largest speed at which the reference closes the pads [m/s], the same for all cases.
-    t_90
-        Time to 90 % of the demand [s]; NaN where it is not reached.
-    filtered, instantaneous
-        Largest power at the drives' input [W], as the rig shows it, and as it is.
-    current
-        Largest current demand of either motor [A].
-    speed
-        Largest speed of either motor [rad/s].
-    copper, friction
-        Energies lost in copper, bearings and screws during the stop [J].
-    held
-        Mean moment in the last fifth of the stop [N m].
-    left
-        Moment at the end of the recording [N m].
-    stop
-        Largest force on the wedge's end stops [N].
-    unsettled
-        Substeps of all cases that hit the cap of the contact iteration.
-    """
-
-    closing_speed: float
-    t_90: Array
-    filtered: Array
-    instantaneous: Array
-    current: Array
-    speed: Array
-    copper: Array
-    friction: Array
-    held: Array
-    left: Array
-    stop: Array
-    unsettled: int
+_LAST = 0.8  # of the demand: what follows is its end
+_TINY = 1e-9
 
 
 def closing_speed(par: WedgeParameters) -> float:
@@ -191,9 +117,13 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
 
 
 def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
-    """Return the time to 90 % of the slowest case [s] for every factor; infinite for none."""
+    """Return the time to 90 % of the slowest case [s] for every factor; infinite for none.
+
+    Only the smallest and the largest friction coefficient are looked at here.
+    """
+    demand = replace(demand, mu_B=(min(demand.mu_B), max(demand.mu_B)))
     cases, slowest = _variations(par, demand, factors), np.zeros(factors.size)
-    for phase in PHASES:
+    for phase in demand.phases:
         run = _run(par, demand, phase, demand.t_hold)
         found = simulate_ensemble(run, cases, ("y_M",), threads=1)
         times = _times(found.time, found["y_M"], 0.9 * demand.moment)
@@ -207,12 +137,14 @@ def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
     whole = demand.t_hold + demand.t_release
     found = [
         simulate_ensemble(_run(par, demand, phase, whole), cases, SIGNALS, threads=1)
-        for phase in PHASES
+        for phase in demand.phases
     ]
-    after = found[0].time >= _SETTLE - 1e-9
+    time = found[0].time - _SETTLE
+    after, held = time >= -_TINY, time < demand.t_hold - _TINY
+    counted = after if demand.whole else after & held
 
-    def largest(*names: str) -> Array:
-        sizes = [np.abs(one[name][:, after]).max(axis=1) for one in found for name in names]
+    def largest(rows: NDArray[np.bool_], *names: str) -> Array:
+        sizes = [np.abs(one[name][:, rows]).max(axis=1) for one in found for name in names]
         return np.asarray(np.max(sizes, axis=0))
 
     def gained(name: str) -> Array:
@@ -220,21 +152,20 @@ def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
         return np.asarray(np.max([row[:, -1] - row[:, 0] for row in rows], axis=0))
 
     times = [_times(one.time, one["y_M"], 0.9 * demand.moment) for one in found]
-    at_end = (found[0].time >= _SETTLE + _LAST * demand.t_hold) & (
-        found[0].time < _SETTLE + demand.t_hold
-    )
+    at_end = held & (time >= _LAST * demand.t_hold)
     return Answer(
         closing_speed=factor * closing_speed(par),
         t_90=np.max(times, axis=0),
-        filtered=largest("P_meas"),
-        instantaneous=largest("P_in"),
-        current=largest("i_1_ref", "i_2_ref"),
-        speed=largest("omega_1", "omega_2"),
+        filtered=largest(counted, "P_meas"),
+        instantaneous=largest(counted, "P_in"),
+        release=largest(~held, "P_meas"),
+        current=largest(after, "i_1_ref", "i_2_ref"),
+        speed=largest(after, "omega_1", "omega_2"),
         copper=gained("E_copper"),
         friction=gained("E_shaft"),
         held=np.min([one["y_M"][:, at_end].mean(axis=1) for one in found], axis=0),
         left=np.max([np.abs(one["y_M"][:, -1]) for one in found], axis=0),
-        stop=largest("F_end"),
+        stop=largest(after, "F_end"),
         unsettled=sum(int(one.unsettled.sum()) for one in found),
     )
 

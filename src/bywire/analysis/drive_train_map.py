@@ -10,7 +10,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.drive_train_design import Answer, Demand, answer, redesigned
+from bywire.analysis.drive_train_answer import Answer, Demand
+from bywire.analysis.drive_train_design import answer, redesigned
 from bywire.analysis.study import variable
 from bywire.assemblies.wedge_parameters import WedgeParameters
 
@@ -28,9 +29,10 @@ _PER_CASE = {
     "t_90": ("s", "time to 90 % of the demand"),
     "filtered": ("W", "largest power, filtered"),
     "instantaneous": ("W", "largest power"),
+    "release": ("W", "largest power of the release, filtered"),
     "current": ("A", "largest current demand"),
     "speed": ("rad/s", "largest motor speed"),
-    "copper": ("J", "copper loss of the stop"),
+    "copper": ("J", "copper loss"),
     "friction": ("J", "friction of bearings and screws"),
     "held": ("N*m", "mean moment at the end of the stop"),
     "left": ("N*m", "moment left at the end"),

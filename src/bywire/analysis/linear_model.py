@@ -161,14 +161,18 @@ class LinearModel:
         """
         from scipy.linalg import expm
 
-        n, nu = self.B.shape
-        whole = np.zeros((n + nu, n + nu))
-        whole[:n, :n], whole[:n, n:] = self.A, self.B
+        n = len(self.A)
+        acting = np.flatnonzero(self.B.any(axis=0))  # an exponential's cost is that of all columns
+        size = n + acting.size
+        whole = np.zeros((size, size))
+        whole[:n, :n], whole[:n, n:] = self.A, self.B[:, acting]
         step = expm(whole * period)
+        B = np.zeros_like(self.B)
+        B[:, acting] = step[:n, n:]
         return LinearModel(
             self.name,
             step[:n, :n],
-            step[:n, n:],
+            B,
             self.C,
             self.D,
             self.states,

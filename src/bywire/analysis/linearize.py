@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cache
 from itertools import combinations
 from typing import Literal, NamedTuple
 
@@ -144,36 +145,45 @@ def _stiffness(
     blocks, at = [], 0
     for C in matrices:
         d = gaps[at : at + len(C), 0]
-        closed, left = _active_set(C, d)
+        left, slack, K = _active(C, d)
         if left < _TOUCH:
             raise ParameterError(
-                f"{model.name}: contact {at + int(np.argmin(_slack(C, d, closed)))} just touches "
+                f"{model.name}: contact {at + int(np.argmin(slack))} just touches "
                 "at the operating point: choose a point at which it is clearly open or closed"
             )
-        blocks.append(_embedded(C, closed))
+        blocks.append(K)
         at += len(C)
     return block_diag(*blocks) if blocks else np.zeros((0, 0))
 
 
-def _active_set(C: Array, d: Array) -> tuple[list[int], float]:
-    """Return the closed contacts of a group: the subset whose smallest slack is largest."""
-    subsets = (list(s) for n in range(len(d) + 1) for s in combinations(range(len(d)), n))
-    found = [(float(_slack(C, d, subset).min()), subset) for subset in subsets]
-    left, closed = max(found)
-    return closed, left
+def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
+    """Return what the closed contacts of a group leave: the subset whose least slack is largest.
+
+    Returns
+    -------
+    tuple
+        Least slack, by how much each contact is closed or open [m], and the closed contacts'
+        stiffness.
+    """
+    stiffness = C.diagonal()
+    best: tuple[float, Array, Array] = (-math.inf, d, C)
+    for closed in _subsets(len(d)):
+        K = np.zeros_like(C)
+        if closed.size:
+            K[closed[:, None], closed] = np.linalg.inv(C[closed[:, None], closed])
+        F = K @ d
+        slack = C @ F - d
+        slack[closed] = (stiffness * F)[closed]
+        least = float(slack.min())
+        if least > best[0]:
+            best = (least, slack, K)
+    return best
 
 
-def _slack(C: Array, d: Array, closed: list[int]) -> Array:
-    """Return by how much each contact is closed or open [m]."""
-    F = _embedded(C, closed) @ d
-    return np.where(np.isin(np.arange(len(d)), closed), np.diag(C) * F, C @ F - d)
-
-
-def _embedded(C: Array, closed: list[int]) -> Array:
-    K = np.zeros_like(C)
-    rows = np.ix_(closed, closed)
-    K[rows] = np.linalg.inv(C[rows])
-    return K
+@cache
+def _subsets(n: int) -> tuple[NDArray[np.intp], ...]:
+    chosen = (s for size in range(n + 1) for s in combinations(range(n), size))
+    return tuple(np.array(s, dtype=np.intp) for s in chosen)
 
 
 def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> None:

@@ -68,7 +68,8 @@ def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
     for n in range(least, least + _CHOICES):
         length = max(round(n / f / common), 1) * common
         whole = max(round(f * length), 1)
-        choices.append((abs(whole / length / f - 1.0), length, whole))
+        # Rounded: of windows that fit alike, the shortest.
+        choices.append((round(abs(whole / length / f - 1.0), 9), length, whole))
     _, length, whole = min(choices)
     return length, whole
 

@@ -124,6 +124,7 @@ class MotorcycleBrake:
     def powers(
         self,
         x: plant.State,
+        xe: plant.State,
         rate: plant.State,
         m: ecu.Memory,
         par: Par,

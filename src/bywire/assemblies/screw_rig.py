@@ -73,6 +73,7 @@ class ScrewRig:
     def powers(
         self,
         x: plant.State,
+        xe: plant.State,
         rate: plant.State,
         m: plant.Memory,
         par: Par,

@@ -75,6 +75,7 @@ class ShaftRig:
     def powers(
         self,
         x: plant.State,
+        xe: plant.State,
         rate: plant.State,
         m: plant.Memory,
         par: Par,

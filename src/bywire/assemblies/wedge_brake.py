@@ -133,6 +133,7 @@ class WedgeBrake:
     def powers(
         self,
         x: plant.State,
+        xe: plant.State,
         rate: plant.State,
         m: control.Memory,
         par: Par,
@@ -140,7 +141,7 @@ class WedgeBrake:
         reaction: tuple[float, ...],
     ) -> energy.Flow:
         """Return the powers for the energy balance."""
-        return energy.rates(x, m, par, contact, reaction)
+        return energy.rates(x, xe, m, par, contact, reaction)
 
     def output(
         self,

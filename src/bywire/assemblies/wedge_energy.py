@@ -59,15 +59,20 @@ class Elastic(NamedTuple):
 
 
 def rates(
-    x: State, m: Memory, par: Par, contact: tuple[float, ...], reaction: tuple[float, ...]
+    x: State,
+    xe: State,
+    m: Memory,
+    par: Par,
+    contact: tuple[float, ...],
+    reaction: tuple[float, ...],
 ) -> Flow:
-    """Return the powers at the midpoint of a substep."""
-    w = wires(x, par, contact)
+    """Return the powers at the midpoint of a substep; sides and run-out as in the balance."""
+    w = wires(xe, par, contact)
     both = sides(x, x, m, par)
     friction_1, friction_2, friction_w, moment = reaction
     motors = motor_power(x, m, par)
     body = wedge.State(x.x, x.v)
-    caliper = caliper_input(x, x, par)
+    caliper = caliper_input(x, xe, par)
     stuck = ops.where(ops.fabs(x.omega_1) + ops.fabs(x.omega_2) == 0, 1.0, 0.0)
     return Flow(
         W_supply=drive_supply.power(motors, par.supply),

@@ -9,7 +9,7 @@
 #include <string.h>
 
 #define PI 3.14159265358979323846
-#define STILL 1e-9   /* floor of the viscous friction's argument */
+#define STILL 1e-9   /* share of the reference speed below which nothing churns */
 #define DECAYED 40.0 /* exp(-40) no longer shows beside 1 */
 #define INLINE static inline __attribute__((always_inline))
 
@@ -23,7 +23,7 @@ typedef struct {
     MotorPar motor[2];
     double w_d, w_s, G, i_max, k_p, k_i, T_t, V, R_off; /* drive */
     double lead, opposing, aiding;                   /* screw: m/rad; friction per axial force */
-    double C_0, C_1, C_2, T_nu, k_nu, per_speed, G_S, decay, creep; /* bearing; creep: at rest */
+    double C_0, C_1, C_2, T_nu, k_nu, per_speed, G_S, decay; /* bearing */
     double W, s, q[3], g_1, g_2, g_12, tau;          /* heart, see pressed() */
     double tan, M_W, mu_B, k_return, x_stop, mu_int, mu_R, k_stop, tau_stop; /* wedge */
     double K_cal, tau_cal, clear, per_F_N, J_F, Om_still, runout; /* caliper, disc */
@@ -71,7 +71,6 @@ static Plant plant_of(const double *p, double h)
     k.C_0 = p[P_bearing_C_0], k.C_1 = p[P_bearing_C_1], k.C_2 = p[P_bearing_C_2];
     k.T_nu = p[P_bearing_T_nu], k.k_nu = p[P_bearing_k_nu];
     k.per_speed = p[P_bearing_nu] / p[P_bearing_nu_ref] / p[P_bearing_omega_ref];
-    k.creep = k.T_nu * pow(STILL, k.k_nu);
     k.G_S = p[P_bearing_G_S], k.decay = p[P_bearing_k_S] / p[P_bearing_omega_S];
     const double s = 1.0 / p[P_heart_K_S], w = s + 1.0 / p[P_heart_K_W];
     const double t = 2.0 * s + 1.0 / p[P_heart_K_C];
@@ -112,7 +111,7 @@ INLINE Grip shaft_grip(const Plant *k, double force, double om)
     const double load = fabs(force), speed = fabs(om), far = k->decay * speed;
     const double ratio = k->per_speed * speed;
     const double axial = k->C_0 + load * (k->C_1 + k->C_2 * load);
-    const double viscous = ratio > STILL ? k->T_nu * pow(ratio, k->k_nu) : k->creep;
+    const double viscous = ratio > STILL ? k->T_nu * pow(ratio, k->k_nu) : 0.0;
     const double peak = far == 0.0 ? 1.0 : far < DECAYED ? exp(-far) : 0.0;
     const double bearing = axial * (1.0 + k->G_S * peak) + viscous;
     const double opposing = bearing + k->opposing * load, aiding = bearing + k->aiding * load;

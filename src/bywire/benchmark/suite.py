@@ -8,7 +8,7 @@ from typing import Any
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.benchmark import wedge_brake
+from bywire.benchmark import frequency, wedge_brake
 from bywire.benchmark.engine import ensemble, single_and_sensitivities
 from bywire.benchmark.others import others
 from bywire.benchmark.processes import processes
@@ -45,6 +45,7 @@ def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
         "ensemble": lambda: ensemble(par),
         "other simulators": lambda: others(par),
         "wedge brake": lambda: wedge_brake.measured(wedge),
+        "frequency responses": lambda: frequency.measured(wedge),
         "start-up": processes,
     }
     here = machine()

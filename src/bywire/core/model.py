@@ -134,6 +134,7 @@ class Model(Protocol):
     def powers(
         self,
         x: Any,
+        xe: Any,
         rate: Any,
         memory: Any,
         par: Any,
@@ -142,7 +143,8 @@ class Model(Protocol):
     ) -> Any:
         """Return the rates of the Flow at the midpoint of a substep.
 
-        ``rate`` is dx/dt; ``reaction`` holds the friction forces, then those of the limits.
+        ``xe`` is the predicted midpoint, as in ``balance``: periodic terms of it are computed only
+        once. ``rate`` is dx/dt; ``reaction`` holds the friction forces, then those of the limits.
         """
         ...
 

@@ -55,10 +55,12 @@ DECAYED = 40.0
 def decay(x: float) -> float:
     """Return e to the power of -x for a pure number x >= 0, and exactly 0 beyond x = 40.
 
-    For terms that are added to something of the order of one: far out on a Stribeck curve, kernels
-    then skip the exponential.
+    For terms that are added to something of the order of one: far out on a Stribeck curve and at
+    rest, kernels then skip the exponential.
     """
-    return where(x < DECAYED, exp(-x), 0.0)
+    half = 0.5 * DECAYED
+    away = x - half  # one comparison for both ends
+    return where(away * away < half * half, exp(-x), where(x < half, 1.0, 0.0))
 
 
 def log(x: float) -> float:

@@ -71,7 +71,9 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
     axial = par.C_0 + par.C_1 * ops.fabs(u.force) + par.C_2 * u.force * u.force
     speed = ops.fabs(u.omega)
     ratio = par.nu / par.nu_ref * (speed / par.omega_ref)
-    viscous = par.T_nu * ops.power(ops.fmax(ratio, _STILL), par.k_nu)
+    # Nothing at rest, where kernels then skip the power; the floor keeps its slope finite.
+    churned = ops.where(ratio > _STILL, ops.power(ops.fmax(ratio, _STILL), par.k_nu), 0.0)
+    viscous = par.T_nu * churned
     stribeck = par.G_S * axial * ops.decay(par.k_S * speed / par.omega_S)
     return axial + viscous + stribeck
 

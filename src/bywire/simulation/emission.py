@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 
-from bywire.simulation.expressions import OWN, PLAIN_C, Dialect, Namer, as_number, needed, text
+from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, as_number, needed, text
 from bywire.simulation.graph import Graph
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
@@ -118,7 +118,7 @@ def branching_statements(
         graph.nodes[node].args[1]
         for node in order
         if graph.nodes[node].op == "if_else_zero"
-        and graph.nodes[graph.nodes[node].args[1]].op in OWN
+        and graph.nodes[graph.nodes[node].args[1]].op in COSTLY
         and uses[graph.nodes[node].args[1]] == 1
     }
 

@@ -12,7 +12,8 @@ Namer = Callable[[Node], str]
 
 _INFIX = {"add": "+", "sub": "-", "mul": "*"}
 _LIBRARY = ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")
-OWN = frozenset({"exp", "log", "sin", "cos"})  # costly functions
+OWN = frozenset({"exp", "log", "sin", "cos"})
+COSTLY = OWN | {"pow", "constpow"}  # worth a branch around them
 
 
 @dataclass(frozen=True)

@@ -111,6 +111,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     contact = K @ overlap
     flow = model.powers(
         symbol_tuple(model.State, middle),
+        symbol_tuple(model.State, y),
         symbol_tuple(model.State, 2.0 / s.h * d),
         symbol_tuple(model.Memory, s.m),
         par,

@@ -6,8 +6,8 @@ Many sets of gains run side by side, in the lanes of one ensemble.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
@@ -17,18 +17,22 @@ from bywire.analysis.design.describing_function import loop_gain, phase_margin, 
 from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop import Loop
 from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response_window import common_interval
 from bywire.bench.bench import Bench
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.running import as_run
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation.run import Run
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 _POINTS = 12
+_BELOW, _ABOVE = 4.0, 3.0  # of the target: the range of frequencies
+_LEAST = 3  # periods in a window
 _WINDOWS = 12  # granted to a response: friction and converter may keep it from repeating exactly
+_ROUGH_WINDOWS, _ROUGH = 8, 5e-3
 STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 
 
@@ -88,7 +92,8 @@ def bench_figures(
     gains: Mapping[str, Sequence[float]],
     bench: Bench | None,
     target: float,
-    progress: Progress | None = None,
+    *,
+    rough: bool = False,
 ) -> tuple[BenchFigures, ...]:
     """Return the figures of several sets of gains.
 
@@ -103,17 +108,18 @@ def bench_figures(
     bench
         The experiment whose step is judged; None for none.
     target
-        Frequency around which is measured [Hz], from a sixth to three times of it.
-    progress
-        Called with a label and the finished share.
+        Frequency around which is measured [Hz], from a quarter to three times of it.
+    rough
+        Whether settling to 0.5 % is enough, as in a search.
     """
     point = loop.point(par, value)
-    top = min(3.0 * target, 0.45 / max(task.period for task in point.model.tasks(point.par)))
+    run, whole = point.run(), loop.whole(point.par)
     sweep = Sweep(
-        loop.inputs, loop.output, np.geomspace(target / 6.0, top, _POINTS).tolist(), amplitudes,
-        dict(gains), flags=(), whole=loop.whole(point.par), most=_WINDOWS,
+        loop.inputs, loop.output, _frequencies(run, whole, target), amplitudes, dict(gains),
+        flags=(), whole=whole, least=_LEAST, tolerance=_ROUGH if rough else 1e-3,
+        most=_ROUGH_WINDOWS if rough else _WINDOWS,
     )  # fmt: skip
-    found = frequency_response(point.run(), sweep, progress)
+    found = frequency_response(run, sweep)
     steps = _steps(bench, gains) if bench is not None else None
     sets = found.sizes["variant"]
     rows = []
@@ -125,6 +131,27 @@ def bench_figures(
         )  # fmt: skip
         rows.append(BenchFigures(small, {} if steps is None else steps[k]))
     return tuple(rows)
+
+
+def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]:
+    """Return ascending frequencies of which few periods are whole sample times and dithers.
+
+    Several periods, at another phase of the dither each: friction would lock one period of 10 Hz
+    to five of 50 Hz, and what is measured would depend on how both began.
+    """
+    common = common_interval(run, whole)
+    nyquist = 0.5 / max(task.period for task in run.model.tasks(run.par))
+    wanted = np.geomspace(target / _BELOW, min(_ABOVE * target, 0.9 * nyquist), _POINTS)
+    found = set()
+    for f in wanted:
+        choices = [(n, max(round(n / f / common), 1)) for n in range(_LEAST, _LEAST + 3)]
+        n, m = min(
+            ((n, m) for n, m in choices if math.gcd(n, m) == 1),
+            key=lambda one: abs(one[0] / (one[1] * common * f) - 1.0),
+            default=choices[0],
+        )
+        found.add(n / (m * common))
+    return sorted(one for one in found if one < nyquist)
 
 
 def has_step(bench: Bench) -> bool:
@@ -175,7 +202,7 @@ def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str,
     setting = definition.step(bench.chosen_options)
     run = as_run(case, bench.step, seed=(bench.seed, 0))
     kept = {name: np.asarray(values, dtype=float) for name, values in gains.items()}
-    found = simulate_ensemble(replace(run), kept, [setting.signal])
+    found = simulate_ensemble(run, kept, [setting.signal])
     unit = signals_of(case.model.Output)[setting.signal].unit
     height = abs((setting.end or 0.0) - (setting.start or 0.0))
     rows = []

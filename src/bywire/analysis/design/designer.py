@@ -248,5 +248,5 @@ def _judged(
         binding=tuple(one for one in bindings if one.slack <= bindings[0].slack + _BINDS),
         conflicts=conflicts,
         slack=float(slack),
-        evaluations=len(problem._known),
+        evaluations=problem.evaluations,
     )

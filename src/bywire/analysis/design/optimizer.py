@@ -55,6 +55,11 @@ class Problem:
     cases: tuple[LinearCase, ...]
     _known: dict[tuple[bytes, int], Array] = field(default_factory=dict, repr=False)
 
+    @property
+    def evaluations(self) -> int:
+        """Loops that were computed so far."""
+        return len(self._known)
+
     def gains(self, z: Array) -> dict[str, float]:
         """Return gains by name for a point of the unit cube."""
         found = {}

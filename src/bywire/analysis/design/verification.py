@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bywire.analysis.design.bench_figures import BenchFigures, bench_figures, has_step
 from bywire.analysis.design.bench_tuning import (
@@ -88,12 +88,12 @@ class Trial:
     bench: Bench | None
 
     def measure(
-        self, gains: Mapping[str, Sequence[float]], target: float
+        self, gains: Mapping[str, Sequence[float]], target: float, *, rough: bool = False
     ) -> tuple[BenchFigures, ...]:
         """Return the figures of sets of gains, see `bench_figures`."""
         own = self.bench if self.bench is not None and has_step(self.bench) else None
         return bench_figures(
-            self.loop, self.par, self.value, self.amplitudes, gains, own, target
+            self.loop, self.par, self.value, self.amplitudes, gains, own, target, rough=rough
         )  # fmt: skip
 
 
@@ -134,17 +134,22 @@ def verify(
     target = _target(requirements, cases[0], gains)
     if progress is not None:
         progress("trial on the bench", 0.0)
-    (found,) = trial.measure({name: [value] for name, value in gains.items()}, target)
-    slacks = bench_slacks(requirements, found, linear_slacks(problem, gains))
-    first = Candidate(dict(gains), found, slacks)
+
+    def judged(own: Mapping[str, float]) -> Candidate:
+        (found,) = trial.measure({name: [value] for name, value in own.items()}, target)
+        slacks = bench_slacks(requirements, found, linear_slacks(problem, own))
+        return Candidate(dict(own), found, slacks)
+
+    first = judged(gains)
     if progress is not None:
         progress("trial on the bench", 1.0)
     tuning = None
     if first.slack < 0.0 and generations > 0:
         tuning = tune(
-            problem, gains, lambda sets: trial.measure(sets, target), seed=seed,
+            problem, gains, lambda sets: trial.measure(sets, target, rough=True), seed=seed,
             generations=generations, progress=progress,
         )  # fmt: skip
+        tuning = replace(tuning, best=judged(tuning.best.gains))
     final = gains if tuning is None else tuning.best.gains
     kpis: tuple[Kpi, ...] = ()
     if trial.bench is not None:
