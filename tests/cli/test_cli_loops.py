@@ -43,6 +43,19 @@ def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".nc", ".png"}
 
 
+@pytest.mark.parametrize("excitation", ["multisine", "chirp"])
+def test_all_frequencies_at_once(bywire, excitation):
+    found = bywire(
+        "frequency-response", "screw-position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes",
+        "0.5 rad", "--excitation", excitation, "--json",
+    ).object  # fmt: skip
+    assert found["excitation"] == excitation
+    assert found["frequency"] == pytest.approx([5.0, 10.0], rel=0.05)
+    for measured, linear in zip(found["gain"][0], found["linear"]["gain"], strict=True):
+        assert abs(20.0 * math.log10(measured / linear)) < 1.0
+    assert all(0.9 < share <= 1.0 for share in found["coherence"][0])
+
+
 def test_what_sticks_is_said_and_has_no_gain(bywire):
     outcome = bywire(
         "frequency-response", "position", "--frequencies", "5 Hz", "--amplitudes", "0.001 rad",
@@ -64,6 +77,7 @@ def test_what_sticks_is_said_and_has_no_gain(bywire):
         (("margins", "moment", "--set", "wedge.mu_b=0.4"), ("wedge.mu_B",)),
         (("frequency-response", "moment", "--frequencies", "600 Hz"), ("Nyquist",)),
         (("frequency-response", "moment", "--frequencies", "5"), ("Hz",)),
+        (("frequency-response", "moment", "--excitation", "sin"), ("did you mean 'sine'",)),
         (
             ("frequency-response", "moment", "--set", "control.moment.f_c=200 Hz"),
             ("unstable", "1/s"),

@@ -97,6 +97,9 @@ class Loop:
         ``whole(par)``: other frequencies [Hz] of which a window must hold whole periods.
     tunables
         What a design may choose: dotted name -> lowest and highest value [SI] worth a try.
+    sustained
+        Parameters with which the loop can be shaken for as long as it takes, for instance a disc
+        that does not slow down; applied by a design's trial with sines.
     proof
         Experiment in which the whole brake shows what the loop is worth.
     laws
@@ -118,6 +121,7 @@ class Loop:
     amplitudes: tuple[float, ...]
     whole: Callable[[ParameterSet], Sequence[float]] = field(default=lambda _: ())
     tunables: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    sustained: Mapping[str, Any] = field(default_factory=dict)
     proof: str = ""
     laws: Callable[[ParameterSet, Array], tuple[Complex, Complex]] | None = None
 

@@ -10,6 +10,7 @@ from bywire.analysis.response_dataset import Sweep
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.simulation.run import Run
 
+_LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
 _CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
 
 
@@ -89,7 +90,7 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     if any(step <= 0 for step in apart):
         raise ParameterError(f"frequencies = {f}: write them in ascending order")
     common = common_interval(run, sweep.whole)
-    wanted = max(sweep.least / f[0], sweep.shortest, *(2.0 / step for step in apart))
+    wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
     # Half a line more: rounded to lines, neighbors keep one between them.
     length = math.ceil(wanted * 1.25 / common) * common
     return length, [math.floor(one * length + 0.5) for one in f]

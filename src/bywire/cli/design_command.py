@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bywire.analysis.design.bench_text import bench_text
-from bywire.analysis.design.designer import Design, design
+from bywire.analysis.design.designer import design
 from bywire.analysis.design.linear_case import cases_of
+from bywire.analysis.design.outcome import Design
 from bywire.analysis.design.requirement import read
 from bywire.analysis.design.verification import Trial, Verification, verify
 from bywire.bench.bench import Bench

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.analysis.design.bench_tuning import Candidate
-from bywire.analysis.design.designer import Design
+from bywire.analysis.design.outcome import Design
 from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.analysis.design.verification import Verification
 from bywire.cli.loop_choice import Chosen

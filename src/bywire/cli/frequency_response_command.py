@@ -173,7 +173,9 @@ def _text(chosen: Chosen, found: xr.Dataset, linear: Any, unit: str) -> str:
     )
     if found.attrs["excitation"] != "sine":
         head += f"excitation: {found.attrs['excitation']}, amplitudes are its peaks\n"
-    return head + table_text(text_table(heading, rows))
+    lowest = found["coherence"].min(dim="frequency").values[0]
+    shares = ", ".join("-" if math.isnan(one) else f"{one:.3f}" for one in lowest)
+    return head + table_text(text_table(heading, rows)) + f"\nlowest coherence: {shares}"
 
 
 def _cell(gain: float, phase: float) -> str:

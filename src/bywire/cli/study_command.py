@@ -96,6 +96,7 @@ def _as_object(
             for one in found.kpis
         },
         "designs": _listed(found.data),
+        "figures": {name: shown.caption for name, shown in found.maps.items()},
         "warnings": list(found.warnings),
         "files": [str(path) for path in files],
     }

@@ -100,7 +100,8 @@ def bench_figures(
     Parameters
     ----------
     loop, par, value
-        Loop, parameters and operating point, friction, dither and limits on.
+        Loop, parameters and operating point, friction, dither and limits on; the loop's
+        ``sustained`` are set for the sines.
     amplitudes
         Of the sines, SI.
     gains
@@ -112,7 +113,7 @@ def bench_figures(
     rough
         Whether settling to 0.5 % is enough, as in a search.
     """
-    point = loop.point(par, value)
+    point = loop.point(par.replace(loop.sustained), value)
     run, whole = point.run(), loop.whole(point.par)
     sweep = Sweep(
         loop.inputs, loop.output, _frequencies(run, whole, target), amplitudes, dict(gains),

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,93 +16,15 @@ from bywire.analysis.design.optimizer import (
     confirmed,
     starts_of,
 )
+from bywire.analysis.design.outcome import MISSED, Binding, Conflict, Design, Status
 from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.core.errors import ParameterError
 
 Array = NDArray[np.float64]
-Status = Literal["met", "infeasible", "interrupted"]
 
 _FINE = 4000  # points of the grid for what is reported
-_MISSED = -1e-3  # share of a limit that counts as missed
 _BINDS = 0.01  # slacks this close to the worst one bind
 _ROUNDS, _PAIRED = 8, 3
-
-
-@dataclass(frozen=True)
-class Binding:
-    """A requirement that leaves no room.
-
-    Parameters
-    ----------
-    requirement, case
-        Which one, and for which model.
-    value, slack
-        What was reached, and its distance from the limit as a share of it.
-    """
-
-    requirement: Requirement
-    case: str
-    value: float
-    slack: float
-
-
-@dataclass(frozen=True)
-class Conflict:
-    """What one requirement allows of another.
-
-    Parameters
-    ----------
-    wanted, kept
-        The requirement that was pushed, while the other one held.
-    best
-        The best value of the wanted one.
-    gains
-        Where it was reached.
-    """
-
-    wanted: Requirement
-    kept: Requirement
-    best: float
-    gains: Mapping[str, float]
-
-    @property
-    def excludes(self) -> bool:
-        """Whether the two alone cannot both be met."""
-        return self.wanted.slack(self.best) < _MISSED
-
-
-@dataclass(frozen=True)
-class Design:
-    """Gains and what they give.
-
-    Parameters
-    ----------
-    gains
-        By dotted name [SI].
-    status
-        ``"met"``, ``"infeasible"``, or ``"interrupted"`` with the best until then.
-    nominal
-        All figures of the nominal model.
-    worst
-        Figure -> worst value over all models, and the model's label.
-    binding
-        What leaves no room, the worst first.
-    conflicts
-        For infeasible requirements, what each binding one allows of the others.
-    slack
-        The worst normalized slack.
-    evaluations
-        Loops that were computed.
-    """
-
-    gains: Mapping[str, float]
-    status: Status
-    nominal: Mapping[str, float]
-    worst: Mapping[str, tuple[float, str]]
-    binding: tuple[Binding, ...]
-    conflicts: tuple[Conflict, ...]
-    slack: float
-    evaluations: int
 
 
 def design(
@@ -152,7 +72,7 @@ def design(
         _over_all(search, [first], seed, progress)
         if search.best is not None:
             search.best = confirmed(search, _FINE)
-        if search.slack < _MISSED:
+        if search.slack < MISSED:
             status = "infeasible"
             conflicts = _conflicts(search, progress)
     except KeyboardInterrupt:
@@ -242,7 +162,7 @@ def _judged(
         worst[name] = (rows[label][name], label)
     return Design(
         gains=gains,
-        status=status or ("met" if slack >= _MISSED else "infeasible"),
+        status=status or ("met" if slack >= MISSED else "infeasible"),
         nominal=next(iter(rows.values())),
         worst=worst,
         binding=tuple(one for one in bindings if one.slack <= bindings[0].slack + _BINDS),

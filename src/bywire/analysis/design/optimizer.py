@@ -31,7 +31,8 @@ KEPT_MISSED = -1e3
 """below this, a search has found nothing that meets the requirements to keep"""
 _STEP = 1e-5  # of differences, share of a range
 _SAMPLES, _STARTS = 64, 3
-_ITERATIONS, _SIMPLEX = 40, 150
+_ITERATIONS = 40
+_SIMPLEX = 25  # evaluations per gain
 _CONFIRMED, _ALIKE = 40, 1e-3  # points looked at anew, and how far apart
 
 
@@ -133,7 +134,7 @@ class Search:
         n = self.best.size
         corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
                              * np.eye(n)])  # fmt: skip
-        options: Any = {"maxfev": _SIMPLEX, "initial_simplex": corners, "fatol": 1e-5}
+        options: Any = {"maxfev": _SIMPLEX * n, "initial_simplex": corners, "fatol": 1e-5}
         climb: Any = minimize  # its stubs tell the methods' starting points apart
         climb(
             lambda z: -self._judged(z), self.best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n,

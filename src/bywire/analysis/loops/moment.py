@@ -65,5 +65,6 @@ LOOP = Loop(
     amplitudes=(0.5, 20.0),
     # The law knows f_c over slope_hat alone: one of them is enough.
     tunables={"control.moment.f_c": (0.3, 60.0)},
+    sustained=CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
 )

@@ -160,7 +160,10 @@ def _cuts(data: xr.Dataset, best: Best) -> tuple[Cut, ...]:
     worst = row[["release", "t_90", "current", "speed", "copper"]].max(dim="mu_B", keep_attrs=True)
     names = ("worst_filtered", "mu_B_filtered", "worst_instantaneous")
     shown = xr.merge([worst, row[list(names)]], compat="override")
-    title = f"tan(alpha) = {float(row['tan_alpha']):.3g}, largest over the friction coefficients"
+    title = (
+        f"tan(alpha) = {float(row['tan_alpha']):.3g}, worst friction coefficient; current, speed "
+        "and copper loss of the whole pulse"
+    )
     return (Cut(title, shown, ("lead", *names, *(str(name) for name in worst))),)
 
 
