@@ -110,6 +110,13 @@ def test_variants_and_amplitudes_are_those_of_single_sweeps() -> None:
                 assert both[name].values[k, j, 0] == pytest.approx(one.values[0, 0, 0], rel=share)
 
 
+def test_one_after_another_gives_what_lanes_give() -> None:
+    sweep = replace(SWEEP, frequencies=(10.0, 40.0), amplitudes=(0.2,))
+    together, apart = (frequency_response(positioned(), sweep, lanes=one) for one in (True, False))
+    for name, share in (("gain", 1e-5), ("phase", 1e-5), ("coherence", 1e-5)):
+        np.testing.assert_allclose(together[name], apart[name], rtol=share)
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [

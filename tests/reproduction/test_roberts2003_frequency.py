@@ -41,6 +41,12 @@ def test_the_current_limit_sets_in_where_the_acceleration_needs_it(items):
         assert items[f"fig6.kink.{size:g}"].computed > 30.0
 
 
+def test_below_the_onset_there_are_two_responses(items):
+    rest, above = (items[f"fig6.jump.from_{where}"].computed for where in ("rest", "above"))
+    assert rest == pytest.approx(0.93, abs=0.02)
+    assert above > 1.2
+
+
 def test_readings_of_the_screws_loss_differ_at_high_frequency(items):
     for f in (60, 100):
         by_load = items[f"fig6.efficiency.load.{f}"].computed

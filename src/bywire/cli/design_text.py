@@ -14,6 +14,8 @@ from bywire.analysis.design.verification import Verification
 from bywire.cli.loop_choice import Chosen
 from bywire.core.parameters import leaf_fields
 
+_PAIRS = 6
+
 
 def as_object(
     chosen: Chosen,
@@ -96,11 +98,11 @@ def as_text(
         for one in found.conflicts
     ]
     if tried is not None:
-        parts.append(_bench_text(chosen, tried))
+        parts.append(_bench_text(chosen, found, tried))
     return "\n".join(parts)
 
 
-def _bench_text(chosen: Chosen, tried: Verification) -> str:
+def _bench_text(chosen: Chosen, found: Design, tried: Verification) -> str:
     from bywire.report.table_text import table_text
     from bywire.report.tables import text_table
     from bywire.report.wording import amount
@@ -121,6 +123,10 @@ def _bench_text(chosen: Chosen, tried: Verification) -> str:
     for name in tried.linear.figures.step:
         cells = [amount(one.figures.step.get(name), FIGURES[name].unit, 3) for _, one in columns]
         rows.append([f"{name}, {chosen.loop.proof}", *cells])
+    for name in ("phase_margin", "gain_margin", "disk_margin"):
+        both = [found.nominal, tried.nominal][: len(columns)]
+        cells = [amount(one[name], FIGURES[name].unit, 3) for one in both]
+        rows.append([f"{name}, linear model", *cells])
     parts = [table_text(text_table(["nonlinear bench", *(c for c, _ in columns)], rows))]
     if not tried.linear.figures.step and tried.kpis:
         kpis = [[one.name, amount(one.value, one.unit)] for one in tried.kpis]
@@ -131,7 +137,8 @@ def _bench_text(chosen: Chosen, tried: Verification) -> str:
     conflict = tried.conflict()
     if conflict is not None:
         one, other, edge = conflict
-        pairs = "; ".join(f"{100 * a:+.0f} % and {100 * b:+.0f} %" for a, b in edge[:8])
+        middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are nearly met
+        pairs = "; ".join(f"{100 * a:+.1f} % and {100 * b:+.1f} %" for a, b in middle)
         parts.append(f"edge between {one} and {other}, as distance from the limits: {pairs}")
     return "\n".join(parts)
 
@@ -144,6 +151,7 @@ def _bench(chosen: Chosen, tried: Verification) -> dict[str, Any]:
         "candidates": 0 if tried.tuning is None else len(tried.tuning.tried),
         "linear_design": _candidate(tried.linear),
         "final": _candidate(tried.final),
+        "final_linear": _finite(tried.nominal),
         "experiment": chosen.loop.proof,
         "kpis": {one.name: {"value": _number(one.value), "unit": one.unit} for one in tried.kpis},
         "conflict": None if conflict is None else {

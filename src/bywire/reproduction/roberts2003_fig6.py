@@ -14,6 +14,7 @@ from bywire.analysis.response_dataset import Sweep
 from bywire.reproduction import roberts2003_facts as facts
 from bywire.reproduction import roberts2003_frequency as frequency
 from bywire.reproduction import roberts2003_frequency_facts as stated
+from bywire.reproduction import roberts2003_jump
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.roberts2003_fig5 import friction
@@ -35,6 +36,7 @@ def part(runs: Runs) -> Part:
     runs.report("Fig. 6: current limit, efficiency", 0.5)
     items = [
         *_limit(),
+        *roberts2003_jump.items(),
         *friction(_HIGH, "fig6"),
         *_efficiency(),
         compared("fig6.linear.gain", stated.SAME_GAIN, gain, SAME_GAIN.size, "1 to 100 Hz"),
@@ -46,9 +48,9 @@ def part(runs: Runs) -> Part:
     ]  # fmt: skip
     text = (
         "A controller of 60 Hz on the preloaded screw, at 0.25, 0.5 and 1 rad: all three, and the "
-        "bandwidth, are our choice. Every sine starts from rest: where the limit sets in, a sweep "
-        "that comes from higher frequencies may find another response. Whether theory and practice "
-        "match cannot be judged: the measured curves are not at hand."
+        "bandwidth, are our choice. Every sine starts from rest: just below where the limit "
+        "sets in, a sweep that comes from above finds another response. Whether theory and "
+        "practice match cannot be judged: the measured curves are not at hand."
     )
     exhibits = (
         Exhibit("fig6", frequency.figure(_HIGH),

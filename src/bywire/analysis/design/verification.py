@@ -16,7 +16,7 @@ from bywire.analysis.design.bench_tuning import (
 )
 from bywire.analysis.design.linear_case import LinearCase
 from bywire.analysis.design.optimizer import Problem, Progress
-from bywire.analysis.design.requirement import Requirement
+from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.analysis.loop import Loop
 from bywire.bench.bench import Bench
 from bywire.bench.kpis.kpi import Kpi
@@ -37,11 +37,14 @@ class Verification:
         The search for better ones; None where the linear design's meet everything.
     kpis
         Key figures of the loop's experiment with the final gains.
+    nominal
+        All figures of the nominal linear model with the final gains.
     """
 
     linear: Candidate
     tuning: Tuning | None
     kpis: tuple[Kpi, ...]
+    nominal: Mapping[str, float]
 
     @property
     def final(self) -> Candidate:
@@ -154,7 +157,9 @@ def verify(
     kpis: tuple[Kpi, ...] = ()
     if trial.bench is not None:
         kpis = run(trial.bench.with_overrides(dict(final))).kpis
-    return Verification(first, tuning, kpis)
+    loop = cases[0].figures(final, 4000)
+    nominal = {name: float(getattr(loop, name)) for name in FIGURES}
+    return Verification(first, tuning, kpis, nominal)
 
 
 def _target(
