@@ -96,7 +96,9 @@ def test_list_is_complete(bywire):
     status, out, err = bywire("list", "--json")
     assert (status, err) == (0, "")
     found = json.loads(out)
-    titles = {"assemblies", "parameter_sets", "experiments", "stimuli", "kpis"}
+    titles = {
+        "assemblies", "parameter_sets", "experiments", "loops", "studies", "stimuli", "kpis",
+    }  # fmt: skip
     assert set(found) == titles | {"kpis_of_experiments"}
     text = bywire("list").out
     for content in found.values():

@@ -52,12 +52,20 @@ DECAYED = 40.0
 """where ``decay`` ends: its value there, 4e-18, no longer shows beside 1"""
 
 
-def decay(x: float) -> float:
+def decay(x: float, *, rests: bool = False) -> float:
     """Return e to the power of -x for a pure number x >= 0, and exactly 0 beyond x = 40.
 
-    For terms that are added to something of the order of one: far out on a Stribeck curve and at
-    rest, kernels then skip the exponential.
+    For terms that are added to something of the order of one: far out on a Stribeck curve, kernels
+    then skip the exponential.
+
+    Parameters
+    ----------
+    rests
+        Whether x is often exactly 0: kernels then skip the exponential there too, at the price of
+        two operations elsewhere.
     """
+    if not rests:
+        return where(x < DECAYED, exp(-x), 0.0)
     half = 0.5 * DECAYED
     away = x - half  # one comparison for both ends
     return where(away * away < half * half, exp(-x), where(x < half, 1.0, 0.0))

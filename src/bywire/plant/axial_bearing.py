@@ -74,7 +74,7 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
     # Nothing at rest, where kernels then skip the power; the floor keeps its slope finite.
     churned = ops.where(ratio > _STILL, ops.power(ops.fmax(ratio, _STILL), par.k_nu), 0.0)
     viscous = par.T_nu * churned
-    stribeck = par.G_S * axial * ops.decay(par.k_S * speed / par.omega_S)
+    stribeck = par.G_S * axial * ops.decay(par.k_S * speed / par.omega_S, rests=True)
     return axial + viscous + stribeck
 
 
