@@ -31,9 +31,10 @@ PAPER = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
 
 
 MET = {
-    "ecu.pressure.k_p": 2.06e-5, "ecu.pressure.k_i": 4.36e-4, "ecu.pressure.k_d": 4.12e-7,
-    "ecu.pressure.tau_d": 5.6e-5, "ecu.pressure.b": 1.0, "ecu.pressure.c": 1.0,
-}  # fmt: skip
+    name: value
+    for name, value in parameters("dardanelli2010-retuned").leaves().items()
+    if value != parameters("dardanelli2010").leaves()[name] or name == "ecu.pressure.b"
+}
 """found by ``bywire design pressure``; 0.7 % are left of bandwidth and phase margin"""
 
 

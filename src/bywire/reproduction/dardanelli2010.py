@@ -13,6 +13,7 @@ from bywire.reproduction import (
     dardanelli2010_fig7,
     dardanelli2010_gear,
     dardanelli2010_repair,
+    dardanelli2010_requirements,
     dardanelli2010_table1,
     dardanelli2010_table2,
     dardanelli2010_table3,
@@ -35,12 +36,14 @@ PARTS = {
     "Table 4": dardanelli2010_table4.part,
     "Fig. 6": dardanelli2010_fig6.part,
     "Fig. 7": dardanelli2010_fig7.part,
+    "requirements": dardanelli2010_requirements.part,
     "gear": dardanelli2010_gear.part,
 }
 
 NAMES = {
     "": "Calibrated set, and what needs no set",
     "table1": "Table 1 as printed (ids with @table1)",
+    "retuned": "Gains retuned on the bench (ids with @retuned)",
 }
 """parameter sets, by what follows @ in an item's id"""
 

@@ -65,8 +65,9 @@ def _bandwidth(q: Quoted) -> RootCause:
         f"are tuned, a crossover of {q('fig7.crossover')} and a phase margin of "
         f"{q('fig7.phase_margin')} (required {q.stated('fig7.crossover')}, "
         f"{q.stated('fig7.phase_margin')}) are reached, though only "
-        f"{q('fig7.bandwidth.table4')} at -3 dB.",
-        ("fig7.bandwidth*", "table4.medium.corner*"),
+        f"{q('fig7.bandwidth.table4')} at -3 dB. Gains searched on the nonlinear bench itself meet "
+        f"all four requirements, with an overshoot of {q('requirements.overshoot@retuned')}.",
+        ("fig7.bandwidth*", "table4.medium.corner*", "requirements.bandwidth*"),
     )
 
 
