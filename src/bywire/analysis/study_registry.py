@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Mapping
 from functools import cache
 
 from bywire.analysis import studies
 from bywire.analysis.study import Study
-from bywire.core.errors import unknown_name
+from bywire.core.discovery import declared, pick
 
 
 @cache
 def all_studies() -> Mapping[str, Study]:
     """Return every study: the ``STUDY`` of each module in ``studies``."""
-    found: dict[str, Study] = {}
-    for module in pkgutil.iter_modules(studies.__path__):
-        loaded = importlib.import_module(f"{studies.__name__}.{module.name}")
-        study = getattr(loaded, "STUDY", None)
-        if study is not None:
-            found[study.name] = study
-    return found
+    return declared(studies, "STUDY", Study)
 
 
 def find_study(name: str) -> Study:
@@ -32,7 +24,4 @@ def find_study(name: str) -> Study:
     UnknownNameError
         With the nearest known names.
     """
-    known = all_studies()
-    if name not in known:
-        raise unknown_name("study", name, known)
-    return known[name]
+    return pick(all_studies(), name, "study")

@@ -9,19 +9,13 @@ from functools import cache
 
 from bywire.bench import experiments
 from bywire.bench.experiment import Experiment
-from bywire.core.errors import unknown_name
+from bywire.core.discovery import declared, pick
 
 
 @cache
 def all_experiments() -> Mapping[str, Experiment]:
     """Return every experiment: the ``EXPERIMENT`` of each module in ``experiments``."""
-    found: dict[str, Experiment] = {}
-    for module in pkgutil.iter_modules(experiments.__path__):
-        loaded = importlib.import_module(f"{experiments.__name__}.{module.name}")
-        experiment = getattr(loaded, "EXPERIMENT", None)
-        if experiment is not None:
-            found[experiment.name] = experiment
-    return found
+    return declared(experiments, "EXPERIMENT", Experiment)
 
 
 def find_experiment(name: str) -> Experiment:
@@ -38,7 +32,4 @@ def find_experiment(name: str) -> Experiment:
         found = importlib.import_module(f"{experiments.__name__}.{module}").EXPERIMENT
         if found.name == name:
             return found  # type: ignore[no-any-return]
-    known = all_experiments()
-    if name not in known:
-        raise unknown_name("experiment", name, known)
-    return known[name]
+    return pick(all_experiments(), name, "experiment")

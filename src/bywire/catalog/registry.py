@@ -10,7 +10,7 @@ from functools import cache
 
 from bywire import catalog
 from bywire.catalog.provenance import Cited
-from bywire.core.errors import unknown_name
+from bywire.core.discovery import pick
 from bywire.core.parameters import ParameterSet
 
 
@@ -72,11 +72,7 @@ def entry(name: str) -> Entry:
     """
     module = name.partition("-")[0]  # a name begins with its module: one import instead of all
     known = _of_module(module) if module in _modules() else {}
-    if name not in known:
-        known = entries()
-    if name not in known:
-        raise unknown_name("parameter set", name, known)
-    return known[name]
+    return known[name] if name in known else pick(entries(), name, "parameter set")
 
 
 def main_set(assembly: str) -> str:

@@ -175,7 +175,7 @@ def design_command(
         typer.Option(help="Requirement, e.g. 'bandwidth >= 10 Hz'; as often as needed."),
     ] = None,
     requirements: Annotated[
-        Path | None, typer.Option(help="TOML file with a section [requirements].")
+        Path | None, typer.Option(help="TOML file with a section 'requirements'.")
     ] = None,
     over: Annotated[
         list[str] | None,

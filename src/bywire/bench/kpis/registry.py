@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
@@ -14,7 +12,7 @@ import xarray as xr
 
 from bywire.bench import kpis
 from bywire.bench.kpis.kpi import Kpi, Measure
-from bywire.core.errors import unknown_name
+from bywire.core.discovery import modules_of, pick
 
 
 @dataclass(frozen=True)
@@ -47,13 +45,13 @@ class Family:
 def families() -> Mapping[str, Family]:
     """Return every family: the modules in this folder that declare figures."""
     found: dict[str, Family] = {}
-    for module in pkgutil.iter_modules(kpis.__path__):
-        loaded = importlib.import_module(f"{kpis.__name__}.{module.name}")
+    for loaded in modules_of(kpis):
+        name = loaded.__name__.rpartition(".")[2]
         figures = {m.name: m for m in vars(loaded).values() if isinstance(m, Measure)}
         if figures:
             summary = (loaded.__doc__ or "").strip().splitlines()[0]
-            found[module.name] = Family(
-                module.name, summary, loaded.Setting, loaded.select, figures
+            found[name] = Family(
+                name, summary, loaded.Setting, loaded.select, figures
             )
     return found
 
@@ -78,10 +76,7 @@ def family(name: str) -> Family:
     UnknownNameError
         With the nearest known names.
     """
-    known = families()
-    if name not in known:
-        raise unknown_name("family of key figures", name, known)
-    return known[name]
+    return pick(families(), name, "family of key figures")
 
 
 def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -14,7 +12,8 @@ from numpy.typing import NDArray
 
 from bywire.bench import stimuli
 from bywire.bench.values import nodes, number
-from bywire.core.errors import ParameterError, UnknownNameError, unknown_name
+from bywire.core.discovery import modules_of, pick
+from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.parameters import ParameterSet, leaf_fields
 
 Value = str | float | Sequence[str | float]
@@ -66,11 +65,11 @@ class Stimulus:
 def entries() -> Mapping[str, Entry]:
     """Return every kind of stimulus: the modules in this folder that offer ``sample``."""
     found: dict[str, Entry] = {}
-    for module in pkgutil.iter_modules(stimuli.__path__):
-        loaded = importlib.import_module(f"{stimuli.__name__}.{module.name}")
+    for loaded in modules_of(stimuli):
+        name = loaded.__name__.rpartition(".")[2]
         if hasattr(loaded, "sample") and hasattr(loaded, "Parameters"):
             summary = (loaded.__doc__ or "").strip().splitlines()[0]
-            found[module.name] = Entry(module.name, summary, loaded.Parameters, loaded.sample)
+            found[name] = Entry(name, summary, loaded.Parameters, loaded.sample)
     return found
 
 
@@ -82,10 +81,7 @@ def entry(kind: str) -> Entry:
     UnknownNameError
         With the nearest known names.
     """
-    known = entries()
-    if kind not in known:
-        raise unknown_name("stimulus", kind, known)
-    return known[kind]
+    return pick(entries(), kind, "stimulus")
 
 
 def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
