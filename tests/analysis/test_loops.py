@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import astuple, replace
 
 import control
 import numpy as np
@@ -93,6 +93,32 @@ def test_operating_points_that_do_not_exist() -> None:
     weak = par.replace({"drive.i_max": 0.2, "wedge.mu_B": 0.2})
     with pytest.raises(ParameterError, match="A in each motor"):
         loop.closed(weak, 900.0)
+    for value in (0.0, -100.0):
+        with pytest.raises(ParameterError, match="must be > 0"):
+            loop.closed(par, value)
+    with pytest.raises(ParameterError, match="standing disc"):
+        loop.closed(par.replace({"flywheel.Omega_0": 0.0}), 200.0)
+    position, par = of("position")
+    with pytest.raises(ParameterError, match="out of the clearance"):
+        position.closed(par, 2e-3)
     pressure, par = of("pressure")
     with pytest.raises(ParameterError):
         pressure.closed(par, 900e5)
+
+
+def test_both_directions_of_rotation_have_the_same_margins() -> None:
+    loop, par = of("moment")
+    forward, backward = (
+        margins(loop, par.replace({"flywheel.Omega_0": speed}), 200.0) for speed in (60.0, -60.0)
+    )
+    for one, other in zip(astuple(forward), astuple(backward), strict=True):
+        assert one == pytest.approx(other, rel=1e-6)
+
+
+def test_an_unstable_loop_has_no_margins_and_is_the_worst_case() -> None:
+    loop, par = of("position")
+    values = [60.0, 400.0]
+    found = over(loop, par, 0.0, "control.position.f_n", values)
+    assert [one.stable for one in found] == [True, False]
+    assert all(math.isnan(v) for v in astuple(found[1])[:-1])
+    assert all(at == 400.0 for _, at in worst(found, values).values())

@@ -150,6 +150,9 @@ def test_a_file_comes_before_an_experiment_of_its_name(bywire, tmp_path, monkeyp
     monkeypatch.chdir(tmp_path)
     (tmp_path / "hard-braking").write_text("nothing = 1")
     refused(bywire("run", "hard-braking"), "unknown key 'nothing'")
+    # A folder is no bench file: that of the last results does not stand in the way.
+    (tmp_path / "moment-ramp").mkdir()
+    assert bywire("run", "moment-ramp").status == 0
 
 
 def test_misspelled_experiment(bywire):

@@ -27,7 +27,7 @@ _LOWEST = 1e-2  # lower end of what is searched, Hz
 
 @dataclass(frozen=True)
 class LoopMargins:
-    """Margins of a sampled loop as it is, with its delays and filters.
+    """Margins of a sampled loop as it is, with its delays and filters; NaN where it is unstable.
 
     Parameters
     ----------
@@ -59,6 +59,13 @@ class LoopMargins:
     stable: bool
 
 
+UNSTABLE = LoopMargins(
+    gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
+    sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
+)  # fmt: skip
+"""what an unstable loop has: no margins"""
+
+
 def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
     """Return the margins of a loop at an operating point, dry friction removed.
 
@@ -68,6 +75,8 @@ def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
         When the operating point does not exist.
     """
     gain, closed = loop.gain(par, value), loop.closed(par, value)
+    if not closed.is_stable:
+        return UNSTABLE
     highest = 0.499 / gain.period
     band = (_LOWEST, highest)
 
@@ -121,12 +130,15 @@ def over(
 def worst(
     found: Sequence[LoopMargins], values: Sequence[float]
 ) -> Mapping[str, tuple[float, float]]:
-    """Return the worst of each margin, and the value at which it occurs."""
+    """Return the worst of each margin, and the value at which it occurs.
+
+    Nothing is worse than an unstable loop, whose margins are NaN.
+    """
     if not found:
         raise ParameterError("no margins to choose from: give at least one value")
     result: dict[str, tuple[float, float]] = {}
     for field, sign in SENSES.items():
-        sizes = [sign * getattr(one, field) for one in found]
+        sizes = [sign * getattr(one, field) if one.stable else -math.inf for one in found]
         k = int(np.nanargmin(sizes)) if not all(map(math.isnan, sizes)) else 0
         result[field] = (getattr(found[k], field), float(values[k]))
     return result

@@ -119,7 +119,7 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def _of_experiment(file: Path) -> dict[str, Any]:
     """Return the shortest bench file of an experiment; nothing where there is a file instead."""
     name = str(file)
-    if not _NAME.fullmatch(name) or file.exists() or name not in all_experiments():
+    if not _NAME.fullmatch(name) or file.is_file() or name not in all_experiments():
         return {}
     assembly = find_experiment(name).assembly
     return {"experiment": name, "parameters": main_set(assembly)}

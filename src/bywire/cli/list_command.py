@@ -23,7 +23,7 @@ def execute(as_text: bool) -> None:
     found = {
         "assemblies": sorted({e.assembly for e in entries().values()}),
         "parameter_sets": {e.name: e.summary for e in entries().values()},
-        "experiments": {e.name: e.summary for e in experiments.values()},
+        "experiments": {e.name: f"{e.summary} ({e.assembly})" for e in experiments.values()},
         "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in all_loops().values()},
         "studies": {one.name: f"{one.summary} ({one.assembly})" for one in all_studies().values()},
         "stimuli": {e.kind: e.summary for e in stimuli().values()},

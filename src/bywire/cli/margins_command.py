@@ -18,6 +18,17 @@ UNITS = {
 }  # fmt: skip
 
 
+TITLES = {
+    "gain": "gain margin", "phase": "phase margin", "delay": "delay margin", "disk": "disk margin",
+    "sensitivity": "max |S|", "complementary": "max |T|",
+}  # fmt: skip
+LEGEND = (
+    "Linear loop as it is sampled, dry friction left out. Gain margin as a factor; delay margin: "
+    "dead time\nthat may be added; disk margin: 2 is the best, 0 none; S, T: sensitivity and "
+    "complementary sensitivity.\nNothing is defined for an unstable loop."
+)
+
+
 def execute(
     loop: str, parameters: str, at: str, changes: Mapping[str, str], range_: str, as_json: bool
 ) -> None:
@@ -25,13 +36,14 @@ def execute(
     chosen = choose(loop, parameters, at, changes)
     if not range_:
         found, values, name = [margins(chosen.loop, chosen.par, chosen.value)], [math.nan], ""
+        unit = "1"
     else:
-        name, _, values = over_range(range_, chosen)
+        name, unit, values = over_range(range_, chosen)
         found = over(chosen.loop, chosen.par, chosen.value, name, values)
     if as_json:
         output.result(json.dumps(_as_object(chosen, name, values, found)))
     else:
-        output.result(_text(chosen, name, values, found))
+        output.result(_text(chosen, (name, unit), values, found))
 
 
 def _as_object(
@@ -57,30 +69,32 @@ def _finite(row: dict[str, Any]) -> dict[str, Any]:
 
 
 def _text(
-    chosen: Chosen, name: str, values: Sequence[float], found: Sequence[LoopMargins]
+    chosen: Chosen, range_: tuple[str, str], values: Sequence[float], found: Sequence[LoopMargins]
 ) -> str:
     from bywire.report.table_text import table_text
     from bywire.report.tables import text_table
     from bywire.report.wording import amount
+
+    name, own_unit = range_
 
     def cells(one: LoopMargins) -> list[str]:
         figures = [amount(getattr(one, k), unit, 3) for k, unit in UNITS.items()]
         return [*figures, "yes" if one.stable else "NO"]
 
     at = chosen.loop.at
-    heading = [*UNITS, "stable"]
+    heading = [*(TITLES.get(k, k) for k in UNITS), "stable"]
     rows: list[list[str]] = [cells(one) for one in found]
     if name:
         heading = [name, *heading]
-        rows = [[f"{v:.4g}", *row] for v, row in zip(values, rows, strict=True)]
+        rows = [[amount(v, own_unit), *row] for v, row in zip(values, rows, strict=True)]
     point = f"{at.name} = {amount(chosen.value, at.unit)}"
     head = f"loop {chosen.loop.name} of {chosen.name} at {point}"
     text = f"{head}, cut at {chosen.loop.cut}\n" + table_text(text_table(heading, rows))
     if name:
         least = worst(found, values)
         lines = [
-            f"{k} {amount(v, UNITS[k], 3)} at {name} = {v_at:.4g}"
+            f"{TITLES.get(k, k)} {amount(v, UNITS[k], 3)} at {name} = {amount(v_at, own_unit)}"
             for k, (v, v_at) in least.items()
         ]
         text += "\nworst: " + "; ".join(lines)
-    return text
+    return f"{text}\n{LEGEND}"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
@@ -26,21 +27,42 @@ def point(par: ParameterSet, value: float) -> Point:
     Raises
     ------
     ParameterError
-        When the moment is beyond the wedge's travel or the drives' current.
+        When the moment is not positive, beyond the wedge's travel or the drives' current, or
+        when the disc stands.
+
+    Notes
+    -----
+    The wedge stands on the side to which the disc turns; the moment counts in that direction.
     """
     own = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
+    _require_braking(value, own)
     x = travel_for(force_for(value, own), own)
     _require_reachable(value, x, own)
+    turning = math.copysign(1.0, own.flywheel.Omega_0)
+    x *= turning
     memory = memory_at(x, own)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
-    state = state_at(x, own)._replace(y_M=value)
+    state = state_at(x, own)._replace(y_M=turning * value)
     return Point(WedgeBrake(), own, state, memory, zeros(Stimulus)._replace(M_set=value))
 
 
-def _require_reachable(value: float, x: float, par: WedgeParameters) -> None:
-    if not 0.0 < x < par.wedge.x_stop:
+def _require_braking(value: float, par: WedgeParameters) -> None:
+    if not value > 0.0:
         raise ParameterError(
-            f"moment = {value:g} N*m needs {x * 1e3:.3g} mm of wedge travel: it must be above 0 "
-            f"and below wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm"
+            f"moment = {value:g} N*m is no operating point: it must be > 0 N*m, counted against "
+            "the disc's rotation whatever its direction"
+        )
+    if par.flywheel.Omega_0 == 0.0:
+        raise ParameterError(
+            "flywheel.Omega_0 = 0 rad/s: a standing disc has no braking moment to control; set it "
+            "to the speed at which the loop works"
+        )
+
+
+def _require_reachable(value: float, x: float, par: WedgeParameters) -> None:
+    if not x < par.wedge.x_stop:
+        raise ParameterError(
+            f"moment = {value:g} N*m needs {x * 1e3:.3g} mm of wedge travel: it must be below "
+            f"wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm; ask for less"
         )
     force = abs(wedge.slope(par.wedge) - par.wedge.mu_B) * force_for(value, par)
     i = 0.5 * force * roller_screw.slope(par.screw) / par.motor_1.K_ref

@@ -9,14 +9,27 @@ from bywire.analysis.loops.wedge_causes import CAUSES
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_control import Stimulus
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_start import memory_at, state_at
+from bywire.assemblies.wedge_start import memory_at, state_at, travel_for
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
 
 def point(par: ParameterSet, value: float) -> Point:
-    """Return the wedge at a travel [m] within the clearance, preloaded between the screws."""
+    """Return the wedge at a travel [m] within the clearance, preloaded between the screws.
+
+    Raises
+    ------
+    ParameterError
+        When the pads would press.
+    """
     own = cast(WedgeParameters, par.replace({"command.mode": "position"}))
+    free = min(travel_for(0.0, own), own.wedge.x_stop)
+    if not abs(value) < free:
+        raise ParameterError(
+            f"wedge travel = {value * 1e3:g} mm is out of the clearance: it must be between "
+            f"{-free * 1e3:.3g} and {free * 1e3:.3g} mm"
+        )
     memory = memory_at(value, own)
     stimulus = zeros(Stimulus)._replace(
         theta_1_set=memory.theta_1_ref, theta_2_set=memory.theta_2_ref
