@@ -84,9 +84,9 @@ def test_verdicts_without_notes_are_narrow() -> None:
         ReproductionRow("area", None, 0.068, "1"),
     ]
     assert texts(verdict_table(rows)) == [
-        ["overshoot", "<= 15 %", "5.1 %", "agrees"],
-        ["pole", "0.866 Hz", "1.3 Hz", "disagrees"],
-        ["area", "-", "0.068", "-"],
+        ["overshoot", "requirement", "<= 15 %", "5.1 %", "agrees"],
+        ["pole", "", "0.866 Hz", "1.3 Hz", "disagrees"],
+        ["area", "", "-", "0.068", "-"],
     ]
 
 

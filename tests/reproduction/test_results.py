@@ -49,7 +49,7 @@ def made_up() -> Reproduction:
 
 def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
     content = as_json(made_up)
-    assert list(content) == ["source", "items"]
+    assert list(content) == ["source", "items", "in_short"]
     assert all(list(item) == KEYS for item in content["items"])
     json.dumps(content, allow_nan=False)
     assert [item["computed"] for item in content["items"]] == [7.6, None, None]
@@ -73,13 +73,13 @@ def test_verdicts_are_counted_for_each_parameter_set() -> None:
     assert tallies(items) == {"": Tally(1, 0, 1), "other": Tally(0, 1, 0)}
 
 
-@pytest.mark.parametrize("width", [40, 80, 200])
+@pytest.mark.parametrize("width", [50, 80, 200])
 def test_terminal_shows_verdicts_then_causes_counts_and_the_report(
     made_up: Reproduction, width: int
 ) -> None:
     lines = terminal_text(made_up, width, "report: here").splitlines()
-    assert lines[0].split() == ["statement", "stated", "computed", "verdict"]
-    assert lines[2].split() == ["t.K", "10.1", "bar/A", "7.6", "bar/A", "disagrees"]
+    assert lines[0].split() == ["statement", "kind", "stated", "computed", "verdict"]
+    assert lines[2].split() == ["t.K", "printed", "10.1", "bar/A", "7.6", "bar/A", "disagrees"]
     assert max(map(len, lines)) <= width + 8
     assert lines[-1] == "report: here"
     rest = " ".join(lines[lines.index("In short") :])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -87,17 +88,18 @@ def frequency_response(
         When a trajectory leaves the numbers.
     """
     require_measurable(run, sweep)
-    signals = (sweep.output, *sweep.flags)
     variations = dict(sweep.variations or {})
     matrix = case_matrix(run, variations) if variations else _own(run)
     variants, sizes = matrix.shape[1], np.asarray(sweep.amplitudes, dtype=float)
     plans = [sine_window(run, f, sweep) for f in sweep.frequencies]
     cases, each = np.repeat(matrix, sizes.size, axis=1), np.tile(sizes, variants)
 
+    stop = threading.Event()
+
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
         own = replace(run, duration=window, record=interval(run))
-        found = _repeated(own, sweep, cases, each, periods, signals, lanes)
+        found = _repeated(own, sweep, cases, each, periods, lanes, stop)
         measured = _measured(found, each, periods, sweep.flags)
         return {name: value.reshape(variants, sizes.size) for name, value in measured.items()}
 
@@ -108,7 +110,10 @@ def frequency_response(
             done.append(one)
             if progress is not None:
                 progress("frequency response", (k + 1) / len(plans))
-    finally:  # an interrupt waits for what runs, and starts nothing more
+    except KeyboardInterrupt:
+        stop.set()  # for the threads, which it does not reach
+        raise
+    finally:  # waits for what runs, and starts nothing more
         pool.shutdown(cancel_futures=True)
     return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
 
@@ -123,8 +128,8 @@ def _repeated(
     matrix: Array,
     sizes: Array,
     periods: int,
-    signals: tuple[str, ...],
     lanes: bool,
+    stop: threading.Event,
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
     columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
@@ -142,8 +147,8 @@ def _repeated(
         # A matrix product would start the threads of a linear algebra library within ours.
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 
-    tolerance, most = sweep.tolerance, sweep.most
-    return repeat(own, matrix, stimuli, signals, figures, tolerance, most, lanes=lanes)
+    signals, tolerance, most = (sweep.output, *sweep.flags), sweep.tolerance, sweep.most
+    return repeat(own, matrix, stimuli, signals, figures, tolerance, most, lanes=lanes, stop=stop)
 
 
 def _measured(

@@ -8,6 +8,8 @@ from collections.abc import Sequence
 
 from bywire.analysis.response_dataset import Sweep
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.signals import signals_of
+from bywire.core.units import shown
 from bywire.simulation.run import Run
 
 _LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
@@ -31,9 +33,12 @@ def require_measurable(run: Run, sweep: Sweep) -> None:
     for name in (sweep.output, *sweep.flags):
         if name not in run.model.Output._fields:
             raise unknown_name("signal", name, run.model.Output._fields)
-    for kind, values in (("frequencies", sweep.frequencies), ("amplitudes", sweep.amplitudes)):
+    unit = signals_of(run.model.Stimulus)[sweep.inputs[0]].unit
+    wanted = (("frequencies", sweep.frequencies, "Hz"), ("amplitudes", sweep.amplitudes, unit))
+    for kind, values, symbol in wanted:
         if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
-            raise ParameterError(f"{kind} = {list(values)}: positive numbers are wanted")
+            given = ", ".join(shown(float(v), symbol) for v in values) or "none"
+            raise ParameterError(f"{kind} = {given}: positive numbers are wanted")
     # Of the slowest: which controller takes the input is not known here.
     nyquist = 0.5 / max(task.period for task in run.model.tasks(run.par))
     highest = max(sweep.frequencies)

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any, get_origin
 
 from bywire.core import units
-from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 
 _ZERO = re.compile(r"\s*[+-]?(?:0+\.?0*|\.0+)\s*")
@@ -114,7 +114,17 @@ def require_unit(value: Any, symbol: str, name: str) -> None:
 def _quantity(value: Any, symbol: str, name: str) -> float:
     if isinstance(value, str) and _ZERO.fullmatch(value):
         return 0.0
-    return units.parse(value, symbol, name)
+    number = units.parse(value, symbol, name)
+    if not isinstance(value, str):
+        return number
+    unit = units.split(value)[1]
+    # Parameters hold differences of temperature alone: 40 degC would be taken as 313.15 K.
+    if symbol == "K" and unit != symbol and units.has_own_zero(unit, symbol):
+        raise UnitError(
+            f"{name} = {value!r}: a temperature difference is wanted, in K; "
+            f"write for instance {units.example(symbol)!r}"
+        )
+    return units.Written(number, value)
 
 
 def _is_table(cls: type[ParameterSet], name: str) -> bool:

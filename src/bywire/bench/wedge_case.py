@@ -16,6 +16,7 @@ from bywire.assemblies.wedge_start import memory_at, state_at
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import energy_residual
+from bywire.bench.wedge_rows import along_disc
 from bywire.control.moment_control import PARKED
 from bywire.plant import wedge
 
@@ -78,7 +79,7 @@ def steps(t: Array, levels: Mapping[float, float]) -> Array:
 
 
 def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
-    """Return the key figures of a braking that begins at time zero.
+    """Return the key figures of a braking that begins at time zero, in the disc's direction.
 
     Parameters
     ----------
@@ -87,6 +88,7 @@ def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
     end
         Time [s] at which the demand changes for the first time.
     """
+    run = along_disc(run)
     after = run.sel(time=slice(-1e-9, None))
     held = run.sel(time=slice(-1e-9, end + 1e-9))
     peak = int(np.argmax(held["U_caliper"].values))
@@ -94,7 +96,7 @@ def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
     work = float(held["W_disc"].values[peak] - held["W_disc"].values[0])
     share = 100.0 * work / stored if stored > 0 else math.nan
     texts: dict[str, tuple[float, str]] = {
-        "contact_time": (first(held, "F_N", 0.0), "Time until the pads press on the disc."),
+        "contact_time": (_contact(held), "Time until the pads press on the disc."),
         "time_to_90": (first(held, "y_M", 0.9 * target),
                        "Time until the moment sensor first shows 90 % of the demand."),
         "peak_power": (float(after["P_in"].max()), "Largest power at the drives' input."),
@@ -111,7 +113,22 @@ def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
         "energy_left": (float(np.abs(energy_residual(run)).max()),
                         "Largest residual of the energy balance: the step's error."),
     }  # fmt: skip
-    return tuple(_kpi(name, *texts[name]) for name in UNITS)
+    problem = "the level is never reached in time"
+    problems = dict.fromkeys(UNITS, problem) | {"disc_share": "the caliper stores no energy"}
+    return tuple(
+        figure(name, texts[name][0], unit, texts[name][1], problems[name])
+        for name, unit in UNITS.items()
+    )
+
+
+def _contact(held: xr.Dataset) -> float:
+    """Return when the pads first press [s]; without clearance they touch from the start."""
+    return 0.0 if parameters_of(held).caliper.clearance == 0.0 else first(held, "F_N", 0.0)
+
+
+def figure(name: str, value: float, unit: str, text: str, problem: str) -> Kpi:
+    """Return a key figure; one that is no number says which problem left it undefined."""
+    return Kpi(name, value, unit, text, "" if math.isfinite(value) else problem)
 
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
@@ -129,7 +146,9 @@ def release_time(run: xr.Dataset, begin: float, name: str = "release_time") -> K
     after = run.sel(time=slice(begin - 1e-9, None))
     pressing = np.flatnonzero(after["F_N"].values > 0)
     value, note = math.nan, ""
-    if not pressing.size:
+    if not after.sizes["time"]:
+        note = "no row of the recording lies after the demand"
+    elif not pressing.size:
         note = "the pads do not press when the demand falls"
     elif pressing[-1] + 1 == after.sizes["time"]:
         note = "the pads press until the end of the recording"
@@ -153,28 +172,25 @@ def first(run: xr.Dataset, name: str, level: float) -> float:
     """Return when a signal first exceeds a level [s], interpolated; NaN where it never does."""
     t, y = run["time"].values, run[name].values
     above = np.flatnonzero(y > level)
-    if above.size == 0 or above[0] == 0:
+    if above.size == 0:
         return math.nan
     k = int(above[0])
-    if level == 0.0:
+    if k == 0 or level == 0.0:
         return float(t[k])
     return float(t[k - 1] + (level - y[k - 1]) / (y[k] - y[k - 1]) * (t[k] - t[k - 1]))
 
 
 def mean(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the mean of a signal between two times [s]."""
-    return float(run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).mean())
+    """Return the mean of a signal between two times [s]; NaN where no row lies there."""
+    values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
+    return float(values.mean()) if values.size else math.nan
 
 
 def swing(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the peak-to-peak value of a signal between two times [s]."""
-    return float(np.ptp(run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values))
+    """Return the peak-to-peak value of a signal between two times [s]; NaN where no row is."""
+    values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
+    return float(np.ptp(values)) if values.size else math.nan
 
 
 def _gained(run: xr.Dataset, name: str) -> float:
     return float(run[name].values[-1] - run[name].values[0])
-
-
-def _kpi(name: str, value: float, text: str) -> Kpi:
-    note = "" if math.isfinite(value) else "the level is never reached in time"
-    return Kpi(name, value, UNITS[name], text, note)

@@ -78,7 +78,11 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
             "commas"
         )
     low, high = (number(part, unit, name) for part in parts[:2])
-    if not low < high or (logarithmic and low <= 0):
+    if logarithmic and low <= 0:
+        raise ParameterError(
+            f"{name} = {text!r}: the range is logarithmic, and must start above 0 {unit}"
+        )
+    if not low < high:
         raise ParameterError(f"{name} = {text!r}: the first value must be below the second")
     between = np.geomspace if logarithmic else np.linspace
     return [float(one) for one in between(low, high, int(parts[2]))]

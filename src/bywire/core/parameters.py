@@ -23,6 +23,7 @@ from pydantic.fields import FieldInfo
 
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.quantities import Unit
+from bywire.core.units import Written, convert, split
 
 T = TypeVar("T", bound="ParameterSet")
 
@@ -41,12 +42,19 @@ class Leaf:
     @property
     def range_text(self) -> str:
         """Admissible range as a user reads it, for instance ``> 0 ohm``."""
-        unit = "" if self.unit.symbol == "1" else f" {self.unit.symbol}"
+        return self.range_in(self.unit.symbol)
+
+    def range_in(self, symbol: str) -> str:
+        """Return the admissible range in a unit of the same dimension."""
+        unit = "" if symbol == "1" else f" {symbol}"
+        low, high = self.low, self.high
         parts = []
-        if not math.isinf(self.low):
-            parts.append(f"{'>' if self.low_open else '>='} {self.low:g}{unit}")
-        if not math.isinf(self.high):
-            parts.append(f"{'<' if self.high_open else '<='} {self.high:g}{unit}")
+        if not math.isinf(low):
+            low = convert(low, self.unit.symbol, symbol)
+            parts.append(f"{'>' if self.low_open else '>='} {low:g}{unit}")
+        if not math.isinf(high):
+            high = convert(high, self.unit.symbol, symbol)
+            parts.append(f"{'<' if self.high_open else '<='} {high:g}{unit}")
         return " and ".join(parts) or f"any finite number{unit and ' in' + unit}"
 
 
@@ -62,7 +70,7 @@ class ParameterSet(BaseModel):
 
     @classmethod
     def create(cls, values: Mapping[str, Any]) -> Self:
-        """Build the set from dotted names.
+        """Build the set from dotted names; of numbers that are `Written`, errors say how.
 
         Raises
         ------
@@ -72,14 +80,15 @@ class ParameterSet(BaseModel):
             With the nearest known names.
         """
         tree: dict[str, Any] = {}
+        texts: dict[str, str] = {}
         for name, value in values.items():
             _require_known(cls, name)
             *groups, last = name.split(".")
             node = tree
             for group in groups:
                 node = node.setdefault(group, {})
-            node[last] = value
-        return _validated(cls, tree)
+            node[last] = _plain(name, value, texts)
+        return _validated(cls, tree, texts)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with other values at dotted names, validated again."""
@@ -205,18 +214,29 @@ def _require_known(cls: type[ParameterSet], name: str) -> None:
         raise unknown_name("parameter", name, (*leaves, *choices))
 
 
-def _validated(cls: type[T], tree: Mapping[str, Any]) -> T:
+def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
+    """Return a value without the texts that it was written as, which are put aside by name."""
+    if isinstance(value, tuple):
+        return tuple(_plain(f"{name}.{k}", node, texts) for k, node in enumerate(value))
+    if isinstance(value, Written):
+        texts[name] = value.text
+        return float(value)
+    return value
+
+
+def _validated(cls: type[T], tree: Mapping[str, Any], texts: Mapping[str, str]) -> T:
     try:
         return cls.model_validate(tree)
     except ValidationError as error:
         found: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
         places = {detail["loc"][:-1] for detail in found}
         # A table with a wrong node also counts as too short: the node alone is worth a line.
-        lines = [_explain(cls, d) for d in found if not (_is_length(d) and d["loc"] in places)]
+        found = [d for d in found if not (_is_length(d) and d["loc"] in places)]
+        lines = [_explain(cls, detail, texts) for detail in found]
         raise ParameterError("\n".join(lines)) from None
 
 
-def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
+def _explain(cls: type[ParameterSet], detail: dict[str, Any], texts: Mapping[str, str]) -> str:
     name = ".".join(str(part) for part in detail["loc"])
     value, kind = detail["input"], detail["type"]
     if kind == "missing":
@@ -226,14 +246,24 @@ def _explain(cls: type[ParameterSet], detail: dict[str, Any]) -> str:
     leaves = leaf_fields(cls)
     leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
     if leaf is not None and kind != "value_error" and not _is_length(detail):
-        unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
         wanted = "a whole number, " if kind.startswith("int") else ""
-        return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}"
+        return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
     if kind == "too_short":
         return f"{name}: at least {detail['ctx']['min_length']} wanted, got {quoted(value)}"
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
     given = "" if isinstance(value, dict) else f", got {quoted(value)}"
     return f"{name or cls.__name__}: {message}{given}"
+
+
+def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> str:
+    symbol = leaf.unit.symbol
+    number, written = split(text)
+    if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
+        refused = f"{name} = {number} {written} is not admissible"
+        return f"{refused}: it must be {wanted}{leaf.range_in(written)}"
+    unit = "" if symbol == "1" else f" {symbol}"
+    got = "" if written in ("", symbol) else f", got {quoted(text)}"
+    return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}{got}"
 
 
 _BOOL, _TEXT = "it must be true or false", "it must be a text"

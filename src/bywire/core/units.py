@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
 from bywire.core.errors import ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
@@ -32,6 +32,8 @@ _COMMON: dict[str, tuple[float, str]] = {
     "N": (1.0, "N"),
     "Hz": (1.0, "Hz"),
     "ohm": (1.0, "ohm"),
+    "rad": (1.0, "rad"),
+    "deg": (math.pi / 180.0, "rad"),
     "%": (1e-2, "1"),
     "": (1.0, "1"),
 }
@@ -43,7 +45,32 @@ _FACTOR = rf"(?:{_POWER}|\({_POWER}(?: *[*·] *{_POWER})*\))"
 _UNIT = re.compile(rf"(?:1? */ *)?{_FACTOR}(?:(?: *[*/·] *| +){_FACTOR})*")
 _MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
 _LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
-_RATES = ("Hz", "rad/s")  # pint takes rad as a pure number and would turn 60 rpm into 6.28 Hz
+# pint takes rad as a pure number: it would turn 60 rpm into 6.28 Hz, and 1 into 57 degrees.
+_NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1")
+
+
+class Written(float):
+    """A number in SI that remembers how it was written, for errors to repeat.
+
+    Parameters
+    ----------
+    value
+        The number, SI.
+    text
+        What it was read from, for instance ``"-0.02mm"``.
+    """
+
+    text: str
+
+    def __new__(cls, value: float, text: str = "") -> Self:
+        """Return the number with its text."""
+        made = super().__new__(cls, value)
+        made.text = text
+        return made
+
+    def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
+        """Return what a copy is made of."""
+        return float(self), self.text
 
 
 @cache
@@ -112,9 +139,10 @@ def _number(text: str, symbol: str, name: str) -> float:
 
     try:
         quantity = registry().Quantity(size, _as_pint(unit))
-        if symbol in _RATES and _base(quantity) != _base(registry().Quantity(1.0, symbol)):
+        wanted = registry().Quantity(1.0, "" if symbol == "1" else symbol)
+        if symbol in _NO_MATTER_OF_RAD and _base(quantity) != _base(wanted):
             raise pint.DimensionalityError(unit, symbol)
-        return _rounded(float(quantity.to("" if symbol == "1" else symbol).magnitude))
+        return _rounded(float(quantity.to(wanted.units).magnitude))
     except pint.DimensionalityError:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
@@ -125,6 +153,23 @@ def _number(text: str, symbol: str, name: str) -> float:
             f"{name} = {text!r}: the unit {unit!r} is not known; "
             f"write for instance {example(symbol)!r}"
         ) from None
+
+
+def split(text: str) -> tuple[str, str]:
+    """Return number and unit of a text that `parse` has read.
+
+    Examples
+    --------
+    >>> split("95deg")
+    ('95', 'deg')
+    """
+    match = _NUMBER.fullmatch(text)
+    return (match[1], match[2]) if match else (text, "")
+
+
+def has_own_zero(unit: str, symbol: str) -> bool:
+    """Return whether zero of a unit is not zero in an SI unit: of degC and degF in K."""
+    return parse(f"0 {unit}", symbol, unit) != 0.0
 
 
 def _base(quantity: Any) -> Any:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
-from pydantic import Field, field_validator
+from pydantic import Field
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
@@ -29,17 +29,6 @@ class Parameters(ParameterSet):
     """return spring toward the middle; 0 for none"""
     x_stop: Length
     """travel at which the end stops stand, on either side"""
-
-    @field_validator("alpha", mode="before")
-    @classmethod
-    def _acute(cls, alpha: Any) -> Any:
-        """Refuse what is no wedge, in degrees too, as drawings have them."""
-        if isinstance(alpha, (int, float)) and not 0 < alpha < 0.5 * math.pi:
-            raise ValueError(
-                f"{alpha} rad, {math.degrees(alpha):g} degrees, is not admissible: it must be "
-                "> 0 rad and < 1.5708 rad, between 0 and 90 degrees"
-            )
-        return alpha
 
 
 class State(NamedTuple):

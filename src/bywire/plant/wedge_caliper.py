@@ -63,10 +63,10 @@ def _require_rising(name: str, unit: str, nodes: Table) -> None:
     wanted = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"
     if len(nodes) < 2 or nodes[0] != 0.0:
         raise ValueError(f"{wanted}: it holds {len(nodes)}, the first is {nodes[0]:g} {unit}")
-    for k, (a, b) in enumerate(pairwise(nodes), 1):
+    for k, (a, b) in enumerate(pairwise(nodes), 2):
         if b <= a:
             raise ValueError(
-                f"{wanted}, but node {k} is {b:g} {unit} after {a:g} {unit}: sort the nodes, and "
+                f"{wanted}, but {b:g} {unit} follows {a:g} {unit} as node {k} of {len(nodes)}: sort the nodes, and "
                 "leave out those where the curve does not rise"
             )
 

@@ -165,15 +165,16 @@ def reproduction_table(rows: Iterable[ReproductionRow]) -> Table:
 
 
 def verdict_table(rows: Iterable[ReproductionRow]) -> Table:
-    """Return the same without kinds, tolerances and notes, narrow enough for a terminal."""
+    """Return the same without tolerances and notes, narrow enough for a terminal."""
     return Table(
         (
-            Column("statement"), Column("stated", numeric=True), Column("computed", numeric=True),
-            Column("verdict"),
+            Column("statement"), Column("kind"), Column("stated", numeric=True),
+            Column("computed", numeric=True), Column("verdict"),
         ),
         tuple(
             (
                 Cell(clean(row.id)),
+                Cell(clean(row.kind)),
                 Cell(_stated(row)),
                 Cell(amount(row.computed, row.unit)),
                 _judged(row.agrees, "agrees", "disagrees"),

@@ -12,6 +12,7 @@ from bywire.core.errors import FileError
 from bywire.data.netcdf import write_recording
 from bywire.report.files import save_figure, write_bytes
 from bywire.report.tables import Table, verdict_table
+from bywire.reproduction.in_short import in_short
 from bywire.reproduction.report_page import reproduction_row, write_report
 from bywire.reproduction.reproduction import Reproduction
 
@@ -23,8 +24,8 @@ def as_json(reproduction: Reproduction) -> dict[str, Any]:
     -------
     dict
         ``{"source", "items": [{"id", "unit", "stated", "computed", "tolerance", "agrees",
-        "note"}]}``. What is not stated, not computed or not defined is None; a tolerance is a
-        number in the item's unit, or ``"<="`` or ``">="`` where the statement is a bound. The
+        "note"}], "in_short"}``. What is not stated, not computed or not defined is None; a
+        tolerance is a number in the item's unit, or ``"<="`` or ``">="`` where the statement is a bound. The
         note ends with the kind of statement.
     """
     return {
@@ -43,6 +44,7 @@ def as_json(reproduction: Reproduction) -> dict[str, Any]:
             }
             for item in reproduction.items
         ],
+        "in_short": list(in_short(reproduction)),
     }
 
 

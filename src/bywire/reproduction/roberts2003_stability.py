@@ -62,9 +62,12 @@ def _static(runs: Runs) -> list[Item]:
     items = []
     for mu_B in COEFFICIENTS:
         stated = values[f"C_star_closed_{tag(mu_B)}"]
-        where = "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B)"
+        where = (
+            "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), read as its value at our "
+            "wedge angle"
+        )
         items.append(
-            compared(f"stability.C.{tag(mu_B)}", Fact(stated, "1", where),
+            compared(f"stability.C.{tag(mu_B)}", Fact(stated, "1", where, "reading"),
                      values[f"C_star_{tag(mu_B)}"], FORMULA.around(stated),
                      f"mu_B = {mu_B:g}, simulated without friction, "
                      f"F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 Nm; with friction "

@@ -89,8 +89,9 @@ class LaneKernel:
         vector: Array,
         rows: Array,
         end: int,
+        begin: int = 0,
     ) -> None:
-        """Run the frames of one group up to ``end``; renews ``vector`` and fills ``rows``.
+        """Run frames begin..end of one group; renews ``vector`` and fills ``rows``.
 
         Parameters
         ----------
@@ -101,12 +102,12 @@ class LaneKernel:
         vector
             State vectors, shape (entries, lanes).
         rows
-            Shape (lanes, recorded rows, signals).
+            Shape (lanes, recorded rows of these frames, signals).
         """
         own = stimulus.ndim == 3
         plan = np.concatenate(
             (
-                plan_array(schedule, 0, end, self._signals),
+                plan_array(schedule, begin, end, self._signals),
                 [int(own), rows.strides[0] // rows.itemsize],
             )
         ).astype(np.int64)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -22,9 +23,13 @@ from bywire.simulation.schedule import Schedule
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Figures = Callable[[Array], Complex]
+Advance = Callable[[Array, Array, Array, Array, int, int], None]
 
 KEPT = 8
 """windows whose figures are kept: the last ones"""
+CHUNK = 10_000
+"""substeps after which an interrupt is looked for: tens of milliseconds compiled, a second without
+a compiler"""
 
 
 @dataclass(frozen=True)
@@ -64,6 +69,7 @@ def repeat(
     most: int,
     *,
     lanes: bool = True,
+    stop: threading.Event | None = None,
 ) -> Repeated:
     """Run every case window after window until all cases of its group of lanes repeat.
 
@@ -89,6 +95,8 @@ def repeat(
         Windows after which a case is given up, >= 2.
     lanes
         False: one case after another on one core, as in a simulator without ensembles.
+    stop
+        Once it is set, from another thread, what runs ends within a moment.
 
     Raises
     ------
@@ -98,6 +106,8 @@ def repeat(
         When the shapes do not fit.
     SolverError
         When a trajectory leaves the numbers.
+    KeyboardInterrupt
+        When ``stop`` was set.
     """
     schedule = window_schedule(run)
     count = matrix.shape[1]
@@ -115,11 +125,14 @@ def repeat(
         kernel = lane_kernel(prepared.program, compiler, tuple(selection.tolist()))
         width = kernel.lanes
 
-        def advance(p: Array, u: Array, vector: Array, values: Array) -> None:
-            kernel.advance(open_end, p, u, vector, values, open_end.frames - 1)
+        def advance(
+            p: Array, u: Array, vector: Array, values: Array, begin: int, end: int
+        ) -> None:
+            kernel.advance(open_end, p, u, vector, values, end, begin)
 
     layout = prepared.engine("auto").layout
     start = initial_vector(layout, run.state, run.memory)
+    stopped = threading.Event() if stop is None else stop
 
     def group(first: int) -> tuple[Array, Complex, int, NDArray[np.bool_], Array]:
         lane = np.minimum(np.arange(first, first + width), count - 1)
@@ -131,7 +144,7 @@ def repeat(
         same = np.zeros(width, dtype=bool)
         windows = 0
         while windows < most and not same.all():
-            advance(columns, u, vector, now)
+            _advance_window(advance, schedule, stopped, columns, u, vector, now)
             require_finite(layout, vector, f"one of cases {first} to {lane[-1]} left the numbers")
             windows += 1
             seen = [*seen[1 - KEPT :], figures(now)]
@@ -139,8 +152,14 @@ def repeat(
                 same = _same(seen[-2], seen[-1], tolerance)
         return now, _padded(seen), windows, same, vector[layout.start["counters"]]
 
-    with ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1) as pool:
+    pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
+    try:
         done = list(pool.map(group, range(0, count, width)))
+    except KeyboardInterrupt:
+        stopped.set()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
     times = np.arange(schedule.frames // schedule.record_frames) * schedule.record_frames
     return Repeated(
         time=np.asarray(times * schedule.frame, dtype=np.float64),
@@ -150,6 +169,27 @@ def repeat(
         repeats=np.concatenate([same for *_, same, _ in done])[:count],
         unsettled=np.concatenate([counters for *_, counters in done])[:count].astype(np.int64),
     )
+
+
+def _advance_window(
+    advance: Advance,
+    schedule: Schedule,
+    stop: threading.Event,
+    p: Array,
+    u: Array,
+    vector: Array,
+    values: Array,
+) -> None:
+    """Run one window in parts, so that it can be stopped; renews vector and values in place."""
+    every = schedule.record_frames
+    rows = max(CHUNK // (schedule.substeps * every), 1)
+    for first in range(0, values.shape[1], rows):
+        if stop.is_set():
+            raise KeyboardInterrupt
+        last = min(first + rows, values.shape[1])
+        part = np.empty((values.shape[0], last - first, values.shape[2]))
+        advance(p, u, vector, part, first * every, last * every)
+        values[:, first:last] = part
 
 
 def _same(before: Complex, now: Complex, tolerance: float) -> NDArray[np.bool_]:
@@ -184,15 +224,15 @@ def window_schedule(run: Run) -> Schedule:
 
 def _one_by_one(
     run: Run, schedule: Schedule, selection: NDArray[np.int32]
-) -> Callable[[Array, Array, Array, Array], None]:
+) -> Advance:
     """Serve without a compiler: one lane, slowly."""
     engine = prepare(run.model, run.par).engine("auto")
 
-    def advance(p: Array, u: Array, vector: Array, values: Array) -> None:
+    def advance(p: Array, u: Array, vector: Array, values: Array, begin: int, end: int) -> None:
         column = vector[:, 0].copy()
         stimulus = np.ascontiguousarray(u[:, :, 0])
         request = Request(schedule, np.ascontiguousarray(p[:, 0]), stimulus, selection)
-        engine.advance(request, column, 0, schedule.frames - 1, values[0])
+        engine.advance(request, column, begin, end, values[0])
         vector[:, 0] = column
 
     return advance

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-import math
-
-import numpy as np
-
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.bench.wedge_case import UNITS, braking, case_from_parked, steps
-from bywire.control.moment_control import PARKED, SomeMoment, SpeedLimit
+from bywire.bench.wedge_case import (
+    UNITS,
+    braking,
+    case_from_parked,
+    parking_time,
+    release_time,
+    steps,
+)
+from bywire.bench.wedge_rows import along_disc
+from bywire.control.moment_control import SomeMoment, SpeedLimit
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 
@@ -45,23 +49,13 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of the braking and of the release."""
-    run = recordings["run"]
-    after = run.sel(time=slice(options.t_pulse - 1e-9, None))
-    t = after["time"].values - options.t_pulse
-    pressing = np.flatnonzero(after["F_N"].values > 0)
-    free = float(t[pressing[-1]]) if pressing.size and pressing[-1] + 1 < t.size else math.nan
-    parked = np.flatnonzero(after["mode"].values == PARKED)
-    home = float(t[parked[0]]) if parked.size else math.nan
+    run = along_disc(recordings["run"])
     own = (
         Kpi("peak_moment", float(run["M_B"].max()), "N*m", "Largest moment."),
         Kpi("peak_angle", float(run["theta_ref"].max()), "rad",
             "Largest common reference of both motors, from the parking position."),
-        Kpi("release_time", free, "s",
-            "Time from the pulse's end until the pads leave the disc.",
-            "" if math.isfinite(free) else "the pads press until the end of the recording"),
-        Kpi("parking_time", home, "s",
-            "Time from the pulse's end until the brake is parked.",
-            "" if math.isfinite(home) else "not parked until the end of the recording"),
+        release_time(run, options.t_pulse),
+        parking_time(run, options.t_pulse),
     )  # fmt: skip
     return (*braking(run, options.M_high, options.t_pulse), *own)
 

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
+import xarray as xr
 from pydantic import Field
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.bench.wedge_case import UNITS, braking, case_from_parked, mean, steps, swing
+from bywire.bench.wedge_case import (
+    UNITS,
+    braking,
+    case_from_parked,
+    figure,
+    mean,
+    steps,
+    swing,
+)
+from bywire.bench.wedge_rows import along_disc, last_turn, too_coarse
 from bywire.control.moment_control import SomeMoment
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Fraction, Unit
@@ -58,23 +69,35 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of the braking, of its hold and of its pulses."""
-    run = recordings["run"]
+    run = along_disc(recordings["run"])
     begin, end = 0.5 * options.t_hold, options.t_hold
-    low_end = options.t_hold + options.t_low
-    hold = mean(run, "M_B", begin, end)
-    fallen = mean(run, "M_B", low_end - 0.2 * options.t_low, low_end)
+    held = too_coarse(run, begin, end)
+    hold, power = (math.nan if held else mean(run, name, begin, end) for name in ("M_B", "P_in"))
+    ripple = math.nan if held else swing(run, "M_B", begin, end)
     own = (
-        Kpi("hold_moment", hold, "N*m", "Mean moment in the second half of the hold."),
-        Kpi("hold_ripple", swing(run, "M_B", begin, end), "N*m",
-            "Moment peak to peak in the second half of the hold: the disc's run-out."),
-        Kpi("hold_power", mean(run, "P_in", begin, end), "W",
-            "Mean input power in the second half of the hold, standby included."),
-        Kpi("brake_power", hold * mean(run, "Omega", begin, end), "W",
-            "Mean braking power in the second half of the hold."),
-        Kpi("pulse_moment", fallen, "N*m",
-            "Mean moment in the last fifth of the first pulse."),
+        figure("hold_moment", hold, "N*m", "Mean moment in the second half of the hold.", held),
+        figure("hold_ripple", ripple, "N*m",
+               "Moment peak to peak in the second half of the hold: the disc's run-out.", held),
+        figure("hold_power", power, "W",
+               "Mean input power in the second half of the hold, standby included.", held),
+        figure("brake_power", hold * mean(run, "Omega", begin, end), "W",
+               "Mean braking power in the second half of the hold.", held),
+        _pulse(run, options),
     )  # fmt: skip
     return (*braking(run, options.M_high, options.t_hold), *own)
+
+
+def _pulse(run: xr.Dataset, options: Options) -> Kpi:
+    """Return the moment in the first pulse; over less than a revolution the run-out would show."""
+    end = options.t_hold + options.t_low
+    turn = last_turn(run, options.t_hold, end)
+    begin = end - 0.2 * options.t_low if turn is None else turn
+    problem = too_coarse(run, begin, end)
+    return figure(
+        "pulse_moment", math.nan if problem else mean(run, "M_B", begin + 2e-9, end - 2e-9), "N*m",
+        "Mean moment over the disc's last revolution of the first pulse; over the pulse's last "
+        "fifth where it is shorter.", problem,
+    )  # fmt: skip
 
 
 EXPERIMENT = Experiment(

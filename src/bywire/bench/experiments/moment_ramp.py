@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
+import xarray as xr
+from pydantic import model_validator
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.bench.wedge_case import UNITS, Array, braking, case_from_parked, steps
+from bywire.bench.wedge_case import UNITS, Array, braking, case_from_parked, figure, steps
+from bywire.bench.wedge_rows import along_disc, too_coarse
 from bywire.control.moment_control import SomeMoment
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+
+_ROWS = 10  # fewest on the ramp
 
 
 class Options(ParameterSet):
@@ -31,6 +38,15 @@ class Options(ParameterSet):
     """time recorded after the ramp"""
     settle: Duration
     """time parked before the step"""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Options:
+        if self.M_low > self.M_high:
+            raise ValueError(
+                f"M_low = {self.M_low:g} N*m must not be above M_high = {self.M_high:g} N*m: "
+                "the ramp rises from M_low to M_high"
+            )
+        return self
 
 
 def demand(t: Array, options: Options) -> Array:
@@ -54,19 +70,28 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of the braking, and how well the ramp is followed."""
-    run = recordings["run"]
+    run = along_disc(recordings["run"])
     begin = options.t_hold + options.t_low
-    ramp = run.sel(time=slice(begin - 1e-9, begin + options.t_ramp + 1e-9))
-    error = (ramp["M_set"] - ramp["M_B"]).values
-    t = ramp["time"].values
-    slope = float(np.polyfit(t, ramp["M_B"].values, 1)[0])
+    end = begin + options.t_ramp
+    problem = too_coarse(run, begin, end, _ROWS)
+    mean, rms, slope = (math.nan,) * 3 if problem else _followed(run, begin, end)
     own = (
-        Kpi("ramp_error_mean", float(error.mean()), "N*m", "Mean of demand less moment, ramp."),
-        Kpi("ramp_error_rms", float(np.sqrt(np.mean(error**2))), "N*m",
-            "Root mean square of demand less moment on the ramp; the run-out is in it."),
-        Kpi("ramp_slope", slope, "N*m/s", "Slope of a line through the moment on the ramp."),
+        figure("ramp_error_mean", mean, "N*m", "Mean of demand less moment, ramp.", problem),
+        figure("ramp_error_rms", rms, "N*m",
+               "Root mean square of demand less moment on the ramp; the run-out is in it.",
+               problem),
+        figure("ramp_slope", slope, "N*m/s", "Slope of a line through the moment on the ramp.",
+               problem),
     )  # fmt: skip
     return (*braking(run, options.M_high, options.t_hold), *own)
+
+
+def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, float]:
+    """Return mean and root mean square of the error [N m], and the moment's slope [N m/s]."""
+    ramp = run.sel(time=slice(begin - 1e-9, end + 1e-9))
+    error = (ramp["M_set"] - ramp["M_B"]).values
+    slope = float(np.polyfit(ramp["time"].values, ramp["M_B"].values, 1)[0])
+    return float(error.mean()), float(np.sqrt(np.mean(error**2))), slope
 
 
 EXPERIMENT = Experiment(

@@ -22,6 +22,7 @@ from bywire.bench.wedge_case import (
     release_time,
     steps,
 )
+from bywire.bench.wedge_rows import along_disc
 from bywire.control.moment_control import SomeMoment
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
@@ -53,7 +54,7 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how fast the moment falls, what drags afterwards, and what the release costs."""
-    run = recordings["run"].sel(time=slice(-1e-9, None))
+    run = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     par = parameters_of(run)
     home = parking_time(run, 0.0)
     parked = run.sel(time=slice(home.value, None)) if math.isfinite(home.value) else None

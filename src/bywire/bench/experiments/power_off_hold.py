@@ -11,6 +11,7 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.bench.wedge_case import case_from_parked, steps
+from bywire.bench.wedge_rows import along_disc
 from bywire.control.moment_control import SomeMoment
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
@@ -40,7 +41,7 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how far the brake relaxes, when it rests, and whether it creeps afterwards."""
-    after = recordings["run"].sel(time=slice(-1e-9, None))
+    after = along_disc(recordings["run"]).sel(time=slice(-1e-9, None))
     t, x, stuck = (after[name].values for name in ("time", "x", "stuck"))
     moving = np.flatnonzero(stuck == 0)
     rest = 0 if moving.size == 0 else int(moving[-1]) + 1
@@ -58,7 +59,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         Kpi("moment_start", float(after["M_B"].values[0]), "N*m", "Moment at power off."),
         Kpi("moment_end", float(after["M_B"].values[-1]), "N*m",
             "Moment at the end; the run-out is in it."),
-        Kpi("preload_end", float(squeeze[-1]), "N", "Preload of the wedge at the end."),
+        Kpi("preload_end", max(0.0, float(squeeze[-1])), "N", "Preload of the wedge at the end."),
         Kpi("end_stop_force", float(F_end.max()), "N", "Largest force of an end stop."),
     )  # fmt: skip
 
