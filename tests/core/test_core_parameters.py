@@ -13,6 +13,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.field_notes import field_notes
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 from bywire.core.quantities import Fraction, Length, Resistance, Unit
+from bywire.core.units import Written
 
 Nodes = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 
@@ -116,6 +117,29 @@ def test_refusal_is_one_line_that_helps(changes, text):
     with pytest.raises(ParameterError) as refused:
         made(**changes)
     assert str(refused.value) == text
+
+
+@pytest.mark.parametrize(
+    ("changes", "text"),
+    [
+        ({"short": Written(-2e-5, "-0.02mm")},
+         "short = -2e-05 m is not admissible: it must be > 0 m, got '-0.02mm'"),
+        ({"share": Written(1.2, "120 %")},
+         "share = 1.2 is not admissible: it must be > 0 and <= 1, got '120 %'"),
+        ({"share": Written(1.2, "1.2")}, "share = 1.2 is not admissible: it must be > 0 and <= 1"),
+        ({"table": (Written(0.0, "0 bar"), Written(-1e5, "-1 bar"))},
+         "table.1 = -100000.0 Pa is not admissible: it must be >= 0 Pa, got '-1 bar'"),
+    ],
+)  # fmt: skip
+def test_refusal_repeats_the_text_as_typed(changes, text):
+    with pytest.raises(ParameterError) as refused:
+        made(**changes)
+    assert str(refused.value) == text
+
+
+def test_texts_are_not_kept():
+    kept = made(short=Written(0.5, "500 mm"), table=(Written(1.0, "1 Pa"),))
+    assert {type(kept.short), type(kept.table[0])} == {float}
 
 
 @pytest.mark.parametrize("name", ["inner.law", "on", "note"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pickle
 import subprocess
 import sys
 import time
@@ -90,6 +91,9 @@ WRONG_UNIT = [
     ("6 Hz", "rad/s", "Hz cannot be rad/s"),
     ("6 1/s", "rad/s", "1/s cannot be rad/s"),
     ("1 Nm", "N", "Nm cannot be N"),
+    ("1", "rad", "a pure number cannot be rad"),
+    ("5 %", "rad", "% cannot be rad"),
+    ("20 deg", "1", "deg cannot be a pure number"),
     ("3 lambda", "1", "lambda cannot be a pure number"),
 ]
 UNKNOWN = ["9 bananas", "9 nan", "9 inf", "9 None", "9 True", "9 def", "9 is not m", "9 import"]
@@ -192,6 +196,11 @@ def test_conversion_and_its_inverse():
     assert units.convert(25e5, "Pa", "bar") == pytest.approx(25.0)
     assert units.convert(1.0, "m**3", "ml") == pytest.approx(1e6)
     assert units.convert(3.0, "A", "A") == 3.0
+
+
+def test_written_number_remembers_its_text_in_copies_too():
+    written = pickle.loads(pickle.dumps(units.Written(2e-5, "20 um")))
+    assert (written, written.text, repr(written)) == (2e-5, "20 um", "2e-05")
 
 
 @pytest.mark.parametrize("home", ["/dev/null/none", "/proc/none"])

@@ -13,12 +13,15 @@ import bywire
 from bywire.cli.main import main
 
 BAD = [
-    ("heart.g_1=-20um", "heart.g_1 = -2e-05 m is not admissible: it must be >= 0 m"),
+    ("heart.g_1=-20um", "heart.g_1 = -2e-05 m is not admissible: it must be >= 0 m, got '-20um'"),
     ("heart.g_12=-1um", "heart.g_12 = -1e-06 m is not admissible: it must be >= 0 m"),
-    ("wedge.alpha=0", "wedge.alpha: 0.0 rad, 0 degrees, is not admissible"),
-    ("wedge.alpha=-5deg", "-5 degrees, is not admissible"),
-    ("wedge.alpha=90deg", "90 degrees, is not admissible: it must be > 0 rad and < 1.5708 rad"),
-    ("wedge.alpha=110deg", "between 0 and 90 degrees"),
+    ("wedge.alpha=0", "wedge.alpha = 0.0 rad is not admissible: it must be > 0 rad"),
+    ("wedge.alpha=-5deg", "wedge.alpha = -5 deg is not admissible"),
+    ("wedge.alpha=90deg", "alpha = 90 deg is not admissible: it must be > 0 deg and < 90 deg\n"),
+    ("wedge.alpha=1600 mrad", "alpha = 1600 mrad is not admissible: it must be > 0 mrad"),
+    ("wedge.alpha=1", "a pure number cannot be rad"),
+    ("motor_1.dT=40 degC", "a temperature difference is wanted, in K"),
+    ("caliper.n_table=0 mm, 1 mm, 0.5 mm", "as node 3 of 3, 0.0005 m follows 0.001 m"),
     ("wedge.alpha=20mm", "mm cannot be rad"),
     ("screw.eta_f=0", "screw.eta_f = 0.0 is not admissible: it must be > 0 and <= 1"),
     ("screw.eta_f=1.01", "screw.eta_f = 1.01 is not admissible: it must be > 0 and <= 1"),

@@ -12,7 +12,7 @@ def along_disc(run: xr.Dataset) -> xr.Dataset:
     """Return a recording whose moments and speed count positive in the disc's first direction."""
     if not float(run["Omega"].values[0]) < 0:
         return run
-    # Plus zero: no negative zeros.
+    # Not negated, which would make negative zeros.
     return run.assign({name: 0.0 - run[name] for name in ("M_B", "y_M", "Omega")})
 
 

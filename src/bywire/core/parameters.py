@@ -8,11 +8,9 @@ equations (``gear.law = "directional"``); it takes part in what is compiled, nev
 from __future__ import annotations
 
 import math
-import re
 import typing
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
@@ -21,9 +19,10 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.quantities import Unit
-from bywire.core.units import Written, convert, split
+from bywire.core.refusals import refusals
+from bywire.core.units import Written, convert
 
 T = TypeVar("T", bound="ParameterSet")
 
@@ -228,53 +227,5 @@ def _validated(cls: type[T], tree: Mapping[str, Any], texts: Mapping[str, str]) 
     try:
         return cls.model_validate(tree)
     except ValidationError as error:
-        found: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
-        places = {detail["loc"][:-1] for detail in found}
-        # A table with a wrong node also counts as too short: the node alone is worth a line.
-        found = [d for d in found if not (_is_length(d) and d["loc"] in places)]
-        lines = [_explain(cls, detail, texts) for detail in found]
-        raise ParameterError("\n".join(lines)) from None
-
-
-def _explain(cls: type[ParameterSet], detail: dict[str, Any], texts: Mapping[str, str]) -> str:
-    name = ".".join(str(part) for part in detail["loc"])
-    value, kind = detail["input"], detail["type"]
-    if kind == "missing":
-        return f"{cls.__name__}: {name} is missing: give it a value"
-    if kind == "literal_error":
-        return _unknown_choice(name, value, detail["ctx"]["expected"])
-    leaves = leaf_fields(cls)
-    leaf = leaves.get(name) or leaves.get(name.rpartition(".")[0])
-    if leaf is not None and kind != "value_error" and not _is_length(detail):
-        wanted = "a whole number, " if kind.startswith("int") else ""
-        return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
-    if kind == "too_short":
-        return f"{name}: at least {detail['ctx']['min_length']} wanted, got {quoted(value)}"
-    message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
-    given = "" if isinstance(value, dict) else f", got {quoted(value)}"
-    return f"{name or cls.__name__}: {message}{given}"
-
-
-def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> str:
-    symbol = leaf.unit.symbol
-    number, written = split(text)
-    if symbol == "rad" and written not in ("", symbol):  # drawings have angles in degrees
-        refused = f"{name} = {number} {written} is not admissible"
-        return f"{refused}: it must be {wanted}{leaf.range_in(written)}"
-    unit = "" if symbol == "1" else f" {symbol}"
-    got = "" if written in ("", symbol) else f", got {quoted(text)}"
-    return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}{got}"
-
-
-_BOOL, _TEXT = "it must be true or false", "it must be a text"
-_PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}
-
-
-def _is_length(detail: Mapping[str, Any]) -> bool:
-    return detail["type"] in ("too_short", "too_long")
-
-
-def _unknown_choice(name: str, value: Any, expected: str) -> str:
-    near = get_close_matches(quoted(value), re.findall(r"'[^']*'", expected), n=1, cutoff=0.6)
-    hint = f": did you mean {near[0]}?" if near else ""
-    return f"{name}: it must be {expected}, got {quoted(value)}{hint}"
+        found = refusals(error, cls.__name__, leaf_fields(cls), texts)
+        raise ParameterError("\n".join(found)) from None

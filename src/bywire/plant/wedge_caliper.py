@@ -66,8 +66,8 @@ def _require_rising(name: str, unit: str, nodes: Table) -> None:
     for k, (a, b) in enumerate(pairwise(nodes), 2):
         if b <= a:
             raise ValueError(
-                f"{wanted}, but {b:g} {unit} follows {a:g} {unit} as node {k} of {len(nodes)}: sort the nodes, and "
-                "leave out those where the curve does not rise"
+                f"{wanted}, but as node {k} of {len(nodes)}, {b:g} {unit} follows {a:g} {unit}: "
+                "sort the nodes, and leave out those where the curve does not rise"
             )
 
 

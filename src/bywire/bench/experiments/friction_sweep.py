@@ -19,7 +19,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.kpis.step_response import Setting
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.bench.wedge_case import case_from_parked, mean, steps
+from bywire.bench.wedge_case import case_from_parked, figure, mean, steps
 from bywire.bench.wedge_series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.control.moment_control import SomeMoment
 from bywire.core.parameters import ParameterSet
@@ -27,6 +27,7 @@ from bywire.core.quantities import Duration
 
 _BAND = 0.05  # of the step: half width of the band in which a stable loop ends
 _LAST = 0.2  # of the hold
+_NO_ROW = "no row of the recording lies there: record more often"
 
 _EACH = {"stable": "1", "overshoot": "%", "settling_time": "s", "hold_power": "W"}
 _ALL = {
@@ -80,6 +81,8 @@ def _stable(run: xr.Dataset, options: Options, name: str) -> Kpi:
     """Return whether a moment ends within 5 % of the step, without the help of an end stop."""
     text = "1 where the last fifth of the hold stays within 5 % of the step, no end stop met."
     last = run.sel(time=slice((1.0 - _LAST) * options.t_hold, None))
+    if not last.sizes["time"]:
+        return Kpi(name, math.nan, "1", text, _NO_ROW)
     if not last["F_N"].values.any():
         return Kpi(name, math.nan, "1", text, "the pads do not press: there is no loop to judge")
     away = np.abs(np.abs(last["M_B"].values) - options.M_step).max()
@@ -98,8 +101,8 @@ def _one(run: xr.Dataset, mu_B: float, options: Options) -> tuple[Kpi, ...]:
         _stable(run, options, "stable" + at),
         replace(step["overshoot"], name="overshoot" + at),
         replace(step["settling_time"], name="settling_time" + at),
-        Kpi("hold_power" + at, mean(run, "P_in", begin, options.t_hold), "W",
-            "Mean input power in the last fifth of the hold, standby included."),
+        figure("hold_power" + at, mean(run, "P_in", begin, options.t_hold), "W",
+               "Mean input power in the last fifth of the hold, standby included.", _NO_ROW),
     )  # fmt: skip
 
 
@@ -116,12 +119,12 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         *(kpi for kpis in each.values() for kpi in kpis),
         Kpi("unstable", math.nan if unjudged else float(sum(value == 0 for value in stable)), "1",
             "Number of friction coefficients at which the loop is not stable.",
-            f"at {unjudged} of them the pads do not press" if unjudged else ""),
+            f"{unjudged} of them cannot be judged" if unjudged else ""),
         Kpi("overshoot_max", max(overshoot), "%", "Largest overshoot."),
         Kpi("settling_time_max", math.nan if slow else max(settling), "s",
             "Largest settling time (2 %).", note),
-        Kpi("hold_power_min", min(power), "W", "Smallest hold power."),
-        Kpi("hold_power_max", max(power), "W", "Largest hold power."),
+        figure("hold_power_min", min(power), "W", "Smallest hold power.", _NO_ROW),
+        figure("hold_power_max", max(power), "W", "Largest hold power.", _NO_ROW),
     )  # fmt: skip
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
@@ -52,7 +54,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = along_disc(recordings["run"])
     own = (
         Kpi("peak_moment", float(run["M_B"].max()), "N*m", "Largest moment."),
-        Kpi("peak_angle", float(run["theta_ref"].max()), "rad",
+        Kpi("peak_angle", float(np.abs(run["theta_ref"]).max()), "rad",
             "Largest common reference of both motors, from the parking position."),
         release_time(run, options.t_pulse),
         parking_time(run, options.t_pulse),

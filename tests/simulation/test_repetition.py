@@ -1,0 +1,85 @@
+"""Windows run in parts: bit for bit as in one, and ended by Ctrl-C within a moment."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bywire.analysis.frequency_response import frequency_response
+from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.response_dataset import Sweep
+from bywire.catalog.registry import parameters
+from bywire.simulation import repetition
+from bywire.simulation.repetition import Repeated, repeat
+from bywire.simulation.run import Run
+
+
+def position(*frequencies: float) -> tuple[Run, Sweep]:
+    """Return the position loop of the wedge brake, and what to measure in it."""
+    loop = find_loop("position")
+    point = loop.point(parameters("roberts2003"), loop.at.default)
+    whole = loop.whole(point.par)
+    return point.run(), Sweep(loop.inputs, loop.output, frequencies, [0.25], whole=whole)
+
+
+def window(stop: threading.Event | None = None, *, lanes: bool = True) -> Repeated:
+    """Return some windows of 48 ms at rest in one place."""
+    run, _ = position()
+    run = replace(run, duration=0.048, record=1e-3)
+    rows = run.schedule().stimulus_times.size - 1
+    stimuli = np.repeat(run.stimulus(np.zeros(1)), rows, axis=0)[None]
+    stimuli += 0.5 * np.sin(2.0 * np.pi * np.arange(rows) / rows)[None, :, None]
+    matrix = np.array(list(run.par.leaves().values()))[:, None]
+
+    def figures(found: NDArray[np.float64]) -> NDArray[np.complex128]:
+        return found[:, :, 0].astype(complex)
+
+    return repeat(
+        run, matrix, stimuli, ("theta_1", "x"), figures, 1e-9, 3, lanes=lanes, stop=stop
+    )
+
+
+@pytest.mark.parametrize("lanes", [True, False])
+def test_parts_of_a_window_change_no_bit(monkeypatch, lanes):
+    monkeypatch.setattr(repetition, "CHUNK", 10**9)
+    whole = window(lanes=lanes)
+    monkeypatch.setattr(repetition, "CHUNK", 350)  # 7 rows of 50 substeps, which leave 6 of 48
+    parts = window(lanes=lanes)
+    assert np.ptp(whole.values[0, :, 0]) > 0.01
+    np.testing.assert_array_equal(parts.values, whole.values)
+    np.testing.assert_array_equal(parts.figures, whole.figures)
+
+
+def test_what_is_stopped_ends():
+    stop = threading.Event()
+    stop.set()
+    with pytest.raises(KeyboardInterrupt):
+        window(stop)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_interrupt_ends_a_long_window_within_a_moment():
+    """All of these windows take a minute, each of them some seconds."""
+    frequency_response(*position(50.0))  # the kernel is built
+    run, sweep = position(*np.geomspace(0.1, 0.2, 12))
+    sent: list[float] = []
+
+    def interrupt() -> None:
+        sent.append(time.monotonic())
+        signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+
+    timer = threading.Timer(1.0, interrupt)
+    timer.start()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            frequency_response(run, sweep)
+    finally:
+        timer.cancel()
+    assert time.monotonic() - sent[0] < 2.0
