@@ -17,6 +17,7 @@ from bywire.analysis.loop_registry import find_loop
 from bywire.analysis.response_dataset import Sweep
 from bywire.catalog.registry import parameters
 from bywire.simulation import repetition
+from bywire.simulation.ensemble import LaneKernel
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
 
@@ -64,8 +65,26 @@ def test_what_is_stopped_ends():
         window(stop)
 
 
+def test_window_is_stopped_in_its_midst(monkeypatch):
+    monkeypatch.setattr(repetition, "CHUNK", 350)
+    stop, ends = threading.Event(), list[int]()
+    compiled = LaneKernel.advance
+
+    def stopping(self, *arguments):
+        ends.append(arguments[-2])
+        if len(ends) == 2:
+            stop.set()
+        compiled(self, *arguments)
+
+    monkeypatch.setattr(LaneKernel, "advance", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        window(stop)
+    per_row = ends[0] // 7
+    assert ends == [7 * per_row, 14 * per_row]
+
+
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_interrupt_ends_a_long_window_within_a_moment():
+def test_interrupt_ends_a_long_sweep_within_a_moment():
     """All of these windows take a minute, each of them some seconds."""
     frequency_response(*position(50.0))  # the kernel is built
     run, sweep = position(*np.geomspace(0.1, 0.2, 12))

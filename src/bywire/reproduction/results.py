@@ -25,8 +25,8 @@ def as_json(reproduction: Reproduction) -> dict[str, Any]:
     dict
         ``{"source", "items": [{"id", "unit", "stated", "computed", "tolerance", "agrees",
         "note"}], "in_short"}``. What is not stated, not computed or not defined is None; a
-        tolerance is a number in the item's unit, or ``"<="`` or ``">="`` where the statement is a bound. The
-        note ends with the kind of statement.
+        tolerance is a number in the item's unit, or ``"<="`` or ``">="`` where the statement is a
+        bound. The note ends with the kind of statement.
     """
     return {
         "source": reproduction.source,
