@@ -113,9 +113,9 @@ def test_every_slope_counts_where_the_step_is_judged(last, doubted):
 
 BAD = [
     ("", "", "law = 'table' needs 2 nodes or more", "n_table [m]", "law = 'linear'"),
-    ("0 mm, 0.1 mm, 0.05 mm", "0 N, 1 kN, 2 kN", "n_table", "5e-05 m after 0.0001 m"),
-    ("0 mm, 0.1 mm, 0.1 mm", "0 N, 1 kN, 2 kN", "n_table", "0.0001 m after 0.0001 m"),
-    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 2 kN", "F_table", "2000 N after 3000 N"),
+    ("0 mm, 0.1 mm, 0.05 mm", "0 N, 1 kN, 2 kN", "n_table", "5e-05 m follows 0.0001 m"),
+    ("0 mm, 0.1 mm, 0.1 mm", "0 N, 1 kN, 2 kN", "n_table", "0.0001 m follows 0.0001 m"),
+    ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 2 kN", "F_table", "2000 N follows 3000 N"),
     ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN, 3 kN", "F_table", "does not rise"),
     ("0 mm, 0.1 mm, 0.2 mm", "0 N, 3 kN", "n_table has 3 nodes and F_table 2"),
     ("0 mm, 0.1 mm", "", "n_table has 2 nodes and F_table 0"),
