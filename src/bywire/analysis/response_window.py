@@ -39,14 +39,17 @@ def require_measurable(run: Run, sweep: Sweep) -> None:
         if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
             given = ", ".join(shown(float(v), symbol) for v in values) or "none"
             raise ParameterError(f"{kind} = {given}: positive numbers are wanted")
-    # Of the slowest: which controller takes the input is not known here.
-    nyquist = 0.5 / max(task.period for task in run.model.tasks(run.par))
-    highest = max(sweep.frequencies)
-    if highest >= nyquist:
+    limit, highest = nyquist(run), max(sweep.frequencies)
+    if highest >= limit:
         raise ParameterError(
             f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
-            f"{nyquist:g} Hz: ask for lower frequencies"
+            f"{limit:g} Hz: ask for lower frequencies"
         )
+
+
+def nyquist(run: Run) -> float:
+    """Return the slowest controller's Nyquist frequency [Hz]: any may take the input."""
+    return 0.5 / max(task.period for task in run.model.tasks(run.par))
 
 
 def interval(run: Run) -> float:

@@ -23,7 +23,6 @@ from bywire.plant import (
     brake_heart,
     drive_supply,
     end_stop,
-    flywheel,
     servo_motor,
     wedge,
     wedge_caliper,
@@ -105,8 +104,3 @@ def stored(x: State, m: Memory, par: Par) -> float:
     motors = (servo_motor.energy(s.motor, s.par) for s in sides(x, x, m, par))
     body = wedge.energy(wedge.State(x.x, x.v), par.wedge)
     return sum(motors, 0.0) + body + sum(elastic(x, par), 0.0)
-
-
-def disc_energy(x: State, par: Par) -> float:
-    """Return the kinetic energy of the flywheel [J], which is not part of the balance."""
-    return flywheel.energy(flywheel.State(x.Omega, x.phi), par.flywheel)

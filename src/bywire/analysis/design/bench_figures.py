@@ -17,7 +17,7 @@ from bywire.analysis.design.describing_function import loop_gain, phase_margin, 
 from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop import Loop
 from bywire.analysis.response_dataset import Sweep
-from bywire.analysis.response_window import common_interval
+from bywire.analysis.response_window import common_interval, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.running import as_run
@@ -141,8 +141,8 @@ def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]
     to five of 50 Hz, and what is measured would depend on how both began.
     """
     common = common_interval(run, whole)
-    nyquist = 0.5 / max(task.period for task in run.model.tasks(run.par))
-    wanted = np.geomspace(target / _BELOW, min(_ABOVE * target, 0.9 * nyquist), _POINTS)
+    limit = nyquist(run)
+    wanted = np.geomspace(target / _BELOW, min(_ABOVE * target, 0.9 * limit), _POINTS)
     found = set()
     for f in wanted:
         choices = [(n, max(round(n / f / common), 1)) for n in range(_LEAST, _LEAST + 3)]
@@ -152,7 +152,7 @@ def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]
             default=choices[0],
         )
         found.add(n / (m * common))
-    return sorted(one for one in found if one < nyquist)
+    return sorted(one for one in found if one < limit)
 
 
 def has_step(bench: Bench) -> bool:
