@@ -18,6 +18,7 @@ from bywire.simulation.emission import (
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
+from bywire.simulation.turning_tangents import TURNS, declare_turns, mend_turns, watch_turns
 
 SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
@@ -56,8 +57,9 @@ class _Tangents:
 
     def leaf(self, kind: str, index: int) -> str:
         """Return the text of an input."""
-        if kind == "sp":
-            return f"seeds[{index} * L + l]"
+        if kind in ("sp", "su"):
+            first = 0 if kind == "sp" else leaf_count(self.stages, "sp")
+            return f"seeds[{first + index} * L + l]"
         if kind in SEEDS:
             return f"T[{self.layout.start[kind[1:]] + index} * L + l]"
         if kind == "h":
@@ -89,8 +91,14 @@ class _Tangents:
         return needed(self.graph, roots, lambda n: self.level[n] < below)
 
 
-def emit_tangents(stages: Stages, lanes: int) -> str:
-    """Return the C source of the kernel with ``lanes`` directions."""
+def emit_tangents(stages: Stages, lanes: int, velocities: Sequence[int] = ()) -> str:
+    """Return the C source of the kernel with ``lanes`` directions.
+
+    Parameters
+    ----------
+    velocities
+        Indices of the states that carry dry friction.
+    """
     t = _Tangents(stages)
     layout = t.layout
     start, length = layout.start, layout.length
@@ -107,11 +115,13 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
     return f"""{SCALAR}{exact_pass(stages)}
 #define L {lanes}
 
+{TURNS}
 {_exact_tangents(stages)}
 {SIGNATURE} {{
   {PLAN}
   double failures = state[{start["counters"]}], repeats = state[{start["counters"] + 1}];
   double *restrict T = tangents;
+  {declare_turns(velocities)}
   double C[{max(len(t.slot), 1)} * L] __attribute__((aligned(64)));
   {indented(loads, 2)}
   {indented(t.lines(t.once, False), 2)}
@@ -135,17 +145,19 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(t.lines(substep, False), 6)}
       {indented(t.results(t.value_roots, "s"), 6)}
+      {indented(watch_turns(velocities), 6)}
       if (__builtin_expect(s{len(t.value_roots) - 1} != 0.0, 0)) {{
         {indented(_repeat(layout, len(t.value_roots)), 8)}
-        continue;
+      }} else {{
+        #pragma omp simd
+        for (int l = 0; l < L; ++l) {{
+          {indented(t.lines(substep, True), 10)}
+          {indented(t.results(t.tangent_roots, "t"), 10)}
+          {indented(new_t, 10)}
+        }}
+        {indented(commits, 8)}
       }}
-      #pragma omp simd
-      for (int l = 0; l < L; ++l) {{
-        {indented(t.lines(substep, True), 8)}
-        {indented(t.results(t.tangent_roots, "t"), 8)}
-        {indented(new_t, 8)}
-      }}
-      {indented(commits, 6)}
+      {indented(mend_turns(velocities), 6)}
     }}
   }}
   {indented(stores, 2)}

@@ -52,7 +52,8 @@ class Sensitivity:
     derivatives
         d(signal)/d(parameter), shape (rows, signals, parameters), in SI units.
     parameters
-        Names of the parameters, in the order of the last axis.
+        Names of the directions, in the order of the last axis: parameters, ``initial.STATE``,
+        ``stimulus.NAME``.
     """
 
     trajectory: Trajectory
@@ -72,9 +73,9 @@ class TangentKernel:
         stages = build_stages(program, directions)
         self.layout: Layout = layout_of(stages)
         self.label = f"compiled C with tangents, {compiler.label}"
-        library = compile_library(
-            emit_tangents(stages, DIRECTIONS), vector_flags(compiler), compiler
-        )
+        velocities = [program.model.State._fields.index(n) for n in program.model.frictions]
+        source = emit_tangents(stages, DIRECTIONS, velocities)
+        library = compile_library(source, vector_flags(compiler), compiler)
         self._run = ctypes.CDLL(str(library)).bw_run_tangents
         self._run.restype = None
         self.rounds = rounds(stages)
@@ -93,15 +94,20 @@ def simulate_with_sensitivities(
 ) -> Sensitivity:
     """Compute a run and the derivatives of its signals.
 
+    Beside parameters, directions may be an initial state, ``initial.omega``, and a constant that
+    is added to a stimulus, ``stimulus.i_set``.
+
     Forward differentiation through every substep, friction and contact decisions included:
     exact derivatives of what is computed. Across stick-slip the instants of breakaway move with
     the parameters only as finely as sampled inputs change: there, let tasks and ideal sources
-    tick as often as the step (the first slips of a ramp are then within 2 % at 20 us).
+    tick as often as the step (the first slips of a ramp are then within 2 % at 20 us). Where a
+    body turns round without resting, the instant moves too (see ``turning_tangents``), within a
+    few per cent where the step resolves what acts on it.
 
     Parameters
     ----------
     parameters
-        Dotted names of the parameters.
+        Dotted names of the parameters and of other directions.
     signals
         Outputs to record.
     initial
@@ -117,22 +123,20 @@ def simulate_with_sensitivities(
     CompilerError
         When there is no compiler.
     """
-    prepared = prepare(run.model, run.par)
-    names = prepared.program.parameter_names
-    for name in parameters:
-        if name not in names:
-            raise unknown_name("parameter", name, names)
     if not parameters:
         raise ParameterError("sensitivities need at least one parameter: name it")
+    prepared = prepare(run.model, run.par)
+    directions = _directions(run, parameters, prepared.program.parameter_names)
     wanted = (len(run.state), len(parameters))
     if initial is not None and np.shape(initial) != wanted:
         raise ParameterError(
             f"initial has the shape {np.shape(initial)}, wanted is {wanted}: states, parameters"
         )
+    from_start = directions.initial + (0.0 if initial is None else initial)
     compiler = find_compiler()
     if compiler is None:
         raise CompilerError("sensitivities need a C compiler: install the extra bywire[compiler]")
-    kernel = _tangent_kernel(prepared.program, tuple(names.index(p) for p in parameters), compiler)
+    kernel = _tangent_kernel(prepared.program, directions.indices, compiler)
     if kernel.rounds:
         warnings.warn(
             "a sampled value is rounded to whole codes, through which derivatives are zero: "
@@ -151,10 +155,11 @@ def simulate_with_sensitivities(
     for first in range(0, count, DIRECTIONS):
         here = min(DIRECTIONS, count - first)
         vector = initial_vector(kernel.layout, run.state, run.memory)
-        seeds, tangents = np.zeros((count, DIRECTIONS)), np.zeros((vector.size, DIRECTIONS))
-        seeds[np.arange(first, first + here), np.arange(here)] = 1.0
-        if initial is not None:
-            tangents[: initial.shape[0], :here] = initial[:, first : first + here]
+        lanes = slice(first, first + here)
+        seeds = np.zeros((len(directions.seeds), DIRECTIONS))
+        tangents = np.zeros((vector.size, DIRECTIONS))
+        seeds[:, :here] = directions.seeds[:, lanes]
+        tangents[: len(from_start), :here] = from_start[:, lanes]
         rec_t = np.empty((schedule.rows, selection.size, DIRECTIONS))
         kernel.run(
             (p, stimulus, vector, plan, selection, values, seeds, tangents, rec_t), schedule.step
@@ -173,6 +178,38 @@ def simulate_with_sensitivities(
         vector=vector,
     )
     return Sensitivity(trajectory, derivatives, tuple(parameters))
+
+
+@dataclass(frozen=True)
+class _Directions:
+    """What moves along each direction.
+
+    Parameters
+    ----------
+    indices
+        Parameters of the kernel's seeds.
+    seeds
+        Shape (seeded parameters and stimuli, directions).
+    initial
+        Shape (states, directions).
+    """
+
+    indices: tuple[int, ...]
+    seeds: Array
+    initial: Array
+
+
+def _directions(run: Run, wanted: Sequence[str], known: Sequence[str]) -> _Directions:
+    states = [f"initial.{name}" for name in run.model.State._fields]
+    stimuli = [f"stimulus.{name}" for name in run.model.Stimulus._fields]
+    for name in wanted:
+        if name not in (*known, *states, *stimuli):
+            raise unknown_name("parameter", name, (*known, *states, *stimuli))
+    own = [name for name in wanted if name in known] or [known[0]]  # a kernel has one at least
+    seeded = [*own, *stimuli]
+    seeds = np.array([[float(row == name) for name in wanted] for row in seeded])
+    initial = np.array([[float(row == name) for name in wanted] for row in states])
+    return _Directions(tuple(known.index(name) for name in own), seeds, initial)
 
 
 @cache

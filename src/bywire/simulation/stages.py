@@ -17,8 +17,8 @@ from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
 from bywire.simulation.signs import NOT_NEGATIVE, Interval
 
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
-LEVEL = {"p": 0, "h": 0, "sp": 0, "m": 1, "sm": 1}
-SEEDS = frozenset({"sp", "sm", "sx", "sd", "sr", "sq"})
+LEVEL = {"p": 0, "h": 0, "sp": 0, "su": 0, "m": 1, "sm": 1}
+SEEDS = frozenset({"sp", "su", "sm", "sx", "sd", "sr", "sq"})
 STATE = ("x", "d", "r", "q")  # what a substep renews, in the order of the state vector
 
 
@@ -104,7 +104,7 @@ def build_stages(
         for kind in kinds:
             if kind == "p":
                 inputs.append([graph.leaf("sp", k) for k in range(len(directions))])
-            elif kind not in ("h", "u"):
+            elif kind != "h":
                 inputs.append([graph.leaf(f"s{kind}", k) for k in range(lengths[kind])])
         return graph.add_function(seeded, inputs)
 
@@ -153,11 +153,11 @@ def _balanced(
 
 
 def _with_tangents(function: Any, kinds: str, directions: Sequence[int]) -> Any:
-    """Return the function of the tangents: the same arguments, then seeds of x, d, m, p, ..."""
+    """Return the function of the tangents: the same arguments, then seeds of x, d, m, u, p, ..."""
     arguments = function.sx_in()
     seeds, points, extra = [], [], []
     for kind, argument in zip(kinds, arguments, strict=True):
-        if kind in ("h", "u"):
+        if kind == "h":
             continue
         if kind == "p":
             chosen = ca.SX.sym("sp", len(directions))

@@ -1,0 +1,167 @@
+"""What an estimator gives: values with their uncertainty, and what the data does not tell."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.identification.unknown import Unknown
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Kept:
+    """An unknown that the data does not tell.
+
+    Parameters
+    ----------
+    unknown
+        What it is; its start is the value that was kept.
+    reason
+        Why it is not told, with numbers.
+    """
+
+    unknown: Unknown
+    reason: str
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Estimated unknowns.
+
+    Parameters
+    ----------
+    unknowns
+        What was estimated; p of them.
+    values
+        Estimates, shape (p,), SI.
+    covariance
+        Of the estimates, shape (p, p).
+    singular_values
+        Of the Jacobian whose columns are per unknown's scale, shape (p,), largest first: what
+        is small beside the first one hardly shows in the data.
+    residuals
+        Measured less computed, weighted, shape (n,): of size one where the noise is as assumed.
+    freedom
+        Degrees of freedom: independent residuals less unknowns.
+    colored
+        Whether neighboring residuals go together, which the covariance then allows for.
+    kept
+        Unknowns that the data does not tell, left at their starts.
+    notes
+        What the user should know.
+    """
+
+    unknowns: tuple[Unknown, ...]
+    values: Array
+    covariance: Array
+    singular_values: Array
+    residuals: Array
+    freedom: float
+    colored: bool
+    kept: tuple[Kept, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Labels of the unknowns."""
+        return tuple(u.label for u in self.unknowns)
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations, shape (p,)."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def correlation(self) -> Array:
+        """Correlations of the estimates, shape (p, p)."""
+        size = self.deviations
+        return np.asarray(self.covariance / np.outer(size, size))
+
+    def intervals(self, level: float = 0.95) -> Array:
+        """Return the confidence intervals (Student's t), shape (p, 2)."""
+        from scipy import stats
+
+        t = float(stats.t.ppf(0.5 + 0.5 * level, max(self.freedom, 1.0)))
+        reach = t * self.deviations
+        return np.column_stack((self.values - reach, self.values + reach))
+
+    def noted(self, notes: tuple[str, ...]) -> Estimate:
+        """Return the estimate with more notes."""
+        return replace(self, notes=(*self.notes, *notes))
+
+    def __getitem__(self, name: str) -> float:
+        """Return the estimate of an unknown by its label."""
+        return float(self.values[self.names.index(name)])
+
+    def correlated(self, above: float = 0.9) -> list[tuple[str, str, float]]:
+        """Return the pairs of unknowns that the data tells apart badly, worst first."""
+        c = self.correlation
+        pairs = [
+            (self.names[i], self.names[j], float(c[i, j]))
+            for i in range(len(c))
+            for j in range(i)
+            if abs(c[i, j]) > above
+        ]
+        return sorted(pairs, key=lambda pair: -abs(pair[2]))
+
+    def parameters(self) -> dict[str, float]:
+        """Return the estimated parameters by name: what a bench file's [set] takes."""
+        return {
+            u.name: float(v)
+            for u, v in zip(self.unknowns, self.values, strict=True)
+            if not u.trial and u.name.split(".")[0] not in ("initial", "stimulus", "offset")
+        }
+
+    def __str__(self) -> str:
+        """Return a table of the estimates with their 95 % intervals."""
+        rows = [
+            f"{name:<16} {v:>12.5g} +- {half:<10.2g} {u.unit}"
+            for name, u, v, half in zip(
+                self.names, self.unknowns, self.values,
+                0.5 * np.diff(self.intervals(), axis=1).ravel(), strict=True,
+            )
+        ]  # fmt: skip
+        kept = [
+            f"{k.unknown.label:<16} not told by the data, kept at {k.unknown.start:g} "
+            f"{k.unknown.unit}: {k.reason}"
+            for k in self.kept
+        ]
+        return "\n".join((*rows, *kept, *self.notes))
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the weighted residuals; 1 where the noise is as assumed."""
+        return math.sqrt(float(np.mean(self.residuals**2)))
+
+
+def as_object(estimate: Estimate) -> dict[str, object]:
+    """Return what JSON holds of an estimate."""
+    rows: Mapping[str, object] = {
+        name: {
+            "value": float(v), "unit": u.unit, "standard_deviation": float(d),
+            "interval_95": [float(lo), float(hi)],
+        }
+        for name, u, v, d, (lo, hi) in zip(
+            estimate.names, estimate.unknowns, estimate.values, estimate.deviations,
+            estimate.intervals(), strict=True,
+        )
+    }  # fmt: skip
+    return {
+        "parameters": rows,
+        "not_identifiable": {
+            k.unknown.label: {"kept": k.unknown.start, "unit": k.unknown.unit, "reason": k.reason}
+            for k in estimate.kept
+        },
+        "correlation": {"names": list(estimate.names), "matrix": estimate.correlation.tolist()},
+        "singular_values": estimate.singular_values.tolist(),
+        "residual_rms": estimate.rms,
+        "degrees_of_freedom": float(estimate.freedom),
+        "colored_residuals": estimate.colored,
+        "notes": list(estimate.notes),
+    }

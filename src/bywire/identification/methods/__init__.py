@@ -1,0 +1,1 @@
+"""Identification methods, one a file; each module has one ``METHOD``."""

@@ -1,0 +1,162 @@
+"""Several starts on all cores; what is finished survives an interrupt."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError, SolverError
+from bywire.identification.least_squares import Loss, Problem, Solution, solve
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+_SAME = 0.01  # of the lowest cost: minima that count as one
+
+
+class _StoppedError(Exception):
+    """Ends the search in a thread after an interrupt."""
+
+
+@dataclass(frozen=True)
+class Search:
+    """Where several starts led.
+
+    Parameters
+    ----------
+    solutions
+        One per start that led anywhere, in the order of the starts.
+    failed
+        Starts from which nothing could be computed.
+    """
+
+    solutions: tuple[Solution, ...]
+    failed: int
+
+    @property
+    def best(self) -> Solution:
+        """The lowest minimum."""
+        return min(self.solutions, key=lambda s: s.cost)
+
+    @property
+    def reached(self) -> int:
+        """How many starts came within 1 % of the lowest minimum."""
+        lowest = self.best.cost
+        return sum(s.cost <= (1.0 + _SAME) * lowest + 1e-12 for s in self.solutions)
+
+
+def search(
+    problem: Problem,
+    starts: Sequence[Array],
+    loss: Loss = "linear",
+    progress: Progress | None = None,
+    store: Path | None = None,
+    threads: int | None = None,
+) -> Search:
+    """Solve from every start.
+
+    Kernels let go of Python's lock while they run, so that threads use all cores.
+
+    Parameters
+    ----------
+    starts
+        Each of shape (p,).
+    progress
+        Called with a label and the finished share.
+    store
+        File that keeps every finished start; a search of the same residuals and starts goes on
+        from there.
+    threads
+        All cores by default.
+
+    Raises
+    ------
+    SolverError
+        When no start led anywhere.
+    KeyboardInterrupt
+        When interrupted; finished starts are in the store.
+    """
+    keys = [_key(problem, start, loss) for start in starts]
+    known = _read(store)
+    found = {k: known[key] for k, key in enumerate(keys) if key in known}
+    stop = threading.Event()
+
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        if stop.is_set():
+            raise _StoppedError
+        return problem.evaluate(values)
+
+    guarded = Problem(problem.unknowns, evaluate)
+    failed = 0
+    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+        jobs = {
+            pool.submit(solve, guarded, start, loss): k
+            for k, start in enumerate(starts)
+            if k not in found
+        }
+        try:
+            for job in as_completed(jobs):
+                k = jobs[job]
+                try:
+                    found[k] = job.result()
+                    _append(store, keys[k], found[k])
+                except SolverError:
+                    failed += 1
+                if progress is not None:
+                    progress("starts", (len(found) + failed) / len(starts))
+        except KeyboardInterrupt:
+            stop.set()
+            pool.shutdown(cancel_futures=True)
+            raise
+    if not found:
+        raise SolverError(
+            "no start could be computed: begin nearer to the truth, or measure at other points"
+        )
+    return Search(tuple(found[k] for k in sorted(found)), failed)
+
+
+def _key(problem: Problem, start: Array, loss: Loss) -> str:
+    """Return what tells one search from another: names, bounds, start, and its residuals."""
+    digest = hashlib.sha256(f"{loss} {problem.unknowns}".encode())
+    digest.update(start.tobytes())
+    try:
+        digest.update(np.round(problem.evaluate(start)[0], 9).tobytes())
+    except SolverError:
+        digest.update(b"failed")
+    return digest.hexdigest()
+
+
+def _read(store: Path | None) -> dict[str, Solution]:
+    """Return the finished starts; a last line that was cut off by a killed run is left out."""
+    if store is None or not store.exists():
+        return {}
+    found = {}
+    try:
+        lines = store.read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{store} cannot be read: {error}; delete it to start anew") from None
+    for line in lines:
+        try:
+            row = json.loads(line)
+            values = np.array(row["values"], dtype=float)
+            found[str(row["key"])] = Solution(values, float(row["cost"]))
+        except (ValueError, KeyError, TypeError):
+            continue
+    return found
+
+
+def _append(store: Path | None, key: str, solution: Solution) -> None:
+    if store is None:
+        return
+    row = {"key": key, "values": solution.values.tolist(), "cost": solution.cost}
+    with store.open("a", encoding="utf-8") as file:
+        file.write(json.dumps(row) + "\n")

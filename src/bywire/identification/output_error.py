@@ -1,0 +1,236 @@
+"""Output error: a model is run over measured inputs and fitted to measured outputs.
+
+Open loop, the measured input of the plant drives it; closed loop, the measured set point drives
+model and controller together, so that the fit sees what feedback makes of an error. Derivatives
+are the exact ones of the run, friction and contacts included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of, zeros
+from bywire.identification.least_squares import Problem
+from bywire.identification.unknown import Unknown
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Trial:
+    """One measured experiment beside its model.
+
+    Parameters
+    ----------
+    run
+        The model with its measured inputs; recorded at the instants of the measurement.
+    measured
+        Measured outputs by the model's names, each of shape (rows,), SI; NaN is left out.
+    noise
+        Standard deviation of each measured output, SI.
+    label
+        What names it among several.
+    used
+        Rows that count, shape (rows,); all by default.
+    """
+
+    run: Run
+    measured: Mapping[str, Array]
+    noise: Mapping[str, float]
+    label: str = ""
+    used: NDArray[np.bool_] | None = field(default=None)
+
+    def rows(self, signal: str) -> NDArray[np.bool_]:
+        """Return which rows of a signal count."""
+        finite = np.isfinite(self.measured[signal])
+        return finite if self.used is None else finite & self.used
+
+
+def trial(
+    model: Model,
+    par: ParameterSet,
+    data: xr.Dataset,
+    inputs: Mapping[str, str],
+    outputs: Mapping[str, float],
+    *,
+    state: Any = None,
+    memory: Any = None,
+    step: float = 20e-6,
+    label: str = "",
+) -> Trial:
+    """Return a measured experiment beside its model.
+
+    Parameters
+    ----------
+    model, par
+        The model.
+    data
+        Measured signals over ``time`` [s], evenly spaced.
+    inputs
+        Stimulus of the model -> measured signal; held from one sample to the next.
+    outputs
+        Output of the model, measured under the same name -> standard deviation of its noise.
+    state, memory
+        Where the run begins; zeros by default, but for what is measured under a state's name.
+    step
+        Substep [s].
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is missing, with the nearest ones.
+    ParameterError
+        When time is not evenly spaced.
+    """
+    for name in (*inputs.values(), *outputs):
+        if name not in data:
+            raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    for name in inputs:
+        if name not in model.Stimulus._fields:
+            raise unknown_name("stimulus", name, model.Stimulus._fields)
+    t = data["time"].values - data["time"].values[0]
+    interval = even_interval(t)
+    columns = {
+        model.Stimulus._fields.index(name): data[signal].values for name, signal in inputs.items()
+    }
+    if state is None:
+        seen = {n: float(data[n][0]) for n in model.State._fields if n in data}
+        state = zeros(model.State)._replace(**seen)
+    run = Run(
+        model, par, state, zeros(model.Memory) if memory is None else memory,
+        partial(_held, columns, len(model.Stimulus._fields), interval),
+        (t.size - 1) * interval, step, interval,
+    )  # fmt: skip
+    return Trial(run, {name: data[name].values for name in outputs}, dict(outputs), label)
+
+
+def initial_states(one: Trial, names: Sequence[str]) -> tuple[Unknown, ...]:
+    """Return initial states of a trial as unknowns that begin where its run begins.
+
+    Raises
+    ------
+    UnknownNameError
+        When the model has no such state.
+    """
+    signals = signals_of(one.run.model.State)
+    found = []
+    for name in names:
+        if name not in signals:
+            raise unknown_name("state", name, tuple(signals))
+        start, signal = float(getattr(one.run.state, name)), signals[name]
+        scale = abs(start) or signal.nominal
+        found.append(
+            Unknown(f"initial.{name}", start, scale=scale, unit=signal.unit, trial=one.label)
+        )
+    return tuple(found)
+
+
+def even_interval(t: Array) -> float:
+    """Return the interval of evenly spaced times [s].
+
+    Raises
+    ------
+    ParameterError
+        When they are not evenly spaced.
+    """
+    steps = np.diff(t)
+    interval = float(f"{np.median(steps):.9g}") if steps.size else 0.0
+    if not interval > 0.0 or np.abs(steps - interval).max() > 1e-3 * interval:
+        raise ParameterError(
+            f"time is not evenly spaced (steps of {steps.min():g} to {steps.max():g} s): resample "
+            "it first"
+        )
+    return interval
+
+
+def _held(columns: Mapping[int, Array], count: int, interval: float, t: Array) -> Array:
+    rows = np.zeros((t.size, count))
+    for column, values in columns.items():
+        index = np.clip(np.floor(t / interval + 1e-6).astype(int), 0, values.size - 1)
+        rows[:, column] = values[index]
+    return rows
+
+
+def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Problem:
+    """Return the fit of several trials to their measured outputs.
+
+    Parameters
+    ----------
+    trials
+        Of models with the same kind of parameters.
+    unknowns
+        Parameters, which all trials share unless they name a trial; ``initial.STATE``,
+        ``stimulus.NAME`` and ``offset.SIGNAL`` of a trial.
+
+    Raises
+    ------
+    UnknownNameError
+        When an unknown names nothing of its trial.
+    """
+    labels = [t.label for t in trials]
+    for unknown in unknowns:
+        if unknown.trial and unknown.trial not in labels:
+            raise unknown_name("trial", unknown.trial, labels)
+
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        parts = [_residuals(one, unknowns, values) for one in trials]
+        return np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
+
+    return Problem(tuple(unknowns), evaluate)
+
+
+def _residuals(one: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[Array, Array]:
+    """Return computed less measured, over the noise, and its derivatives."""
+    own = [k for k, u in enumerate(unknowns) if u.trial in ("", one.label)]
+    moving = [k for k in own if not unknowns[k].name.startswith("offset.")]
+    run = moved_run(one.run, {unknowns[k].name: float(values[k]) for k in moving})
+    signals = tuple(one.measured)
+    names = [unknowns[k].name for k in moving]
+    if names:
+        found = simulate_with_sensitivities(run, names, signals)
+        computed, slopes = found.trajectory.values, found.derivatives
+    else:
+        computed = simulate(run, signals).values
+        slopes = np.empty((*computed.shape, 0))
+    residuals, jacobians = [], []
+    for s, signal in enumerate(signals):
+        rows, weight = one.rows(signal), 1.0 / one.noise[signal]
+        J = np.zeros((int(rows.sum()), len(unknowns)))
+        J[:, moving] = slopes[rows, s, :] * weight
+        r = computed[rows, s] - one.measured[signal][rows]
+        for k in own:
+            if unknowns[k].name == f"offset.{signal}":
+                r, J[:, k] = r + values[k], weight
+        residuals.append(r * weight)
+        jacobians.append(J)
+    return np.concatenate(residuals), np.vstack(jacobians)
+
+
+def moved_run(run: Run, values: Mapping[str, float]) -> Run:
+    """Return a run with parameters, initial states and offsets of its stimulus changed.
+
+    Parameters
+    ----------
+    values
+        By name; ``initial.STATE`` replaces, ``stimulus.NAME`` adds.
+    """
+    par = {n: v for n, v in values.items() if not n.startswith(("initial.", "stimulus."))}
+    start = {n[8:]: v for n, v in values.items() if n.startswith("initial.")}
+    shift = {n[9:]: v for n, v in values.items() if n.startswith("stimulus.")}
+    if shift:
+        fields, inner = run.model.Stimulus._fields, run.stimulus
+        add = np.array([shift.get(name, 0.0) for name in fields])
+        run = replace(run, stimulus=lambda t: inner(t) + add)
+    return replace(run, par=run.par.replace(par), state=run.state._replace(**start))

@@ -1,0 +1,223 @@
+"""Every slip of a ramp shot from its own rest and laid over the measured one.
+
+A fit to the whole pressure curve fails from starts a few per cent off: a slip that begins too
+early or too late costs as much as one that is not there. So each slip is run by itself, from the
+rest that was measured, beginning where the model breaks away, and moved in time to where it lies
+best on the measured one. What breaking away tells, the current at which it happened, is a residual
+of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.assemblies.motorcycle_brake import MotorcycleBrake
+from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_trim import memory_at, state_at
+from bywire.identification.equation import Equation, EquationError
+from bywire.identification.slips import Slip
+from bywire.identification.unknown import Unknown
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+Array = NDArray[np.float64]
+
+_ROUNDS = 12  # of Newton for the shift in time
+_LEAD = 0.05  # s of rest before the measured onset
+_SMOOTHED = 0.006  # s: the converter's noise on the current
+_BEGUN = 0.02  # of a slip: before, that noise would decide when the model breaks away
+_RESTED = 1.0  # s of rest from which the ramp of the current is read
+
+
+@dataclass(frozen=True)
+class Shot:
+    """A measured slip.
+
+    Parameters
+    ----------
+    slip
+        Where it lies.
+    time, pressure, current
+        Measured around it, from a little before its onset; shape (n,), SI.
+    line
+        Rate [A/s] and level [A], at the first of these times, of the current's ramp while the
+        piston rested.
+    """
+
+    slip: Slip
+    time: Array
+    pressure: Array
+    current: Array
+    line: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A slip of the model, laid over the measured one.
+
+    Parameters
+    ----------
+    residuals
+        Computed less measured pressure [Pa], shape (n,).
+    slopes
+        Their derivatives by the unknowns with the shift at its best, shape (n, p).
+    breakaway, breakaway_slopes
+        Measured less computed current at the instant of breaking away [A], and its
+        derivatives, shape (p,).
+    current
+        At which the model breaks away [A].
+    onset
+        When, on the measurement's clock [s].
+    """
+
+    residuals: Array
+    slopes: Array
+    breakaway: float
+    breakaway_slopes: Array
+    current: float
+    onset: float
+
+
+def cut_out(
+    time: Array, pressure: Array, current: Array, slips: Sequence[Slip], longest: float
+) -> list[Shot]:
+    """Return the measured slips with what lies around them, up to the next onset."""
+    interval = float(time[1] - time[0])
+    found = []
+    lead, most, rested = (int(span / interval) for span in (_LEAD, longest, _RESTED))
+    for k, slip in enumerate(slips):
+        first = max(slip.begin - lead, 0)
+        until = slips[k + 1].begin - lead if k + 1 < len(slips) else time.size
+        last = min(slip.end + 2 * lead, slip.begin + most, until)
+        since = max(slip.begin - rested, slips[k - 1].end + lead if k else 0)
+        before = slice(min(since, slip.begin - 2), slip.begin)
+        rate, level = np.polyfit(time[before] - time[first], current[before], 1)
+        rows = slice(first, last)
+        line = (float(rate), float(level))
+        found.append(Shot(slip, time[rows], pressure[rows], current[rows], line))
+    return found
+
+
+class Shooting:
+    """Runs slips of the motorcycle brake for values of the unknowns.
+
+    Parameters
+    ----------
+    par
+        Everything that is known.
+    unknowns
+        Friction parameters.
+    step
+        Substep [s].
+    """
+
+    def __init__(
+        self, par: MotorcycleParameters, unknowns: Sequence[Unknown], step: float = 20e-6
+    ) -> None:
+        self.par = par.replace({"drive.mode": "current-source"})
+        self.names = tuple(u.name for u in unknowns)
+        self.model, self.step = MotorcycleBrake(), step
+        self._error = EquationError(Equation(self.model, "omega", "alpha"), self.par, unknowns)
+
+    def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
+        """Return the current [A] that breaks away from a rest [Pa], and its derivatives.
+
+        Where motor, pressure and breakaway torque balance: the equation of motion without
+        motion, which is affine in the current.
+        """
+        columns = self._error.at(
+            state_at(max(rest, 0.0), self.par)._replace(omega=direction * 1e-12),
+            memory_at(max(rest, 0.0), self.par), "i_source", (0.0, 1.0),
+        )  # fmt: skip
+        e, slopes = self._error(columns, values)
+        per_ampere = e[1] - e[0]
+        return -e[0] / per_ampere, -slopes[0] / per_ampere
+
+    def fit(self, shot: Shot, values: Array) -> Fitted:
+        """Run one slip and lay it over the measured one."""
+        slip, interval = shot.slip, float(f"{shot.time[1] - shot.time[0]:.9g}")
+        t: Array = np.arange(shot.time.size, dtype=float) * interval
+        current, current_slopes = self.breakaway(slip.rest, slip.direction, values)
+        rate, level = shot.line
+        ramp = current + rate * (t + interval)  # just beyond breaking away
+        par = self.par.replace(dict(zip(self.names, values.tolist(), strict=True)))
+        rest = max(slip.rest, 0.0)
+        run = Run(
+            self.model, par, state_at(rest, par), memory_at(rest, par),
+            partial(_held, ramp, interval), (t.size - 1) * interval, self.step, interval,
+        )  # fmt: skip
+        # Where the shaft turns quickly the current dips below its ramp: follow the measured one,
+        # once the slip has begun.
+        alone = simulate(run, ("p_mc",))["p_mc"]
+        shift = _best_shift(shot, alone, interval)
+        dip = _dip(np.interp(t + shift, t, shot.current - level - rate * t), interval)
+        dip[np.abs(alone - alone[0]) < _BEGUN * np.abs(alone - alone[0]).max()] = 0.0
+        run = replace(run, stimulus=partial(_held, ramp + dip, interval))
+        found = simulate_with_sensitivities(run, [*self.names, "stimulus.i_set"], ("p_mc",))
+        p = found.trajectory["p_mc"]
+        slopes = found.derivatives[:, 0, :-1]
+        slopes = slopes + found.derivatives[:, 0, -1:] * current_slopes
+        shift = _best_shift(shot, p, interval)
+        r, v = _laid_over(shot, p, shift, interval)
+        at = t - shift
+        J = np.column_stack([np.interp(at, t, column) for column in slopes.T])
+        J[at < 0.0] = 0.0
+        shift_slopes = (v @ J) / max(float(v @ v), 1e-300)
+        return Fitted(
+            residuals=r, slopes=J - np.outer(v, shift_slopes),
+            breakaway=level + rate * shift - current,
+            breakaway_slopes=rate * shift_slopes - current_slopes,
+            current=current, onset=float(shot.time[0] + shift),
+        )  # fmt: skip
+
+
+def _held(ramp: Array, interval: float, at: Array) -> Array:
+    fields = MotorcycleBrake().Stimulus._fields
+    rows = np.zeros((at.size, len(fields)))
+    index = np.clip(np.floor(at / interval + 1e-6).astype(int), 0, ramp.size - 1)
+    rows[:, fields.index("i_set")] = ramp[index]
+    return rows
+
+
+def _dip(beside: Array, interval: float) -> Array:
+    """Return how far the current leaves its ramp, smoothed over a few samples."""
+    width = max(int(_SMOOTHED / interval), 1)
+    padded = np.pad(beside, (width // 2, width - 1 - width // 2), mode="edge")
+    return np.convolve(padded, np.ones(width) / width, mode="valid")
+
+
+def _best_shift(shot: Shot, p: Array, interval: float) -> float:
+    """Return by how much later the computed slip lies on the measured one [s] (Gauss, Newton)."""
+    t = np.arange(p.size, dtype=float) * interval
+    shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
+    for _ in range(_ROUNDS):
+        r, v = _laid_over(shot, p, shift, interval)
+        size = float(v @ v)
+        if size == 0.0:
+            break
+        change = float(v @ r) / size
+        shift += float(np.clip(change, -_LEAD, _LEAD))
+        if abs(change) < 1e-9:
+            break
+    return shift
+
+
+def _laid_over(shot: Shot, p: Array, shift: float, interval: float) -> tuple[Array, Array]:
+    """Return computed less measured pressure with the computed one later, and its speed."""
+    t = np.arange(p.size, dtype=float) * interval
+    at = t - shift
+    v = np.interp(at, t, np.gradient(p, interval))
+    v[(at <= 0.0) | (at >= t[-1])] = 0.0
+    return np.interp(at, t, p) - shot.pressure, v
+
+
+def _half_way(t: Array, p: Array, slip: Slip) -> float:
+    """Return when a slip has gone half of its way [s]."""
+    middle = 0.5 * (p[0] + p[-1])
+    beyond = np.flatnonzero(slip.direction * (p - middle) > 0.0)
+    return float(t[beyond[0]]) if beyond.size else float(t[-1])

@@ -1,0 +1,107 @@
+"""Stick-slip in a measured signal: where it rests, where it slips, and which way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_WINDOW = 0.02  # s: over which a change counts as motion
+_SURE = 6.0  # standard deviations of that change
+_PAUSE = 0.05  # s: shorter rests belong to the slip around them
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A stretch of motion between two rests.
+
+    Parameters
+    ----------
+    begin, end
+        Samples at which the motion begins and ends (or the record does).
+    direction
+        1 for rising, -1 for falling.
+    rest
+        Level at which the signal rested before.
+    """
+
+    begin: int
+    end: int
+    direction: int
+    rest: float
+
+
+def noise_of(values: Array) -> float:
+    """Return the standard deviation of a measured signal's noise, quantization included.
+
+    From differences of the third order, which a slow signal has not, by their median: slips do
+    not count.
+    """
+    third = np.diff(values, 3) / np.sqrt(20.0)
+    scatter = 1.4826 * float(np.median(np.abs(third)))
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 0]
+    step = float(steps.min()) if steps.size else 0.0
+    repeated = float(np.mean(np.diff(values) == 0.0))
+    quantized = step / np.sqrt(12.0) if 0.05 < repeated < 1.0 and step > 3.0 * scatter else 0.0
+    return max(scatter, quantized)
+
+
+def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
+    """Return the slips of a signal.
+
+    Parameters
+    ----------
+    values
+        Shape (n,).
+    interval
+        Sample time [s].
+    least
+        Changes smaller than this are no slips.
+    """
+    width = max(round(_WINDOW / interval), 1)
+    smooth = _mean(values, width)
+    change = np.zeros(values.size)
+    change[width:-width] = smooth[2 * width :] - smooth[: -2 * width]
+    threshold = max(_SURE * noise_of(values) * np.sqrt(2.0 / width), 0.01 * least)
+    moving = np.abs(change) > threshold
+    slips = []
+    for begin, end in _stretches(moving, int(_PAUSE / interval)):
+        for first, last in _one_way(values, begin, end, least):
+            before = values[max(first - 5 * width, 0) : max(first - width, 1)]
+            travel = values[min(last, values.size - 1)] - before.mean()
+            if abs(travel) >= least:
+                direction = 1 if travel > 0 else -1
+                slips.append(Slip(first, last, direction, float(before.mean())))
+    return slips
+
+
+def _mean(values: Array, width: int) -> Array:
+    padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
+    return np.convolve(padded, np.ones(width) / width, mode="valid")
+
+
+def _stretches(moving: NDArray[np.bool_], pause: int) -> list[tuple[int, int]]:
+    edges = np.flatnonzero(np.diff(np.concatenate(([0], moving.astype(int), [0]))))
+    found: list[tuple[int, int]] = []
+    for begin, end in edges.reshape(-1, 2).tolist():
+        if found and begin - found[-1][1] <= pause:
+            found[-1] = (found[-1][0], end)
+        else:
+            found.append((begin, end))
+    return found
+
+
+def _one_way(values: Array, begin: int, end: int, least: float) -> list[tuple[int, int]]:
+    """Split a stretch where it turns back by more than what counts as a slip."""
+    part = values[begin:end]
+    top, low = int(np.argmax(part)), int(np.argmin(part))
+    rise, fall = part[top] - part[0], part[0] - part[low]
+    if top > 0 and rise > least and part[top] - part[-1] > least:
+        return [(begin, begin + top), *_one_way(values, begin + top, end, least)]
+    if low > 0 and fall > least and part[-1] - part[low] > least:
+        return [(begin, begin + low), *_one_way(values, begin + low, end, least)]
+    return [(begin, end)]

@@ -1,0 +1,134 @@
+"""What is to be estimated: names with starts, bounds, and what is known beforehand."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.parameters import ParameterSet, leaf_fields
+
+Array = NDArray[np.float64]
+
+_BEYOND = 1e3  # of the start: how far a parameter may go that nothing else bounds
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """A number that is estimated, SI.
+
+    Parameters
+    ----------
+    name
+        Dotted name of a parameter; or ``initial.STATE``, ``stimulus.NAME`` (an offset of an
+        input), ``offset.SIGNAL`` (an offset of a measured output).
+    start
+        Where the search begins.
+    low, high
+        Bounds.
+    scale
+        Typical magnitude, > 0: what an uncertainty is large or small against.
+    unit
+        SI unit.
+    prior
+        Mean and standard deviation known beforehand; None where nothing is known.
+    trial
+        Label of the trial that it belongs to; empty where all trials share it.
+    """
+
+    name: str
+    start: float
+    low: float = -math.inf
+    high: float = math.inf
+    scale: float = 1.0
+    unit: str = "1"
+    prior: tuple[float, float] | None = None
+    trial: str = ""
+
+    def __post_init__(self) -> None:
+        if not self.low <= self.start <= self.high:
+            raise ParameterError(
+                f"start of {self.label} = {self.start:g} {self.unit} is not admissible: it must "
+                f"lie within {self.low:g} and {self.high:g} {self.unit}"
+            )
+        if not (self.scale > 0.0 and math.isfinite(self.scale)):
+            raise ParameterError(f"scale of {self.label} = {self.scale:g} must be > 0 and finite")
+        if self.prior is not None and not self.prior[1] > 0.0:
+            raise ParameterError(f"prior of {self.label} needs a standard deviation > 0")
+
+    @property
+    def label(self) -> str:
+        """Name, with the trial's where it belongs to one."""
+        return f"{self.trial}:{self.name}" if self.trial else self.name
+
+
+def parameters_of(
+    par: ParameterSet,
+    names: Sequence[str],
+    starts: Mapping[str, float] | None = None,
+    priors: Mapping[str, tuple[float, float]] | None = None,
+) -> tuple[Unknown, ...]:
+    """Return parameters of a set as unknowns, within their admissible ranges.
+
+    Parameters
+    ----------
+    par
+        Gives units, ranges, and the starts that are not given.
+    names
+        Dotted names.
+    starts, priors
+        By name, SI.
+
+    Raises
+    ------
+    UnknownNameError
+        When the set has no such number.
+    ParameterError
+        When a start is out of range.
+    """
+    fields, known = leaf_fields(type(par)), par.leaves()
+    found = []
+    for name in names:
+        if name not in fields or name not in known:
+            raise unknown_name("parameter", name, tuple(n for n in fields if n in known))
+        field, start = fields[name], (starts or {}).get(name, known[name])
+        size = abs(start) or abs(known[name]) or field.unit.nominal
+        low, high = _inside(field.low, field.low_open, size), min(field.high, _BEYOND * size)
+        prior = (priors or {}).get(name)
+        found.append(Unknown(name, start, low, high, size, field.unit.symbol, prior))
+    return tuple(found)
+
+
+def _inside(low: float, is_open: bool, size: float) -> float:
+    if is_open:
+        return low + 1e-6 * size
+    return max(low, -_BEYOND * size)
+
+
+def scattered(
+    unknowns: Sequence[Unknown], count: int, spread: float, seed: int
+) -> tuple[Array, ...]:
+    """Return ``count`` starts: the given one, then others up to ``spread`` of it away.
+
+    Parameters
+    ----------
+    spread
+        Share of the start, or of the scale where the start is zero.
+    seed
+        Of the random numbers.
+    """
+    random = np.random.default_rng(seed)
+    first = np.array([u.start for u in unknowns])
+    reach = np.array([abs(u.start) or u.scale for u in unknowns])
+    low, high = (np.array([getattr(u, end) for u in unknowns]) for end in ("low", "high"))
+    away = random.uniform(-spread, spread, (count - 1, len(unknowns)))
+    return (first, *np.clip(first + away * reach, low, high))
+
+
+def moved(unknowns: Sequence[Unknown], values: Array) -> tuple[Unknown, ...]:
+    """Return the unknowns with other starts."""
+    return tuple(replace(u, start=float(v)) for u, v in zip(unknowns, values, strict=True))

@@ -1,0 +1,196 @@
+"""Least squares with confidence: closed forms, what the data does not tell, several starts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError, SolverError
+from bywire.identification.confidence import autocorrelation, is_white, uncertainty
+from bywire.identification.least_squares import Problem, estimate, solve
+from bywire.identification.multistart import search
+from bywire.identification.unknown import Unknown, scattered
+
+Array = NDArray[np.float64]
+
+T = np.linspace(0.0, 5.0, 400)
+TRUTH = np.array([2.0, 0.7])
+
+
+def decay(noise: Array, *, more: bool = False) -> Problem:
+    """Return the fit of a exp(-b t), with a third unknown that hardly shows if asked for."""
+    measured = TRUTH[0] * np.exp(-TRUTH[1] * T) + noise
+    unknowns = [Unknown("a", 1.5), Unknown("b", 1.0, low=0.0)]
+    unknowns += [Unknown("c", 3.0, scale=3.0)] if more else []
+
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        a, b = values[:2]
+        e = np.exp(-b * T)
+        r, J = a * e - measured, np.column_stack((e, -a * T * e))
+        if more:
+            r, J = r + 1e-6 * values[2] * T, np.column_stack((J, 1e-6 * T))
+        return r / 0.01, J / 0.01
+
+    return Problem(tuple(unknowns), evaluate)
+
+
+def white(seed: int, size: float = 0.01) -> Array:
+    return np.random.default_rng(seed).normal(0.0, size, T.size)
+
+
+def colored(seed: int) -> Array:
+    e = np.random.default_rng(seed).normal(0.0, 0.01, T.size)
+    for k in range(1, T.size):
+        e[k] += 0.8 * e[k - 1]
+    return e
+
+
+@pytest.mark.parametrize("make", [white, colored])
+def test_parameters_put_in_come_back_with_honest_intervals(make: object) -> None:
+    found = [estimate(decay(make(seed))) for seed in range(200)]  # type: ignore[operator]
+    values = np.array([f.values for f in found])
+    error = values.mean(axis=0) - TRUTH
+    assert np.all(np.abs(error) < 3.0 * values.std(axis=0, ddof=1) / np.sqrt(len(found)))
+    inside = [(f.intervals()[:, 0] < TRUTH) & (f.intervals()[:, 1] > TRUTH) for f in found]
+    coverage = np.mean(inside, axis=0)
+    assert np.all((coverage >= 0.9) & (coverage <= 0.99)), coverage
+
+
+def test_white_residuals_counted_as_independent_would_lie_about_colored_ones() -> None:
+    """The gate of the test above can fail: the plain formula covers far too little."""
+    hits = []
+    for seed in range(60):
+        found = estimate(decay(colored(seed)))
+        r, J = decay(colored(seed)).evaluate(found.values)
+        plain = np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * (r @ r) / (r.size - 2))
+        hits.append(np.abs(found.values - TRUTH) < 1.96 * plain)
+    assert np.mean(hits) < 0.8
+
+
+def test_linear_covariance_equals_the_closed_form() -> None:
+    J = np.column_stack((np.ones(400), T))
+    r = white(5, 1.0)
+    r -= J @ np.linalg.lstsq(J, r, rcond=None)[0]
+    wanted = np.linalg.inv(J.T @ J) * (r @ r) / (400 - 2)
+    found = uncertainty(J, r)
+    assert not found.colored
+    np.testing.assert_allclose(found.covariance, wanted, rtol=1e-10)
+
+
+def test_whiteness() -> None:
+    assert is_white(white(1))
+    assert not is_white(colored(1))
+    rho = autocorrelation(colored(2), 1)
+    assert rho[0] == pytest.approx(1.0)
+    assert rho[1] == pytest.approx(0.8, abs=0.1)
+
+
+def test_what_the_data_does_not_tell_is_kept_and_named() -> None:
+    found = estimate(decay(white(1), more=True))
+    assert found.names == ("a", "b")
+    assert [k.unknown.name for k in found.kept] == ["c"]
+    assert "times its usual magnitude 3" in found.kept[0].reason
+    assert found["a"] == pytest.approx(2.0, abs=0.02)
+
+
+def test_an_unknown_that_nothing_depends_on_is_named_too() -> None:
+    inner = decay(white(1))
+
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        r, J = inner.evaluate(values[:2])
+        return r, np.column_stack((J, np.zeros(r.size)))
+
+    found = estimate(Problem((*inner.unknowns, Unknown("d", 1.0)), evaluate))
+    assert found.kept[0].unknown.name == "d"
+    assert found.kept[0].reason == "nothing measured depends on it"
+
+
+def test_a_prior_weighs_like_a_measurement() -> None:
+    """Estimate of a mean with a prior: the closed form of two Gaussians."""
+    y = np.random.default_rng(3).normal(1.0, 0.5, 50)
+    unknown = Unknown("mean", 0.0, prior=(3.0, 0.1))
+    problem = Problem((unknown,), lambda v: ((v[0] - y) / 0.5, np.full((50, 1), 2.0)))
+    weights = np.array([50 / 0.25, 1 / 0.01])
+    wanted = weights @ [y.mean(), 3.0] / weights.sum()
+    assert estimate(problem)["mean"] == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_robust_loss_shrugs_off_outliers() -> None:
+    spoiled = white(2)
+    spoiled[::20] += 1.0
+    plain, robust = (estimate(decay(spoiled), loss) for loss in ("linear", "soft_l1"))
+    assert abs(plain["a"] - 2.0) > 5.0 * abs(robust["a"] - 2.0)
+    assert abs(robust["a"] - 2.0) < 0.01
+
+
+def test_a_bound_that_is_met_is_said() -> None:
+    problem = decay(white(1))
+    tight = Problem((Unknown("a", 1.5, high=1.8), problem.unknowns[1]), problem.evaluate)
+    found = estimate(tight)
+    assert found["a"] == pytest.approx(1.8, abs=1e-6)
+    assert any("a lies at its bound, 1.8" in note for note in found.notes)
+
+
+def test_too_few_measurements_are_refused() -> None:
+    problem = Problem((Unknown("a", 1.0),), lambda v: (v, np.ones((1, 1))))
+    with pytest.raises(ParameterError, match="1 measured values cannot tell 1 unknowns"):
+        estimate(problem)
+
+
+def test_several_starts_find_the_lower_of_two_minima() -> None:
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        x = values[0]
+        return np.array([(x * x - 1.0) * 3.0, x - 1.0, 0.0]), np.array([[6.0 * x], [1.0], [0.0]])
+
+    problem = Problem((Unknown("x", -1.2),), evaluate)
+    starts = scattered(problem.unknowns, 16, 2.0, seed=1)
+    found = search(problem, starts)
+    assert solve(problem, starts[0]).values[0] < 0.0
+    assert found.best.values[0] == pytest.approx(1.0, abs=1e-6)
+    assert 2 <= found.reached < 16
+
+
+def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path) -> None:
+    store, calls = tmp_path / "starts.jsonl", [0]
+    inner = decay(white(1))
+
+    def counted(values: Array) -> tuple[Array, Array]:
+        calls[0] += 1
+        return inner.evaluate(values)
+
+    problem = Problem(inner.unknowns, counted)
+    starts = scattered(problem.unknowns, 4, 0.3, seed=1)
+
+    def stop(label: str, share: float) -> None:
+        if share >= 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        search(problem, starts, progress=stop, store=store, threads=1)
+    lines = store.read_text().splitlines()
+    assert 2 <= len(lines) <= 4
+    store.write_text("\n".join(lines[:2]) + '\n{"key": "cut')  # as a killed run leaves it
+    calls[0] = 0
+    again = search(problem, starts, store=store, threads=1)
+    whole = search(problem, starts, threads=1)
+    np.testing.assert_array_equal(
+        [s.values for s in again.solutions], [s.values for s in whole.solutions]
+    )
+    store.write_text("nothing that is understood\n")
+    assert len(search(problem, starts, store=store).solutions) == 4
+
+
+def test_starts_that_cannot_be_computed_are_counted() -> None:
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        if values[0] > 1.0:
+            raise SolverError("left the numbers")
+        return values - 0.5 * np.ones(1), np.ones((1, 1))
+
+    problem = Problem((Unknown("x", 0.8),), evaluate)
+    found = search(problem, [np.array([0.8]), np.array([2.0])])
+    assert found.failed == 1
+    with pytest.raises(SolverError, match="no start could be computed"):
+        search(problem, [np.array([2.0])])
