@@ -17,6 +17,7 @@ from typing import Any
 
 from bywire import assemblies, control, plant
 from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.plant_registry import all_plants
 from bywire.bench.kpis.registry import families
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
@@ -200,6 +201,13 @@ def bench_reference() -> str:
         for one in all_loops().values()
     )  # fmt: skip
     lines += table(("loop", "meaning", "of", "at", "from", "to", "cut at"), rows)
+    lines += ["## Plants", "", "What `linearize` knows besides loops.", ""]
+    rows = (
+        (f"`{one.name}`", one.summary, one.assembly,
+         ", ".join(f"{q.name} [{unit_text(q.unit)}]" for q in one.at), f"{one.band:g} Hz")
+        for one in all_plants().values()
+    )  # fmt: skip
+    lines += table(("plant", "meaning", "of", "at one of", "judged up to"), rows)
     lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]
     for s in stimuli().values():
         lines += [f"### {s.kind}", "", s.summary, ""]

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
     from bywire.bench.running import run
     from bywire.catalog.registry import parameters
     from bywire.core.errors import BywireError
+    from bywire.data.alignment import resample
+    from bywire.data.measurement import read_measurement
     from bywire.data.netcdf import read_recording, write_recording
+    from bywire.data.writing import write_measurement
     from bywire.simulation.ensemble import Ensemble, simulate_ensemble
     from bywire.simulation.run import Run, Trajectory, simulate
     from bywire.simulation.sensitivity import Sensitivity, simulate_with_sensitivities
@@ -37,11 +40,14 @@ _HOMES = {
     "Trajectory": "simulation.run",
     "load": "bench.bench_file",
     "parameters": "catalog.registry",
+    "read_measurement": "data.measurement",
     "read_recording": "data.netcdf",
+    "resample": "data.alignment",
     "run": "bench.running",
     "simulate": "simulation.run",
     "simulate_ensemble": "simulation.ensemble",
     "simulate_with_sensitivities": "simulation.sensitivity",
+    "write_measurement": "data.writing",
     "write_recording": "data.netcdf",
 }
 
@@ -55,11 +61,14 @@ __all__ = [
     "Trajectory",
     "load",
     "parameters",
+    "read_measurement",
     "read_recording",
+    "resample",
     "run",
     "simulate",
     "simulate_ensemble",
     "simulate_with_sensitivities",
+    "write_measurement",
     "write_recording",
 ]
 

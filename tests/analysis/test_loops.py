@@ -13,11 +13,9 @@ from bywire.analysis.agreement import agreement
 from bywire.analysis.loop_registry import all_loops, find_loop
 from bywire.analysis.robustness import margins, over, worst
 from bywire.catalog.registry import main_set, parameters
-from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.errors import ParameterError, StepError, UnknownNameError
 
 LOOPS = sorted(all_loops())
-# The current loop wants a step of at most 1/(100 f).
-STEPS = {"current": 10e-6}
 
 
 def of(name: str):
@@ -32,11 +30,27 @@ def test_nonlinear_response_is_the_linear_one_without_its_causes(name: str) -> N
     frequencies = (max(low, 2.0), math.sqrt(max(low, 2.0) * high), high)
     found = agreement(
         replace(loop, causes={}), loop.smooth(par), loop.at.default, frequencies,
-        (loop.amplitudes[0], loop.amplitudes[0]), STEPS.get(name, 20e-6),
+        (loop.amplitudes[0], loop.amplitudes[0]),
     )  # fmt: skip
     assert found.holds
     assert np.abs(found.gain[""]).max() < 0.01
     assert np.abs(found.phase[""]).max() < 0.1
+
+
+def test_without_causes_a_run_is_the_linear_model_of_its_own_scheme() -> None:
+    """What is left against the exact model is the error of the step, of second order."""
+    loop, par = of("position")
+    own, f = replace(loop, causes={}), (20.0, 150.0)
+    found = agreement(own, loop.smooth(par), 0.0, f, (1e-3, 1e-3))
+    np.testing.assert_allclose(found.gain[""], found.step_gain, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found.phase[""], found.step_phase, rtol=0.0, atol=1e-9)
+    assert abs(found.step_gain[1]) > 1e-6
+    exact = loop.closed(par, 0.0).response(np.array(f))
+    coarse, fine = (np.abs(loop.closed(par, 0.0, h).response(np.array(f)) / exact - 1.0)
+                    for h in (20e-6, 10e-6))  # fmt: skip
+    np.testing.assert_allclose(coarse / fine, 4.0, rtol=0.02)
+    with pytest.raises(StepError, match="does not divide the sample time of 200 us"):
+        loop.closed(par, 0.0, 30e-6)
 
 
 def test_agreement_shows_what_breaks_it() -> None:
@@ -47,8 +61,25 @@ def test_agreement_shows_what_breaks_it() -> None:
     assert found.holds
     assert abs(found.phase["bearing friction"][0]) > 1.0
     assert abs(found.phase["encoder"][0]) < 0.5
+    assert found.largest == ["bearing friction"]
     rubbing = {"": found.gain["bearing friction"]}, {"": found.phase["bearing friction"]}
     assert not replace(found, gain=rubbing[0], phase=rubbing[1]).holds
+
+
+def test_agreement_tells_limits_from_causes() -> None:
+    """At 100 Hz and 1 rad the drives' current limit acts; friction hides behind it."""
+    loop, par = of("position")
+    one = replace(loop, causes={"bearing friction": loop.causes["bearing friction"]})
+    found = agreement(one, loop.smooth(par, "bearing friction"), 0.0, (100.0,), (1e-3, 1.0))
+    assert found.holds
+    assert found.largest == ["limits"]
+    assert found.gain["limits"][0] < -6.0
+    assert found.gain["bearing friction"][0] < -6.0
+    added, turned = found.beyond_limits("bearing friction")
+    assert abs(added[0]) < 0.5
+    assert 0.1 < abs(turned[0]) < 20.0
+    lost = replace(found, gain=found.gain | {"bearing friction": np.array([math.nan])})
+    assert lost.largest == ["bearing friction"]
 
 
 @pytest.mark.parametrize("name", LOOPS)
@@ -56,7 +87,8 @@ def test_margins_are_those_of_the_library(name: str) -> None:
     loop, par = of(name)
     found = margins(loop, par, loop.at.default)
     gain = loop.gain(par, loop.at.default)
-    omega = 2.0 * math.pi * np.geomspace(0.01, 0.499 / gain.period, 2000)
+    highest = 0.998 * min(gain.nyquist, loop.closed(par, loop.at.default).nyquist)
+    omega = 2.0 * math.pi * np.geomspace(0.01, highest, 2000)
     response = control.frd(gain.response(omega / 2.0 / math.pi)[:, 0, 0], omega)
     _, phase, _, _, crossover, _ = control.stability_margins(response, returnall=True)
     k = int(np.argmin(np.abs(crossover - 2.0 * math.pi * found.crossover)))

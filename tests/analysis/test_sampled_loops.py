@@ -9,9 +9,12 @@ from scipy.signal import cont2discrete
 
 from bywire.analysis.closed_loop import closed_loop
 from bywire.analysis.current_loop import current_loop
+from bywire.analysis.frequency_response import frequency_response
+from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.measured_bandwidth import complex_values, fall
 from bywire.analysis.pressure_loop import PressureLoop, cancelling_pi
 from bywire.analysis.rational import first_orders
-from bywire.analysis.sine_test import Excitation, SineTest, sine_test
+from bywire.analysis.response_dataset import Sweep
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at
@@ -19,7 +22,7 @@ from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
 from bywire.catalog.registry import entry
 from bywire.control import current_pi, low_pass_2, pressure_pid
-from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.errors import UnknownNameError
 from bywire.core.signals import zeros
 from bywire.simulation.run import simulate
 
@@ -58,18 +61,17 @@ def test_current_loop_is_that_of_the_simulation(rotor: Any) -> None:
 
 def test_closed_pressure_loop_is_that_of_sine_tests() -> None:
     """Without friction the nonlinear brake is nearly linear: one model checks the other."""
-    par = brake(**FRICTIONLESS)
-    own = par.replace({"drive.mode": "pressure"})
-    assert isinstance(own, MotorcycleParameters)
+    own = brake(**FRICTIONLESS, **{"drive.mode": "pressure"})
     p = 20e5
     linear = closed_loop(
         MotorcycleBrake(), own, state_at(p, own), memory_at(p, own),
         inputs=("p_set",), outputs=("p_mc",),
     )  # fmt: skip
-    f = (0.5, 2.0, 10.0)
-    measured = sine_test(par, Excitation("pressure", "p_set", p, p, 1e4), f, settle=2.0)
-    expected = linear.response(np.array(f))[:, 0, 0]
-    np.testing.assert_allclose(measured.values, expected, rtol=2e-3)
+    sweep = Sweep(("p_set",), "p_mc", (0.5, 2.0, 10.0), (1e4,), flags=())
+    found = frequency_response(find_loop("pressure").point(own, p).run(), sweep)
+    expected = linear.response(found["frequency"].values)[:, 0, 0]
+    measured = complex_values(found.isel(variant=0, amplitude=0))
+    np.testing.assert_allclose(measured, expected, rtol=2e-3)
 
 
 def test_pressure_loop_is_that_of_a_simulation_of_its_chain() -> None:
@@ -122,18 +124,17 @@ def test_pid_and_pi_have_their_known_margins() -> None:
     assert pi.phase == pytest.approx(16.0, abs=1.0)
 
 
-def test_bandwidth_of_a_sine_test_is_interpolated() -> None:
+def test_fall_is_interpolated() -> None:
     f = np.array([0.25, 1.0, 4.5, 5.5, 30.0])
-    lag = SineTest(f, 1.0 / (1.0 + 1j * f / 5.0))
-    assert lag.bandwidth(of=1.0) == pytest.approx(5.0, rel=0.01)
-    slope = SineTest(f, (2.0 / f).astype(complex))
-    assert slope.bandwidth(of=1.0) == pytest.approx(2.0 * math.sqrt(2.0), rel=1e-12)
-    assert math.isnan(SineTest(f, np.ones(5, dtype=complex)).bandwidth())
+    assert fall(1.0 / np.abs(1.0 + 1j * f / 5.0), f) == pytest.approx(5.0, rel=0.01)
+    assert fall(2.0 / f, f) == pytest.approx(2.0 * math.sqrt(2.0), rel=1e-12)
+    assert fall(2.0 / f, f, start=8.0) == pytest.approx(2.0 / (8.0 * math.sqrt(0.5)), rel=1e-12)
+    assert fall(np.ones(5), f) == math.inf
+    assert fall(np.full(5, 0.5), f) == 0.0
+    assert fall(np.array([1.0, 1.0, math.nan, math.nan, math.nan]), f) == 1.0, "it sticks"
 
 
 def test_refusals() -> None:
-    with pytest.raises(ParameterError, match="no multiple"):
-        sine_test(brake(), Excitation("pressure", "p_set", 20e5, 20e5, 1e5), (0.3,))
     par = brake(**{"drive.mode": "pressure"})
     with pytest.raises(UnknownNameError, match="p_sett"):
         closed_loop(

@@ -36,6 +36,7 @@ CHOICES: dict[str, dict[str, Any]] = {
     "port.law": {"dead-stroke": {}},
     "pressure_sensor.place": {"mid-pipeline": {}},
     "adc.law": {"ideal": {}},
+    "ecu.schedule.law": {"regions": {"ecu.schedule.low.k_p": 2e-5, "ecu.schedule.low.k_i": 2e-4}},
     "ecu.filter.place": {"before-dither": {}},
     "ecu.dither.waveform": {"off": {}, "square": {}, "triangle": {}},
     "drive.mode": {

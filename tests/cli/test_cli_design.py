@@ -73,6 +73,62 @@ def test_what_is_set_stays(bywire):
     assert set(outcome.object["gains"]) == {"ecu.current.k_p"}
 
 
+def test_the_operating_point_may_be_a_range(bywire):
+    kept = ("k_d=1.5e-7 A*s/Pa", "tau_d=2 ms", "b=1", "c=0", "k_i=5e-5 A/(Pa*s)")
+    outcome = bywire(
+        "design", "pressure", "--require", "phase margin >= 60 deg", "--over",
+        "at=5 bar:35 bar:2", *LINEAR,
+        *(part for one in kept for part in ("--set", f"ecu.pressure.{one}")),
+    )  # fmt: skip
+    assert outcome.status == 0
+    places = {one["at"] for one in outcome.object["linear"]["worst"].values()}
+    assert {"pressure = 5 bar", "pressure = 35 bar"} & places
+    margins = bywire("margins", "pressure", "--over", "at=5 bar:35 bar:2", "--json").object
+    assert margins["over"] == "pressure"
+    assert [one["pressure"] for one in margins["cases"]] == [5e5, 35e5]
+
+
+def test_the_bench_looks_at_the_worst_corner_too(bywire):
+    arguments = (
+        "design", "current", "--require", "bandwidth >= 60 Hz", "--set",
+        "ecu.current.k_i=10.39 1/(A*s)", "--over", "motor.R_m=0.3 ohm, 0.4 ohm",
+        "--amplitudes", "1 A",
+    )  # fmt: skip
+    outcome = bywire(*arguments)
+    assert outcome.status in (0, 1)
+    assert "bandwidth, sine of 1 A at motor.R_m = 0." in outcome.out
+    assert "(worst of 2 corners)" in outcome.out
+    assert "ecu.current.k_p" in outcome.out
+
+
+def test_a_gain_schedule_as_a_bench_file_that_runs(bywire, tmp_path):
+    kept = [
+        f"ecu.{region}.{name}={value}"
+        for region in ("pressure", "schedule.low", "schedule.high")
+        for name, value in (("k_p", "2e-5 A/Pa"), ("k_i", "4e-4 A/(Pa*s)"), ("k_d", "4e-7 A*s/Pa"))
+        if (region, name) != ("schedule.low", "k_p")
+    ]
+    kept += ["ecu.pressure.tau_d=56 us", "ecu.pressure.b=1", "ecu.pressure.c=1"]
+    outcome = bywire(
+        "design", "pressure", "--schedule", "--at", "6 bar, 20 bar, 37 bar",
+        "--require", "phase margin >= 60 deg", "--linear-only", "--json", "--out", tmp_path / "out",
+        *(part for one in kept for part in ("--set", one)),
+    )  # fmt: skip
+    assert outcome.status == 0
+    found = outcome.object
+    assert found["operating_points"] == {"unit": "Pa", "low": [6e5], "medium": [2e6],
+                                         "high": [3.7e6]}  # fmt: skip
+    assert found["gains"].keys() == {"ecu.schedule.low.k_p"}
+    assert found["regions"]["low"]["binding"][0]["requirement"] == "phase_margin >= 60 deg"
+    assert found["across"]["worst"]["slack"] == min(
+        one["slack"] for one in found["across"]["cases"]
+    )  # fmt: skip
+    file = tmp_path / "out" / "pressure-design.toml"
+    assert 'ecu.schedule.law = "regions"' in file.read_text()
+    run = bywire("run", file, "--json")
+    assert run.status == 0
+
+
 @pytest.mark.parametrize(
     ("arguments", "texts"),
     [
@@ -91,6 +147,23 @@ def test_what_is_set_stays(bywire):
         (
             ("moment", "--require", "bandwidth >= 5 Hz", "--set", "control.moment.f_c=5 Hz"),
             ("--set fixes all",),
+        ),
+        (
+            ("moment", "--schedule", "--require", "bandwidth >= 5 Hz"),
+            ("'moment' has no gain schedule", "leave out --schedule"),
+        ),
+        (
+            ("pressure", "--schedule", "--at", "5 bar, 20 bar", "--require", "bandwidth >= 5 Hz"),
+            ("region 'high'", "35 bar", "--at"),
+        ),
+        (
+            ("pressure", "--schedule", "--require", "bandwidth >= 5 Hz", "--over",
+             "at=5 bar:30 bar:3"),
+            ("what the schedule follows", "--at"),
+        ),
+        (
+            ("pressure", "--require", "bandwidth >= 5 Hz", "--over", "motor.R=0.3:0.4:2"),
+            ("unknown parameter 'motor.R'", "motor.R_m"),
         ),
         (("moment", "--requirements", "nowhere.toml"), ("nowhere.toml", "No such file")),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -29,6 +30,60 @@ def test_margins_over_a_range_name_the_worst(bywire):
     assert "bar" in table.out
 
 
+def test_margins_leave_figures_and_a_report(bywire, tmp_path):
+    outcome = bywire(
+        "margins", "moment", "--over", "control.moment.f_c=8 Hz, 40 Hz, 100 Hz", "--out", tmp_path,
+        "--json",
+    )  # fmt: skip
+    assert outcome.status == 0
+    names = {Path(path).name for path in outcome.object["files"]}
+    drawn = {"loop-gain", "nyquist", "nichols", "sensitivity"}
+    assert names == {"report.html", *(f"moment-{name}.png" for name in drawn)}
+    assert {path.name for path in tmp_path.iterdir()} == names
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "1 of 3 loops unstable" in page
+    assert "disk margin" in page
+
+
+def test_a_locus_names_the_border(bywire, tmp_path):
+    outcome = bywire(
+        "linearize", "moment", "--locus", "control.moment.f_c=50 Hz:90 Hz:5", "--out", tmp_path,
+        "--json",
+    )  # fmt: skip
+    assert outcome.status == 0
+    (border,) = outcome.object["locus"]["borders"]
+    assert 50.0 < border["value"] < 90.0
+    assert outcome.object["locus"]["stable"] == [
+        value < border["value"] for value in outcome.object["locus"]["values"]
+    ]
+    assert {path.suffix for path in tmp_path.iterdir()} == {".json", ".png", ".html"}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert f"unstable above control.moment.f_c = {border['value']:.4g} Hz" in page
+
+
+def test_the_locus_of_a_plant_shows_the_neutral_point(bywire, tmp_path):
+    outcome = bywire(
+        "linearize", "wedge-rigid", "--locus", "wedge.mu_B=0.3:0.4:3", "--out", tmp_path, "--json"
+    )
+    (border,) = outcome.object["locus"]["borders"]
+    assert border["value"] == pytest.approx(math.tan(math.radians(20.0)), rel=1e-4)
+    assert [path.name for path in tmp_path.iterdir()] == ["wedge-rigid-locus.png"]
+
+
+def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
+    asked = ("agreement", "screw-position", "--frequencies", "5 Hz", "--out", tmp_path, "--json")
+    outcome = bywire(*asked)
+    assert outcome.status == 0
+    found = outcome.object
+    assert found["holds"]
+    assert abs(found["differences"]["nothing"]["gain_dB"][0]) < found["tolerance"]["gain_dB"]
+    assert found["largest"] == ["bearing friction"]
+    assert "agree" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    monkeypatch.setattr("bywire.analysis.agreement.GAIN", -1.0)
+    assert bywire(*asked).status == 1
+    assert "DO NOT agree" in (tmp_path / "report.html").read_text(encoding="utf-8")
+
+
 def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     outcome = bywire(
         "frequency-response", "position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes", "0.5 rad",
@@ -39,8 +94,11 @@ def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     assert found["frequency"] == pytest.approx([5.0, 10.0], rel=0.01)
     for measured, linear in zip(found["gain"][0], found["linear"]["gain"], strict=True):
         assert 0.0 > 20.0 * math.log10(measured / linear) > -0.5
-    assert len(found["files"]) == 2
-    assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".nc", ".png"}
+    assert len(found["files"]) == 3
+    assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".nc", ".png", ".html"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert ">0.5 rad<" in page
+    assert "lowest coherence" in page
 
 
 @pytest.mark.parametrize("excitation", ["multisine", "chirp"])
@@ -54,6 +112,34 @@ def test_all_frequencies_at_once(bywire, excitation):
     for measured, linear in zip(found["gain"][0], found["linear"]["gain"], strict=True):
         assert abs(20.0 * math.log10(measured / linear)) < 1.0
     assert all(0.9 < share <= 1.0 for share in found["coherence"][0])
+
+
+def test_bandwidths_over_a_range_name_the_worst_case(bywire, tmp_path):
+    asked = (
+        "frequency-response", "screw-position", "--frequencies", "20 Hz:70 Hz:4", "--amplitudes",
+        "0.25 rad, 1 rad", "--over", "control.position.f_n=15 Hz:60 Hz:2",
+    )  # fmt: skip
+    outcome = bywire(*asked, "--out", tmp_path, "--json")
+    found = outcome.object
+    assert [case["control.position.f_n"] for case in found["cases"]] == [15.0, 60.0]
+    low, high = (case["figures"][0] for case in found["cases"])
+    assert low["bandwidth"] is None
+    assert low["bandwidth_below"] == pytest.approx(20.0, rel=0.01)
+    assert 30.0 < high["bandwidth"] < 70.0
+    assert high["largest_share_sat_current"] > 0.0
+    assert found["worst"][0]["control.position.f_n"] == 15.0
+    assert "Bandwidth by amplitude" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    text = bywire(*asked).out
+    assert "worst: < 20 Hz for 0.25 rad at control.position.f_n = 15 Hz" in text
+
+
+def test_a_disc_that_would_stop_is_driven_and_that_is_said(bywire):
+    asked = ("frequency-response", "moment", "--frequencies", "4 Hz", "--amplitudes", "20 Nm")
+    outcome = bywire(*asked, "--json")
+    assert outcome.object["gain"][0][0] == pytest.approx(1.0, abs=0.1)
+    assert any("flywheel.law = driven" in line for line in outcome.lines)
+    own = ("--set", "flywheel.law=driven", "--set", "flywheel.runout=0mm")
+    assert not any("driven" in line for line in bywire(*asked, *own).lines)
 
 
 def test_what_sticks_is_said_and_has_no_gain(bywire):
@@ -76,6 +162,9 @@ def test_what_sticks_is_said_and_has_no_gain(bywire):
         (("margins", "moment", "--over", "wedge.mu_B=0.6:0.2:3"), ("below",)),
         (("margins", "moment", "--set", "wedge.mu_b=0.4"), ("wedge.mu_B",)),
         (("frequency-response", "moment", "--frequencies", "600 Hz"), ("Nyquist",)),
+        (("agreement", "moment", "--amplitudes", "1 Nm"), ("two are wanted",)),
+        (("linearize", "moment", "--locus", "wedge.mu_B"), ("--locus", "LOW:HIGH:COUNT")),
+        (("linearize", "moment", "--locus", "wedge.mu_B=0.3"), ("two values or more",)),
         (("frequency-response", "moment", "--frequencies", "5"), ("Hz",)),
         (("frequency-response", "moment", "--excitation", "sin"), ("did you mean 'sine'",)),
         (

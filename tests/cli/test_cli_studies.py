@@ -22,7 +22,9 @@ def test_the_actuator_is_sized_with_figures_and_numbers(bywire, tmp_path):
     assert power["dims"] == ["k_g", "frequency"]
     assert [len(power["values"]), len(power["values"][0])] == [5, 4]
     assert found["assumptions"]
-    assert {path.suffix for path in out.iterdir()} == {".nc", ".png"}
+    assert {path.suffix for path in out.iterdir()} == {".nc", ".png", ".html"}
+    page = (out / "report.html").read_text(encoding="utf-8")
+    assert all(text in page for text in ("optimum_k_g", "Dither is left out"))
     no_half_files(out)
 
 

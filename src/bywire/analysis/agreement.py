@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -20,6 +21,9 @@ Progress = Callable[[str, float], None]
 _PATIENCE = 12  # windows granted to loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
 """largest difference of gain [dB] and phase [degree] that counts as agreement"""
+NOTHING, LIMITS, EVERYTHING = "", "limits", "all"
+"""what is left on: nothing, at a small amplitude; the limits of currents, voltages and rates alone,
+which show at a large one; everything"""
 
 
 @dataclass(frozen=True)
@@ -31,19 +35,58 @@ class Agreement:
     frequencies
         Frequencies [Hz], shape (n,).
     gain, phase
-        By what is left on (``""``: nothing, ``"all"``: everything, else one cause): measured less
-        linear in dB and degree, shape (n,); NaN where the output stuck or did not settle.
+        By what is left on (`NOTHING`, `LIMITS`, one cause, `EVERYTHING`): measured less linear in
+        dB and degree, shape (n,); NaN where the output stuck or did not settle. The limits act in
+        all but `NOTHING`: see `beyond_limits` for what a cause does by itself.
+    step_gain, step_phase
+        What the finite step of the simulation makes of the linear model: that of the midpoint rule
+        less the exact one in dB and degree, shape (n,).
     """
 
     frequencies: Array
     gain: dict[str, Array]
     phase: dict[str, Array]
+    step_gain: Array
+    step_phase: Array
 
     @property
     def holds(self) -> bool:
         """Whether the responses agree with everything off."""
-        gain, phase = np.abs(self.gain[""]).max(), np.abs(self.phase[""]).max()
+        gain, phase = np.abs(self.gain[NOTHING]).max(), np.abs(self.phase[NOTHING]).max()
         return bool(gain <= GAIN and phase <= PHASE)  # NaN agrees with nothing
+
+    def beyond_limits(self, cause: str) -> tuple[Array, Array]:
+        """Return what a cause adds to the limits at the same amplitude.
+
+        Returns
+        -------
+        tuple
+            Differences of gain [dB] and phase [degree, within 180], shape (n,) each.
+        """
+        turned = self.phase[cause] - self.phase[LIMITS]
+        phase = np.remainder(turned + 180.0, 360.0) - 180.0
+        return self.gain[cause] - self.gain[LIMITS], np.asarray(phase)
+
+    @property
+    def largest(self) -> list[str]:
+        """By frequency, the cause that moves the response most, shape (n,).
+
+        The limits count by what they do alone, other causes by what they add. What sticks or does
+        not settle has no number and counts as more than any; several are joined. Empty where
+        nothing moves it by more than counts as agreement.
+        """
+        moves = {LIMITS: (self.gain[LIMITS], self.phase[LIMITS])}
+        singles = [c for c in self.gain if c not in (NOTHING, LIMITS, EVERYTHING)]
+        moves |= {cause: self.beyond_limits(cause) for cause in singles}
+        sizes = {cause: _move(*by) for cause, by in moves.items()}
+        found = []
+        for k in range(len(self.frequencies)):
+            here = {cause: float(size[k]) for cause, size in sizes.items()}
+            lost = [cause for cause, size in here.items() if not math.isfinite(size)]
+            most = max(here, key=lambda cause: here[cause])
+            gain, phase = (abs(float(by[k])) for by in moves[most])
+            found.append(", ".join(lost) or ("" if gain <= GAIN and phase <= PHASE else most))
+        return found
 
 
 def agreement(
@@ -52,10 +95,13 @@ def agreement(
     value: float,
     frequencies: Sequence[float],
     amplitudes: tuple[float, float],
-    step: float = 20e-6,
+    step: float | None = None,
     progress: Progress | None = None,
 ) -> Agreement:
     """Compare both responses with all causes of nonlinearity off, each one on, and all on.
+
+    Everything off is measured twice: at the small amplitude, where nothing is left that could
+    differ, and at the large one, where the limits may show.
 
     Parameters
     ----------
@@ -64,10 +110,10 @@ def agreement(
     frequencies
         Frequencies [Hz], ascending.
     amplitudes
-        Amplitudes of the sine, in the input's SI unit: with everything off (small, or limits
-        show), and with anything on (as large as in use, or everything sticks).
+        Amplitudes of the sine, in the input's SI unit: small, or limits show with everything off;
+        and as large as in use, or everything sticks.
     step
-        Substep [s]; the current loop wants at most 1/(100 f).
+        Substep [s]; the operating point's own by default.
 
     Raises
     ------
@@ -77,7 +123,9 @@ def agreement(
     linear = loop.closed(par, value)
     gain: dict[str, Array] = {}
     phase: dict[str, Array] = {}
-    left = {"": loop.smooth(par), **{c: loop.smooth(par, c) for c in loop.causes}, "all": par}
+    smooth = loop.smooth(par)
+    left = {NOTHING: smooth, LIMITS: smooth, **{c: loop.smooth(par, c) for c in loop.causes},
+            EVERYTHING: par}  # fmt: skip
     found = xr.Dataset()
     for k, (cause, own) in enumerate(left.items()):
         sweep = Sweep(
@@ -89,7 +137,10 @@ def agreement(
         gain[cause], phase[cause] = _difference(found, linear.response(found["frequency"].values))
         if progress is not None:
             progress(f"agreement of loop {loop.name}", (k + 1) / len(left))
-    return Agreement(found["frequency"].values, gain, phase)
+    f = found["frequency"].values
+    own_step = step or loop.point(par, value).step
+    ratio = loop.closed(par, value, own_step).response(f) / linear.response(f)
+    return Agreement(f, gain, phase, *_in_dB_and_degree(ratio[:, 0, 0]))
 
 
 def _difference(found: xr.Dataset, linear: NDArray[np.complex128]) -> tuple[Array, Array]:
@@ -97,4 +148,13 @@ def _difference(found: xr.Dataset, linear: NDArray[np.complex128]) -> tuple[Arra
     settled = one["settled"].values > 0
     gain = np.where(settled, one["gain"].values, np.nan)
     ratio = gain * np.exp(1j * np.radians(one["phase"].values)) / linear[:, 0, 0]
+    return _in_dB_and_degree(ratio)
+
+
+def _in_dB_and_degree(ratio: NDArray[np.complex128]) -> tuple[Array, Array]:
     return 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
+
+
+def _move(gain: Array, phase: Array) -> Array:
+    """Return by how much a response moves in the complex plane, relative to where it was."""
+    return np.abs(10.0 ** (gain / 20.0) * np.exp(1j * np.radians(phase)) - 1.0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -12,13 +12,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.analysis.response_cases import Cases, cases_of
 from bywire.analysis.response_dataset import Sweep, as_dataset
 from bywire.analysis.response_window import interval, line_window, require_measurable
 from bywire.analysis.window_scatter import kept, spread_of
 from bywire.core.errors import ParameterError
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
-from bywire.simulation.variations import case_matrix
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -58,6 +58,8 @@ def broadband_response(
     sweep: Sweep,
     excitation: Broadband,
     progress: Callable[[str, float], None] | None = None,
+    *,
+    points: Sequence[Run] | None = None,
 ) -> xr.Dataset:
     r"""Measure the response at all frequencies at once, for every amplitude and variant.
 
@@ -79,6 +81,8 @@ def broadband_response(
         Its kind.
     progress
         Called with ``"frequency response"`` and the finished share, 0 to 1.
+    points
+        As in ``frequency_response``.
 
     Returns
     -------
@@ -107,13 +111,15 @@ def broadband_response(
     length, lines = line_window(run, sweep)
     own = replace(run, duration=length, record=interval(run))
     shapes = _excitations(own, lines, excitation)
-    found, sizes = _repeated(own, sweep, shapes, lines)
-    variants = len(found.windows) // (len(sizes) * len(shapes))
-    shape = (variants, len(sizes), len(shapes))
-    measured = _measured(found, shapes, lines, shape, sizes)
+    cases = cases_of(own, sweep, points)
+    found = _repeated(own, sweep, cases, shapes, lines)
+    shape = (*cases.shape, len(shapes))
+    measured = _measured(found, shapes, lines, shape, np.asarray(sweep.amplitudes, dtype=float))
     if excitation.kind == "chirp":
         measured["distortion"] = np.full_like(measured["distortion"], np.nan)
-    measured |= _of_runs(found, sweep, shape, len(lines))
+    matrix = np.repeat(cases.matrix, len(shapes), axis=1)
+    shares = sweep.shares(found.values, matrix, list(run.par.leaves()))
+    measured |= _of_runs(found, shares, shape, len(lines))
     if progress is not None:
         progress("frequency response", 1.0)
     done = [{k: v[:, :, j] for k, v in measured.items()} for j in range(len(lines))]
@@ -153,29 +159,25 @@ def _chirp(share: Array, lines: list[int]) -> Array:
 
 
 def _repeated(
-    own: Run, sweep: Sweep, shapes: Array, lines: list[int]
-) -> tuple[Repeated, Array]:
+    own: Run, sweep: Sweep, cases: Cases, shapes: Array, lines: list[int]
+) -> Repeated:
     """Run all variants, amplitudes and realizations, in this order, until they repeat."""
-    sizes = np.asarray(sweep.amplitudes, dtype=float)
-    matrix = case_matrix(own, dict(sweep.variations or {})) if sweep.variations else _leaves(own)
     columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
-    each = np.tile((sizes[:, None, None] * shapes).reshape(-1, shapes.shape[1]),
-                   (matrix.shape[1], 1))  # fmt: skip
-    stimuli = np.repeat(own.stimulus(np.zeros(1)), shapes.shape[1], axis=0)
-    stimuli = np.repeat(stimuli[None], len(each), axis=0)
-    stimuli[:, :, columns] += each[:, :, None]
-    cases = np.repeat(matrix, sizes.size * len(shapes), axis=1)
+    n = len(shapes)
+
+    def excited(which: NDArray[np.int64], first: int, last: int) -> Array:
+        rows = np.repeat(cases.rest[which // n, None], last - first, axis=1)
+        waves = cases.sizes[which // n, None] * shapes[which % n, first:last]
+        rows[:, :, columns] += waves[:, :, None]
+        return rows
 
     def figures(window: Array) -> Complex:
         return np.asarray(np.fft.rfft(window[:, :, 0], axis=1)[:, lines])
 
-    signals = (sweep.output, *sweep.flags)
-    most = min(sweep.most, MOST)
-    return repeat(own, cases, stimuli, signals, figures, sweep.tolerance, most), sizes
-
-
-def _leaves(own: Run) -> Array:
-    return np.array(list(own.par.leaves().values()))[:, None]
+    return repeat(
+        own, np.repeat(cases.matrix, n, axis=1), excited, sweep.recorded, figures, sweep.tolerance,
+        min(sweep.most, MOST), starts=[one for one in cases.starts for _ in range(n)],
+    )  # fmt: skip
 
 
 def _measured(
@@ -217,16 +219,13 @@ def _distortion(found: Repeated, lines: list[int], shape: tuple[int, int, int]) 
 
 
 def _of_runs(
-    found: Repeated, sweep: Sweep, shape: tuple[int, int, int], lines: int
+    found: Repeated, shares: Mapping[str, Array], shape: tuple[int, int, int], lines: int
 ) -> dict[str, Array]:
-    """Return what concerns whole runs: the worst of their realizations, means of the flags."""
-    shares = found.values[:, :, 1:].mean(axis=1)
+    """Return what concerns whole runs: the worst of their realizations, means of the shares."""
     known = {
         "windows": found.windows.reshape(shape).max(axis=2),
         "settled": found.repeats.reshape(shape).min(axis=2),
         "unsettled_substeps": found.unsettled.reshape(shape).sum(axis=2),
-    } | {
-        f"share_{name}": shares[:, k].reshape(shape).mean(axis=2)
-        for k, name in enumerate(sweep.flags)
+        **{name: share.reshape(shape).mean(axis=2) for name, share in shares.items()},
     }
     return {k: np.repeat(v.astype(float)[:, :, None], lines, axis=2) for k, v in known.items()}

@@ -24,6 +24,7 @@ def closed_loop(
     outputs: Sequence[str],
     locked: Sequence[str] = (),
     stimulus: NamedTuple | None = None,
+    step: float = 0.0,
 ) -> LinearModel:
     r"""Return a model with its controllers, from one instant at which all of them run to the next.
 
@@ -51,6 +52,9 @@ def closed_loop(
     stimulus
         Stimulus at the operating point, where a limit of the controller depends on it; zero by
         default.
+    step
+        Substep [s] of the simulation's midpoint rule, which then takes the place of the exact
+        A_d, B_d; 0 for none.
 
     Raises
     ------
@@ -59,7 +63,7 @@ def closed_loop(
     UnknownNameError
         When a name is unknown.
     """
-    system = sampled_system(model, par, (state, memory, stimulus), inputs, outputs, locked)
+    system = sampled_system(model, par, (state, memory, stimulus), inputs, outputs, locked, step)
     plant, fields = system.plant, model.Memory._fields
     size = len(plant.states) + len(fields)
     A, B = np.eye(size), np.zeros((size, len(inputs)))

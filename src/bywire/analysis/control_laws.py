@@ -1,4 +1,8 @@
-"""The ECU's control laws as linear models, from the laws themselves."""
+"""The ECU's control laws as linear models, from the laws themselves.
+
+Where the gains are scheduled, a law is that of the gains frozen at a pressure: small motion about
+an equilibrium knows no other, because the schedule is bumpless.
+"""
 
 from __future__ import annotations
 
@@ -15,34 +19,37 @@ from bywire.core.signals import signals_of, zeros
 Law = Callable[[Any, Any], tuple[Any, Any]]
 
 
-def pressure_feedback(ecu: EcuParameters) -> LinearModel:
-    """Return the PID from a fall of the measured pressure [Pa] to the current demand [A]."""
+def pressure_feedback(ecu: EcuParameters, p: float) -> LinearModel:
+    """Return the PID at a pressure p from a fall of the measured one [Pa] to the demand [A]."""
+    own = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=0.0 * u, p_meas=-u)
-        state, out = pressure_pid.output(x, signals, ecu.T_s, ecu.pressure)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
         return state, out.i
 
     return _linear("pressure-feedback", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
 
 
-def pressure_demand(ecu: EcuParameters) -> LinearModel:
-    """Return the PID from the pressure set point [Pa] to the current demand [A]."""
+def pressure_demand(ecu: EcuParameters, p: float) -> LinearModel:
+    """Return the PID at a pressure p [Pa] from the set point [Pa] to the current demand [A]."""
+    own = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=u, p_meas=0.0 * u)
-        state, out = pressure_pid.output(x, signals, ecu.T_s, ecu.pressure)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
         return state, out.i
 
     return _linear("pressure-demand", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
 
 
-def pressure_control(ecu: EcuParameters) -> LinearModel:
-    """Return the PID from set point and measured pressure [Pa] to the current demand [A]."""
+def pressure_control(ecu: EcuParameters, p: float) -> LinearModel:
+    """Return the PID at a pressure p from set point and measured one [Pa] to the demand [A]."""
+    own = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=u[0], p_meas=u[1])
-        state, out = pressure_pid.output(x, signals, ecu.T_s, ecu.pressure)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
         return state, out.i
 
     units, inputs = ("Pa", "A"), ("p_ref", "p_meas")

@@ -14,18 +14,21 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.response_cases import Cases, cases_of
 from bywire.analysis.response_dataset import Sweep, as_dataset
 from bywire.analysis.response_window import interval, require_measurable, sine_window
 from bywire.analysis.window_scatter import spread_of
 from bywire.core.errors import ParameterError
+from bywire.core.signals import signals_of
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
-from bywire.simulation.variations import case_matrix
 
 Array = NDArray[np.float64]
 
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
+STILL = 1e-12
+"""peak to peak, as a share of the output's usual magnitude, up to which it counts as still"""
 
 
 def require_stable(closed: LinearModel) -> None:
@@ -51,6 +54,7 @@ def frequency_response(
     sweep: Sweep,
     progress: Callable[[str, float], None] | None = None,
     *,
+    points: Sequence[Run] | None = None,
     lanes: bool = True,
 ) -> xr.Dataset:
     """Measure the response at every frequency, amplitude and variant.
@@ -64,6 +68,9 @@ def frequency_response(
         Frequencies, amplitudes, variants.
     progress
         Called with ``"frequency response"`` and the finished share, 0 to 1.
+    points
+        Variants with operating points of their own, in place of the sweep's variations: runs of
+        the same model with the same choices and sample times.
     lanes
         False: one sine after another on one core, as in a simulator without ensembles.
 
@@ -74,8 +81,9 @@ def frequency_response(
         input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
         (share of the output's power, its mean left out, at the excited line), ``scatter`` (of the
         complex amplitude, see ``window_scatter``), ``windows``, ``settled`` (0 or 1), and
-        ``share_FLAG`` for every flag. Gain and phase are NaN where the output does not move at
-        all: what sticks has no gain. Where it never repeats, they are means of the last windows.
+        ``share_FLAG`` for every flag and saturation. Gain and phase are NaN where the output does
+        not move at all: what sticks has no gain. Where it never repeats, they are means of the
+        last windows.
 
     Raises
     ------
@@ -88,20 +96,18 @@ def frequency_response(
         When a trajectory leaves the numbers.
     """
     require_measurable(run, sweep)
-    variations = dict(sweep.variations or {})
-    matrix = case_matrix(run, variations) if variations else _own(run)
-    variants, sizes = matrix.shape[1], np.asarray(sweep.amplitudes, dtype=float)
+    cases = cases_of(run, sweep, points)
     plans = [sine_window(run, f, sweep) for f in sweep.frequencies]
-    cases, each = np.repeat(matrix, sizes.size, axis=1), np.tile(sizes, variants)
-
-    stop = threading.Event()
+    names, stop = list(run.par.leaves()), threading.Event()
+    least = STILL * signals_of(run.model.Output)[sweep.output].nominal
 
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
         own = replace(run, duration=window, record=interval(run))
-        found = _repeated(own, sweep, cases, each, periods, lanes, stop)
-        measured = _measured(found, each, periods, sweep.flags)
-        return {name: value.reshape(variants, sizes.size) for name, value in measured.items()}
+        found = _repeated(own, sweep, cases, periods, lanes, stop)
+        measured = _measured(found, cases.sizes, periods, least)
+        measured |= sweep.shares(found.values, cases.matrix, names)
+        return {name: value.reshape(cases.shape) for name, value in measured.items()}
 
     done: list[dict[str, Array]] = []
     pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
@@ -118,27 +124,19 @@ def frequency_response(
     return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
 
 
-def _own(run: Run) -> Array:
-    return np.array(list(run.par.leaves().values()))[:, None]
-
-
 def _repeated(
-    own: Run,
-    sweep: Sweep,
-    matrix: Array,
-    sizes: Array,
-    periods: int,
-    lanes: bool,
-    stop: threading.Event,
+    own: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
     columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
-    times = own.schedule().stimulus_times[:-1]
-    f = periods / own.duration
-    stimuli = np.repeat(own.stimulus(np.zeros(1)), times.size, axis=0)
-    stimuli = np.repeat(stimuli[None], matrix.shape[1], axis=0)
-    sines = sizes[:, None] * np.sin(2.0 * math.pi * f * times)
-    stimuli[:, :, columns] += sines[:, :, None]
+    schedule = own.schedule()
+    apart, f = schedule.stimulus_frames * schedule.frame, periods / own.duration
+
+    def sines(which: NDArray[np.int64], first: int, last: int) -> Array:
+        rows = np.repeat(cases.rest[which, None], last - first, axis=1)
+        wave = np.sin(2.0 * math.pi * f * (np.arange(first, last) * apart))
+        rows[:, :, columns] += (cases.sizes[which, None] * wave)[:, :, None]
+        return rows
 
     rows = round(own.duration / own.record)
     wave = 2j / rows * np.exp(-2j * math.pi * periods / rows * np.arange(rows))
@@ -147,23 +145,23 @@ def _repeated(
         # A matrix product would start the threads of a linear algebra library within ours.
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 
-    signals, tolerance, most = (sweep.output, *sweep.flags), sweep.tolerance, sweep.most
-    return repeat(own, matrix, stimuli, signals, figures, tolerance, most, lanes=lanes, stop=stop)
+    return repeat(
+        own, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
+        starts=cases.starts, lanes=lanes, stop=stop,
+    )  # fmt: skip
 
 
-def _measured(
-    found: Repeated, sizes: Array, periods: int, flags: Sequence[str]
-) -> dict[str, Array]:
+def _measured(found: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:
     """Return the figures of all cases at one frequency, shape (cases,) each."""
     outputs = found.values[:, :, 0]
     count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
     # The window holds whole periods: harmonics are lines of its Fourier transform.
     spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
     lines = 2.0 / outputs.shape[1] * spectrum
-    moves = np.ptp(outputs, axis=1) > 0
+    moves = np.ptp(outputs, axis=1) > least
     last = np.where(moves, np.abs(lines[:, 0]), np.nan)
     value, scatter = (one[:, 0] for one in spread_of(found.figures, found.repeats))
-    shown = {
+    return {
         "gain": np.where(moves, np.abs(value), np.nan) / sizes,
         "phase": np.where(moves, np.degrees(np.angle(value)), np.nan),
         "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / last,
@@ -173,5 +171,3 @@ def _measured(
         "settled": found.repeats.astype(float),
         "unsettled_substeps": found.unsettled.astype(float),
     }
-    shares = found.values[:, :, 1:].mean(axis=1)
-    return shown | {f"share_{name}": shares[:, k] for k, name in enumerate(flags)}

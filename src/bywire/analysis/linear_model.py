@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -71,10 +72,37 @@ class LinearModel:
             name=self.name,
         )
 
+    def transfer_function(self, input: str = "", output: str = "") -> Any:
+        """Return one path as ``control.TransferFunction`` with named signals.
+
+        What cancels exactly is left out. `bywire.analysis.transfer.transfer` has its zeros, poles
+        and gain, without the rounding of polynomials.
+
+        Parameters
+        ----------
+        input, output
+            Names of the signals; the first ones where empty.
+
+        Raises
+        ------
+        UnknownNameError
+            When a name is unknown.
+        ParameterError
+            When polynomials cannot hold the model to 0.1 %.
+        """
+        from bywire.analysis.transfer import transfer
+
+        return transfer(self, input, output).transfer_function()
+
     def poles(self) -> NDArray[np.complex128]:
         """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
         found = np.linalg.eigvals(self.A).astype(np.complex128)
         return found[np.argsort(np.abs(found))]
+
+    @property
+    def nyquist(self) -> float:
+        """Half the sampling frequency [Hz]; infinite for a continuous model."""
+        return 0.5 / self.period if self.period else math.inf
 
     @property
     def is_stable(self) -> bool:

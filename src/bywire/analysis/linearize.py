@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from itertools import combinations
 from typing import Literal, NamedTuple
@@ -33,7 +33,7 @@ def linearize(
     *,
     inputs: Sequence[str],
     outputs: Sequence[str],
-    friction: Friction = "removed",
+    friction: Friction | Mapping[str, Friction] = "removed",
 ) -> LinearModel:
     r"""Return the Jacobians of a model's smooth part at an operating point.
 
@@ -57,12 +57,13 @@ def linearize(
     friction
         ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
         force of the sliding direction with its slope; every friction's velocity must be nonzero.
-        ``"stuck"``: every velocity with friction stays zero.
+        ``"stuck"``: every velocity with friction stays zero. Or one of these by the name of each
+        velocity, removed where it is not named.
 
     Raises
     ------
     UnknownNameError
-        When an input or output is unknown.
+        When an input, an output or a velocity with friction is unknown.
     ParameterError
         When a contact just touches, a friction is at rest with ``friction="sliding"``, or moves
         with ``"stuck"``.
@@ -106,18 +107,21 @@ def _rows(model: Model, outputs: Sequence[str], C: Array, D: Array) -> tuple[Arr
 
 
 def _frictions(
-    model: Model, state: NamedTuple, friction: Friction
+    model: Model, state: NamedTuple, friction: Friction | Mapping[str, Friction]
 ) -> tuple[list[float], list[float]]:
     """Return the direction of every friction, 0 where removed, and 0 for velocities that stick."""
-    if friction == "sliding":
-        return [math.copysign(1.0, _direction(n, state)) for n in model.frictions], [
-            1.0 for _ in model.frictions
-        ]
-    if friction == "stuck":
-        for name in model.frictions:
+    if isinstance(friction, str):
+        friction = dict.fromkeys(model.frictions, friction)
+    _require_known("velocity with friction", tuple(friction), model.frictions)
+    directions, moving = [0.0 for _ in model.frictions], [1.0 for _ in model.frictions]
+    for k, name in enumerate(model.frictions):
+        kind = friction.get(name, "removed")
+        if kind == "sliding":
+            directions[k] = math.copysign(1.0, _direction(name, state))
+        elif kind == "stuck":
             _require_rest(name, state)
-    moving = 0.0 if friction == "stuck" else 1.0
-    return [0.0 for _ in model.frictions], [moving for _ in model.frictions]
+            moving[k] = 0.0
+    return directions, moving
 
 
 def _direction(name: str, state: NamedTuple) -> float:

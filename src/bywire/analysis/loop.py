@@ -9,9 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.analog_gain import analog_gain
 from bywire.analysis.closed_loop import closed_loop
 from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.open_loop import open_loop
+from bywire.analysis.saturation import Saturation
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.run import Run
@@ -30,6 +33,8 @@ class Point:
         The system; the parameters close this loop and no outer one.
     state, memory, stimulus
         Equilibrium without dry friction.
+    step
+        Substep [s] that its fastest motions want.
     """
 
     model: Model
@@ -37,13 +42,14 @@ class Point:
     state: NamedTuple
     memory: NamedTuple
     stimulus: NamedTuple
+    step: float = 20e-6
 
-    def run(self, step: float = 20e-6) -> Run:
-        """Return a run that rests at the point."""
+    def run(self, step: float | None = None) -> Run:
+        """Return a run that rests at the point, with the point's own substep [s] by default."""
         row = [float(value) for value in self.stimulus]
         return Run(
             self.model, self.par, self.state, self.memory,
-            lambda t: np.repeat([row], t.size, axis=0), 1.0, step, 1e-3,
+            lambda t: np.repeat([row], t.size, axis=0), 1.0, step or self.step, 1e-3,
         )  # fmt: skip
 
 
@@ -103,9 +109,22 @@ class Loop:
     proof
         Experiment in which the whole brake shows what the loop is worth.
     laws
-        ``laws(par, frequencies [Hz])``: responses of the controller to its set point and to a
-        fall of the output, sensor and filters included, of shape (n,) each; None where the loop
-        is not that simple.
+        ``laws(par, value, frequencies [Hz])``: responses of the controller, at an operating point,
+        to its set point and to a fall of the output, sensor and filters included, of shape (n,)
+        each; None where the loop is not that simple.
+    schedule
+        Its gain schedule, where there is one.
+    saturations
+        Limits whose share of the time a frequency response tells, where the model records no mode
+        of that name.
+    single
+        Whether nothing but one linear controller stands between set point, output and the rest:
+        then the loop gain follows from a measured closed response, see ``large_signal``.
+    analog
+        Whether its controller is not sampled: then ``cut`` is a state within the plant, and the
+        loop gain a continuous model.
+    locked
+        States that its linear models hold, as those of a clamped shaft.
     """
 
     name: str
@@ -123,7 +142,12 @@ class Loop:
     tunables: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     sustained: Mapping[str, Any] = field(default_factory=dict)
     proof: str = ""
-    laws: Callable[[ParameterSet, Array], tuple[Complex, Complex]] | None = None
+    laws: Callable[[ParameterSet, float, Array], tuple[Complex, Complex]] | None = None
+    schedule: LoopSchedule | None = None
+    saturations: tuple[Saturation, ...] = ()
+    single: bool = True
+    analog: bool = False
+    locked: tuple[str, ...] = ()
 
     def smooth(self, par: ParameterSet, leave: str = "") -> ParameterSet:
         """Return parameters without anything that makes the loop nonlinear, except one cause."""
@@ -133,16 +157,27 @@ class Loop:
                 changes |= off
         return par.replace(changes)
 
-    def closed(self, par: ParameterSet, value: float) -> LinearModel:
-        """Return the exact linear model from the input to the output at an operating point."""
+    def closed(self, par: ParameterSet, value: float, step: float = 0.0) -> LinearModel:
+        """Return the exact linear model from the input to the output at an operating point.
+
+        With a step [s] it is the one that the simulation's midpoint rule has, see ``stepped``.
+        """
         p = self.point(self.smooth(par), value)
         model = closed_loop(
             p.model, p.par, p.state, p.memory,
-            inputs=self.inputs, outputs=(self.output,), stimulus=p.stimulus,
+            inputs=self.inputs, outputs=(self.output,), stimulus=p.stimulus, locked=self.locked,
+            step=step,
         )  # fmt: skip
         return model.together(self.inputs)
 
     def gain(self, par: ParameterSet, value: float) -> LinearModel:
         """Return the exact loop gain at an operating point."""
         p = self.point(self.smooth(par), value)
-        return open_loop(p.model, p.par, p.state, p.memory, cut=self.cut, stimulus=p.stimulus)
+        if self.analog:
+            return analog_gain(
+                p.model, p.par, p.state, p.memory, cut=self.cut, locked=self.locked
+            )  # fmt: skip
+        return open_loop(
+            p.model, p.par, p.state, p.memory,
+            cut=self.cut, stimulus=p.stimulus, locked=self.locked,
+        )  # fmt: skip

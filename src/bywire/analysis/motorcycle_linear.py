@@ -1,15 +1,18 @@
-"""The motorcycle brake's linear model: eqs. (14) and (15) of Dardanelli et al. (2010)."""
+"""The motorcycle brake's linear models: eqs. (14), (15), (21), (22) of Dardanelli et al. (2010)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.rational import Rational
+from bywire.analysis.rational import Rational, first_orders
+from bywire.analysis.reduction_error import ReductionError, reduction_error
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.core.errors import ParameterError
 from bywire.plant import ball_screw_gear, brake_fluid, caliper, master_cylinder, pipeline
 
 Par = MotorcycleParameters
@@ -162,3 +165,84 @@ def theoretical(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 def theoretical_transfer_function(par: Par, p: float = 20e5, x: float | None = None) -> Any:
     """Return eq. (15) as ``control.TransferFunction`` [Pa/A]."""
     return theoretical(par, p, x).transfer_function()
+
+
+def two_pole(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
+    r"""Return eq. (21): eq. (15) without its zero and its fast, hydraulic pole.
+
+    .. math:: G = \frac{K}{(1 + s T_1)(1 + s T_2)}
+
+    Parameters
+    ----------
+    par, p, x
+        As in `coefficients`.
+
+    Notes
+    -----
+    The zero is what it costs: 160 Hz beside the second pole's 9.75 Hz in Table 2, the fast pole
+    lies at 47 kHz. `two_pole_error` tells how much.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (21).
+    """
+    whole = theoretical(par, p, x)
+    first, second = whole.poles[:2]
+    product = complex(first * second).real
+    den = (1.0 / product, -complex(first + second).real / product, 1.0)
+    return Rational("eq-21", (whole.gain,), den)
+
+
+def two_pole_error(
+    par: Par, p: float = 20e5, x: float | None = None, high: float = 50.0
+) -> ReductionError:
+    """Return how far eq. (21) is off eq. (15) up to a frequency [Hz].
+
+    Parameters
+    ----------
+    par, p, x
+        As in `coefficients`.
+    high
+        End of the band [Hz].
+    """
+    whole, less = linear_model(par, p, x), two_pole(par, p, x)
+    a_2, a_1, _ = less.den
+    own = replace(
+        whole, name="eq-21",
+        A=np.array([[0.0, 1.0], [-1.0 / a_2, -a_1 / a_2]]), B=np.array([[0.0], [less.gain / a_2]]),
+        C=np.array([[1.0, 0.0]]), states=("p_mc", "rate"), state_units=("Pa", "Pa/s"),
+        rate=np.zeros(2),
+    )  # fmt: skip
+    return reduction_error(whole, own, high)
+
+
+def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -> Rational:
+    r"""Return eq. (22): eq. (21) with a slow pair of a zero and a pole.
+
+    .. math:: G = \frac{K (1 + s \tau_L)}{(1 + s T_1)(1 + s T_2)(1 + s T_L)}
+
+    Parameters
+    ----------
+    K
+        Static gain [Pa/A].
+    tau_L, T_L
+        Time constants of the slow zero and pole [s]: a response that creeps on after its step
+        where tau_L < T_L, one that overshoots and falls where tau_L > T_L.
+    T_1, T_2
+        Time constants of the brake [s].
+
+    Raises
+    ------
+    ParameterError
+        When a time constant is not positive.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (22); Table 4 has the corner frequencies
+    1/(2 pi T) of three pressure regions: below 10 bar, 10 to 35 bar, above 35 bar.
+    """
+    for name, T in (("tau_L", tau_L), ("T_1", T_1), ("T_2", T_2), ("T_L", T_L)):
+        if not 0.0 < T < math.inf:
+            raise ParameterError(f"{name} = {T:g} s is not admissible: it must be > 0 s and finite")
+    corners = tuple(1.0 / (2.0 * math.pi * T) for T in (T_1, T_2, T_L))
+    return first_orders("eq-22", K, (1.0 / (2.0 * math.pi * tau_L),), corners)

@@ -61,11 +61,11 @@ class PressureLoop:
 
     def open(self, frequencies: Array) -> Complex:
         """Return the open loop, cut at the measured pressure, at frequencies [Hz]."""
-        return self._law("pressure_feedback", frequencies) * self._inner(frequencies, 2)
+        return self._pid("pressure_feedback", frequencies) * self._inner(frequencies, 2)
 
     def closed(self, frequencies: Array) -> Complex:
         """Return pressure over its set point, at frequencies [Hz]."""
-        drive = self._law("pressure_demand", frequencies)
+        drive = self._pid("pressure_demand", frequencies)
         return drive * self._inner(frequencies, 1) / (1.0 + self.open(frequencies))
 
     def models(self) -> tuple[LinearModel, LinearModel]:
@@ -80,9 +80,9 @@ class PressureLoop:
         inner = control.feedback(block(self.plant) * block(control_laws.current_control(ecu)),
                                  current)  # fmt: skip
         path = inner * block(control_laws.demand_filter(ecu))
-        gain = path[2, 0] * block(control_laws.pressure_feedback(ecu))
+        gain = path[2, 0] * block(control_laws.pressure_feedback(ecu, self.p))
         # The measured pressure goes back into the second input of the pressure control.
-        ahead = path * block(control_laws.pressure_control(ecu))
+        ahead = path * block(control_laws.pressure_control(ecu, self.p))
         back = control.ss([], [], [], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], T)
         closed = control.feedback(ahead, back, sign=1)[1, 0]
         return _single(gain, "p_meas"), _single(closed, "p")
@@ -90,6 +90,10 @@ class PressureLoop:
     def margin(self) -> Margin:
         """Return crossover and phase margin."""
         return margin(self.open, BAND)
+
+    def _pid(self, name: str, frequencies: Array) -> Complex:
+        law: LinearModel = getattr(control_laws, name)(self.par.ecu, self.p)
+        return law.response(frequencies)[:, 0, 0]
 
     def _law(self, name: str, frequencies: Array) -> Complex:
         law: LinearModel = getattr(control_laws, name)(self.par.ecu)

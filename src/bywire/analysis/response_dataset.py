@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.analysis.saturation import Saturation
 from bywire.core.signals import signals_of
 from bywire.simulation.run import Run
 from bywire.simulation.variations import Variations
@@ -36,6 +37,8 @@ class Sweep:
         Dotted name of a parameter -> one value per variant; empty for the run's own parameters.
     flags
         Outputs that are 0 or 1, whose share of the time is reported, such as ``"stuck"``.
+    saturations
+        Limits that the model has no such output for, reported likewise.
     least
         Periods in a window, at least.
     shortest
@@ -55,11 +58,37 @@ class Sweep:
     amplitudes: Sequence[float]
     variations: Variations | None = None
     flags: Sequence[str] = ("stuck",)
+    saturations: Sequence[Saturation] = ()
     least: int = 2
     shortest: float = 0.05
     whole: Sequence[float] = ()
     tolerance: float = 1e-3
     most: int = 60
+
+    @property
+    def recorded(self) -> tuple[str, ...]:
+        """Outputs that a run must record: the answer first, then flags, then what is limited."""
+        limited = [name for one in self.saturations for name in one.signals]
+        return (self.output, *self.flags, *limited)
+
+    def shares(self, values: Array, matrix: Array, names: Sequence[str]) -> dict[str, Array]:
+        """Return the share of the time of every flag and limit, shape (cases,) each.
+
+        Parameters
+        ----------
+        values
+            What was recorded, shape (cases, rows, signals).
+        matrix, names
+            Parameter vectors, shape (parameters, cases), and the names of their rows.
+        """
+        k = 1 + len(self.flags)
+        means = values[:, :, 1:k].mean(axis=1)
+        found = {f"share_{name}": means[:, j] for j, name in enumerate(self.flags)}
+        for one in self.saturations:
+            own = values[:, :, k : k + len(one.signals)]
+            found[f"share_{one.name}"] = one.share(own, matrix, names)
+            k += len(one.signals)
+        return found
 
 
 def as_dataset(

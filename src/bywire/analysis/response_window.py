@@ -30,7 +30,7 @@ def require_measurable(run: Run, sweep: Sweep) -> None:
     for name in sweep.inputs:
         if name not in run.model.Stimulus._fields:
             raise unknown_name("signal of the stimulus", name, run.model.Stimulus._fields)
-    for name in (sweep.output, *sweep.flags):
+    for name in sweep.recorded:
         if name not in run.model.Output._fields:
             raise unknown_name("signal", name, run.model.Output._fields)
     unit = signals_of(run.model.Stimulus)[sweep.inputs[0]].unit

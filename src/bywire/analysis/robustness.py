@@ -77,7 +77,7 @@ def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
     gain, closed = loop.gain(par, value), loop.closed(par, value)
     if not closed.is_stable:
         return UNSTABLE
-    highest = 0.499 / gain.period
+    highest = 0.998 * min(gain.nyquist, closed.nyquist)
     band = (_LOWEST, highest)
 
     def response(f: Array) -> NDArray[np.complex128]:
@@ -152,6 +152,7 @@ def _gain_margin(gain: LinearModel, L: NDArray[np.complex128]) -> float:
         share = L.imag[k] / (L.imag[k] - L.imag[k + 1])
         sizes.append(float(abs(L.real[k] + share * (L.real[k + 1] - L.real[k]))))
     # Half the sampling frequency, where the response is real, lies beyond the grid.
-    sizes.append(-float(gain.response(np.array([0.5 / gain.period]))[0, 0, 0].real))
+    if gain.period:
+        sizes.append(-float(gain.response(np.array([gain.nyquist]))[0, 0, 0].real))
     factors = [1.0 / size for size in sizes if 0.0 < size < 1.0]
     return min(factors, default=math.inf)

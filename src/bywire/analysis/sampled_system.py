@@ -13,6 +13,7 @@ import numpy as np
 from bywire.analysis.linear_model import LinearModel
 from bywire.analysis.linearize import linearize
 from bywire.analysis.smooth_functions import smooth_functions, vector
+from bywire.analysis.stepped import stepped
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -75,6 +76,7 @@ def sampled_system(
     inputs: Sequence[str],
     outputs: Sequence[str],
     locked: Sequence[str] = (),
+    step: float = 0.0,
 ) -> SampledSystem:
     """Return plant and controllers at an operating point; dry friction is removed.
 
@@ -82,7 +84,7 @@ def sampled_system(
     ----------
     point
         State, Memory and Stimulus; None for a stimulus of zeros.
-    inputs, outputs, locked
+    inputs, outputs, locked, step
         As in ``closed_loop``.
 
     Raises
@@ -103,8 +105,9 @@ def sampled_system(
     kept = [name for name in plant.states if name not in locked]
     frame, every = _frames([task.period for task in tasks])
     at = zeros(cast(Any, model.Stimulus)) if stimulus is None else stimulus
+    moving = plant.reduced(kept, held=bool(locked))
     return SampledSystem(
-        plant=plant.reduced(kept, held=bool(locked)).sampled(frame),
+        plant=stepped(moving, frame, step) if step else moving.sampled(frame),
         names=tuple(task.name for task in tasks),
         ticks=_ticks(model, par, (state, memory, at), inputs, kept),
         every=tuple(every),

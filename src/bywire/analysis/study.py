@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 
 Progress = Callable[[str, float], None]
@@ -47,6 +48,8 @@ class Map:
     limits
         Label -> variable and the level at which it draws the border of what is possible. Beyond
         it the variable is larger.
+    curves
+        Label -> abscissas and ordinates [SI] of a line to compare with, for instance a closed form.
     """
 
     values: str
@@ -55,6 +58,7 @@ class Map:
     caption: str
     marks: tuple[Mark, ...] = ()
     limits: Mapping[str, tuple[str, float]] = field(default_factory=dict)
+    curves: Mapping[str, tuple[tuple[float, ...], tuple[float, ...]]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -94,6 +98,8 @@ class Found:
         Tables.
     warnings
         What the user should know.
+    limits
+        What limits the best design, a sentence each.
     """
 
     data: xr.Dataset
@@ -102,6 +108,7 @@ class Found:
     maps: Mapping[str, Map]
     cuts: tuple[Cut, ...] = ()
     warnings: tuple[str, ...] = ()
+    limits: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -122,6 +129,8 @@ class Study:
         Options unless others are given.
     compute
         ``compute(par, options, progress) -> Found``.
+    ruled
+        Parameters, or groups of them, without effect on the study -> what rules them instead.
     """
 
     name: str
@@ -130,6 +139,22 @@ class Study:
     options: type[ParameterSet]
     defaults: ParameterSet
     compute: Callable[[Any, Any, Progress], Found]
+    ruled: Mapping[str, str] = field(default_factory=dict)
+
+    def require_effect(self, names: Iterable[str]) -> None:
+        """Refuse to set parameters that would change nothing.
+
+        Raises
+        ------
+        ParameterError
+            With what to set instead.
+        """
+        for name in names:
+            for ruled, instead in self.ruled.items():
+                if name == ruled or name.startswith(f"{ruled}."):
+                    raise ParameterError(
+                        f"{name} has no effect on study {self.name!r}: {instead}"
+                    )
 
 
 def variable(values: Any, dims: tuple[str, ...], unit: str, label: str) -> xr.Variable:

@@ -57,11 +57,12 @@ def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) 
     """Run the ECU once: convert, close the pressure loop if asked to, close the current loop."""
     p_share = adc.sample(readings.p, u.noise_p, par.adc)
     i_share = adc.sample(readings.i, u.noise_i, par.adc)
+    p_before = m.p_meas
     m = m._replace(**_values(p_share, i_share, par))
     if par.drive.mode == "current-direct":
         m = m._replace(i_star=u.i_set, i_dit=0.0, i_ref=u.i_set)
     else:
-        m = _shaped(_demand(m, u, par), par)
+        m = _shaped(_demand(m, p_before, u, par), par)
     limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
     pi, out = current_pi.output(
         current_pi.State(m.pi_integral),
@@ -104,8 +105,11 @@ def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
     }
 
 
-def _demand(m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
-    """Return the memory with the unfiltered current demand renewed."""
+def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) -> Memory:
+    """Return the memory with the unfiltered current demand renewed.
+
+    ``p_before`` is the pressure of the last tick, whose gains a schedule hands over from.
+    """
     if par.drive.mode == "current":
         return m._replace(i_star=u.i_set)
     p_ref = u.p_set
@@ -113,12 +117,13 @@ def _demand(m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
         V_pedal = pedal.output(pedal.Input(force=u.pedal_force), par.pedal).V
         p_ref = pedal_map.output(V_pedal, par.ecu.pedal_map)
         m = m._replace(V_pedal=V_pedal)
-    pid, out = pressure_pid.output(
-        pressure_pid.State(m.pid_integral, m.pid_slope, m.pid_last),
-        pressure_pid.Input(p_ref=p_ref, p_meas=m.p_meas),
-        par.ecu.T_s,
-        par.ecu.pressure,
-    )
+    state = pressure_pid.State(m.pid_integral, m.pid_slope, m.pid_last)
+    signals = pressure_pid.Input(p_ref=p_ref, p_meas=m.p_meas)
+    own = par.ecu.pressure_at(m.p_meas)
+    if par.ecu.schedule.law != "off":
+        last = par.ecu.pressure_at(p_before)
+        state = pressure_pid.transferred(state, signals, last.k_p, own)
+    pid, out = pressure_pid.output(state, signals, par.ecu.T_s, own)
     saturated = ops.where(ops.fabs(out.i) >= par.ecu.pressure.i_max, 1.0, 0.0)
     return m._replace(
         p_ref=p_ref,

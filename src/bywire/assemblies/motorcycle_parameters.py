@@ -6,7 +6,14 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from bywire.control import current_pi, dither, low_pass_2, pedal_map, pressure_pid
+from bywire.control import (
+    current_pi,
+    dither,
+    gain_schedule,
+    low_pass_2,
+    pedal_map,
+    pressure_pid,
+)
 from bywire.control.dither import Believed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure
@@ -54,6 +61,7 @@ class EcuParameters(ParameterSet):
     T_s: Duration
     """sample time of both control loops"""
     pressure: pressure_pid.Parameters
+    schedule: gain_schedule.Parameters
     current: current_pi.Parameters
     filter: low_pass_2.Parameters
     dither: dither.Parameters
@@ -76,6 +84,14 @@ class EcuParameters(ParameterSet):
                 "ecu.dither.waveform = 'off'"
             )
         return self
+
+    def pressure_at(self, p: float) -> pressure_pid.Parameters:
+        """Return the pressure PID with the gains that its schedule gives at a pressure [Pa]."""
+        if self.schedule.law == "off":
+            return self.pressure
+        gains = gain_schedule.output(p, self.pressure, self.schedule)
+        # Between valid gains; symbols could not be validated.
+        return pressure_pid.Parameters.model_construct(**{**dict(self.pressure), **gains._asdict()})
 
 
 class MotorcycleParameters(ParameterSet):

@@ -8,7 +8,7 @@ from typing import Any
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.benchmark import frequency, wedge_brake
+from bywire.benchmark import frequency, measurement_files, wedge_brake
 from bywire.benchmark.engine import ensemble, single_and_sensitivities
 from bywire.benchmark.others import others
 from bywire.benchmark.processes import processes
@@ -46,6 +46,7 @@ def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
         "other simulators": lambda: others(par),
         "wedge brake": lambda: wedge_brake.measured(wedge),
         "frequency responses": lambda: frequency.measured(wedge),
+        "measurement files": measurement_files.measured,
         "start-up": processes,
     }
     here = machine()

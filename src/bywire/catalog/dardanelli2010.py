@@ -22,6 +22,8 @@ _T1, _T3 = "Table 1", "Table 3"
 _TABLE2 = "tuned so that (15) gives Table 2: "
 _PID = "tuned on Table 4's medium model with filters and sampling: crossover 10 Hz, margin 64 deg"
 _PI = "current loop of 100 Hz at -3 dB (section 3.1) with the 180 Hz filter and 1 kHz sampling"
+_BLEND = "optional law, off; wider than what dither and converter move the pressure by"
+_REGION = "optional law, off; the gains of medium pressure"
 
 _ELECTRICAL = {
     "supply.V_bat": chosen(12.0, "motorcycle battery"),
@@ -100,6 +102,16 @@ _ECU = {
     "ecu.pressure.c": chosen(0.0, "D on the measurement"),
     "ecu.pressure.T_t": chosen(0.05, "between derivative and integral time"),
     "ecu.pressure.i_max": chosen(20.0, "a 40 mm DC motor of this K_e; within the sensor's range"),
+    "ecu.schedule.law": chosen("off", "one set of gains, as the paper uses"),
+    "ecu.schedule.p_1": paper(10e5, "Table 4"),
+    "ecu.schedule.p_2": paper(35e5, "Table 4"),
+    "ecu.schedule.p_blend": chosen(2e5, _BLEND),
+    "ecu.schedule.low.k_p": chosen(0.797e-5, _REGION),
+    "ecu.schedule.low.k_i": chosen(5.33e-5, _REGION),
+    "ecu.schedule.low.k_d": chosen(0.0151e-5, _REGION),
+    "ecu.schedule.high.k_p": chosen(0.797e-5, _REGION),
+    "ecu.schedule.high.k_i": chosen(5.33e-5, _REGION),
+    "ecu.schedule.high.k_d": chosen(0.0151e-5, _REGION),
     "ecu.current.k_p": chosen(0.00522, _PI),
     "ecu.current.k_i": chosen(10.39, _PI),
     "ecu.current.T_t": chosen(2e-3, "a few sample times"),
@@ -151,6 +163,21 @@ _RETUNED = _REPAIRED | {
     "ecu.pressure.k_d": chosen(4.12e-7, _DESIGN),
     "ecu.pressure.tau_d": chosen(5.6e-5, _DESIGN),
     "ecu.pressure.c": chosen(1.0, _DESIGN + ": D on the error"),
+    "ecu.schedule.low.k_p": chosen(2.06e-5, _REGION),
+    "ecu.schedule.low.k_i": chosen(4.36e-4, _REGION),
+    "ecu.schedule.low.k_d": chosen(4.12e-7, _REGION),
+    "ecu.schedule.high.k_p": chosen(2.06e-5, _REGION),
+    "ecu.schedule.high.k_i": chosen(4.36e-4, _REGION),
+    "ecu.schedule.high.k_d": chosen(4.12e-7, _REGION),
+}
+
+_LOW = "tuned on the bench at 5 and 8.5 bar: 10 Hz at 1 and 3 bar with dither, 69 deg, disk 0.9"
+
+_SCHEDULED = _RETUNED | {
+    "ecu.schedule.law": chosen("regions", "less friction at low pressure: less gain will do"),
+    "ecu.schedule.low.k_p": chosen(1.48e-5, _LOW),
+    "ecu.schedule.low.k_i": chosen(1.51e-4, _LOW),
+    "ecu.schedule.low.k_d": chosen(3.37e-7, _LOW),
 }
 
 ENTRIES = (
@@ -177,5 +204,13 @@ ENTRIES = (
         summary="the calibrated brake with gains that meet section 6 under friction and dither",
         parameter_class=MotorcycleParameters,
         values=_RETUNED,
+    ),
+    Entry(
+        name="dardanelli2010-scheduled",
+        assembly="motorcycle-brake",
+        source=SOURCE,
+        summary="the retuned brake with gains of their own below 10 bar: less overshoot",
+        parameter_class=MotorcycleParameters,
+        values=_SCHEDULED,
     ),
 )

@@ -4,24 +4,36 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.broadband import Broadband, broadband_response
-from bywire.analysis.frequency_response import frequency_response, require_stable
+from bywire.analysis.large_signal import Variant, widths, with_widths
 from bywire.analysis.response_dataset import Sweep
 from bywire.cli import output
-from bywire.cli.loop_choice import Chosen, choose, spread
+from bywire.cli.loop_choice import Chosen, choose, spread, subject
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
+from bywire.cli.response_variants import cases_over, measured, sustained
+from bywire.cli.width_text import (
+    NOTE,
+    figures_object,
+    figures_table,
+    figures_text,
+    over_object,
+    over_table,
+    over_text,
+)
 from bywire.core.errors import unknown_name
 from bywire.core.signals import signals_of
 from bywire.report.wording import amount
-from bywire.simulation.run import Run
+
+if TYPE_CHECKING:
+    from bywire.report.page import Block
+    from bywire.report.tables import Table
 
 _POINTS = 20
 _EXCITATIONS = ("sine", "multisine", "chirp")
@@ -35,6 +47,7 @@ def execute(
     frequencies: str,
     amplitudes: str,
     excitation: str,
+    range_: str,
     out: Path | None,
     as_json: bool,
 ) -> None:
@@ -52,32 +65,38 @@ def execute(
         else [float(f) for f in np.geomspace(*own.band, _POINTS)]
     )
     sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else list(own.amplitudes)
-    linear = own.closed(chosen.par, chosen.value)
-    require_stable(linear)
-    point = own.point(chosen.par, chosen.value)
+    base, note = sustained(chosen, changes)
+    variants, varied = cases_over(base, chosen, range_)
+    point = variants[0].point
     flags = [name for name in ("stuck", "sat_current", "sat_duty", "sat_rate")
              if name in point.model.Output._fields]  # fmt: skip
-    sweep = Sweep(own.inputs, own.output, wanted, sizes, flags=flags, whole=own.whole(point.par))
+    sweep = Sweep(own.inputs, own.output, wanted, sizes, flags=flags, whole=own.whole(point.par),
+                  saturations=own.saturations)  # fmt: skip
     with progress_bar() as progress:
-        found = _measured(point.run(), sweep, excitation, progress)
-    response = linear.response(found["frequency"].values)[:, 0, 0]
-    files = [] if out is None else _written(chosen, found, response, out)
-    for text in _warnings(found, unit, sweep.tolerance):
+        found = measured(variants, sweep, excitation, progress)
+    found = with_widths(found, widths(variants, found))
+    response = variants[0].linear(found["frequency"].values)
+    notes = _warnings(found, unit, sweep.tolerance)
+    files = []
+    if out is not None:
+        more = _figures(found, variants, varied, unit)
+        files = _written(chosen, found, response, [note, *notes] if note else notes, more, out)
+    if note:
+        output.message(note)
+    for text in notes:
         output.message(f"warning: {text}")
     if as_json:
-        output.result(json.dumps(_as_object(chosen, found, response, files)))
+        shown = _as_object(chosen, found, response, files)
+        shown["figures"] = figures_object(found, 0)
+        shown |= over_object(found, variants, varied[0]) if range_ else {}
+        output.result(json.dumps(shown))
+    elif range_:
+        output.result(f"{_head(chosen)}: {over_text(found, variants, varied, unit)}")
     else:
-        output.result(_text(chosen, found, response, unit))
+        text = _text(chosen, found, response, unit)
+        output.result(f"{text}\n\n{figures_text(found, unit)}")
     for path in files:
         output.message(f"written: {path}")
-
-
-def _measured(
-    run: Run, sweep: Sweep, excitation: str, progress: Callable[[str, float], None]
-) -> xr.Dataset:
-    if excitation == "sine":
-        return frequency_response(run, sweep, progress).assign_attrs(excitation=excitation)
-    return broadband_response(run, sweep, Broadband(cast(Any, excitation)), progress)
 
 
 def _input_unit(chosen: Chosen) -> str:
@@ -88,18 +107,19 @@ def _input_unit(chosen: Chosen) -> str:
 def _warnings(found: xr.Dataset, unit: str, tolerance: float) -> list[str]:
     """Return what the user should know: what stuck, and what never repeated."""
     texts = []
+    cases = "frequencies" if found.sizes["variant"] == 1 else "frequencies of all cases"
     for k, size in enumerate(found["amplitude"].values):
-        one = found.isel(variant=0, amplitude=k)
+        one = found.isel(amplitude=k)
         still, restless = np.isnan(one["gain"].values), one["settled"].values == 0
         label = f"amplitude {amount(float(size), unit, 3)}"
         if still.any():
-            texts.append(f"{label}: the output sticks at {int(still.sum())} frequencies: no gain")
+            texts.append(f"{label}: the output sticks at {int(still.sum())} {cases}: no gain")
         shaken = restless & ~still
         if shaken.any():
             scatter = float(np.nanmax(one["scatter"].values[shaken]))
             texts.append(
                 f"{label}: the response does not repeat itself within {100 * tolerance:g} % at "
-                f"{int(shaken.sum())} frequencies (a limit cycle, a drift, or the encoder's "
+                f"{int(shaken.sum())} {cases} (a limit cycle, a drift, or the encoder's "
                 f"resolution): shown are means of the last windows, which scatter by up to "
                 f"{100 * scatter:.2g} %"
             )
@@ -108,10 +128,34 @@ def _warnings(found: xr.Dataset, unit: str, tolerance: float) -> list[str]:
     return texts
 
 
-def _written(chosen: Chosen, found: xr.Dataset, linear: Any, out: Path) -> list[Path]:
+def _figures(
+    found: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
+) -> list[Block]:
+    """Return what a page says of bandwidths."""
+    from bywire.report.bandwidth_range import bandwidth_range
+    from bywire.report.page import FigureBlock, TableBlock
+
+    blocks: list[Block] = [TableBlock(figures_table(found, unit), f"{NOTE.capitalize()}.")]
+    if range_[0]:
+        figure = bandwidth_range(found, [one.label for one in variants], *range_)
+        caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
+        table = TableBlock(over_table(found, variants, range_, unit), "Bandwidth by amplitude.")
+        blocks += [FigureBlock(figure, caption), table]
+    return blocks
+
+
+def _written(
+    chosen: Chosen,
+    found: xr.Dataset,
+    linear: Any,
+    notes: list[str],
+    more: list[Block],
+    out: Path,
+) -> list[Path]:
     from bywire.data.netcdf import write_recording
     from bywire.report.bode import Response, bode
     from bywire.report.files import save_figure
+    from bywire.report.response_report import write_response
 
     name = f"{chosen.loop.name}-frequency-response"
     f = found["frequency"].values
@@ -121,9 +165,13 @@ def _written(chosen: Chosen, found: xr.Dataset, linear: Any, out: Path) -> list[
         one = found.isel(variant=0, amplitude=k)
         value = one["gain"].values * np.exp(1j * np.radians(one["phase"].values))
         lines.append(Response(f"amplitude {amount(float(size), unit, 3)}", f, value))
+    figure = bode(lines)
+    method = f"Excitation: {found.attrs['excitation']}. {_coherence(found)}."
+    table = _table(found, linear, unit)
     return [
         write_recording(found, out / f"{name}.nc"),
-        save_figure(bode(lines), out / f"{name}.png"),
+        save_figure(figure, out / f"{name}.png"),
+        write_response(out, subject(chosen), figure, table, notes, method, more),
     ]
 
 
@@ -153,6 +201,14 @@ def _as_object(chosen: Chosen, found: xr.Dataset, linear: Any, files: list[Path]
 
 def _text(chosen: Chosen, found: xr.Dataset, linear: Any, unit: str) -> str:
     from bywire.report.table_text import table_text
+
+    head = f"{_head(chosen)}: gain and phase by amplitude\n"
+    if found.attrs["excitation"] != "sine":
+        head += f"excitation: {found.attrs['excitation']}, amplitudes are its peaks\n"
+    return f"{head}{table_text(_table(found, linear, unit))}\n{_coherence(found)}"
+
+
+def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
     from bywire.report.tables import text_table
 
     sizes = found["amplitude"].values
@@ -166,16 +222,19 @@ def _text(chosen: Chosen, found: xr.Dataset, linear: Any, unit: str) -> str:
             one = found.isel(variant=0, amplitude=j, frequency=k)
             row.append(_cell(float(one["gain"]), float(one["phase"])))
         rows.append(row)
-    at = chosen.loop.at
-    head = (
-        f"closed loop {chosen.loop.name} of {chosen.name} at {at.name} = "
-        f"{amount(chosen.value, at.unit)}: gain and phase by amplitude\n"
-    )
-    if found.attrs["excitation"] != "sine":
-        head += f"excitation: {found.attrs['excitation']}, amplitudes are its peaks\n"
+    return text_table(heading, rows)
+
+
+def _coherence(found: xr.Dataset) -> str:
     lowest = found["coherence"].min(dim="frequency").values[0]
     shares = ", ".join("-" if math.isnan(one) else f"{one:.3f}" for one in lowest)
-    return head + table_text(text_table(heading, rows)) + f"\nlowest coherence: {shares}"
+    return f"lowest coherence: {shares}"
+
+
+def _head(chosen: Chosen) -> str:
+    at = chosen.loop.at
+    point = f"{at.name} = {amount(chosen.value, at.unit)}"
+    return f"closed loop {chosen.loop.name} of {chosen.name} at {point}"
 
 
 def _cell(gain: float, phase: float) -> str:

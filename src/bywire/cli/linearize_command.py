@@ -7,11 +7,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from bywire.analysis.linear_model import LinearModel
-from bywire.cli import output
-from bywire.cli.loop_choice import Chosen, choose
+from bywire.analysis.locus import Locus, locus
+from bywire.analysis.rates import rates
+from bywire.cli import output, periodic_choice, reduction_choice
+from bywire.cli.locus_object import locus_object
+from bywire.cli.loop_choice import Chosen, choose, over_range, subject
 from bywire.cli.output_folder import require_folder
 from bywire.report.wording import amount
 
@@ -21,29 +22,67 @@ def execute(
     parameters: str,
     at: str,
     changes: Mapping[str, str],
+    range_: str,
+    reduce: str,
+    dither: bool,
     out: Path | None,
     as_json: bool,
 ) -> None:
-    """Print the exact linear model of a closed loop, or its poles."""
+    """Print the exact linear model of a closed loop, or its poles and where it turns unstable."""
     if out is not None:
         require_folder(out)
     chosen = choose(loop, parameters, at, changes)
     model = chosen.loop.closed(chosen.par, chosen.value)
-    if out is not None:
-        from bywire.report.files import write_bytes
-
-        text = json.dumps(as_object(chosen, model), indent=1)
-        path = write_bytes(out / f"{loop}-linear-model.json", text.encode())
-        output.message(f"model: {path}")
+    found = _locus(chosen, range_) if range_ else None
+    less = reduction_choice.reduced(model, reduce, chosen.loop.band[1]) if reduce else None
+    shaken = periodic_choice.dithered(chosen) if dither else None
+    files = [] if out is None else _written(chosen, model, found, out)
+    if shaken is not None and out is not None:
+        files.append(periodic_choice.write(shaken, out, chosen.loop.name))
     if as_json:
-        output.result(json.dumps(as_object(chosen, model)))
+        shown = as_object(chosen, model)
+        if found is not None:
+            shown["locus"] = locus_object(found)
+        if less is not None:
+            shown["reduced"] = reduction_choice.as_object(less)
+        if shaken is not None:
+            shown["dithered"] = periodic_choice.as_object(shaken)
+        output.result(json.dumps({**shown, "files": [str(path) for path in files]}))
     else:
-        output.result(_text(chosen, model))
+        output.result(_text(chosen, model, found))
+        if less is not None:
+            output.result(reduction_choice.text(less))
+        if shaken is not None:
+            output.result(periodic_choice.text(shaken, chosen.loop.band))
+    for path in files:
+        output.message(f"written: {path}")
+
+
+def _locus(chosen: Chosen, range_: str) -> Locus:
+    name, unit, values = over_range(range_, chosen, "--locus")
+    return locus(chosen.loop, chosen.par, chosen.value, name, unit, sorted(values))
+
+
+def _written(chosen: Chosen, model: LinearModel, found: Locus | None, out: Path) -> list[Path]:
+    from bywire.analysis.loop_curves import varied
+    from bywire.report.files import write_bytes
+    from bywire.report.linearize_report import own_bandwidth, write_model
+
+    loop = chosen.loop
+    text = json.dumps(as_object(chosen, model), indent=1)
+    path = write_bytes(out / f"{loop.name}-linear-model.json", text.encode())
+    models = [model]
+    if found is not None:
+        ends = (float(found.values[0]), float(found.values[-1]))
+        cases = varied(loop, chosen.par, chosen.value, found.name, ends)
+        models += [loop.closed(*case) for case in cases]
+    widest = max((own_bandwidth(one) for one in models if one.is_stable), default=float("nan"))
+    return [path, *write_model(out, subject(chosen), model, found, widest)]
 
 
 def as_object(chosen: Chosen, model: LinearModel) -> dict[str, Any]:
     """Return the JSON object of a model: matrices with names and units, poles."""
-    rates = continuous(model)
+    found = rates(model)
     return {
         "loop": chosen.loop.name,
         "parameters": chosen.name,
@@ -54,34 +93,23 @@ def as_object(chosen: Chosen, model: LinearModel) -> dict[str, Any]:
         "state_units": list(model.state_units), "input_units": list(model.input_units),
         "output_units": list(model.output_units),
         "poles": [[float(z.real), float(z.imag)] for z in model.poles()],
-        "rates": [[float(s.real), float(s.imag)] for s in rates],
+        "rates": [[float(s.real), float(s.imag)] for s in found],
         "stable": model.is_stable,
+        "transfer_functions": reduction_choice.transfers(model),
     }  # fmt: skip
 
 
-def continuous(model: LinearModel) -> Any:
-    """Return the poles as rates of continuous motions [1/s], slowest first; dead beats left out."""
-    poles = model.poles()
-    rates = np.log(poles[np.abs(poles) > 1e-9].astype(complex)) / model.period
-    return rates[np.argsort(np.abs(rates))]
-
-
-def _text(chosen: Chosen, model: LinearModel) -> str:
+def _text(chosen: Chosen, model: LinearModel, found: Locus | None) -> str:
+    from bywire.report.linearize_report import locus_texts, rate_table
     from bywire.report.table_text import table_text
-    from bywire.report.tables import text_table
 
-    rows = []
-    for s in continuous(model):
-        if s.imag < -1e-9 or abs(s) < 1e-6:  # the other of a pair; what does not move
-            continue
-        size = abs(s)
-        figures = (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)
-        rows.append([f"{figure:.4g}" for figure in figures])
     stable = "stable" if model.is_stable else "UNSTABLE"
     loop = chosen.loop
-    head = (
+    lines = [
         f"closed loop {loop.name} of {chosen.name} at {loop.at.name} = "
-        f"{amount(chosen.value, loop.at.unit)}: {stable}, sampled with {model.period * 1e3:g} ms\n"
-    )
-    heading = ("real [1/s]", "imaginary [rad/s]", "frequency [Hz]", "damping ratio")
-    return head + table_text(text_table(heading, rows))
+        f"{amount(chosen.value, loop.at.unit)}: {stable}, sampled with {model.period * 1e3:g} ms",
+        table_text(rate_table(model)),
+    ]
+    if found is not None:
+        lines += [f"over {found.name}:", *(f"- {text}" for text in locus_texts(found))]
+    return "\n".join(lines)

@@ -7,12 +7,15 @@ from collections.abc import Iterable
 from textwrap import wrap
 
 from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.plant_registry import all_plants
 from bywire.analysis.study_registry import all_studies
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli
 from bywire.catalog.registry import entries
 from bywire.cli.output import result
+from bywire.identification.method import Method
+from bywire.identification.method_registry import all_methods
 
 _WIDTH = 100  # characters of a line
 
@@ -25,7 +28,9 @@ def execute(as_text: bool) -> None:
         "parameter_sets": {e.name: e.summary for e in entries().values()},
         "experiments": {e.name: f"{e.summary} ({e.assembly})" for e in experiments.values()},
         "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in all_loops().values()},
+        "plants": {one.name: f"{one.summary} ({one.assembly})" for one in all_plants().values()},
         "studies": {one.name: f"{one.summary} ({one.assembly})" for one in all_studies().values()},
+        "methods": {one.name: _method(one) for one in all_methods().values()},
         "stimuli": {e.kind: e.summary for e in stimuli().values()},
         "kpis": {m.name: m.definition for m in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments.values()},
@@ -41,6 +46,11 @@ def execute(as_text: bool) -> None:
             lines += _entry(name, about)
         lines.append("")
     result("\n".join(lines))
+
+
+def _method(one: Method) -> str:
+    signals = ", ".join(f"{name} [{unit}]" for name, unit in one.signals.items())
+    return f"{one.summary}; needs {signals} ({one.assembly or 'any'})"
 
 
 def _entry(name: str, about: str | Iterable[str]) -> list[str]:

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.analysis.loop import Loop
+from bywire.analysis.loop import Loop, Quantity
 from bywire.analysis.loop_registry import find_loop
 from bywire.bench.values import number, parsed
 from bywire.catalog.registry import entry, main_set
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
+
+if TYPE_CHECKING:
+    from bywire.report.subject import Subject
 
 _MOST = 10_000
 
@@ -59,6 +63,18 @@ def choose(name: str, parameters: str, at: str, changes: Mapping[str, str]) -> C
     return Chosen(loop, found.name, par, value)
 
 
+def subject(chosen: Chosen) -> Subject:
+    """Return what a report says of a loop and its operating point."""
+    from bywire.report.subject import Subject
+    from bywire.report.wording import amount
+
+    at = chosen.loop.at
+    return Subject(
+        chosen.loop.name, chosen.loop.summary, chosen.name, chosen.par,
+        f"{at.name} = {amount(chosen.value, at.unit)}",
+    )  # fmt: skip
+
+
 def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> list[float]:
     """Return the values of ``low:high:count``, or of a list with commas; each with its unit.
 
@@ -88,8 +104,15 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     return [float(one) for one in between(low, high, int(parts[2]))]
 
 
-def over_range(text: str, chosen: Chosen) -> tuple[str, str, list[float]]:
-    """Return name, unit and values of ``NAME=LOW:HIGH:COUNT``.
+def over_range(text: str, chosen: Chosen, option: str = "--over") -> tuple[str, str, list[float]]:
+    """Return name, unit and values of a range for a loop, see `range_of`."""
+    return range_of(text, chosen.loop.at, chosen.par, option)
+
+
+def range_of(
+    text: str, quantity: Quantity, par: ParameterSet, option: str
+) -> tuple[str, str, list[float]]:
+    """Return name, unit and values of ``NAME=LOW:HIGH:COUNT``; ``at`` is the operating point.
 
     Raises
     ------
@@ -98,10 +121,11 @@ def over_range(text: str, chosen: Chosen) -> tuple[str, str, list[float]]:
     """
     name, equals, values = (part.strip() for part in text.partition("="))
     if not equals:
-        raise ParameterError(f"--over {text}: write NAME=LOW:HIGH:COUNT")
-    quantity = chosen.loop.at
-    if name == quantity.name:
-        return name, quantity.unit, spread(values, quantity.unit, name)
-    leaves = leaf_fields(type(chosen.par))
-    unit = leaves[name].unit.symbol if name in leaves else "1"
+        raise ParameterError(f"{option} {text}: write NAME=LOW:HIGH:COUNT")
+    if name in ("at", quantity.name):
+        return quantity.name, quantity.unit, spread(values, quantity.unit, quantity.name)
+    if name not in par.leaves():
+        raise unknown_name("parameter", name, ["at", quantity.name, *par.leaves()])
+    leaves = leaf_fields(type(par))
+    unit = leaves[name if name in leaves else name.rpartition(".")[0]].unit.symbol  # of its table
     return name, unit, spread(values, unit, name)

@@ -6,33 +6,31 @@ import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from bywire.analysis.robustness import LoopMargins, margins, over, worst
 from bywire.cli import output
-from bywire.cli.loop_choice import Chosen, choose, over_range
+from bywire.cli.loop_choice import Chosen, choose, over_range, subject
+from bywire.cli.output_folder import require_folder
+from bywire.report.margins_table import LEGEND, UNITS, margins_table, worst_texts
 
-UNITS = {
-    "gain": "1", "phase": "deg", "crossover": "Hz", "delay": "s", "disk": "1", "sensitivity": "1",
-    "complementary": "1", "bandwidth": "Hz",
-}  # fmt: skip
-
-
-TITLES = {
-    "gain": "gain margin", "phase": "phase margin", "delay": "delay margin", "disk": "disk margin",
-    "sensitivity": "max |S|", "complementary": "max |T|",
-}  # fmt: skip
-LEGEND = (
-    "Linear loop as it is sampled, dry friction left out. Gain margin as a factor; delay margin: "
-    "dead time\nthat may be added; disk margin: 2 is the best, 0 none; S, T: sensitivity and "
-    "complementary sensitivity.\nNothing is defined for an unstable loop."
-)
+_WIDTH = 100  # characters of a line
 
 
 def execute(
-    loop: str, parameters: str, at: str, changes: Mapping[str, str], range_: str, as_json: bool
+    loop: str,
+    parameters: str,
+    at: str,
+    changes: Mapping[str, str],
+    range_: str,
+    out: Path | None,
+    as_json: bool,
 ) -> None:
     """Print the margins of a loop, at a point or over a range with the worst case."""
+    if out is not None:
+        require_folder(out)
     chosen = choose(loop, parameters, at, changes)
     if not range_:
         found, values, name = [margins(chosen.loop, chosen.par, chosen.value)], [math.nan], ""
@@ -40,10 +38,34 @@ def execute(
     else:
         name, unit, values = over_range(range_, chosen)
         found = over(chosen.loop, chosen.par, chosen.value, name, values)
+    files = [] if out is None else _written(chosen, (name, unit), values, found, out)
     if as_json:
-        output.result(json.dumps(_as_object(chosen, name, values, found)))
+        shown = _as_object(chosen, name, values, found)
+        output.result(json.dumps({**shown, "files": [str(path) for path in files]}))
     else:
         output.result(_text(chosen, (name, unit), values, found))
+    for path in files:
+        output.message(f"written: {path}")
+
+
+def _written(
+    chosen: Chosen,
+    range_: tuple[str, str],
+    values: Sequence[float],
+    found: Sequence[LoopMargins],
+    out: Path,
+) -> list[Path]:
+    from bywire.analysis.loop_curves import Family, loop_curve, varied
+    from bywire.report.margins_report import write_margins
+
+    name, unit = range_
+    loop = chosen.loop
+    cases = [(chosen.par, chosen.value)]
+    if name:
+        cases = varied(loop, chosen.par, chosen.value, name, values)
+    curves = [loop_curve(loop, *case, one) for case, one in zip(cases, found, strict=True)]
+    family = Family(tuple(curves), name, unit, tuple(values))
+    return write_margins(out, subject(chosen), loop.cut, family)
 
 
 def _as_object(
@@ -59,7 +81,10 @@ def _as_object(
     if not name:
         return {**shared, "margins": rows[0]}
     cases = [{name: value, **row} for value, row in zip(values, rows, strict=True)]
-    least = {k: {"value": v, name: at} for k, (v, at) in worst(found, values).items()}
+    least = {
+        k: {"value": v if math.isfinite(v) else None, name: at}
+        for k, (v, at) in worst(found, values).items()
+    }
     return {**shared, "over": name, "cases": cases, "worst": least}
 
 
@@ -72,29 +97,14 @@ def _text(
     chosen: Chosen, range_: tuple[str, str], values: Sequence[float], found: Sequence[LoopMargins]
 ) -> str:
     from bywire.report.table_text import table_text
-    from bywire.report.tables import text_table
     from bywire.report.wording import amount
 
-    name, own_unit = range_
-
-    def cells(one: LoopMargins) -> list[str]:
-        figures = [amount(getattr(one, k), unit, 3) for k, unit in UNITS.items()]
-        return [*figures, "yes" if one.stable else "NO"]
-
+    name, unit = range_
     at = chosen.loop.at
-    heading = [*(TITLES.get(k, k) for k in UNITS), "stable"]
-    rows: list[list[str]] = [cells(one) for one in found]
-    if name:
-        heading = [name, *heading]
-        rows = [[amount(v, own_unit), *row] for v, row in zip(values, rows, strict=True)]
     point = f"{at.name} = {amount(chosen.value, at.unit)}"
     head = f"loop {chosen.loop.name} of {chosen.name} at {point}"
-    text = f"{head}, cut at {chosen.loop.cut}\n" + table_text(text_table(heading, rows))
+    table = table_text(margins_table(found, name, unit, values), _WIDTH)
+    text = f"{head}, cut at {chosen.loop.cut}\n{table}"
     if name:
-        least = worst(found, values)
-        lines = [
-            f"{TITLES.get(k, k)} {amount(v, UNITS[k], 3)} at {name} = {amount(v_at, own_unit)}"
-            for k, (v, v_at) in least.items()
-        ]
-        text += "\nworst: " + "; ".join(lines)
-    return f"{text}\n{LEGEND}"
+        text += "\nworst: " + "; ".join(worst_texts(found, name, unit, values))
+    return f"{text}\n{fill(LEGEND, _WIDTH)}"

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.study import Cut, Found, Study
+from bywire.analysis.study import Found, Study
 from bywire.analysis.study_registry import find_study
 from bywire.bench.values import parsed
 from bywire.catalog.registry import entry, main_set
@@ -38,7 +38,8 @@ def execute(
         require_folder(out)
     with progress_bar() as progress:
         found = study.compute(par, options, progress)
-    files = [] if out is None else _written(study, found, out)
+    made_of = (found_set.name, par, options)
+    files = [] if out is None else _written(study, made_of, found, out)
     for text in found.warnings:
         output.message(f"warning: {text}")
     if as_json:
@@ -60,22 +61,29 @@ def _changed(
         if name not in options:
             raise unknown_name("option", name, (*options, *par.flat()))
     others = {name: value for name, value in changes.items() if "." in name}
+    study.require_effect(others)
     return (
         par.replace(parsed(type(par), others, "parameter")),
         study.defaults.replace(parsed(study.options, own, "option")),
     )
 
 
-def _written(study: Study, found: Found, out: Path) -> list[Path]:
+def _written(
+    study: Study, made_of: tuple[str, ParameterSet, ParameterSet], found: Found, out: Path
+) -> list[Path]:
     from bywire.data.netcdf import write_recording
     from bywire.report.contour import contour
     from bywire.report.files import save_figure
+    from bywire.report.study_report import write_study
+    from bywire.report.subject import Subject
 
+    name, par, options = made_of
     files = [write_recording(found.data, out / f"{study.name}.nc")]
-    for name, shown in found.maps.items():
-        figure = contour(found.data, shown)
-        files.append(save_figure(figure, out / f"{study.name}-{name}.png"))
-    return files
+    figures = {kind: contour(found.data, shown) for kind, shown in found.maps.items()}
+    for kind, figure in figures.items():
+        files.append(save_figure(figure, out / f"{study.name}-{kind}.png"))
+    subject = Subject(study.name, study.summary, name, par)
+    return [*files, write_study(out, study, subject, options, found, figures)]
 
 
 def _as_object(
@@ -86,6 +94,7 @@ def _as_object(
         "parameters": parameters,
         "options": options.model_dump(mode="json"),
         "assumptions": list(found.assumptions),
+        "limits": list(found.limits),
         "kpis": {
             one.name: {
                 "value": _finite(one.value),
@@ -122,28 +131,14 @@ def _finite(value: Any) -> Any:
 
 
 def _text(study: Study, parameters: str, found: Found) -> str:
+    from bywire.report.study_report import cut_table, kpi_rows
     from bywire.report.table_text import table_text
-    from bywire.report.tables import KpiRow, kpi_table
+    from bywire.report.tables import kpi_table
 
-    rows = [
-        KpiRow(one.name, one.value, one.unit,
-               f"{one.definition} ({one.note})" if one.note else one.definition)
-        for one in found.kpis
-    ]  # fmt: skip
-    parts = [f"study {study.name} of {parameters}: {study.summary}", table_text(kpi_table(rows))]
-    parts += [_table(cut) for cut in found.cuts]
+    kpis = table_text(kpi_table(kpi_rows(found)))
+    parts = [f"study {study.name} of {parameters}: {study.summary}", kpis]
+    if found.limits:
+        parts.append("what limits the best design\n" + "\n".join(f"- {t}" for t in found.limits))
+    parts += [f"{cut.title}\n{table_text(cut_table(cut), 140)}" for cut in found.cuts]
     parts.append("assumptions\n" + "\n".join(f"- {text}" for text in found.assumptions))
     return "\n\n".join(parts)
-
-
-def _table(cut: Cut) -> str:
-    from bywire.report.table_text import table_text
-    from bywire.report.tables import text_table
-    from bywire.report.wording import in_display_unit, unit_text
-
-    heading, columns = [], []
-    for name in cut.columns:
-        factor, unit = in_display_unit(1.0, str(cut.data[name].attrs["units"]))
-        heading.append(f"{name} [{unit_text(unit) or '-'}]")
-        columns.append([f"{factor * float(value):.4g}" for value in cut.data[name].values])
-    return f"{cut.title}\n" + table_text(text_table(heading, zip(*columns, strict=True)), 140)

@@ -87,3 +87,29 @@ def at_rest(
     """Return the state that holds a current demand ``i`` at a constant input."""
     integral = i - par.k_p * (par.b * u.p_ref - u.p_meas)
     return State(integral=integral, slope=0.0, last=par.c * u.p_ref - u.p_meas)
+
+
+def transferred(
+    x: State,
+    u: Input,
+    k_p: Annotated[float, Signal("A/Pa", "proportional gain until now", 1e-5)],
+    par: Parameters,
+) -> State:
+    r"""Return the state with which the gains of ``par`` take over without a bump.
+
+    .. math:: I \leftarrow I + (k_p^{old} - k_p) (b r - p)
+
+    The demand at this input is then that of the old gains. Integral and derivative part are
+    currents, which new k_i and k_d leave as they are.
+
+    Notes
+    -----
+    A k_p that follows the pressure sums up to an integral of k_p over the error: at an equilibrium
+    the loop's linear model is exactly that of the gains frozen there.
+
+    References
+    ----------
+    I. Kaminer, A. M. Pascoal, P. P. Khargonekar, E. E. Coleman, A velocity algorithm for the
+    implementation of gain-scheduled controllers, Automatica 31 (1995).
+    """
+    return x._replace(integral=x.integral + (k_p - par.k_p) * (par.b * u.p_ref - u.p_meas))

@@ -37,6 +37,7 @@ DISPLAY_UNITS = {
     "s": "s",
     "m**3": "ml",
     "m**2": "mm**2",
+    "m/rad": "mm/rad",
 }
 
 

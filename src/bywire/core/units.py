@@ -34,6 +34,7 @@ _COMMON: dict[str, tuple[float, str]] = {
     "ohm": (1.0, "ohm"),
     "rad": (1.0, "rad"),
     "deg": (math.pi / 180.0, "rad"),
+    "mm/rad": (1e-3, "m/rad"),
     "%": (1e-2, "1"),
     "": (1.0, "1"),
 }
@@ -45,8 +46,9 @@ _FACTOR = rf"(?:{_POWER}|\({_POWER}(?: *[*·] *{_POWER})*\))"
 _UNIT = re.compile(rf"(?:1? */ *)?{_FACTOR}(?:(?: *[*/·] *| +){_FACTOR})*")
 _MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
 _LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
-# pint takes rad as a pure number: it would turn 60 rpm into 6.28 Hz, and 1 into 57 degrees.
-_NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1")
+# pint takes rad as a pure number: it would turn 60 rpm into 6.28 Hz, 1 into 57 degrees, and 2 mm
+# into 2 mm/rad where 2 mm/rev may be meant.
+_NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
 
 
 class Written(float):
@@ -81,6 +83,7 @@ def registry() -> pint.UnitRegistry[Any]:
     # No cache folder: pint's is a pickle that an interrupted or parallel process leaves damaged.
     known: pint.UnitRegistry[Any] = pint.UnitRegistry()
     known.define("percent = 0.01 = %")
+    known.define("@alias turn = rev")
     return known
 
 

@@ -17,7 +17,8 @@ from bywire.core.errors import FileError, quoted
 
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _HEADER = "a first row such as 'time [s], pedal [mm]'"
-_SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
+SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
+"""what may stand between two cells, in the order in which it is looked for"""
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ def read_table(path: Path) -> Table:
         if len(cells) != len(header):
             raise FileError(
                 f"{path}, line {line}: {len(cells)} cells, but the header has {len(header)} "
-                f"(separated by {_SEPARATORS[separator]}): complete the row; with decimal commas, "
+                f"(separated by {SEPARATORS[separator]}): complete the row; with decimal commas, "
                 "separate the columns by semicolons"
             )
     rows, lines = [cells for _, cells in found[1:]], [line for line, _ in found[1:]]
@@ -170,10 +171,13 @@ def _text(path: Path) -> str:
 
 
 def _separator(text: str) -> str:
-    """Return the header's separator; what stands in quotes does not count."""
-    first = next((line for line in text.splitlines() if line.strip()), "")
+    return separator_of(next((line for line in text.splitlines() if line.strip()), ""))
+
+
+def separator_of(first: str) -> str:
+    """Return the separator of a table's first line; what stands in quotes does not count."""
     bare = re.sub(r'"[^"]*"', "", first)
-    return next((mark for mark in _SEPARATORS if mark in bare), ",")
+    return next((mark for mark in SEPARATORS if mark in bare), ",")
 
 
 def _split(path: Path, text: str, separator: str) -> list[tuple[int, list[str]]]:

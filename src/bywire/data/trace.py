@@ -8,7 +8,6 @@ what is doubtful is refused, never guessed.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
@@ -22,16 +21,11 @@ from numpy.typing import NDArray
 from bywire.core import units
 from bywire.core.errors import FileError, ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
+from bywire.data.column_units import converted, measures, si_symbol, split_title, unit_of
 from bywire.data.text_table import Table, numbers, read_table
 
 _GAP = 10.0  # median steps: a pause must be longer to count as a gap
 _CLOCKS = ("time", "t")
-_POWER = r"[A-Za-zµμΩ°%_]+(?:(?:\*\*|\^)-?[0-9])?"
-_UNIT = re.compile(rf"(?:1|(?:1/)?{_POWER}(?:[*/· ]{_POWER})*)")
-_SI = (
-    "1", "s", "m", "rad", "m/s", "rad/s", "N", "Pa", "N*m", "A", "V", "W", "ohm", "Hz",
-    "m/s**2", "m**2", "m**3", "m**3/s", "kg", "K",
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -91,7 +85,7 @@ def read_trace(
         raise FileError(
             f"{table.path} has too few rows of numbers, {len(values)}: add some, two at least"
         )
-    si = [_converted(v, u, c.symbol) for v, u, c in zip(values.T, scales, chosen, strict=True)]
+    si = [converted(v, u, c.symbol) for v, u, c in zip(values.T, scales, chosen, strict=True)]
     _require_increasing(table, chosen[0], si[0])
     _require_no_gap(table, chosen[0], si[0], longest)
     signals = {
@@ -117,10 +111,7 @@ def _known(table: Table) -> dict[str, _Column]:
     """Return the named columns of the header by their names in lower case."""
     found: dict[str, _Column] = {}
     for index, title in enumerate(table.header):
-        label, unit = title, ""
-        cut = max(title.rfind("["), title.rfind("("))
-        if cut >= 0 and title[-1] in "])":
-            label, unit = title[:cut].rstrip(), title[cut + 1 : -1].strip()
+        label, unit = split_title(title)
         if not label:
             continue
         key = label.casefold()
@@ -137,7 +128,7 @@ def _chosen(table: Table, columns: Mapping[str, str] | None) -> list[_Column]:
     chosen = [replace(clock, name="time", symbol="s")]
     if columns is None:
         others = [c for c in known.values() if c != clock]
-        chosen += [replace(c, name=c.label, symbol=_si(_unit(table, c))) for c in others]
+        chosen += [replace(c, name=c.label, symbol=si_symbol(_unit(table, c))) for c in others]
     for name, symbol in (columns or {}).items():
         found = known.get(name.strip().casefold())
         if found is None:
@@ -170,42 +161,18 @@ def _unit(table: Table, column: _Column) -> Any:
         raise FileError(f"{where}: the name stands twice, capitals or not: rename one of them")
     if not column.unit:
         raise UnitError(f"{where}: it has no unit: write for instance {example}, or [1] for none")
-    text = re.sub(r"(?<=N)(?=m\b)", "*", "1" if column.unit == "-" else column.unit)
     try:
-        if not _UNIT.fullmatch(text):
-            raise ValueError(text)
-        unit = _pint(text.replace("%", "percent").replace("·", "*").replace(" ", "*"))
-        base = _base(unit)
-    except Exception:
+        unit = unit_of(column.unit)
+    except ValueError:
         raise UnitError(
             f"{where}: {quoted(column.unit)} is no known unit: write for instance {example}"
         ) from None
-    if column.symbol and base != _base(_pint(column.symbol)):
+    if column.symbol and not measures(unit, column.symbol):
         raise UnitError(
             f"{where}: {column.unit!r} has the wrong unit, it cannot be {column.symbol}: "
             f"write for instance {example}"
         )
     return unit
-
-
-def _si(unit: Any) -> str:
-    """Return the SI unit of a unit's quantity."""
-    base = _base(unit)
-    return next((s for s in _SI if _base(_pint(s)) == base), f"{base:~C}")
-
-
-def _pint(symbol: str) -> Any:
-    """Return the registry's unit object for a symbol."""
-    return units.registry().Unit("" if symbol == "1" else symbol)
-
-
-def _base(unit: Any) -> Any:
-    """Return the base units; radians stay, so that rpm is no frequency in Hz."""
-    return units.registry().Quantity(1.0, unit).to_base_units().units
-
-
-def _converted(values: NDArray[np.float64], unit: Any, symbol: str) -> NDArray[np.float64]:
-    return np.asarray(units.registry().Quantity(values, unit).to(_pint(symbol)).magnitude)
 
 
 def _require_increasing(table: Table, clock: _Column, t: NDArray[np.float64]) -> None:

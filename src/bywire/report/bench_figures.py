@@ -9,11 +9,12 @@ from dataclasses import dataclass
 import xarray as xr
 from matplotlib.figure import Figure
 
+from bywire.bench.energy_ledger import actuator_ledger, disc_ledger
 from bywire.bench.result import Result
 from bywire.bench.wedge_series import tag
 from bywire.core.errors import ParameterError
 from bywire.report.brake_factor import WedgeForces, brake_factor
-from bywire.report.energy_balance import energy_balance
+from bywire.report.energy_balance import ledger_bars
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.overlaid_traces import overlaid_traces
 from bywire.report.step_marks import StepFacts, StepLimits
@@ -111,13 +112,20 @@ def _brake_factor(result: Result) -> list[Shown]:
 
 
 def _energy_balance(result: Result) -> list[Shown]:
-    caption = "Where the energy came from and where it went, from time zero on."
     shown = []
     for label, recording in result.recordings.items():
-        name = f"energy-balance-{label}" if len(result.recordings) > 1 else "energy-balance"
-        with contextlib.suppress(ParameterError):  # a brake at rest turns over no energy
-            figure = energy_balance(recording.sel(time=slice(-1e-9, None)))
-            shown.append(Shown(name, figure, caption))
+        suffix = f"-{label}" if len(result.recordings) > 1 else ""
+        after = recording.sel(time=slice(-1e-9, None))
+        books = {
+            "energy-balance": (actuator_ledger(after),
+                "Where the actuator's energy came from and where it went, from time zero on."),
+            "energy-with-disc": (disc_ledger(after),
+                "The same with what the disc gives and what the pads turn into heat."),
+        }  # fmt: skip
+        for name, (own, caption) in books.items():
+            with contextlib.suppress(ParameterError):  # a brake at rest turns over no energy
+                if own is not None:
+                    shown.append(Shown(name + suffix, ledger_bars(own), caption))
     return shown
 
 

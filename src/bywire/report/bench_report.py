@@ -10,7 +10,7 @@ from bywire.catalog.registry import entry
 from bywire.core.errors import FileError
 from bywire.data.netcdf import write_recording
 from bywire.report.bench_figures import Shown, bench_figures
-from bywire.report.bench_results import as_json, kpi_rows
+from bywire.report.bench_results import as_json, energy_ledgers, energy_table, kpi_rows
 from bywire.report.files import save_figure, write_bytes
 from bywire.report.page import (
     Banner,
@@ -62,6 +62,7 @@ def _page(result: Result, shown: list[Shown], path: Path) -> Path:
     sections = [
         Section("Key figures", [*notes, TableBlock(kpi_table(kpi_rows(result)))]),
         Section("Figures", [FigureBlock(s.figure, s.caption) for s in shown]),
+        *_energy(result),
         Section(
             "How it was made",
             [
@@ -85,6 +86,14 @@ def _page(result: Result, shown: list[Shown], path: Path) -> Path:
         sections,
         banner=Banner(text, verdict),  # type: ignore[arg-type]
     )
+
+
+def _energy(result: Result) -> list[Section]:
+    """Return the books of every run that keeps any."""
+    blocks: list[Block] = []
+    for label, books in energy_ledgers(result).items():
+        blocks += [Paragraph(f"{label}, from time zero on:"), TableBlock(energy_table(books))]
+    return [Section("Energy", blocks)] if blocks else []
 
 
 def _provenance(result: Result) -> str:

@@ -24,6 +24,7 @@ _MOST = 14  # levels; with more the colors cannot be told apart
 _MARKERS = ("*", "o", "s", "D")
 _HATCHES = ("///", "...", "xx")
 _LINES = ("-", "--", ":")
+_CURVES = ("--", ":", "-.")
 
 
 def contour(data: xr.Dataset, shown: Map) -> Figure:
@@ -57,7 +58,9 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     bar = figure.colorbar(filled, ax=axes, ticks=levels, format="%g")
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
     bar.set_label(_label(data[shown.values]), fontsize=style.TEXT_SIZE)
-    handles = [*_limits(axes, data, shown, x, y), *_marks(axes, data, shown)]
+    handles = [
+        *_limits(axes, data, shown, x, y), *_curves(axes, data, shown), *_marks(axes, data, shown)
+    ]  # fmt: skip
     axes.set_xlabel(_label(data[shown.x]))
     axes.set_ylabel(_label(data[shown.y]))
     if handles:
@@ -81,7 +84,7 @@ def levels_between(low: float, high: float) -> list[float]:
     span = (high - low) or abs(high) or 1.0
     step = 10.0 ** math.floor(math.log10(span / 5.0))
     step *= next(f for f in (1.0, 2.0, 5.0, 10.0) if span / (f * step) <= 10.0)
-    first = math.ceil(low / step)
+    first = math.ceil(low / step) or int(low == 0)  # no level below what cannot be negative
     return [float(f"{k * step:.6g}") for k in range(first - 1, math.floor(high / step) + 2)]
 
 
@@ -105,6 +108,22 @@ def _limits(
             Patch(facecolor="none", edgecolor=style.BLACK, hatch=hatch,
                   linewidth=0.8, label=style.plain(label))
         )  # fmt: skip
+    return handles
+
+
+def _curves(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
+    """Draw the lines to compare with; return the legend's entries."""
+    handles: list[Line2D | Patch] = []
+    factors = [
+        in_display_unit(1.0, str(data[name].attrs["units"]))[0] for name in (shown.x, shown.y)
+    ]  # fmt: skip
+    for k, (label, points) in enumerate(shown.curves.items()):
+        at = [factor * np.array(part) for factor, part in zip(factors, points, strict=True)]
+        (handle,) = axes.plot(
+            *at, color=style.VERMILLION, linewidth=1.3, linestyle=_CURVES[k % len(_CURVES)],
+            zorder=4, label=style.plain(label),
+        )  # fmt: skip
+        handles.append(handle)
     return handles
 
 

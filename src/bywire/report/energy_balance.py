@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import cycle
 from typing import TYPE_CHECKING
@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bywire.bench.energy_ledger import Ledger, actuator_ledger, ledger
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import channel
@@ -18,40 +19,12 @@ from bywire.report.wording import amount
 if TYPE_CHECKING:
     import xarray as xr
 
-BRAKE_SOURCE = {"E_source": "source"}
-BRAKE_SINKS = {
-    "E_copper": "copper",
-    "E_gear": "gear and screw",
-    "E_seal": "seal friction",
-    "E_damping": "fluid damping",
-    "E_pipeline": "pipeline",
-    "E_supply": "supply",
-    "E_stop": "end stops",
-    "E_port": "reservoir port",
-    "E_stored": "stored",
-}
-"""energies of the motorcycle brake: integrals over the run, and what is stored"""
-
-WEDGE_SOURCE = {
-    "W_electric": "electrical",
-    "W_disc": "disc on wedge",
-    "W_runout": "run-out",
-}
-WEDGE_SINKS = {
-    "E_copper": "copper",
-    "E_shaft": "bearings and screws",
-    "E_wedge": "friction on the wedge",
-    "E_damping": "motor damping",
-    "E_heart": "brake heart",
-    "E_caliper": "caliper damping",
-    "E_line": "damping of screws and sensor",
-    "E_stop": "end stops",
-    "E_stored": "stored",
-}
-"""energies of the wedge brake and its rigs; of the brake the disc gives most, so it stands apart"""
-
 COLORS = {
     "E_copper": style.VERMILLION,
+    "E_copper_moving": style.VERMILLION,
+    "E_copper_holding": "#F2A679",
+    "E_standby": "#8B5A2B",
+    "E_pads": style.BLACK,
     "E_gear": style.GREEN,
     "E_seal": style.ORANGE,
     "E_damping": style.PURPLE,
@@ -109,15 +82,32 @@ def energy_balance(
 
     Raises
     ------
+    UnknownNameError
+        When the recording has no such source.
     ParameterError
         When no energy was turned over.
     """
-    if source is None:
-        source = WEDGE_SOURCE if "W_disc" in recording.data_vars else BRAKE_SOURCE
-    named = {source: "source"} if isinstance(source, str) else source
-    if sinks is None:
-        sinks = WEDGE_SINKS if "E_shaft" in recording.data_vars else BRAKE_SINKS
-    given, taken = _sides(recording, named, sinks)
+    books = actuator_ledger(recording)
+    if source is not None or sinks is not None:
+        named = {source: "source"} if isinstance(source, str) else source
+        for name in named or ():
+            channel(recording, name)
+        books = Ledger(
+            books.sources if named is None else ledger(recording, named, {}).sources,
+            books.sinks if sinks is None else ledger(recording, {}, sinks).sinks,
+        )
+    return ledger_bars(books)
+
+
+def ledger_bars(books: Ledger) -> Figure:
+    """Draw a ledger as `energy_balance` does.
+
+    Raises
+    ------
+    ParameterError
+        When no energy was turned over.
+    """
+    given, taken = _sides(books)
     total = max(sum(e.energy for e in given), sum(e.energy for e in taken))
     if not total > 0:
         raise ParameterError("energy_balance: the recording turned over no energy")
@@ -137,25 +127,21 @@ def energy_balance(
     return figure
 
 
-def _sides(
-    recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]
-) -> tuple[list[Entry], list[Entry]]:
+def _sides(books: Ledger) -> tuple[list[Entry], list[Entry]]:
     """Return the givers and the receivers of energy."""
     given: list[Entry] = []
     taken: list[Entry] = []
-    for (variable, label), color in zip(sources.items(), cycle(SOURCE_COLORS)):
-        change = _change(recording, variable)
-        back = "back to the source" if len(sources) == 1 else f"{label} (takes)"
-        side = given if change > 0 else taken
-        side.append(Entry(label if change > 0 else back, abs(change), color))
-    colors = _colors(sinks)
-    for variable, label in sinks.items():
-        if variable not in recording.data_vars:
-            continue
-        change = _change(recording, variable)
-        side = taken if change > 0 else given
-        suffix = "" if change > 0 else " (gives)"
-        side.append(Entry(label + suffix, abs(change), colors[variable]))
+    for one, color in zip(books.sources, cycle(SOURCE_COLORS)):
+        back = "back to the source" if len(books.sources) == 1 else f"{one.label} (takes)"
+        gives = one.energy > 0
+        side = given if gives else taken
+        side.append(Entry(one.label if gives else back, abs(one.energy), color))
+    colors = _colors([one.name for one in books.sinks])
+    for one in books.sinks:
+        takes = one.energy > 0
+        suffix = "" if takes else " (gives)"
+        side = taken if takes else given
+        side.append(Entry(one.label + suffix, abs(one.energy), colors[one.name]))
     return given, taken
 
 
@@ -168,22 +154,18 @@ def _gathered(entries: list[Entry], total: float) -> list[Entry]:
     return [*large, Entry("rest", sum(entry.energy for entry in small), REST_COLOR)]
 
 
-def _colors(sinks: Mapping[str, str]) -> dict[str, str]:
+def _colors(sinks: Sequence[str]) -> dict[str, str]:
     """Return a color for every variable; unknown ones take those that are left over."""
     left = cycle([color for name, color in COLORS.items() if name not in sinks] or [style.BLACK])
     return {name: COLORS[name] if name in COLORS else next(left) for name in sinks}
-
-
-def _change(recording: xr.Dataset, variable: str) -> float:
-    values = channel(recording, variable).values
-    return float(values[-1] - values[0])
 
 
 def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:
     left = 0.0
     for entry in entries:
         share = f"{100 * entry.energy / total:.3g} %"
-        label = f"{entry.label}: {amount(entry.energy, 'J', 3)} ({share})"
+        digits = max(3, len(f"{entry.energy:.0f}"))  # no powers of ten where kilojoules are turned
+        label = f"{entry.label}: {amount(entry.energy, 'J', digits)} ({share})"
         axes.barh(
             row, entry.energy, left=left, height=0.62, color=entry.color, linewidth=0,
             label=style.plain(label),

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import xarray as xr
 
 from bywire.analysis.margins import bandwidth
+from bywire.analysis.measured_bandwidth import complex_values, fall
 from bywire.analysis.pressure_loop import BAND, PressureLoop, cancelling_pi
-from bywire.analysis.sine_test import Excitation, SineTest, sine_test
 from bywire.bench.result import Result
 from bywire.report.bode import Response, bode
 from bywire.report.step_marks import StepFacts, StepLimits
@@ -16,6 +17,7 @@ from bywire.report.step_response import step_response
 from bywire.report.tracking import tracking
 from bywire.reproduction import dardanelli2010_facts as facts
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, parameters
+from bywire.reproduction.dardanelli2010_sines import of_set_point
 from bywire.reproduction.dardanelli2010_tolerances import ROUND, STEADY
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
@@ -33,20 +35,20 @@ HUNTING = 20.0
 def part(runs: Runs) -> Part:
     """Return hard braking and tracking on the nonlinear brake, and the loop's linear figures."""
     items: list[Item] = []
-    tests: dict[str, SineTest] = {}
+    tests: dict[str, xr.Dataset] = {}
     for name, suffix in SETS.items():
         items += _hard_braking(runs.bench("hard-braking", name), suffix)
-        tests[name] = _closed_loop(name, AMPLITUDES[0])
+        tests[name] = _closed_loop(name).isel(amplitude=0)
         items.append(
             compared(
-                f"fig7.bandwidth{suffix}", facts.BANDWIDTH, tests[name].bandwidth(of=1.0), ">=",
+                f"fig7.bandwidth{suffix}", facts.BANDWIDTH, _bandwidth(tests[name]), ">=",
                 "-3 dB of the nonlinear closed loop with dither, sines of 1 bar at 25 bar",
             )
         )  # fmt: skip
         items += _tracking(runs.bench("pedal-tracking", name), suffix)
     items.append(
         found(
-            "fig7.bandwidth.3bar", "Hz", _closed_loop(MAIN, AMPLITUDES[1]).bandwidth(of=1.0),
+            "fig7.bandwidth.3bar", "Hz", _bandwidth(_closed_loop(MAIN).isel(amplitude=1)),
             "the same with sines of 3 bar: friction makes it depend on the amplitude",
         )
     )  # fmt: skip
@@ -108,9 +110,12 @@ def _tracking(result: Result, suffix: str) -> list[Item]:
     ]  # fmt: skip
 
 
-def _closed_loop(name: str, amplitude: float) -> SineTest:
-    excitation = Excitation("pressure", "p_set", P_MEAN, P_MEAN, amplitude)
-    return sine_test(parameters(name), excitation, FREQUENCIES)
+def _closed_loop(name: str) -> xr.Dataset:
+    return of_set_point(name, P_MEAN, AMPLITUDES, FREQUENCIES)
+
+
+def _bandwidth(one: xr.Dataset) -> float:
+    return fall(one["gain"].values, one["frequency"].values)
 
 
 def _linear_loop() -> list[Item]:
@@ -155,7 +160,7 @@ def _linear_loop() -> list[Item]:
     return items
 
 
-def _exhibits(runs: Runs, tests: dict[str, SineTest]) -> tuple[Exhibit, ...]:
+def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
     hard = runs.bench("hard-braking", MAIN)
     values, options = kpis(hard), hard.bench.chosen_options.flat()
     limits = StepLimits(0.0, options["p_from"], options["p_to"], overshoot=0.15)
@@ -163,7 +168,9 @@ def _exhibits(runs: Runs, tests: dict[str, SineTest]) -> tuple[Exhibit, ...]:
     f = np.geomspace(0.1, 20.0, 300)
     medium = PressureLoop(parameters(MAIN), facts.table4_model("medium"))
     responses = [Response("Table 4, medium, linear", f, medium.closed(f))] + [
-        Response(f"nonlinear, {name}", test.frequencies, test.values, measured=True)
+        Response(
+            f"nonlinear, {name}", test["frequency"].values, complex_values(test), measured=True
+        )
         for name, test in tests.items()
     ]
     return (

@@ -3,20 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
+import xarray as xr
 
+from bywire.analysis.measured_bandwidth import complex_values, fall
 from bywire.analysis.motorcycle_linear import theoretical
 from bywire.analysis.rational import Rational
-from bywire.analysis.sine_test import Excitation, SineTest, sine_test
-from bywire.assemblies.motorcycle_trim import holding_current, travel_at
+from bywire.assemblies.motorcycle_trim import travel_at
 from bywire.report.bode import Response, bode
 from bywire.reproduction import dardanelli2010_facts as facts
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, before, parameters
+from bywire.reproduction.dardanelli2010_sines import of_current
 from bywire.reproduction.dardanelli2010_tolerances import CORNER, GAIN, OVERSHOOT
 from bywire.reproduction.item import Fact, Item, compared, found, quoted
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis
 
 EQ22 = "eq. (22) with the numbers of Table 4, medium"
+AMPLITUDE = 0.1
+"""of the sines of the current demand [A]"""
 FREQUENCIES = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 7.0, 10.0, 15.0)
 """sines of the test [Hz]; the paper's reach from 1 to 15 Hz"""
 
@@ -125,19 +129,17 @@ def _with_air(height: float) -> float:
     return 100.0 * max(high / (height * model.gain) - 1.0, 0.0)
 
 
-def _sines(runs: Runs) -> dict[str, SineTest]:
+def _sines(runs: Runs) -> dict[str, xr.Dataset]:
     """Return the dithered brake's response to small sines of the current demand."""
-    found_tests: dict[str, SineTest] = {}
+    found_tests: dict[str, xr.Dataset] = {}
     for name in SETS:
-        par = parameters(name)
         step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
         start = step.bench.chosen_options.flat()["p_start"]
-        excitation = Excitation("current", "i_set", start, holding_current(start, par), 0.1)
-        found_tests[name] = sine_test(par, excitation, FREQUENCIES)
+        found_tests[name] = of_current(name, start, (AMPLITUDE,), FREQUENCIES).isel(amplitude=0)
     return found_tests
 
 
-def _corner(runs: Runs, measured: dict[str, SineTest]) -> list[Item]:
+def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
     """Return where the response has fallen 3 dB below the static gain, against Table 4."""
     f = np.geomspace(0.05, 20.0, 4000)
     model = facts.table4_model("medium")
@@ -147,7 +149,8 @@ def _corner(runs: Runs, measured: dict[str, SineTest]) -> list[Item]:
     items = []
     for name, suffix in SETS.items():
         step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
-        corner = measured[name].bandwidth(of=kpis(step)["static_gain"])
+        one, static = measured[name], kpis(step)["static_gain"]
+        corner = fall(one["gain"].values, one["frequency"].values, static)
         note = "-3 dB; computed: nonlinear brake with dither, sines of 0.1 A at 25 bar"
         items.append(
             compared(f"table4.medium.corner{suffix}", fact, corner, CORNER.around(stated), note)
@@ -155,13 +158,16 @@ def _corner(runs: Runs, measured: dict[str, SineTest]) -> list[Item]:
     return items
 
 
-def _figure(measured: dict[str, SineTest]) -> Exhibit:
+def _figure(measured: dict[str, xr.Dataset]) -> Exhibit:
     f = np.geomspace(0.02, 20.0, 400)
     responses = [
         Response("Table 4, medium", f, facts.table4_model("medium").response(f) / BAR),
         Response("eq. (15), calibrated", f, theoretical(parameters(MAIN)).response(f) / BAR),
         *(
-            Response(f"with dither, {name}", test.frequencies, test.values / BAR, measured=True)
+            Response(
+                f"with dither, {name}", test["frequency"].values, complex_values(test) / BAR,
+                measured=True,
+            )
             for name, test in measured.items()
         ),
     ]

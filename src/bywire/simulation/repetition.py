@@ -12,24 +12,21 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, StepError
+from bywire.core.errors import StepError
 from bywire.simulation.compiler import find_compiler
+from bywire.simulation.emission import Layout
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import lane_kernel
-from bywire.simulation.native import Request
 from bywire.simulation.run import Run, initial_vector, require_finite, selected
 from bywire.simulation.schedule import Schedule
+from bywire.simulation.window import Stimuli, advance_window, given_rows, one_by_one
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Figures = Callable[[Array], Complex]
-Advance = Callable[[Array, Array, Array, Array, int, int], None]
 
 KEPT = 8
 """windows whose figures are kept: the last ones"""
-CHUNK = 10_000
-"""substeps after which an interrupt is looked for: tens of milliseconds compiled, a second without
-a compiler"""
 
 
 @dataclass(frozen=True)
@@ -62,12 +59,13 @@ class Repeated:
 def repeat(
     run: Run,
     matrix: Array,
-    stimuli: Array,
+    stimuli: Array | Stimuli,
     signals: Sequence[str],
     figures: Figures,
     tolerance: float,
     most: int,
     *,
+    starts: Sequence[tuple[Sequence[float], Sequence[float]]] | None = None,
     lanes: bool = True,
     stop: threading.Event | None = None,
 ) -> Repeated:
@@ -82,7 +80,8 @@ def repeat(
         Parameter vectors, shape (parameters, cases); see ``variations.case_matrix``.
     stimuli
         One window of each case, shape (cases, rows, nu), rows at ``schedule.stimulus_times``
-        without the end.
+        without the end. Or ``stimuli(cases, first, last)``, which returns these rows of some
+        cases, shape (cases, last - first, nu): a long window never lies in memory as a whole.
     signals
         Outputs to record.
     figures
@@ -93,6 +92,8 @@ def repeat(
         most this share of the norm of the figures.
     most
         Windows after which a case is given up, >= 2.
+    starts
+        State and memory that each case starts from; by default those of the run.
     lanes
         False: one case after another on one core, as in a simulator without ensembles.
     stop
@@ -111,40 +112,39 @@ def repeat(
     """
     schedule = window_schedule(run)
     count = matrix.shape[1]
-    rows = schedule.frames // schedule.stimulus_frames
-    if stimuli.shape[:2] != (count, rows):
-        raise ParameterError(f"stimuli: shape ({count}, {rows}, nu) is wanted, got {stimuli.shape}")
+    given = given_rows(stimuli, count, schedule)
     prepared = prepare(run.model, run.par)
     selection = selected(tuple(prepared.program.outputs), signals)
     compiler = find_compiler()
     # One frame too many: the end of a window is the beginning of the next, and ticks only there.
     open_end = replace(schedule, frames=schedule.frames + 1)
     if compiler is None or not lanes:
-        advance, width = _one_by_one(run, open_end, selection), 1
+        advance, width = one_by_one(run, open_end, selection), 1
     else:
         kernel = lane_kernel(prepared.program, compiler, tuple(selection.tolist()))
         width = kernel.lanes
 
-        def advance(
-            p: Array, u: Array, vector: Array, values: Array, begin: int, end: int
-        ) -> None:
-            kernel.advance(open_end, p, u, vector, values, end, begin)
+        def advance(p: Array, u: Array, vector: Array, values: Array, frames: int) -> None:
+            kernel.advance(open_end, p, u, vector, values, frames)
 
     layout = prepared.engine("auto").layout
-    start = initial_vector(layout, run.state, run.memory)
+    start = _start_vectors(layout, starts or [(run.state, run.memory)] * count)
     stopped = threading.Event() if stop is None else stop
 
     def group(first: int) -> tuple[Array, Complex, int, NDArray[np.bool_], Array]:
         lane = np.minimum(np.arange(first, first + width), count - 1)
         columns = np.ascontiguousarray(matrix[:, lane])
-        u = np.ascontiguousarray(np.moveaxis(stimuli[lane], 0, 2))
-        vector = np.repeat(start[:, None], width, axis=1)
+        vector = np.ascontiguousarray(start[:, lane])
+
+        def u(begin: int, end: int) -> Array:
+            return np.ascontiguousarray(np.moveaxis(given(lane, begin, end), 0, 2))
+
         shape = (width, schedule.frames // schedule.record_frames, len(signals))
         now, seen = np.empty(shape), list[Complex]()
         same = np.zeros(width, dtype=bool)
         windows = 0
         while windows < most and not same.all():
-            _advance_window(advance, schedule, stopped, columns, u, vector, now)
+            advance_window(advance, schedule, stopped, columns, u, vector, now)
             require_finite(layout, vector, f"one of cases {first} to {lane[-1]} left the numbers")
             windows += 1
             seen = [*seen[1 - KEPT :], figures(now)]
@@ -171,25 +171,11 @@ def repeat(
     )
 
 
-def _advance_window(
-    advance: Advance,
-    schedule: Schedule,
-    stop: threading.Event,
-    p: Array,
-    u: Array,
-    vector: Array,
-    values: Array,
-) -> None:
-    """Run one window in parts, so that it can be stopped; renews vector and values in place."""
-    every = schedule.record_frames
-    rows = max(CHUNK // (schedule.substeps * every), 1)
-    for first in range(0, values.shape[1], rows):
-        if stop.is_set():
-            raise KeyboardInterrupt
-        last = min(first + rows, values.shape[1])
-        part = np.empty((values.shape[0], last - first, values.shape[2]))
-        advance(p, u, vector, part, first * every, last * every)
-        values[:, first:last] = part
+def _start_vectors(
+    layout: Layout, starts: Sequence[tuple[Sequence[float], Sequence[float]]]
+) -> Array:
+    """Return the state vectors of all cases at the start, shape (entries, cases)."""
+    return np.stack([initial_vector(layout, *one) for one in starts], axis=1)
 
 
 def _same(before: Complex, now: Complex, tolerance: float) -> NDArray[np.bool_]:
@@ -220,19 +206,3 @@ def window_schedule(run: Run) -> Schedule:
             f"sample times, {common * schedule.frame:g} s: round it to one"
         )
     return schedule
-
-
-def _one_by_one(
-    run: Run, schedule: Schedule, selection: NDArray[np.int32]
-) -> Advance:
-    """Serve without a compiler: one lane, slowly."""
-    engine = prepare(run.model, run.par).engine("auto")
-
-    def advance(p: Array, u: Array, vector: Array, values: Array, begin: int, end: int) -> None:
-        column = vector[:, 0].copy()
-        stimulus = np.ascontiguousarray(u[:, :, 0])
-        request = Request(schedule, np.ascontiguousarray(p[:, 0]), stimulus, selection)
-        engine.advance(request, column, begin, end, values[0])
-        vector[:, 0] = column
-
-    return advance

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
 from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop import Loop
+from bywire.analysis.measured_bandwidth import fall
 from bywire.analysis.response_dataset import Sweep
 from bywire.analysis.response_window import common_interval, nyquist
 from bywire.bench.bench import Bench
@@ -127,7 +128,7 @@ def bench_figures(
     for k in range(sets):
         own = par.replace({name: float(values[k]) for name, values in gains.items()})
         small = tuple(
-            _small(loop, own, found.isel(variant=k, amplitude=j), target)
+            _small(loop, own, value, found.isel(variant=k, amplitude=j), target)
             for j in range(found.sizes["amplitude"])
         )  # fmt: skip
         rows.append(BenchFigures(small, {} if steps is None else steps[k]))
@@ -160,38 +161,25 @@ def has_step(bench: Bench) -> bool:
     return bench.definition.step is not None and len(bench.cases()) == 1
 
 
-def _small(loop: Loop, par: ParameterSet, one: xr.Dataset, target: float) -> Small:
+def _small(
+    loop: Loop, par: ParameterSet, value: float, one: xr.Dataset, target: float
+) -> Small:
     closed, f = response_of(one)
     margin, crossover = math.nan, math.nan
-    gain = loop_gain(loop, par, closed, f) if f.size else None
+    gain = loop_gain(loop, par, value, closed, f) if f.size else None
     if gain is not None:
         margin, crossover = phase_margin(gain, f)
     size, every = np.nan_to_num(one["gain"].values), one["frequency"].values
     before = np.append(size[every < target], np.interp(target, every, size))
     return Small(
         amplitude=float(one["amplitude"]),
-        bandwidth=fallen(size, every),
+        bandwidth=min(fall(size, every), float(every[-1])),
         least=float(before.min()),
         phase_margin=margin,
         crossover=crossover,
         peak=float(size.max()),
         settled=bool(np.all(one["settled"].values > 0)),
     )
-
-
-def fallen(gain: Array, frequencies: Array) -> float:
-    """Return where a gain that is 1 at standstill has fallen to -3 dB [Hz]; 0: from the start."""
-    size, level = gain, math.sqrt(0.5)
-    below = np.flatnonzero(size < level)
-    if below.size == 0:
-        return float(frequencies[-1])
-    k = int(below[0])
-    if k == 0:
-        return 0.0
-    if size[k] == 0.0:
-        return float(frequencies[k - 1])
-    share = math.log(size[k - 1] / level) / math.log(size[k - 1] / size[k])
-    return float(frequencies[k - 1] * (frequencies[k] / frequencies[k - 1]) ** share)
 
 
 def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str, float]] | None:

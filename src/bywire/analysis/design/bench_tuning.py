@@ -6,7 +6,6 @@ know (friction under dither, converter, limits) is measured for every candidate.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -16,45 +15,19 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, differential_evolution
 from scipy.stats import qmc
 
-from bywire.analysis.design.bench_figures import STEP_FIGURES, BenchFigures
+from bywire.analysis.design.bench_figures import BenchFigures
+from bywire.analysis.design.candidate import Candidate, judged, linear_slacks
+from bywire.analysis.design.linear_case import NOMINAL
 from bywire.analysis.design.optimizer import Problem, Progress
-from bywire.analysis.design.requirement import Requirement
 
 Array = NDArray[np.float64]
-Measure = Callable[[Mapping[str, Sequence[float]]], Sequence[BenchFigures]]
+Measure = Callable[[Mapping[str, Sequence[float]]], Sequence[Mapping[str, BenchFigures]]]
 
-STEADY = 0.05
-"""mean error that counts as none where zero is required [% of the step]; converters round"""
 _ENOUGH = 0.02  # worst slack at which the search ends
-_LEAST = -3.0
 _MEMBERS = 36
 GENERATIONS = 60
 """of a search, at most"""
 _REACH = 0.5  # of the linear ranges (logarithmic), around the linear design
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A set of gains with what it showed.
-
-    Parameters
-    ----------
-    gains
-        By dotted name [SI].
-    figures
-        On the bench.
-    slacks
-        By requirement's text: share of the limit, worst amplitude.
-    """
-
-    gains: Mapping[str, float]
-    figures: BenchFigures
-    slacks: Mapping[str, float]
-
-    @property
-    def slack(self) -> float:
-        """The worst slack."""
-        return min(self.slacks.values())
 
 
 @dataclass(frozen=True)
@@ -69,11 +42,19 @@ class Tuning:
         All candidates, in the order in which they ran.
     interrupted
         Whether the user ended it.
+    untold
+        Candidates that ran besides, judged by a part of the trials only.
     """
 
     best: Candidate
     tried: tuple[Candidate, ...]
     interrupted: bool
+    untold: int = 0
+
+    @property
+    def count(self) -> int:
+        """Candidates that ran."""
+        return len(self.tried) + self.untold
 
     def curve(self, one: str, other: str) -> list[tuple[float, float]]:
         """Return the edge of what was reached in two slacks while the rest was met.
@@ -100,57 +81,6 @@ class Tuning:
         return edge[::-1]
 
 
-def bench_slacks(
-    requirements: Sequence[Requirement], found: BenchFigures, linear: Mapping[str, float]
-) -> dict[str, float]:
-    """Return how far each requirement is met on the bench.
-
-    Bandwidth counts at the worst amplitude, by the room of the gain above -3 dB; a phase margin
-    in the linear model (what large motion comes near) and in each describing function; figures
-    of the step where the experiment has one; the rest is the linear model's alone.
-
-    Parameters
-    ----------
-    requirements
-        What is required.
-    found
-        Figures on the bench.
-    linear
-        Slack in the linear models by requirement's text.
-    """
-    slacks = {}
-    for one in requirements:
-        slack = _on_bench(one, found)
-        if math.isinf(slack) or one.figure == "phase_margin":
-            slack = min(slack, linear[one.text])
-        slacks[one.text] = max(slack, _LEAST)
-    return slacks
-
-
-def _on_bench(one: Requirement, found: BenchFigures) -> float:
-    """Return the slack of what the bench measures; infinity for what it does not."""
-    if one.figure == "bandwidth" and one.sense > 0:
-        return min((s.least / math.sqrt(0.5) - 1.0 for s in found.small), default=math.inf)
-    if one.figure == "phase_margin":
-        seen = [s for s in found.small if not math.isnan(s.crossover)]
-        return min((one.slack(s.phase_margin) for s in seen), default=math.inf)
-    if one.figure in ("bandwidth", "crossover"):
-        values = [getattr(s, one.figure) for s in found.small]
-        return min((one.slack(v) for v in values if not math.isnan(v)), default=math.inf)
-    if one.figure not in STEP_FIGURES or not found.step:
-        return math.inf
-    value = found.step[one.figure]
-    if one.figure == "steady_state_error" and one.limit == 0.0 and not math.isnan(value):
-        return (STEADY - value) / STEADY
-    return one.slack(value)
-
-
-def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
-    """Return the slack of every requirement for the worst model, by its text."""
-    slacks = problem.slacks(problem.point(gains), range(len(problem.cases))).min(axis=0)
-    return {one.text: float(s) for one, s in zip(problem.requirements, slacks, strict=True)}
-
-
 def tune(
     problem: Problem,
     start: Mapping[str, float],
@@ -169,7 +99,7 @@ def tune(
     start
         The linear design's gains, one of the first generation.
     measure
-        ``measure(gains) -> figures`` of several sets at once.
+        ``measure(gains) -> figures`` by label, for several sets at once.
     seed
         Of the search.
     generations
@@ -219,13 +149,12 @@ def _candidates(
     """Return candidates; those that a linear model says are unstable are not run."""
     linear = [linear_slacks(problem, row) for row in rows]
     alive = [k for k, one in enumerate(linear) if min(one.values()) > -10.0]
-    nothing = BenchFigures((), {})
+    nothing: Mapping[str, BenchFigures] = {NOMINAL: BenchFigures((), {})}
     found = dict.fromkeys(range(len(rows)), nothing)
     if alive:
         names = rows[0].keys()
         measured = measure({name: [rows[k][name] for k in alive] for name in names})
         found |= dict(zip(alive, measured, strict=True))
     return [
-        Candidate(row, found[k], bench_slacks(problem.requirements, found[k], linear[k]))
-        for k, row in enumerate(rows)
-    ]  # fmt: skip
+        judged(problem.requirements, row, found[k], linear[k]) for k, row in enumerate(rows)
+    ]

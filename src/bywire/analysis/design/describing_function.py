@@ -7,7 +7,8 @@ C_r (set point) and C_y (output, sensor included):
 .. math:: G = \frac{C_r P}{1 + C_y P}, \quad L = C_y P = \frac{C_y G}{C_r - C_y G}
 
 P is the describing function at that amplitude of the set point, so the margin is one of small and
-middle-sized motion, not a proof of stability in the large.
+middle-sized motion, not a proof of stability in the large. Scheduled gains count as those at the
+operating point: within a blend that is exact for small sines only.
 """
 
 from __future__ import annotations
@@ -25,13 +26,15 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 
-def loop_gain(loop: Loop, par: ParameterSet, closed: Complex, frequencies: Array) -> Complex | None:
+def loop_gain(
+    loop: Loop, par: ParameterSet, value: float, closed: Complex, frequencies: Array
+) -> Complex | None:
     """Return the loop gain behind a measured closed response.
 
     Parameters
     ----------
-    loop, par
-        Loop and the parameters it was measured with.
+    loop, par, value
+        Loop, and the parameters and operating point it was measured with.
     closed, frequencies
         Response and frequencies [Hz], shape (n,).
 
@@ -42,7 +45,7 @@ def loop_gain(loop: Loop, par: ParameterSet, closed: Complex, frequencies: Array
     """
     if loop.laws is None:
         return None
-    demand, feedback = loop.laws(par, frequencies)
+    demand, feedback = loop.laws(par, value, frequencies)
     return np.asarray(feedback * closed / (demand - feedback * closed))
 
 

@@ -82,7 +82,7 @@ def design(
 
 
 def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
-    period = problem.cases[0].figures(start).gain.period
+    period = problem.cases[0].figures(start).closed.period
     for one in problem.requirements:
         if one.unit == "Hz" and one.sense > 0 and one.limit >= 0.5 / period:
             raise ParameterError(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 
 from bywire.analysis.design.loop_figures import LoopFigures
@@ -11,7 +11,8 @@ from bywire.analysis.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.interrupts import interrupts_deferred
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.units import shown
 
 NOMINAL = "nominal"
 """label of the model at the operating point itself"""
@@ -28,10 +29,15 @@ class LinearCase:
         What distinguishes it, for instance ``"wedge.mu_B = 0.2"``.
     build
         ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, both sampled alike.
+    changes, at
+        Parameters in which it differs from the nominal model, and its operating point [SI]; None
+        for a model that is no loop of the bench, for instance an identified one.
     """
 
     label: str
     build: Callable[[Mapping[str, float]], tuple[LinearModel, LinearModel]]
+    changes: Mapping[str, float] = field(default_factory=dict)
+    at: float | None = None
 
     def figures(self, gains: Mapping[str, float], points: int = 400) -> LoopFigures:
         """Return the figures of the loop with some gains, see `LoopFigures`."""
@@ -59,7 +65,7 @@ def cases_of(
         When a tunable is among them, there are too many combinations, or one does not exist.
     """
     for name in over:
-        if name in loop.tunables:
+        if name in loop.tunables or _scheduled(loop, name):
             raise ParameterError(f"{name} is what the design chooses: it cannot also be a range")
         if name != loop.at.name and name not in par.leaves():
             raise unknown_name("parameter", name, [loop.at.name, *par.leaves()])
@@ -68,23 +74,38 @@ def cases_of(
         raise ParameterError(
             f"the ranges have {len(combinations)} combinations: {_MOST} at most, take fewer values"
         )
-    found = [_case(loop, NOMINAL, par, value)]
+    found = [_case(loop, NOMINAL, par, {}, value)]
     for one in combinations:
         values = dict(zip(over, one, strict=True))
-        label = ", ".join(f"{name} = {number:.6g}" for name, number in values.items())
+        label = ", ".join(_shown(loop, par, name, number) for name, number in values.items())
         at = values.pop(loop.at.name, value)
         try:
-            own = par.replace(values)
-            loop.point(own, at)
+            loop.point(par.replace(values), at)
         except InputError as error:
             raise ParameterError(f"{label}: {error}") from None
-        found.append(_case(loop, label, own, at))
+        found.append(_case(loop, label, par, values, at))
     return tuple(found)
 
 
-def _case(loop: Loop, label: str, par: ParameterSet, value: float) -> LinearCase:
+def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
+    """Return a value of a range as a user writes it."""
+    known = leaf_fields(type(par))  # tables have their unit under the name of the table
+    leaf = known.get(name) or known.get(name.rpartition(".")[0])
+    unit = loop.at.unit if leaf is None else leaf.unit.symbol
+    return f"{name} = {shown(value, unit)}"
+
+
+def _scheduled(loop: Loop, name: str) -> bool:
+    return loop.schedule is not None and any(name in own for own in loop.schedule.regions.values())
+
+
+def _case(
+    loop: Loop, label: str, par: ParameterSet, changes: Mapping[str, float], value: float
+) -> LinearCase:
+    base = par.replace(changes)
+
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        own = par.replace(gains)
+        own = base.replace(gains)
         return loop.gain(own, value), loop.closed(own, value)
 
-    return LinearCase(label, build)
+    return LinearCase(label, build, changes, value)

@@ -45,7 +45,8 @@ class LoopFigures:
     @cached_property
     def frequencies(self) -> Array:
         """The grid [Hz], up to half the sampling frequency."""
-        return np.geomspace(_LOWEST, 0.499 / self.gain.period, self.points)
+        highest = 0.998 * min(self.gain.nyquist, self.closed.nyquist)
+        return np.geomspace(_LOWEST, highest, self.points)
 
     @cached_property
     def growth(self) -> float:
@@ -110,8 +111,9 @@ class LoopFigures:
             share = L.imag[k] / (L.imag[k] - L.imag[k + 1])
             sizes.append(abs(L.real[k] + share * (L.real[k + 1] - L.real[k])))
         # Half the sampling frequency, where L is real, lies beyond the grid.
-        last = float(self.gain.response(np.array([0.5 / self.gain.period]))[0, 0, 0].real)
-        sizes.append(max(-last, 0.0))
+        if self.gain.period:
+            last = float(self.gain.response(np.array([self.gain.nyquist]))[0, 0, 0].real)
+            sizes.append(max(-last, 0.0))
         return min((1.0 / float(size) for size in sizes if 0.0 < size < 1.0), default=math.inf)
 
     @property

@@ -5,24 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from bywire.analysis.design.bench_figures import BenchFigures, bench_figures, has_step
-from bywire.analysis.design.bench_tuning import (
-    GENERATIONS,
-    Candidate,
-    Tuning,
-    bench_slacks,
-    linear_slacks,
-    tune,
-)
+from bywire.analysis.design.bench_tuning import GENERATIONS, Tuning, tune
+from bywire.analysis.design.candidate import Candidate, judged, linear_slacks
+from bywire.analysis.design.corners import corners_of, worst_of
 from bywire.analysis.design.linear_case import LinearCase
 from bywire.analysis.design.optimizer import Problem, Progress
 from bywire.analysis.design.requirement import FIGURES, Requirement
-from bywire.analysis.loop import Loop
-from bywire.bench.bench import Bench
+from bywire.analysis.design.trial import Trial, measured
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
 
 
 @dataclass(frozen=True)
@@ -39,12 +31,15 @@ class Verification:
         Key figures of the loop's experiment with the final gains.
     nominal
         All figures of the nominal linear model with the final gains.
+    corners
+        Corners that were looked at; the figures shown are those of the worst.
     """
 
     linear: Candidate
     tuning: Tuning | None
     kpis: tuple[Kpi, ...]
     nominal: Mapping[str, float]
+    corners: int = 0
 
     @property
     def final(self) -> Candidate:
@@ -59,45 +54,15 @@ class Verification:
     def conflict(self) -> tuple[str, str, list[tuple[float, float]]] | None:
         """Return the two requirements that are worst off, and the edge between their slacks.
 
-        None where everything is met, or only one requirement counts.
+        None where everything is met, only one requirement counts, or no candidates are at hand.
         """
-        if self.met or self.tuning is None:
+        if self.met or self.tuning is None or not self.tuning.tried:
             return None
         order = sorted(self.final.slacks, key=lambda text: self.final.slacks[text])
         if len(order) < 2:
             return None
         one, other = order[:2]
         return one, other, self.tuning.curve(one, other)
-
-
-@dataclass(frozen=True)
-class Trial:
-    """What a design is tried on.
-
-    Parameters
-    ----------
-    loop, par, value
-        Loop, parameters and operating point; nothing switched off.
-    amplitudes
-        Of the sines, SI.
-    bench
-        The loop's experiment with the same parameters; None where it has none.
-    """
-
-    loop: Loop
-    par: ParameterSet
-    value: float
-    amplitudes: tuple[float, ...]
-    bench: Bench | None
-
-    def measure(
-        self, gains: Mapping[str, Sequence[float]], target: float, *, rough: bool = False
-    ) -> tuple[BenchFigures, ...]:
-        """Return the figures of sets of gains, see `bench_figures`."""
-        own = self.bench if self.bench is not None and has_step(self.bench) else None
-        return bench_figures(
-            self.loop, self.par, self.value, self.amplitudes, gains, own, target, rough=rough
-        )  # fmt: skip
 
 
 def verify(
@@ -107,6 +72,7 @@ def verify(
     cases: Sequence[LinearCase],
     trial: Trial,
     *,
+    corners: Sequence[LinearCase] = (),
     seed: int = 0,
     generations: int = GENERATIONS,
     progress: Progress | None = None,
@@ -121,6 +87,9 @@ def verify(
         As in `designer.design`.
     trial
         What it is tried on.
+    corners
+        Further models at whose parameters and operating points it is tried as well; by default
+        that corner of the ranges at which it is worst off on the bench.
     seed, generations
         Of the search, see `bench_tuning.tune`; no generation: only try.
     progress
@@ -135,31 +104,36 @@ def verify(
         raise ParameterError(f"loop {trial.loop.name!r}: no amplitude is given to try it with")
     problem = Problem(tunables, tuple(requirements), tuple(cases))
     target = _target(requirements, cases[0], gains)
+    trials = [trial, *(trial.at(one) for one in corners)]
+    looked = () if corners else corners_of(problem, gains)
+
+    def tried(own: Mapping[str, float]) -> Candidate:
+        linear = linear_slacks(problem, own)
+        known = {one.label for one in trials}
+        worst = worst_of(trial, looked, problem, own, linear, target)
+        trials.extend(one for one in worst if one.label not in known)
+        (found,) = measured(trials, {name: [value] for name, value in own.items()}, target)
+        return judged(requirements, own, found, linear)
+
     if progress is not None:
         progress("trial on the bench", 0.0)
-
-    def judged(own: Mapping[str, float]) -> Candidate:
-        (found,) = trial.measure({name: [value] for name, value in own.items()}, target)
-        slacks = bench_slacks(requirements, found, linear_slacks(problem, own))
-        return Candidate(dict(own), found, slacks)
-
-    first = judged(gains)
+    first = tried(gains)
     if progress is not None:
         progress("trial on the bench", 1.0)
     tuning = None
     if first.slack < 0.0 and generations > 0:
         tuning = tune(
-            problem, gains, lambda sets: trial.measure(sets, target, rough=True), seed=seed,
+            problem, gains, lambda sets: measured(trials, sets, target, rough=True), seed=seed,
             generations=generations, progress=progress,
         )  # fmt: skip
-        tuning = replace(tuning, best=judged(tuning.best.gains))
+        tuning = replace(tuning, best=tried(tuning.best.gains))
     final = gains if tuning is None else tuning.best.gains
     kpis: tuple[Kpi, ...] = ()
     if trial.bench is not None:
         kpis = run(trial.bench.with_overrides(dict(final))).kpis
     loop = cases[0].figures(final, 4000)
     nominal = {name: float(getattr(loop, name)) for name in FIGURES}
-    return Verification(first, tuning, kpis, nominal)
+    return Verification(first, tuning, kpis, nominal, len(corners) or len(looked))
 
 
 def _target(

@@ -14,16 +14,19 @@ from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
+_STEP = 10e-6  # substep [s]: at most 1/(100 f) in the loop's band, or midpoint's own error shows
+
 
 def point(par: ParameterSet, value: float) -> Point:
     """Return the brake held at a pressure [Pa] by its current."""
     own = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
     state, memory = state_at(value, own), memory_at(value, own)
-    return Point(MotorcycleBrake(), own, state, memory, zeros(Stimulus)._replace(i_set=state.i))
+    stimulus = zeros(Stimulus)._replace(i_set=state.i)
+    return Point(MotorcycleBrake(), own, state, memory, stimulus, _STEP)
 
 
-def laws(par: ParameterSet, frequencies: Array) -> tuple[Complex, Complex]:
-    """Return what the PI makes of set point and current, up to its duty cycle."""
+def laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
+    """Return what the PI makes of set point and current, up to its duty cycle, at any pressure."""
     own = cast(MotorcycleParameters, par)
     pi = control_laws.current_control(own.ecu).response(frequencies)[:, 0, 0]
     return pi, pi / (1.0 + 1j * frequencies / own.anti_alias.f_aa)

@@ -6,7 +6,7 @@ import math
 from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.analysis.loops.wedge_causes import CAUSES
+from bywire.analysis.loops.wedge_causes import CAUSES, DRIVE_LIMITS
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_control import Stimulus
 from bywire.assemblies.wedge_parameters import WedgeParameters
@@ -89,4 +89,5 @@ LOOP = Loop(
     tunables={"control.moment.f_c": (0.3, 60.0)},
     sustained=CAUSES["run-out, disc slowing"],
     proof="moment-pulses",
+    saturations=DRIVE_LIMITS,
 )

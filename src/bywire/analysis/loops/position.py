@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.analysis.loops.wedge_causes import CAUSES
+from bywire.analysis.loops.wedge_causes import CAUSES, DRIVE_LIMITS
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_control import Stimulus
 from bywire.assemblies.wedge_parameters import WedgeParameters
@@ -53,4 +53,6 @@ LOOP = Loop(
         "control.position.f_n": (2.0, 200.0), "control.position.zeta": (0.2, 4.0),
         "control.position.c": (0.0, 1.0),
     },
+    saturations=DRIVE_LIMITS,
+    single=False,  # two motors share the load
 )

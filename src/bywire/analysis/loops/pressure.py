@@ -7,6 +7,7 @@ from typing import cast
 
 from bywire.analysis import control_laws
 from bywire.analysis.loop import Array, Complex, Loop, Point, Quantity
+from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.loops.motorcycle_causes import CAUSES
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_ecu import Stimulus
@@ -29,13 +30,18 @@ def whole(par: ParameterSet) -> Sequence[float]:
     return () if dither.waveform == "off" else (dither.f_dit,)
 
 
-def laws(par: ParameterSet, frequencies: Array) -> tuple[Complex, Complex]:
-    """Return what the PID makes of set point and pressure, up to its current demand."""
+def laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
+    """Return what the PID makes of set point and pressure at a pressure [Pa], up to its demand."""
     own = cast(MotorcycleParameters, par)
-    demand = control_laws.pressure_demand(own.ecu).response(frequencies)[:, 0, 0]
-    feedback = control_laws.pressure_feedback(own.ecu).response(frequencies)[:, 0, 0]
+    demand = control_laws.pressure_demand(own.ecu, value).response(frequencies)[:, 0, 0]
+    feedback = control_laws.pressure_feedback(own.ecu, value).response(frequencies)[:, 0, 0]
     return demand, feedback / (1.0 + 1j * frequencies / own.anti_alias.f_aa)
 
+
+_GAINS = {"k_p": (5e-7, 1e-4), "k_i": (1e-6, 3e-3), "k_d": (1e-9, 3e-6)}
+_OWN = {f"ecu.pressure.{name}": span for name, span in _GAINS.items()} | {
+    "ecu.pressure.tau_d": (5e-5, 1e-2), "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
+}  # fmt: skip
 
 LOOP = Loop(
     name="pressure",
@@ -50,11 +56,18 @@ LOOP = Loop(
     band=(0.1, 50.0),
     amplitudes=(1e4, 1e5, 3e5),
     whole=whole,
-    tunables={
-        "ecu.pressure.k_p": (5e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3),
-        "ecu.pressure.k_d": (1e-9, 3e-6), "ecu.pressure.tau_d": (5e-5, 1e-2),
-        "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
-    },
+    tunables=_OWN,
     proof="hard-braking",
     laws=laws,
+    schedule=LoopSchedule(
+        changes={"ecu.schedule.law": "regions"},
+        borders=("ecu.schedule.p_1", "ecu.schedule.p_2"),
+        regions={
+            "low": {f"ecu.schedule.low.{name}": span for name, span in _GAINS.items()},
+            "medium": _OWN,
+            "high": {f"ecu.schedule.high.{name}": span for name, span in _GAINS.items()},
+        },
+        main="medium",
+        points=(5e5, 20e5, 37e5),
+    ),
 )

@@ -1,9 +1,11 @@
-"""What makes the loops of the wedge brake nonlinear, and how each of it is switched off."""
+"""What makes the loops of the wedge brake nonlinear: causes to switch off, limits to report."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
+
+from bywire.analysis.saturation import Saturation
 
 CAUSES: Mapping[str, Mapping[str, Any]] = {
     "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,
@@ -15,3 +17,10 @@ CAUSES: Mapping[str, Mapping[str, Any]] = {
     "run-out, disc slowing": {"flywheel.runout": 0.0, "flywheel.law": "driven"},
 }  # fmt: skip
 """cause -> parameters without it"""
+
+DRIVE_LIMITS = (
+    Saturation(
+        "sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")
+    ),
+)
+"""current demand of a drive at the controller's or at its own limit"""

@@ -27,6 +27,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency, GearRatio, Pressure, Unit
+from bywire.core.units import shown
 
 Array = NDArray[np.float64]
 Par = MotorcycleParameters
@@ -80,7 +81,9 @@ class Options(ParameterSet):
                                 ("p_from", "p_peak", "Pa")):  # fmt: skip
             a, b = getattr(self, low), getattr(self, high)
             if not a < b:
-                raise ValueError(f"{low} = {a:g} {unit} must be below {high} = {b:g} {unit}")
+                raise ValueError(
+                    f"{low} = {shown(a, unit)} must be below {high} = {shown(b, unit)}"
+                )
         if not 2.0 * self.amplitude <= self.p_peak:
             raise ValueError(
                 f"amplitude = {self.amplitude / 1e5:g} bar must be <= half of p_peak = "
@@ -226,7 +229,7 @@ def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ..
         )
     for edge in (options.k_g_min, options.k_g_max):
         if math.isclose(k_best, edge, rel_tol=1e-3):
-            found.append(f"the optimum lies at the edge, k_g = {edge:g} m/rad: widen the range")
+            found.append(f"the optimum lies at the edge, k_g = {1e3 * edge:g} mm/rad: widen the range")
     return tuple(found)
 
 
@@ -240,4 +243,8 @@ STUDY = Study(
         k_g_max=1e-3, ratios=41, f_min=1.0, f_max=30.0, frequencies=31,
     ),
     compute=lambda par, options, progress: compute(cast(Par, par), options, progress),
+    ruled={
+        "drive.mode": "the study demands pressures",
+        "pedal": "the study demands pressures without it",
+    },
 )

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.analysis.drive_train_answer import Answer, Demand
 from bywire.analysis.drive_train_design import answer
+from bywire.analysis.drive_train_limits import active, around
 from bywire.analysis.drive_train_map import mapped
 from bywire.analysis.drive_train_options import ASSUMPTIONS, DEFAULTS, Options
 from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
@@ -78,7 +79,10 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found
         for kind in (options.power, _other(options.power))
     }  # fmt: skip
     kpis = (*_optimum(best, grids, options), *_given(given, options))
-    return Found(data, kpis, ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options))
+    limits = (*active(best.at, par, options), *around(grids, best.at, options))
+    return Found(
+        data, kpis, ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
+    )
 
 
 def smallest(data: xr.Dataset, power: str) -> Best:
@@ -189,4 +193,10 @@ STUDY = Study(
     options=Options,
     defaults=DEFAULTS,
     compute=compute,
+    ruled={
+        "wedge.mu_B": "the study takes several; set its option mu_B, e.g. --set mu_B=0.3,0.5",
+        "control.moment.omega_gap": "set the study's option omega_gap",
+        "command.mode": "the study demands moments",
+        "rig": "it belongs to the rigs",
+    },
 )

@@ -70,31 +70,43 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of the braking, of its hold and of its pulses."""
     run = along_disc(recordings["run"])
-    begin, end = 0.5 * options.t_hold, options.t_hold
+    begin, end = _turn(run, 0.0, options.t_hold, 0.5)
     held = too_coarse(run, begin, end)
     hold, power = (math.nan if held else mean(run, name, begin, end) for name in ("M_B", "P_in"))
     ripple = math.nan if held else swing(run, "M_B", begin, end)
+    over = "over the disc's last revolution of the hold; over its second half where that is shorter"
     own = (
-        figure("hold_moment", hold, "N*m", "Mean moment in the second half of the hold.", held),
+        figure("hold_moment", hold, "N*m", f"Mean moment {over}.", held),
+        figure("hold_error", 100.0 * (hold / options.M_high - 1.0), "%",
+               "That moment less the demand, over the demand: far below 0 where the demand is "
+               "beyond the brake.", held),
         figure("hold_ripple", ripple, "N*m",
-               "Moment peak to peak in the second half of the hold: the disc's run-out.", held),
-        figure("hold_power", power, "W",
-               "Mean input power in the second half of the hold, standby included.", held),
+               f"Moment peak to peak {over}: the disc's run-out.", held),
+        figure("hold_power", power, "W", f"Mean input power {over}, standby included.", held),
         figure("brake_power", hold * mean(run, "Omega", begin, end), "W",
-               "Mean braking power in the second half of the hold.", held),
+               f"Mean braking power {over}.", held),
         _pulse(run, options),
     )  # fmt: skip
     return (*braking(run, options.M_high, options.t_hold), *own)
 
 
+def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
+    """Return begin and end of what counts of a time [s], the rows at its ends left out.
+
+    The disc's last revolution in it, over which the run-out averages out; where there is none,
+    the ``last`` share of it.
+    """
+    turn = last_turn(run, begin, end)
+    start = end - last * (end - begin) if turn is None else turn
+    return start + 2e-9, end - 2e-9
+
+
 def _pulse(run: xr.Dataset, options: Options) -> Kpi:
     """Return the moment in the first pulse; over less than a revolution the run-out would show."""
-    end = options.t_hold + options.t_low
-    turn = last_turn(run, options.t_hold, end)
-    begin = end - 0.2 * options.t_low if turn is None else turn
+    begin, end = _turn(run, options.t_hold, options.t_hold + options.t_low, 0.2)
     problem = too_coarse(run, begin, end)
     return figure(
-        "pulse_moment", math.nan if problem else mean(run, "M_B", begin + 2e-9, end - 2e-9), "N*m",
+        "pulse_moment", math.nan if problem else mean(run, "M_B", begin, end), "N*m",
         "Mean moment over the disc's last revolution of the first pulse; over the pulse's last "
         "fifth where it is shorter.", problem,
     )  # fmt: skip
@@ -113,6 +125,7 @@ EXPERIMENT = Experiment(
     kpis=UNITS
     | {
         "hold_moment": "N*m",
+        "hold_error": "%",
         "hold_ripple": "N*m",
         "hold_power": "W",
         "brake_power": "W",

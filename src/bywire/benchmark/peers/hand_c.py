@@ -23,6 +23,7 @@ SUBJECT = Subject(
         "caliper.law": ("linear",),
         "pressure_sensor.place": ("master-cylinder",),
         "adc.law": ("quantized",),
+        "ecu.schedule.law": ("off",),
         "ecu.filter.place": ("after-dither",),
         "ecu.dither.waveform": ("sine",),
         "drive.mode": ("pressure",),

@@ -1,0 +1,119 @@
+"""How far gains meet requirements on the nonlinear bench, by the worst amplitude and trial."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from bywire.analysis.design.bench_figures import STEP_FIGURES, BenchFigures
+from bywire.analysis.design.linear_case import NOMINAL
+from bywire.analysis.design.optimizer import Problem
+from bywire.analysis.design.requirement import Requirement
+
+STEADY = 0.05
+"""mean error that counts as none where zero is required [% of the step]; converters round"""
+_LEAST = -3.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of gains with what it showed.
+
+    Parameters
+    ----------
+    gains
+        By dotted name [SI].
+    figures
+        On the bench at the nominal point.
+    slacks
+        By requirement's text: share of the limit, worst amplitude and worst trial.
+    corners
+        Figures of further trials, by label.
+    """
+
+    gains: Mapping[str, float]
+    figures: BenchFigures
+    slacks: Mapping[str, float]
+    corners: Mapping[str, BenchFigures] = field(default_factory=dict)
+
+    @property
+    def slack(self) -> float:
+        """The worst slack."""
+        return min(self.slacks.values())
+
+
+def bench_slacks(
+    requirements: Sequence[Requirement], found: BenchFigures, linear: Mapping[str, float]
+) -> dict[str, float]:
+    """Return how far each requirement is met on the bench.
+
+    Bandwidth counts at the worst amplitude, by the room of the gain above -3 dB; a phase margin
+    in the linear model (what large motion comes near) and in each describing function; figures
+    of the step where the experiment has one; the rest is the linear model's alone.
+
+    Parameters
+    ----------
+    requirements
+        What is required.
+    found
+        Figures on the bench.
+    linear
+        Slack in the linear models by requirement's text.
+    """
+    slacks = {}
+    for one in requirements:
+        slack = _on_bench(one, found)
+        if math.isinf(slack) or one.figure == "phase_margin":
+            slack = min(slack, linear[one.text])
+        slacks[one.text] = max(slack, _LEAST)
+    return slacks
+
+
+def judged(
+    requirements: Sequence[Requirement],
+    gains: Mapping[str, float],
+    found: Mapping[str, BenchFigures],
+    linear: Mapping[str, float],
+) -> Candidate:
+    """Return gains with what they showed, judged by the worst of several trials.
+
+    Parameters
+    ----------
+    requirements, linear
+        As in `bench_slacks`.
+    gains
+        By dotted name [SI].
+    found
+        Figures by the trial's label, that of the nominal point among them.
+    """
+    # A trial without a step has the parameters of the nominal one: so is its step.
+    steps = [replace(one, step=one.step or found[NOMINAL].step) for one in found.values()]
+    rows = [bench_slacks(requirements, one, linear) for one in steps]
+    slacks = {one.text: min(row[one.text] for row in rows) for one in requirements}
+    corners = {label: one for label, one in found.items() if label != NOMINAL}
+    return Candidate(dict(gains), found[NOMINAL], slacks, corners)
+
+
+def _on_bench(one: Requirement, found: BenchFigures) -> float:
+    """Return the slack of what the bench measures; infinity for what it does not."""
+    if one.figure == "bandwidth" and one.sense > 0:
+        return min((s.least / math.sqrt(0.5) - 1.0 for s in found.small), default=math.inf)
+    if one.figure == "phase_margin":
+        seen = [s for s in found.small if not math.isnan(s.crossover)]
+        return min((one.slack(s.phase_margin) for s in seen), default=math.inf)
+    if one.figure in ("bandwidth", "crossover"):
+        values = [getattr(s, one.figure) for s in found.small]
+        return min((one.slack(v) for v in values if not math.isnan(v)), default=math.inf)
+    if one.figure not in STEP_FIGURES or not found.step:
+        return math.inf
+    value = found.step[one.figure]
+    if one.figure == "steady_state_error" and one.limit == 0.0 and not math.isnan(value):
+        return (STEADY - value) / STEADY
+    return one.slack(value)
+
+
+def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
+    """Return the slack of every requirement for the worst model, by its text."""
+    slacks = problem.slacks(problem.point(gains), range(len(problem.cases))).min(axis=0)
+    return {one.text: float(s) for one, s in zip(problem.requirements, slacks, strict=True)}

@@ -1,0 +1,206 @@
+"""Gain schedules: every region designed at its own operating points, then seen as one."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from bywire.analysis.design.designer import design
+from bywire.analysis.design.linear_case import LinearCase, cases_of
+from bywire.analysis.design.loop_figures import LoopFigures
+from bywire.analysis.design.optimizer import Progress
+from bywire.analysis.design.outcome import Design
+from bywire.analysis.design.requirement import FIGURES, Requirement
+from bywire.analysis.design.schedule_outcome import Across, ScheduleDesign
+from bywire.analysis.loop import Loop
+from bywire.analysis.loop_schedule import LoopSchedule
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.units import shown
+
+_FINE = 4000  # points of the grid for what is reported
+_ACROSS = 15
+"""operating points of the scheduled loop that are looked at between the designed ones"""
+
+def scheduled(loop: Loop) -> LoopSchedule:
+    """Return the schedule of a loop.
+
+    Raises
+    ------
+    ParameterError
+        When it has none.
+    """
+    if loop.schedule is None:
+        raise ParameterError(f"loop {loop.name!r} has no gain schedule: leave out --schedule")
+    return loop.schedule
+
+
+def points_by_region(
+    loop: Loop, par: ParameterSet, points: Sequence[float]
+) -> dict[str, tuple[float, ...]]:
+    """Return operating points [SI] by the region that they fall into.
+
+    Parameters
+    ----------
+    loop, par
+        Loop, and the parameters that hold the borders.
+    points
+        At least one in each region; none: the loop's own, where the borders leave them there.
+
+    Raises
+    ------
+    ParameterError
+        When a region has none.
+    """
+    schedule, at = scheduled(loop), loop.at
+    found: dict[str, list[float]] = {name: [] for name in schedule.regions}
+    for value in points or schedule.points:
+        found[schedule.region(par, value)].append(value)
+    for name, own in found.items():
+        if not own:
+            leaves = par.leaves()
+            borders = " and ".join(shown(leaves[one], at.unit) for one in schedule.borders)
+            given = ", ".join(shown(one, at.unit) for one in points or schedule.points)
+            raise ParameterError(
+                f"no operating point lies in the region {name!r}: the borders are {borders}, the "
+                f"points {given}; give one {at.name} in each region with --at, or move the borders "
+                f"({', '.join(schedule.borders)})"
+            )
+    return {name: tuple(sorted(own)) for name, own in found.items()}
+
+
+def design_schedule(
+    loop: Loop,
+    par: ParameterSet,
+    requirements: Sequence[Requirement],
+    points: Mapping[str, Sequence[float]],
+    tunables: Mapping[str, Mapping[str, tuple[float, float]]],
+    *,
+    over: Mapping[str, Sequence[float]] | None = None,
+    seed: int = 0,
+    progress: Progress | None = None,
+) -> ScheduleDesign:
+    """Design the gains of every region, the main one first, and look at the loop across them.
+
+    The regions share what only the main one chooses, for instance a filter. A region begins with
+    the gains of the main one. Models are those of the frozen gains: what small motion about an
+    equilibrium has, and slow motion between equilibria.
+
+    Parameters
+    ----------
+    loop, par
+        Loop, and parameters with the schedule switched on.
+    requirements
+        See `requirement.read`.
+    points
+        See `points_by_region`.
+    tunables
+        By region; empty for one whose gains stay as they are.
+    over
+        Ranges that every region must serve as well, see `cases_of`.
+    seed, progress
+        See `designer.design`.
+
+    Raises
+    ------
+    ParameterError
+        As `designer.design` and `cases_of`, and when no region has anything to tune.
+    """
+    schedule = scheduled(loop)
+    if not any(tunables.values()):
+        raise ParameterError("nothing is left to tune in any region: set fewer gains")
+    order = [schedule.main, *(name for name in schedule.regions if name != schedule.main)]
+    order = [name for name in order if tunables[name]]
+    gains: dict[str, float] = {}
+    found: dict[str, Design] = {}
+    for region in order:
+        own = par.replace(gains)
+        cases = cases_of(loop, own, points[region][0], _ranges(loop, points[region], over or {}))
+        start = _start(own, schedule, region, tunables[region])
+        found[region] = design(
+            tunables[region], requirements, cases, start, seed=seed,
+            progress=_named(progress, region),
+        )  # fmt: skip
+        gains |= found[region].gains
+        if found[region].status == "interrupted":
+            rest = [name for name in order if name not in found]
+            gains |= {k: v for r in rest for k, v in _start(par.replace(gains), schedule, r,
+                                                            tunables[r]).items()}  # fmt: skip
+            break
+    return _seen_whole(loop, par, requirements, (points, found, gains), over or {})
+
+
+def _seen_whole(
+    loop: Loop,
+    par: ParameterSet,
+    requirements: Sequence[Requirement],
+    made: tuple[Mapping[str, Sequence[float]], Mapping[str, Design], Mapping[str, float]],
+    over: Mapping[str, Sequence[float]],
+) -> ScheduleDesign:
+    points, designs, gains = made
+    schedule = scheduled(loop)
+    every = [one for name in schedule.regions for one in points[name]]
+    middle = points[schedule.main][0]
+    cases = cases_of(loop, par, middle, _ranges(loop, every, over))
+    nominal = cases[0].figures(gains, _FINE)
+    dense = cases_of(loop, par, middle, {loop.at.name: _between(par, schedule, every)})[1:]
+    return ScheduleDesign(
+        {name: designs[name] for name in schedule.regions if name in designs},
+        {name: tuple(points[name]) for name in schedule.regions},
+        gains,
+        {name: float(getattr(nominal, name)) for name in FIGURES},
+        cases,
+        tuple(_across(one, schedule.region(par, one.at or 0.0), requirements, gains)
+              for one in dense),
+    )  # fmt: skip
+
+
+def _across(
+    case: LinearCase, region: str, requirements: Sequence[Requirement], gains: Mapping[str, float]
+) -> Across:
+    found = case.figures(gains, _FINE)
+    row = {name: float(getattr(found, name)) for name in FIGURES}
+    return Across(case.label, case.at or 0.0, region, row, slack_of(found, requirements))
+
+
+def slack_of(found: LoopFigures, requirements: Sequence[Requirement]) -> float:
+    """Return the slack of the requirement that is worst off; negative infinity where unstable."""
+    if not found.is_stable:
+        return -math.inf
+    return float(min(found.slack(one) for one in requirements))
+
+
+def _ranges(
+    loop: Loop, points: Sequence[float], over: Mapping[str, Sequence[float]]
+) -> dict[str, Sequence[float]]:
+    if loop.at.name in over:
+        raise ParameterError(
+            f"{loop.at.name} is what the schedule follows: give its operating points with --at"
+        )
+    return {loop.at.name: points, **over} if len(points) > 1 or over else {}
+
+
+def _between(par: ParameterSet, schedule: LoopSchedule, points: Sequence[float]) -> list[float]:
+    """Return evenly spread operating points, the designed ones and the borders among them."""
+    leaves = par.leaves()
+    spread = np.linspace(min(points), max(points), _ACROSS)
+    borders = [leaves[name] for name in schedule.borders]
+    return sorted({*map(float, spread), *map(float, points), *borders})
+
+
+def _start(
+    par: ParameterSet, schedule: LoopSchedule, region: str, tunables: Mapping[str, Any]
+) -> dict[str, float]:
+    """Return gains of a region to begin with: those of the main one, by their last names."""
+    leaves = par.leaves()
+    main = {name.rpartition(".")[2]: leaves[name] for name in schedule.regions[schedule.main]}
+    return {name: main[name.rpartition(".")[2]] for name in tunables}
+
+
+def _named(progress: Progress | None, region: str) -> Progress | None:
+    if progress is None:
+        return None
+    return lambda label, share: progress(f"{label}, {region}", share)

@@ -1,0 +1,191 @@
+"""Root locus: poles of a loop or plant against any parameter, and where it turns unstable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.loop import Loop
+from bywire.analysis.loop_curves import varied
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_OUTSIDE = 1e-9  # by so much a pole must leave the unit circle: rounding of an integrator
+_AT_REST = 1e-6  # poles this close to 1 are integrators that the loop does not move
+_SLOWEST = 1e-3  # rates below it [1/s] are integrators of a continuous model
+_HALVINGS = 50
+
+
+@dataclass(frozen=True)
+class Border:
+    """Value of the parameter at which stability changes.
+
+    Parameters
+    ----------
+    value
+        Of the parameter [SI].
+    rate
+        The pole that crosses, as a rate [1/s], with positive frequency of a pair.
+    above
+        Whether the loop is stable above the value; else below it.
+    """
+
+    value: float
+    rate: complex
+    above: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """Poles over the values of a parameter.
+
+    Parameters
+    ----------
+    name, unit
+        The parameter and its SI unit.
+    values
+        Its values [SI], ascending, shape (n,).
+    poles
+        Poles of the model, shape (n, states); a column is one pole, followed from value to value.
+    period
+        Sample time [s]; 0 for a continuous model, whose poles are rates.
+    stable
+        Whether the loop is stable, shape (n,).
+    borders
+        Where that changes. A range that turns unstable and back between two values looks stable.
+    """
+
+    name: str
+    unit: str
+    values: Array
+    poles: Complex
+    period: float
+    stable: NDArray[np.bool_]
+    borders: tuple[Border, ...]
+
+    @property
+    def rates(self) -> Complex:
+        """The poles as rates of continuous motions [1/s], shape (n, states); -inf for dead ones."""
+        if not self.period:
+            return self.poles
+        alive = self.poles != 0.0
+        found = np.full(self.poles.shape, -np.inf, dtype=complex)
+        found[alive] = np.log(self.poles[alive]) / self.period
+        return found
+
+
+def locus(
+    loop: Loop, par: ParameterSet, value: float, name: str, unit: str, values: Sequence[float]
+) -> Locus:
+    """Return the closed loop's poles over a range of a parameter or of the operating point.
+
+    Parameters
+    ----------
+    loop, par, value
+        The loop and its operating point.
+    name, unit
+        Dotted name of a parameter, or that of the loop's operating quantity; its SI unit. Over a
+        gain of the controller this is the classical root locus.
+    values
+        Values [SI], ascending, at least two.
+
+    Raises
+    ------
+    InputError
+        When an operating point does not exist, or a value is out of range.
+    """
+
+    def model(at: float) -> LinearModel:
+        ((own, point),) = varied(loop, par, value, name, [at])
+        return loop.closed(own, point)
+
+    return locus_of(model, name, unit, values)
+
+
+def locus_of(
+    model: Callable[[float], LinearModel], name: str, unit: str, values: Sequence[float]
+) -> Locus:
+    """Return the poles of any family of models.
+
+    Parameters
+    ----------
+    model
+        ``model(value [SI]) -> LinearModel``, of equal size and sample time for all values.
+    name, unit
+        What is varied, and its SI unit.
+    values
+        Values [SI], ascending, at least two.
+
+    Raises
+    ------
+    ParameterError
+        For fewer than two values.
+    """
+    if len(values) < 2:
+        raise ParameterError(f"{name}: a locus needs two values or more, got {len(values)}")
+    models = [model(at) for at in values]
+    tracked = [models[0].poles()]
+    for one in models[1:]:
+        tracked.append(_followed(tracked[-1], one.poles()))
+    stable = np.array([_is_stable(one) for one in models])
+    borders = [
+        _border(model, (values[k], values[k + 1]), bool(stable[k + 1]))
+        for k in map(int, np.flatnonzero(stable[1:] != stable[:-1]))
+    ]
+    return Locus(
+        name, unit, np.asarray(values, dtype=float), np.array(tracked), models[0].period, stable,
+        tuple(borders),
+    )  # fmt: skip
+
+
+def _followed(before: Complex, found: Complex) -> Complex:
+    """Return poles in the order of those before: the assignment that moves them least."""
+    from scipy.optimize import linear_sum_assignment
+
+    _, columns = linear_sum_assignment(np.abs(before[:, None] - found))
+    return np.asarray(found[columns])
+
+
+def _outermost(model: LinearModel) -> tuple[complex, float]:
+    """Return the least stable pole as a rate [1/s], and its excess; integrators left out.
+
+    The excess is by how much it lies outside the unit circle, or right of the imaginary axis.
+    """
+    poles = model.poles()
+    if not model.period:
+        moving = poles[np.abs(poles) > _SLOWEST]
+        excess = moving.real
+    else:
+        moving = poles[(np.abs(poles - 1.0) > _AT_REST) & (poles != 0.0)]
+        excess = np.abs(moving) - 1.0
+    if not moving.size:
+        return 0j, -np.inf
+    k = int(np.argmax(excess))
+    rate = np.log(moving[k]) / model.period if model.period else moving[k]
+    return complex(rate.real, abs(rate.imag)), float(excess[k])
+
+
+def _is_stable(model: LinearModel) -> bool:
+    return _outermost(model)[1] <= _OUTSIDE
+
+
+def _border(
+    model: Callable[[float], LinearModel], between: tuple[float, float], above: bool
+) -> Border:
+    """Return where stability changes between two values, by bisection."""
+    low, high = between
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        if _is_stable(model(middle)) == above:
+            high = middle
+        else:
+            low = middle
+    rate, _ = _outermost(model(low if above else high))  # where it is unstable
+    return Border(float(0.5 * (low + high)), rate, above)

@@ -1,0 +1,190 @@
+"""Loop gains over frequency, with their margins: what Nyquist and Nichols charts show."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.loop import Loop
+from bywire.analysis.robustness import LoopMargins
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+_BELOW = 30.0  # by so much a chart begins below the band of the loop
+_NYQUIST = 0.998  # of half the sampling frequency, where the phase has no direction
+_POINTS = 1500
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCurve:
+    """Frequency response of a loop that is cut open, negative feedback not counted.
+
+    Parameters
+    ----------
+    frequency
+        Frequencies [Hz], ascending, shape (n,).
+    L
+        Loop gain, shape (n,).
+    margins
+        Margins of the loop.
+    phase_crossover
+        Frequency at which the gain margin is read [Hz]; NaN where there is none.
+    """
+
+    frequency: Array
+    L: Complex
+    margins: LoopMargins
+    phase_crossover: float
+
+    @property
+    def S(self) -> Complex:
+        """Sensitivity 1/(1 + L), shape (n,)."""
+        return np.asarray(1.0 / (1.0 + self.L))
+
+    @property
+    def T(self) -> Complex:
+        """Complementary sensitivity L/(1 + L), shape (n,)."""
+        return np.asarray(self.L / (1.0 + self.L))
+
+    @property
+    def phase(self) -> Array:
+        """Phase [degree] without jumps, between -360 and 0 at the lowest frequency; shape (n,)."""
+        found = np.degrees(np.unwrap(np.angle(self.L)))
+        return np.asarray(found - 360.0 * math.ceil((found[0] - 1.0) / 360.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Family:
+    """Curves of a loop over the values of a parameter; one curve where nothing is varied.
+
+    Parameters
+    ----------
+    curves
+        One per value.
+    name, unit
+        Parameter and its SI unit; empty and ``"1"`` for a single curve.
+    values
+        Its values [SI].
+    """
+
+    curves: tuple[LoopCurve, ...]
+    name: str = ""
+    unit: str = "1"
+    values: tuple[float, ...] = (math.nan,)
+
+    @property
+    def worst(self) -> int:
+        """Index of the least disk margin; an unstable loop is worse than any."""
+        disks = [c.margins.disk if c.margins.stable else -math.inf for c in self.curves]
+        return int(np.argmin(disks))
+
+
+@dataclass(frozen=True)
+class Disk:
+    """Circle on the real axis of the Nyquist plane that the loop gain stays out of.
+
+    Parameters
+    ----------
+    middle, radius
+        Of the circle; both infinite for the largest margin, where it is the left half plane.
+    """
+
+    middle: float
+    radius: float
+
+
+def disk(margin: float) -> Disk:
+    r"""Return the circle that a loop gain of a disk margin touches.
+
+    .. math:: \left|\frac{1 - L}{1 + L}\right| = \frac{2}{\alpha} \;\Leftrightarrow\;
+        \left|L + \frac{1 + a^2}{1 - a^2}\right| = \frac{2 a}{1 - a^2}, \quad a = \alpha/2
+
+    Parameters
+    ----------
+    margin
+        Disk margin :math:`\alpha`, symmetric (skew 0): above 0, at most 2.
+
+    Raises
+    ------
+    ParameterError
+        When it is not in that range.
+
+    References
+    ----------
+    P. Seiler, A. Packard, P. Gahinet, "An Introduction to Disk Margins", IEEE Control Systems
+    Magazine 40(5), 2020: the symmetric margin, drawn in the Nyquist plane.
+    """
+    if not 0.0 < margin <= 2.0:
+        raise ParameterError(f"disk margin = {margin:g}: it must be > 0 and <= 2")
+    a = 0.5 * margin
+    if a == 1.0:
+        return Disk(-math.inf, math.inf)
+    return Disk(-(1.0 + a * a) / (1.0 - a * a), 2.0 * a / (1.0 - a * a))
+
+
+def loop_curve(
+    loop: Loop, par: ParameterSet, value: float, margins: LoopMargins, points: int = _POINTS
+) -> LoopCurve:
+    """Return the loop gain at an operating point, up to half its sampling frequency.
+
+    Parameters
+    ----------
+    loop, par, value
+        The loop and its operating point.
+    margins
+        Margins there.
+    points
+        Number of frequencies n.
+
+    Raises
+    ------
+    InputError
+        When the operating point does not exist.
+    """
+    gain = loop.gain(par, value)
+    highest = min(gain.nyquist, loop.closed(par, value).nyquist)
+    f = np.geomspace(loop.band[0] / _BELOW, _NYQUIST * highest, points)
+    L = gain.response(f)[:, 0, 0]
+    return LoopCurve(f, L, margins, _phase_crossover(gain, f, L, margins.gain))
+
+
+def varied(
+    loop: Loop, par: ParameterSet, value: float, name: str, values: Sequence[float]
+) -> list[tuple[ParameterSet, float]]:
+    """Return parameters and operating point for each value of one of them.
+
+    Parameters
+    ----------
+    name
+        Dotted name of a parameter, or that of the loop's operating quantity.
+    values
+        Its values, SI.
+    """
+    if name == loop.at.name:
+        return [(par, one) for one in values]
+    return [(par.replace({name: one}), value) for one in values]
+
+
+def _phase_crossover(gain: LinearModel, f: Array, L: Complex, margin: float) -> float:
+    """Return where the loop gain is real and -1/margin, NaN without a margin."""
+    if not math.isfinite(margin):
+        return math.nan
+
+    def imaginary(at: float) -> float:
+        return float(gain.response(np.array([at]))[0, 0, 0].imag)
+
+    crossings = np.flatnonzero(np.diff(np.signbit(L.imag)) & (L.real[:-1] < 0))
+    found = [float(brentq(imaginary, f[k], f[k + 1])) for k in crossings]
+    if gain.period:
+        found.append(gain.nyquist)  # where the response is real, beyond the grid
+    sizes = np.abs(gain.response(np.array(found))[:, 0, 0])
+    return found[int(np.argmin(np.abs(sizes * margin - 1.0)))]

@@ -1,0 +1,1 @@
+"""Plants of the brakes and their simplified models, one file each."""

@@ -1,0 +1,50 @@
+"""Options of the commands that run what is ready: benches, papers, the benchmark."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import (
+    JsonFlag,
+    OutFolder,
+    changes,
+    execute,
+)
+
+
+def list_command(json: JsonFlag = False) -> None:
+    """Show assemblies, parameter sets, experiments, stimuli and KPIs."""
+    execute("list_command", json)
+
+
+def run(
+    bench: Annotated[
+        Path,
+        typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False),
+    ],
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
+    ] = None,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Run a bench file or an experiment; exit status 1 when a requirement is not met."""
+    raise typer.Exit(execute("run_command", bench, changes(set_), out, json))
+
+
+def reproduce(
+    source: Annotated[str, typer.Argument(help="Published source, e.g. dardanelli2010.")],
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make a paper's tables and figures: stated, computed, agrees or not."""
+    execute("reproduce_command", source, out, json)
+
+
+def benchmark(json: JsonFlag = False) -> None:
+    """Measure speed against hand-written C and what users would pick instead."""
+    execute("benchmark_command", json)

@@ -1,0 +1,48 @@
+"""Commands on measurement files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import JsonFlag, execute
+
+
+def convert(
+    source: Annotated[
+        Path, typer.Argument(metavar="IN", help="Measurement file.", show_default=False)
+    ],
+    target: Annotated[
+        Path, typer.Argument(metavar="OUT", help="File to write.", show_default=False)
+    ],
+    map_: Annotated[
+        Path | None,
+        typer.Option("--map", metavar="PATH", help="What the columns mean (TOML)."),
+    ] = None,
+    signals: Annotated[str, typer.Option(help="Signals to keep, e.g. 'p_mc, x_mc'.")] = "",
+    rate: Annotated[
+        str, typer.Option(help="Bring all signals to one time axis, e.g. '1 kHz'.")
+    ] = "",
+    method: Annotated[
+        str, typer.Option(help="How: linear (default), previous, nearest, average.")
+    ] = "",
+    exclude: Annotated[
+        str,
+        typer.Option(help="Leave out gaps, missing (both by default), clipped; or nothing."),
+    ] = "",
+    max_gap: Annotated[
+        str, typer.Option(help="Longest pause that is no gap, e.g. '50 ms'; 10 steps by default.")
+    ] = "",
+    format_: Annotated[
+        str, typer.Option("--format", help="Format to write, e.g. mat73; else by the ending.")
+    ] = "",
+    force: Annotated[bool, typer.Option("--force", help="Replace a file that is there.")] = False,
+    json: JsonFlag = False,
+) -> None:
+    """Convert a measurement file: CSV, TSV, Parquet, MAT, MDF4, NetCDF."""
+    from bywire.cli.convert_command import Wanted
+
+    wanted = Wanted(map_, signals, rate, method, exclude, max_gap, format_, force)
+    execute("convert_command", source, target, wanted, json)

@@ -1,0 +1,50 @@
+"""``bywire linearize``: of a closed loop, or of a plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.plant_registry import all_plants
+from bywire.cli import linearize_command, plant_command, plant_locus
+from bywire.core.errors import ParameterError, unknown_name
+
+
+def execute(
+    name: str,
+    parameters: str,
+    at: str,
+    changes: Mapping[str, str],
+    locus: str,
+    reduce: str,
+    friction: str,
+    speed: str,
+    dither: bool,
+    out: Path | None,
+    as_json: bool,
+) -> None:
+    """Print the exact linear model of what has the name."""
+    if name in all_plants():
+        if dither:
+            raise ParameterError("--dither is for loops: leave it out, or name a loop")
+        if locus:
+            if reduce:
+                raise ParameterError("--reduce and --locus exclude each other: ask for one of them")
+            plant_locus.execute(
+                name, parameters, at, changes, (friction, speed), locus, out, as_json
+            )  # fmt: skip
+            return
+        plant_command.execute(
+            name, parameters, at, changes, friction, speed, reduce, out, as_json
+        )  # fmt: skip
+        return
+    if name not in all_loops():
+        raise unknown_name("loop or plant", name, (*all_loops(), *all_plants()))
+    for option, given in (("--friction", friction), ("--speed", speed)):
+        if given:
+            raise ParameterError(
+                f"{option} is for plants ({', '.join(all_plants())}): controllers are linearized "
+                "without dry friction; leave it out"
+            )
+    linearize_command.execute(name, parameters, at, changes, locus, reduce, dither, out, as_json)

@@ -1,0 +1,111 @@
+"""Options of the commands that analyze a control loop."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import (
+    At,
+    Changes,
+    JsonFlag,
+    LoopName,
+    OutFolder,
+    Parameters,
+    changes,
+    execute,
+)
+
+LoopOrPlant = Annotated[
+    str, typer.Argument(help="Loop or plant, see 'bywire list'.", show_default=False)
+]
+
+
+def linearize_command(
+    loop: LoopOrPlant,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    locus: Annotated[
+        str, typer.Option(help="Poles over a range of a parameter, e.g. wedge.mu_B=0.1:0.8:71.")
+    ] = "",
+    reduce: Annotated[
+        str, typer.Option(help="Reduce it to an order, e.g. 4, or to a band, e.g. '150 Hz'.")
+    ] = "",
+    friction: Annotated[
+        str, typer.Option(help="Of a plant: removed (as of loops), sliding, or stuck.")
+    ] = "",
+    speed: Annotated[str, typer.Option(help="Motor speed of sliding, e.g. '5 rad/s'.")] = "",
+    dither: Annotated[
+        bool, typer.Option("--dither", help="Also about its motion under dither, friction on.")
+    ] = False,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Make the exact linear model of a closed loop, with its sampling, or of a plant."""
+    execute(
+        "linear_command", loop, parameters, at, changes(set_), locus, reduce, friction, speed,
+        dither, out, json,
+    )  # fmt: skip
+
+
+def frequency_response_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    frequencies: Annotated[
+        str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:40', or a list.")
+    ] = "",
+    amplitudes: Annotated[str, typer.Option(help="Amplitudes, e.g. '0.5 rad, 1 rad'.")] = "",
+    excitation: Annotated[
+        str, typer.Option(help="sine (one frequency at a time), multisine, or chirp.")
+    ] = "sine",
+    over: Annotated[
+        str, typer.Option(help="Range, for bandwidths, e.g. wedge.mu_B=0.2:0.6:5.")
+    ] = "",
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Measure a closed loop's response by amplitude: friction, limits and sampling included."""
+    execute(
+        "frequency_response_command", loop, parameters, at, changes(set_), frequencies,
+        amplitudes, excitation, over, out, json,
+    )  # fmt: skip
+
+
+def agreement_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    frequencies: Annotated[
+        str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:6', or a list.")
+    ] = "",
+    amplitudes: Annotated[
+        str, typer.Option(help="A small and a large amplitude, e.g. '0.001 rad, 1 rad'.")
+    ] = "",
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Show what makes a loop nonlinear, cause by cause; exit status 1 when it does not add up."""
+    status = execute(
+        "agreement_command", loop, parameters, at, changes(set_), frequencies, amplitudes, out, json
+    )
+    raise typer.Exit(status)
+
+
+def margins_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    over: Annotated[
+        str, typer.Option(help="Range, e.g. wedge.mu_B=0.2:0.6:9 or at=5bar:35bar:7.")
+    ] = "",
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Show margins and bandwidth of a loop as it is sampled, and the worst case over a range."""
+    execute("margins_command", loop, parameters, at, changes(set_), over, out, json)

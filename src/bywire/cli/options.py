@@ -1,0 +1,62 @@
+"""What the commands share: the types of their options, and the way to what they do."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from bywire.cli.output import message
+from bywire.cli.output_folder import folder
+from bywire.core.errors import ParameterError
+
+INTERRUPTED = 130
+
+JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
+OutFolder = Annotated[
+    Path | None,
+    typer.Option(
+        "--out",
+        help="Folder for recordings, figures and the report.",
+        parser=folder,
+        metavar="PATH",
+    ),
+]
+LoopName = Annotated[str, typer.Argument(help="Loop, see 'bywire list'.", show_default=False)]
+Parameters = Annotated[str, typer.Option(help="Parameter set, e.g. roberts2003.")]
+At = Annotated[str, typer.Option("--at", help="Operating point, e.g. '20 bar'.")]
+Changes = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. wedge.mu_B=0.4."),
+]
+
+
+# Each command loads what it needs when it runs, so that `bywire --help` stays quick.
+def execute(name: str, *arguments: Any) -> Any:
+    """Run a command's module; an interrupt ends it with its exit status and a word."""
+    try:
+        return import_module(f"bywire.cli.{name}").execute(*arguments)
+    except KeyboardInterrupt:  # typer would exit without a word
+        message("interrupted")
+        raise typer.Exit(INTERRUPTED) from None
+
+
+def changes(texts: list[str] | None, flag: str = "--set") -> dict[str, str]:
+    """Return what ``--set KEY=VALUE``, or another such option, asks for.
+
+    Raises
+    ------
+    ParameterError
+        For what is no KEY=VALUE, and keys that are set twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts or ():
+        key, equals, value = (part.strip() for part in text.partition("="))
+        if not equals or not key or not value:
+            raise ParameterError(f"{flag} {text}: write KEY=VALUE, for instance motor.R_m=0.4ohm")
+        if key in found:
+            raise ParameterError(f"{flag} {text}: {key} is set twice: leave one of them out")
+        found[key] = value
+    return found

@@ -1,0 +1,94 @@
+"""A plant with the parameters and the operating point that a user asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import get_args
+
+from bywire.analysis.linearize import Friction
+from bywire.analysis.loop import Quantity
+from bywire.analysis.plant import Plant, PlantPoint
+from bywire.analysis.plant_registry import find_plant
+from bywire.bench.values import number, parsed
+from bywire.catalog.registry import entry, main_set
+from bywire.core.errors import ParameterError, UnitError, unknown_name
+from bywire.core.parameters import ParameterSet
+
+
+@dataclass(frozen=True)
+class ChosenPlant:
+    """A plant, its parameters by name and value, and where it is linearized."""
+
+    plant: Plant
+    name: str
+    par: ParameterSet
+    point: PlantPoint
+
+
+def choose(
+    name: str, parameters: str, at: str, changes: Mapping[str, str], friction: str, speed: str
+) -> ChosenPlant:
+    """Return what the command line asks for.
+
+    Parameters
+    ----------
+    name
+        Plant.
+    parameters
+        Parameter set; empty for the main one of the plant's brake.
+    at
+        Operating point; its unit says what it is. Empty for the plant's own.
+    changes
+        Parameters by dotted name, with units.
+    friction, speed
+        What dry friction does, and how fast the motors turn; empty: removed, at rest.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, and sets of another brake.
+    """
+    plant = find_plant(name)
+    found = entry(parameters or main_set(plant.assembly))
+    if found.assembly != plant.assembly:
+        raise ParameterError(
+            f"plant {plant.name!r} is one of a {plant.assembly}, but parameter set "
+            f"{found.name!r} is for a {found.assembly}"
+        )
+    base = found.parameters()
+    par = base.replace(parsed(type(base), changes, "parameter"))
+    quantity, value = _operating_point(plant, at)
+    kind, omega = _friction(friction, speed)
+    return ChosenPlant(plant, found.name, par, PlantPoint(quantity, value, kind, omega))
+
+
+def _operating_point(plant: Plant, at: str) -> tuple[Quantity, float]:
+    if not at:
+        return plant.at[0], plant.at[0].default
+    for quantity in plant.at:
+        try:
+            return quantity, number(at, quantity.unit, quantity.name)
+        except UnitError:
+            continue
+    known = ", ".join(f"{one.name} in {one.unit}" for one in plant.at)
+    raise UnitError(f"--at {at!r}: {plant.name} takes one of {known}")
+
+
+def _friction(friction: str, speed: str) -> tuple[Friction, float]:
+    kinds: tuple[Friction, ...] = get_args(Friction)
+    kind = next((one for one in kinds if one == (friction or "removed")), None)
+    if kind is None:
+        raise unknown_name("kind of friction", friction, kinds)
+    omega = number(speed, "rad/s", "--speed") if speed else 0.0
+    if kind == "sliding" and omega == 0.0:
+        raise ParameterError(
+            "--friction sliding: friction at rest has no slope; give the motors' speed with "
+            "--speed, for instance '5 rad/s', positive toward clamping"
+        )
+    if kind != "sliding" and omega != 0.0:
+        raise ParameterError(
+            f"--speed {speed}: only sliding friction depends on it: add --friction sliding, or "
+            "leave it out"
+        )
+    return kind, omega

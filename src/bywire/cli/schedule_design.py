@@ -1,0 +1,72 @@
+"""``bywire design --schedule``: gains by region of the operating point."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from bywire.analysis.design.schedule_designer import (
+    design_schedule,
+    points_by_region,
+    scheduled,
+)
+from bywire.analysis.design.schedule_verification import verify_schedule
+from bywire.analysis.design.verification import Verification
+from bywire.analysis.loop_registry import find_loop
+from bywire.cli import output
+from bywire.cli.design_ending import exit_status, written
+from bywire.cli.design_inputs import Wanted, requirements_of, trial_of
+from bywire.cli.loop_choice import choose, over_range, spread
+from bywire.cli.progress import progress_bar
+from bywire.cli.schedule_text import as_object, as_text
+from bywire.core.units import shown
+
+
+def execute(
+    loop: str,
+    parameters: str,
+    at: str,
+    changes: Mapping[str, str],
+    wanted: Wanted,
+    out: Path | None,
+    as_json: bool,
+) -> int:
+    """Design a gain schedule and return the exit status: 1 where requirements are not met."""
+    own = find_loop(loop)
+    schedule = scheduled(own)
+    changes = {**changes, **schedule.changes}
+    chosen = choose(loop, parameters, "", changes)
+    given = spread(at, own.at.unit, own.at.name) if at else []
+    points = points_by_region(own, chosen.par, given)
+    chosen = replace(chosen, value=points[schedule.main][0])
+    requirements = requirements_of(wanted)
+    tunables = {
+        region: {name: span for name, span in spans.items() if name not in changes}
+        for region, spans in schedule.regions.items()
+    }
+    ranges = dict(over_range(text, chosen)[::2] for text in wanted.over)
+    trial = trial_of(chosen, changes, wanted)
+    tried: Verification | None = None
+    with progress_bar() as progress:
+        found = design_schedule(
+            own, chosen.par, requirements, points, tunables, over=ranges, seed=wanted.seed,
+            progress=progress,
+        )  # fmt: skip
+        if trial is not None and found.status == "met":
+            tried = verify_schedule(
+                found, requirements, tunables, trial, seed=wanted.seed, progress=progress
+            )
+    files = []
+    if out is not None:
+        gains = found.gains if tried is None else tried.final.gains
+        every = ", ".join(shown(one, own.at.unit) for own_ in points.values() for one in own_)
+        files = [written(chosen, changes, gains, (found.status, tried), every, out)]
+    if as_json:
+        output.result(json.dumps(as_object(chosen, requirements, found, tried, files)))
+    else:
+        output.result(as_text(chosen, requirements, found, tried))
+    for path in files:
+        output.message(f"written: {path}")
+    return exit_status(found.status, tried)

@@ -1,0 +1,129 @@
+"""A gain schedule in words and as a JSON object."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from bywire.analysis.design.requirement import FIGURES, Requirement
+from bywire.analysis.design.schedule_designer import scheduled
+from bywire.analysis.design.schedule_outcome import Across, ScheduleDesign
+from bywire.analysis.design.verification import Verification
+from bywire.cli.design_text import gain_text, unit_of
+from bywire.cli.loop_choice import Chosen
+from bywire.cli.verification_text import finite, number, verification_object, verification_text
+from bywire.core.units import shown
+
+_SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin", "overshoot")
+
+
+def as_object(
+    chosen: Chosen,
+    requirements: Sequence[Requirement],
+    found: ScheduleDesign,
+    tried: Verification | None,
+    files: Sequence[Path],
+) -> dict[str, Any]:
+    """Return everything as plain data; null for what is infinite or not defined."""
+    final = found.gains if tried is None else tried.final.gains
+    at = chosen.loop.at
+    return {
+        "loop": chosen.loop.name,
+        "parameters": chosen.name,
+        "operating_points": {"unit": at.unit, **{k: list(v) for k, v in found.points.items()}},
+        "borders": {name: chosen.par.leaves()[name] for name in scheduled(chosen.loop).borders},
+        "requirements": [one.text for one in requirements],
+        "status": found.status,
+        "gains": dict(final),
+        "gain_units": {name: unit_of(chosen, name) for name in final},
+        "regions": {
+            region: {
+                "status": one.status, "gains": dict(one.gains), "slack": number(one.slack),
+                "binding": [
+                    {"requirement": b.requirement.text, "at": b.case, "value": number(b.value),
+                     "slack": number(b.slack)}
+                    for b in one.binding
+                ],
+            }
+            for region, one in found.regions.items()
+        },
+        "across": {
+            "units": {name: kind.unit for name, kind in FIGURES.items()},
+            "cases": [_case(one, at.name) for one in found.across],
+            "worst": _case(found.worst, at.name),
+        },
+        "bench": None if tried is None else verification_object(chosen, tried),
+        "files": [str(path) for path in files],
+    }  # fmt: skip
+
+
+def _case(one: Across, name: str) -> dict[str, Any]:
+    return {name: one.at, "region": one.region, "slack": number(one.slack), **finite(one.figures)}
+
+
+def as_text(
+    chosen: Chosen,
+    requirements: Sequence[Requirement],
+    found: ScheduleDesign,
+    tried: Verification | None,
+) -> str:
+    """Return what a person wants to know, in tables."""
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import text_table
+    from bywire.report.wording import amount
+
+    at, leaves = chosen.loop.at, chosen.par.leaves()
+    borders = " and ".join(shown(leaves[one], at.unit) for one in scheduled(chosen.loop).borders)
+    parts = [
+        f"gain schedule of loop {chosen.loop.name} of {chosen.name}, borders at {at.name} = "
+        f"{borders}: linear design {found.status}",
+        _gains(chosen, found, found.gains, "linear design"),
+    ]
+    if tried is not None and tried.tuning is not None:
+        parts.append(_gains(chosen, found, tried.final.gains, "retuned on the bench"))
+    for region, one in found.regions.items():
+        where = ", ".join(shown(point, at.unit) for point in found.points[region])
+        bound = ", ".join(
+            f"{b.requirement.text} ({amount(b.value, b.requirement.unit, 3)})" for b in one.binding
+        )
+        parts.append(f"{region}, designed at {where}: {one.status}; binds: {bound}")
+        parts += [
+            f"  {c.wanted.text}: at best {amount(c.best, c.wanted.unit, 3)} with {c.kept.text}"
+            for c in one.conflicts
+        ]
+    heading = [at.name, "region", *_SEEN, "least room"]
+    rows = [
+        [
+            shown(one.at, at.unit), one.region,
+            *(amount(one.figures[name], FIGURES[name].unit, 3) for name in _SEEN),
+            f"{100.0 * one.slack:+.1f} %",
+        ]
+        for one in found.across
+    ]  # fmt: skip
+    parts.append("linear design with the gains frozen, room as a share of the limit:")
+    parts.append(table_text(text_table(heading, rows)))
+    worst = found.worst
+    parts.append(
+        f"worst at {at.name} = {shown(worst.at, at.unit)}: {100.0 * worst.slack:+.1f} % of a limit"
+    )
+    if tried is not None:
+        parts.append(verification_text(chosen, found.nominal, tried))
+    return "\n".join(parts)
+
+
+def _gains(chosen: Chosen, found: ScheduleDesign, gains: Mapping[str, float], title: str) -> str:
+    """Return a table of gains, a column for each region."""
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import text_table
+
+    regions = scheduled(chosen.loop).regions
+    cells: dict[str, dict[str, str]] = {}
+    for region, spans in regions.items():
+        for name in spans:
+            if name in gains:
+                cells.setdefault(name.rpartition(".")[2], {})[region] = gain_text(
+                    chosen, name, gains[name]
+                )
+    rows = [[name, *(row.get(region, "") for region in regions)] for name, row in cells.items()]
+    return table_text(text_table([title, *regions], rows))

@@ -1,0 +1,79 @@
+"""Options of the commands that choose gains and sizes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import (
+    At,
+    Changes,
+    JsonFlag,
+    LoopName,
+    OutFolder,
+    Parameters,
+    changes,
+    execute,
+)
+
+
+def study_command(
+    name: Annotated[
+        str, typer.Argument(help="Sizing study, see 'bywire list'.", show_default=False)
+    ],
+    parameters: Parameters = "",
+    set_: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set", metavar="KEY=VALUE", help="Change an option or a parameter, e.g. t_90=120ms."
+        ),
+    ] = None,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Compare designs of a brake at equal demands: the best, what limits it, at what price."""
+    execute("study_command", name, parameters, changes(set_), out, json)
+
+
+def design_command(
+    loop: LoopName,
+    parameters: Parameters = "",
+    at: At = "",
+    set_: Changes = None,
+    require: Annotated[
+        list[str] | None,
+        typer.Option(help="Requirement, e.g. 'bandwidth >= 10 Hz'; as often as needed."),
+    ] = None,
+    requirements: Annotated[
+        Path | None, typer.Option(help="TOML file with a section 'requirements'.")
+    ] = None,
+    over: Annotated[
+        list[str] | None,
+        typer.Option(help="Range to serve too, e.g. wedge.mu_B=0.2:0.6:5 or at=5bar:35bar:7."),
+    ] = None,
+    amplitudes: Annotated[
+        str, typer.Option(help="Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.")
+    ] = "",
+    schedule: Annotated[
+        bool,
+        typer.Option("--schedule", help="Gains by region; --at then lists points of all regions."),
+    ] = False,
+    linear_only: Annotated[
+        bool, typer.Option("--linear-only", help="Leave out the nonlinear bench.")
+    ] = False,
+    seed: Annotated[int, typer.Option(help="Seed of the searches.", min=0)] = 0,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Choose a loop's gains from requirements; exit status 1 when they cannot be met."""
+    from bywire.cli.design_inputs import Wanted
+
+    wanted = Wanted(
+        requirements, require or [], over or [], amplitudes, schedule, linear_only, seed
+    )
+    status = execute(
+        "design_command", loop, parameters, at, changes(set_), wanted, out, json
+    )  # fmt: skip
+    raise typer.Exit(status)

@@ -1,0 +1,141 @@
+"""What the nonlinear bench says of a design, in words and as a JSON object."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from bywire.analysis.design.bench_figures import BenchFigures
+from bywire.analysis.design.candidate import Candidate
+from bywire.analysis.design.requirement import FIGURES
+from bywire.analysis.design.verification import Verification
+from bywire.cli.loop_choice import Chosen
+
+_PAIRS = 6
+
+
+def verification_text(chosen: Chosen, nominal: Mapping[str, float], tried: Verification) -> str:
+    """Return tables of the linear design's figures, and of the retuned gains', on the bench.
+
+    ``nominal`` are the figures of the linear design's nominal model.
+    """
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import text_table
+    from bywire.report.wording import amount
+
+    columns = [("linear design", tried.linear)]
+    if tried.tuning is not None:
+        columns.append(("retuned", tried.tuning.best))
+    shown = [one for _, one in columns]
+    rows = _figure_rows(chosen, "", [one.figures for one in shown])
+    for label in tried.final.corners:
+        rows += _figure_rows(chosen, f" at {label}", [one.corners.get(label) for one in shown])
+    for name in ("phase_margin", "gain_margin", "disk_margin"):
+        both = [nominal, tried.nominal][: len(columns)]
+        cells = [amount(one[name], FIGURES[name].unit, 3) for one in both]
+        rows.append([f"{name}, linear model", *cells])
+    parts = [table_text(text_table(["nonlinear bench", *(c for c, _ in columns)], rows))]
+    if not tried.linear.figures.step and tried.kpis:
+        kpis = [[one.name, amount(one.value, one.unit)] for one in tried.kpis]
+        parts.append(table_text(text_table([chosen.loop.proof, "final gains"], kpis)))
+    labels = tried.final.corners
+    if labels:
+        worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
+        parts.append(
+            f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}"
+        )
+    for text, slack in tried.final.slacks.items():
+        verdict = "met" if slack >= 0.0 else "NOT met"
+        parts.append(f"on the bench: {text} {verdict} ({100.0 * slack:+.1f} % of the limit)")
+    conflict = tried.conflict()
+    if conflict is not None:
+        one, other, edge = conflict
+        middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are nearly met
+        pairs = "; ".join(f"{100 * a:+.1f} % and {100 * b:+.1f} %" for a, b in middle)
+        parts.append(f"edge between {one} and {other}, as distance from the limits: {pairs}")
+    return "\n".join(parts)
+
+
+def _figure_rows(
+    chosen: Chosen, where: str, found: list[BenchFigures | None]
+) -> list[list[str]]:
+    """Return rows of one trial: what the sines and the step show, a column for each design."""
+    from bywire.report.wording import amount
+
+    def cell(one: BenchFigures | None, k: int, name: str) -> str:
+        if one is None or not one.small:
+            return "-"
+        return amount(getattr(one.small[k], name), FIGURES[name].unit, 3)
+
+    sizes = next(([s.amplitude for s in one.small] for one in found if one and one.small), [])
+    rows = [
+        [f"{name}, sine of {amount(size, _input_unit(chosen), 3)}{where}",
+         *(cell(one, k, name) for one in found)]
+        for k, size in enumerate(sizes) for name in ("bandwidth", "phase_margin", "crossover")
+    ]  # fmt: skip
+    steps = next((tuple(one.step) for one in found if one and one.step), ())
+    for name in steps:
+        cells = [
+            amount(one.step.get(name) if one else None, FIGURES[name].unit, 3) for one in found
+        ]
+        rows.append([f"{name}, {chosen.loop.proof}{where}", *cells])
+    return rows
+
+
+def verification_object(chosen: Chosen, tried: Verification) -> dict[str, Any]:
+    """Return the same as plain data; null for what is infinite or not defined."""
+    conflict = tried.conflict()
+    return {
+        "met": tried.met,
+        "corners_looked_at": tried.corners,
+        "retuned": tried.tuning is not None,
+        "candidates": 0 if tried.tuning is None else tried.tuning.count,
+        "linear_design": _candidate(tried.linear),
+        "final": _candidate(tried.final),
+        "final_linear": finite(tried.nominal),
+        "experiment": chosen.loop.proof,
+        "kpis": {one.name: {"value": number(one.value), "unit": one.unit} for one in tried.kpis},
+        "conflict": None if conflict is None else {
+            "requirements": list(conflict[:2]),
+            "slacks": [list(pair) for pair in conflict[2]],
+        },
+    }  # fmt: skip
+
+
+def _candidate(one: Candidate) -> dict[str, Any]:
+    return {
+        "gains": dict(one.gains),
+        **_figures(one.figures),
+        "corners": {label: _figures(found) for label, found in one.corners.items()},
+        "slacks": finite(one.slacks),
+    }
+
+
+def _figures(one: BenchFigures) -> dict[str, Any]:
+    return {
+        "sines": [
+            {"amplitude": s.amplitude, "bandwidth": number(s.bandwidth),
+             "phase_margin": number(s.phase_margin), "crossover": number(s.crossover),
+             "peak": number(s.peak), "settled": s.settled}
+            for s in one.small
+        ],
+        "step": finite(one.step),
+    }  # fmt: skip
+
+
+def number(value: float) -> float | None:
+    """Return a figure, or None for what is infinite or not defined."""
+    return float(value) if math.isfinite(value) else None
+
+
+def finite(values: Mapping[str, float]) -> dict[str, float | None]:
+    """Return figures by name, None for what is infinite or not defined."""
+    return {name: number(value) for name, value in values.items()}
+
+
+def _input_unit(chosen: Chosen) -> str:
+    from bywire.core.signals import signals_of
+
+    model = chosen.loop.point(chosen.par, chosen.value).model
+    return signals_of(model.Stimulus)[chosen.loop.inputs[0]].unit

@@ -1,0 +1,253 @@
+"""Signals of different rates, instants and delays on one time axis, with a report of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.core import units
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.data.channel_quality import ChannelQuality, Stretch, quality
+from bywire.data.resampling import METHODS, resampled
+
+FLAWS = ("gaps", "missing", "clipped")
+"""what may be excluded"""
+
+_SLACK = 1e-9  # intervals: rounding of instants that are meant to be the same
+_LARGEST = 2**31  # samples
+_FASTER = 0.01  # clocks of the same nominal rate differ by less
+
+
+@dataclass(frozen=True)
+class AlignedChannel:
+    """What was found in a channel, and what was done with it.
+
+    Parameters
+    ----------
+    name
+        Name of the signal.
+    quality
+        What it is like.
+    delay
+        By how much its instants had been moved back [s].
+    excluded
+        Number of samples of the common axis that are NaN because of its flaws.
+    """
+
+    name: str
+    quality: ChannelQuality
+    delay: float
+    excluded: int
+
+
+@dataclass(frozen=True)
+class AlignmentReport:
+    """What was done to bring signals to one time axis.
+
+    Parameters
+    ----------
+    interval
+        Step of the common axis [s].
+    start, stop
+        Its first and last instant [s].
+    samples
+        How many there are.
+    method
+        How values between samples were found.
+    exclude
+        Which flaws were excluded; the others were used.
+    channels
+        What was found and done, for each signal.
+    """
+
+    interval: float
+    start: float
+    stop: float
+    samples: int
+    method: str
+    exclude: tuple[str, ...]
+    channels: tuple[AlignedChannel, ...]
+
+    @property
+    def folded(self) -> tuple[str, ...]:
+        """Signals that are faster than the axis, so that their fast content folds into slow."""
+        if self.method == "average":
+            return ()
+        limit = (1.0 + _FASTER) / self.interval
+        return tuple(one.name for one in self.channels if one.quality.rate > limit)
+
+
+@dataclass(frozen=True)
+class Aligned:
+    """Signals on one time axis, and the report of how they came there."""
+
+    dataset: xr.Dataset
+    report: AlignmentReport
+
+
+def resample(
+    measurement: xr.Dataset,
+    interval: str | float,
+    signals: Sequence[str] | None = None,
+    method: str = "linear",
+    *,
+    exclude: Iterable[str] = ("gaps", "missing"),
+    max_gap: str | float | None = None,
+) -> Aligned:
+    """Bring signals to one time axis.
+
+    The axis has its instants at whole multiples of the interval, as far as every signal reaches.
+
+    Parameters
+    ----------
+    measurement
+        What `read_measurement` returns: variables with one dimension each, instants in s.
+    interval
+        Step of the axis, text with a unit or [s].
+    signals
+        Which ones; all by default.
+    method
+        ``"linear"`` or ``"previous"`` (the value holds until the next sample) or ``"nearest"``,
+        between samples; or ``"average"``, the mean of the line through the samples over an
+        interval around each instant, which keeps fast content from folding into slow.
+    exclude
+        Flaws in which the result is NaN: ``"gaps"``, ``"missing"`` (NaN in the file),
+        ``"clipped"``. Those that are not named are used: the method bridges gaps.
+    max_gap
+        Longest pause that is no gap, text with a unit or [s]; ten median steps by default.
+
+    Returns
+    -------
+    Aligned
+        Dataset with dimension ``time``, and the report.
+
+    Raises
+    ------
+    ParameterError
+        When interval or pause is not positive, a signal has too few values, or signals do not
+        overlap.
+    UnknownNameError
+        For an unknown signal, method or flaw.
+    """
+    step = _positive(interval, "interval")
+    longest = None if max_gap is None else _positive(max_gap, "max_gap")
+    left_out = _flaws(exclude)
+    if method not in METHODS:
+        raise unknown_name("method", method, METHODS)
+    names = [str(n) for n in measurement.data_vars] if signals is None else list(signals)
+    for name in names:
+        if name not in measurement.data_vars:
+            raise unknown_name("signal", name, map(str, measurement.data_vars))
+    found = {name: _quality(measurement, name, longest) for name in names}
+    axis = _axis(found, step, method)
+    variables, channels = {}, []
+    for name, one in found.items():
+        values, excluded = _on_axis(measurement, name, one, axis, step, method, left_out)
+        variables[name] = ("time", values, dict(measurement[name].attrs))
+        delay = float(measurement[name].attrs.get("delay", 0.0))
+        channels.append(AlignedChannel(name, one, delay, excluded))
+    time = ("time", pd.Index(axis, copy=False, name="time"), {"units": "s", "long_name": "time"})
+    dataset = xr.Dataset(variables, coords={"time": time}, attrs=dict(measurement.attrs))
+    report = AlignmentReport(
+        step, float(axis[0]), float(axis[-1]), int(axis.size), method, left_out, tuple(channels)
+    )
+    return Aligned(dataset, report)
+
+
+def instants_of(measurement: xr.Dataset, name: str) -> NDArray[np.float64]:
+    """Return the instants of a signal [s]."""
+    (dim,) = measurement[name].dims
+    return np.asarray(measurement[dim].values, dtype=np.float64)
+
+
+def _positive(value: str | float, name: str) -> float:
+    number = units.parse(value, "s", name)
+    if not number > 0.0:
+        raise ParameterError(f"{name} = {value!r} is not admissible: it must be > 0 s")
+    return number
+
+
+def _flaws(exclude: Iterable[str]) -> tuple[str, ...]:
+    named = tuple(exclude)
+    for flaw in named:
+        if flaw not in FLAWS:
+            raise unknown_name("flaw", flaw, FLAWS)
+    return named
+
+
+def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> ChannelQuality:
+    signal = measurement[name]
+    if signal.ndim != 1:
+        raise ParameterError(
+            f"{name} has the dimensions {', '.join(map(str, signal.dims))}: choose one case"
+        )
+    low, high = signal.attrs.get("valid_min"), signal.attrs.get("valid_max")
+    limits = (float(low), float(high)) if low is not None and high is not None else None
+    try:
+        return quality(
+            instants_of(measurement, name), signal.values, max_gap=longest, limits=limits
+        )
+    except ValueError as error:
+        raise ParameterError(f"{name} has {error}: two at least are needed") from None
+
+
+def _axis(found: dict[str, ChannelQuality], step: float, method: str) -> NDArray[np.float64]:
+    """Return the multiples of the step that lie in all channels."""
+    margin = step / 2.0 if method == "average" else 0.0
+    if not found:
+        raise ParameterError("no signal was chosen: name one at least")
+    last_start = max(found, key=lambda name: found[name].start)
+    first_stop = min(found, key=lambda name: found[name].stop)
+    start, stop = found[last_start].start + margin, found[first_stop].stop - margin
+    first, last = math.ceil(start / step - _SLACK), math.floor(stop / step + _SLACK)
+    if last - first < 1:
+        raise ParameterError(
+            f"nothing of {step:g} s fits between the start of {last_start} at "
+            f"{found[last_start].start:g} s and the end of {first_stop} at "
+            f"{found[first_stop].stop:g} s: choose a smaller interval, or signals that overlap"
+        )
+    if last - first >= _LARGEST:
+        raise ParameterError(
+            f"interval = {step:g} s would make {last - first + 1:.3g} samples: choose a larger one"
+        )
+    return np.round(np.arange(first, last + 1) * step, 12)
+
+
+def _on_axis(
+    measurement: xr.Dataset,
+    name: str,
+    found: ChannelQuality,
+    axis: NDArray[np.float64],
+    step: float,
+    method: str,
+    left_out: tuple[str, ...],
+) -> tuple[NDArray[np.float64], int]:
+    """Return a signal on the axis, and how many of its values are NaN there."""
+    time, values = instants_of(measurement, name), measurement[name].values
+    there = ~np.isnan(values)
+    if not there.all():
+        time, values = time[there], values[there]
+    result = resampled(time, values, axis, step, method)
+    reach = step / 2.0 if method == "average" else 0.0
+    flawed = np.zeros(axis.size, dtype=bool)
+    for flaw in left_out:
+        for stretch in getattr(found, flaw):
+            flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
+    result[flawed] = np.nan
+    return result, int(flawed.sum())
+
+
+def _inside(
+    stretch: Stretch, axis: NDArray[np.float64], step: float, reach: float, *, ends: bool
+) -> slice:
+    """Return the part of the axis whose values would come from a stretch."""
+    slack = -_SLACK * step if ends else _SLACK * step  # of a gap, the samples at its ends are good
+    begin = stretch.start - reach + slack
+    end = stretch.start + stretch.length + reach - slack
+    return slice(int(np.searchsorted(axis, begin)), int(np.searchsorted(axis, end, side="right")))

@@ -1,0 +1,150 @@
+"""What a measured channel is like: rate, jitter, gaps, missing values, clipped stretches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+GAP = 10.0
+"""median steps: a longer pause is a gap, unless a length is given"""
+
+CLIPPED = 10
+"""samples in a row at the highest or lowest value: as many count as clipped, where the range of
+the sensor is not known; where it is known, one at its end does"""
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """A piece of a channel, between two instants.
+
+    Parameters
+    ----------
+    start
+        Where it begins [s].
+    length
+        How long it is [s].
+    samples
+        How many samples lie in it.
+    """
+
+    start: float
+    length: float
+    samples: int
+
+
+@dataclass(frozen=True)
+class ChannelQuality:
+    """What a channel is like.
+
+    Parameters
+    ----------
+    samples
+        How many measured values there are, NaN left out.
+    rate
+        One over the median step [Hz].
+    jitter
+        Largest distance of a step from the median step [s]; gaps left out.
+    start, stop
+        First and last measured instant [s].
+    gaps
+        Pauses that are longer than the longest allowed; from the sample before to that after.
+    missing
+        Stretches of NaN, from the measured sample before to that after.
+    clipped
+        Stretches at the end of the sensor's range, or at the highest or lowest value.
+    """
+
+    samples: int
+    rate: float
+    jitter: float
+    start: float
+    stop: float
+    gaps: tuple[Stretch, ...]
+    missing: tuple[Stretch, ...]
+    clipped: tuple[Stretch, ...]
+
+
+def quality(
+    time: NDArray[np.float64],
+    values: NDArray[np.float64],
+    *,
+    max_gap: float | None = None,
+    limits: tuple[float, float] | None = None,
+) -> ChannelQuality:
+    """Return what a channel is like.
+
+    Parameters
+    ----------
+    time
+        Increasing instants [s], shape ``(sample,)``.
+    values
+        Values, NaN where nothing was measured, shape ``(sample,)``.
+    max_gap
+        Longest pause that is no gap [s]; ``GAP`` median steps by default.
+    limits
+        Range of the sensor, in the unit of the values.
+
+    Raises
+    ------
+    ValueError
+        When fewer than two values were measured.
+    """
+    there = ~np.isnan(values)
+    missing = _missing(time, there)
+    whole = bool(there.all())
+    t, y = (time, values) if whole else (time[there], values[there])
+    if t.size < 2:
+        raise ValueError(f"{t.size} measured values")
+    steps = np.diff(t)
+    typical = float(np.median(steps))
+    longest = GAP * typical if max_gap is None else max_gap
+    is_gap = steps > longest * (1.0 + 1e-9)
+    gaps = [Stretch(float(t[k]), float(steps[k]), 0) for k in np.flatnonzero(is_gap)]
+    regular = steps[~is_gap]
+    jitter = float(np.abs(regular - typical).max()) if regular.size else 0.0
+    return ChannelQuality(
+        samples=int(t.size),
+        rate=1.0 / typical,
+        jitter=jitter,
+        start=float(t[0]),
+        stop=float(t[-1]),
+        gaps=tuple(gaps),
+        missing=tuple(missing),
+        clipped=tuple(_clipped(t, y, limits)),
+    )
+
+
+def _missing(time: NDArray[np.float64], there: NDArray[np.bool_]) -> list[Stretch]:
+    """Return the stretches of NaN between measured values."""
+    found = []
+    for first, last in _runs(~there):
+        if first > 0 and last < time.size - 1:
+            begin, end = float(time[first - 1]), float(time[last + 1])
+            found.append(Stretch(begin, end - begin, last - first + 1))
+    return found
+
+
+def _clipped(
+    time: NDArray[np.float64], values: NDArray[np.float64], limits: tuple[float, float] | None
+) -> list[Stretch]:
+    low, high = (float(values.min()), float(values.max())) if limits is None else limits
+    least = CLIPPED if limits is None else 1
+    if low == high:  # a channel that never moves says nothing of its range
+        return []
+    runs = [*_runs(values <= low), *_runs(values >= high)]
+    return [
+        Stretch(float(time[first]), float(time[last] - time[first]), last - first + 1)
+        for first, last in sorted(runs)
+        if last - first + 1 >= least
+    ]
+
+
+def _runs(flags: NDArray[np.bool_]) -> Sequence[tuple[int, int]]:
+    """Return first and last index of every run of true."""
+    if not flags.any():
+        return []
+    edges = np.flatnonzero(np.diff(flags.astype(np.int8), prepend=0, append=0))
+    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]

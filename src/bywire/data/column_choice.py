@@ -1,0 +1,227 @@
+"""Which columns of a file become which signals, with which units and instants."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError, UnitError, quoted, unknown_name
+from bywire.data.column_units import (
+    convert_in_place,
+    converted,
+    measures,
+    si_symbol,
+    split_title,
+    unit_of,
+)
+from bywire.data.file_format import Column, Source
+from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
+
+_CLOCKS = ("time", "t")
+_SHOWN = 12
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A signal to read.
+
+    Parameters
+    ----------
+    mapping
+        What its column means.
+    column
+        Name of the column.
+    clock
+        Where its instants come from; a column with its unit, or a rate.
+    unit
+        Unit of the scaled numbers.
+    symbol
+        SI unit of the signal.
+    label
+        Description.
+    """
+
+    mapping: SignalMapping
+    column: str
+    clock: Clock
+    unit: str
+    symbol: str
+    label: str
+
+    def to_si(self, values: NDArray[np.float64]) -> None:
+        """Turn numbers of the file into the signal, where they lie."""
+        factor = self.mapping.sign * (1.0 if self.mapping.scale is None else self.mapping.scale)
+        if factor != 1.0:
+            values *= factor
+        convert_in_place(values, unit_of(self.unit), self.symbol)
+        if self.mapping.offset:
+            values += self.mapping.offset
+
+    def attributes(self) -> dict[str, Any]:
+        """Return what a dataset says of the signal."""
+        found: dict[str, Any] = {
+            "units": self.symbol, "long_name": self.label, "column": self.column,
+        }  # fmt: skip
+        if self.mapping.delay:
+            found["delay"] = self.mapping.delay
+        if self.mapping.limits is not None:
+            found["valid_min"], found["valid_max"] = self.mapping.limits
+        return found
+
+
+def choose(
+    file: Path, source: Source, meaning: MeasurementMapping, signals: Sequence[str] | None
+) -> list[Chosen]:
+    """Return the signals to read.
+
+    Raises
+    ------
+    UnknownNameError
+        For a signal that the mapping or the file does not have.
+    FileError
+        For a column that is not there, or when the file does not say its instants.
+    UnitError
+        When a unit is missing, unknown or contradicts that of the file.
+    """
+    wanted = dict(meaning.signals) or _own(file, source, meaning)
+    if signals is not None:
+        for name in signals:
+            if name not in wanted:
+                raise unknown_name("signal", name, wanted)
+        wanted = {name: wanted[name] for name in signals}
+    if not wanted:
+        raise FileError(f"{file} holds no signal: {_listing(source.columns)}")
+    return [_chosen(file, source, meaning, one) for one in wanted.values()]
+
+
+def _own(file: Path, source: Source, meaning: MeasurementMapping) -> dict[str, SignalMapping]:
+    """Return every column that is no clock under its own name."""
+    clocks = {c.clock for c in source.columns.values()}
+    if meaning.clock is not None and meaning.clock.column:
+        clocks |= {meaning.clock.column}
+    elif clocks == {None} or meaning.clock is not None:
+        clocks |= {_usual_clock(source)}
+    names = [name for name in source.columns if name not in clocks]
+    return {name: SignalMapping(name, name) for name in names}
+
+
+def _chosen(
+    file: Path, source: Source, meaning: MeasurementMapping, one: SignalMapping
+) -> Chosen:
+    column = _column(file, source, one.column, f"signals.{one.name}.column")
+    clock = _clock(file, source, column, one.clock or meaning.clock)
+    unit = one.unit or column.unit
+    where = f"{file}, column {quoted(column.name)}"
+    if not unit:
+        raise UnitError(
+            f"{where}: it has no unit: write one in a mapping, as "
+            f"[signals.{one.name}] unit = 'bar', or '1' for none"
+        )
+    found = _known_unit(unit, where)
+    if one.unit and column.unit and one.scale is None:
+        _require_same(one, column, where)
+    # A unit that is SI already keeps its name, for instance Pa*s.
+    plain = float(converted(np.array([1.0]), found, si_symbol(found))[0]) == 1.0
+    keeps = plain and si_symbol(found) != "1" and unit.isascii() and unit[0].isalpha()
+    symbol = _plain(unit) if keeps else si_symbol(found)
+    label = one.label or column.label or one.name
+    return Chosen(one, column.name, clock, unit, symbol, label)
+
+
+def _plain(unit: str) -> str:
+    """Return the SI unit as the dataset writes it."""
+    return {"Nm": "N*m"}.get(unit, unit)
+
+
+def _known_unit(unit: str, where: str) -> Any:
+    try:
+        return unit_of(unit)
+    except ValueError:
+        raise UnitError(
+            f"{where}: {quoted(unit)} is no known unit: write it in a mapping, for instance "
+            "unit = 'bar', or '1' for none"
+        ) from None
+
+
+def _require_same(one: SignalMapping, column: Column, where: str) -> None:
+    """Refuse a mapping whose unit is another one than the file's."""
+    own = _known_unit(column.unit, where)
+    said = unit_of(one.unit)
+    two = np.array([1.0, 2.0])
+    if measures(own, si_symbol(said)) and np.array_equal(
+        converted(two, own, si_symbol(said)), converted(two, said, si_symbol(said))
+    ):
+        return
+    raise UnitError(
+        f"{where}: the file says {column.unit!r} and the mapping {one.unit!r}: leave "
+        f"signals.{one.name}.unit out, or give signals.{one.name}.scale, which tells how many "
+        f"{one.unit} the number 1 is"
+    )
+
+
+def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> Clock:
+    if given is not None and given.rate:
+        return given
+    if given is not None:
+        found = _column(file, source, given.column, "time.column")
+    else:
+        name = column.clock or _usual_clock(source)
+        if name is None:
+            raise FileError(
+                f"{file} does not say when it was measured: write in a mapping "
+                'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
+                + _listing(source.columns)
+            )
+        found = source.columns[name]
+    unit = (given.unit if given is not None else "") or found.unit
+    where = f"{file}, column {quoted(found.name)}"
+    if not unit:
+        raise UnitError(
+            f"{where}: the time has no unit: write in a mapping "
+            f'time = {{ column = "{found.name}", unit = "ms" }}'
+        )
+    if not measures(_known_unit(unit, where), "s"):
+        raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
+    if given is not None and given.unit and found.unit:
+        _require_same(SignalMapping("time", found.name, given.unit), found, where)
+    return Clock(found.name, unit)
+
+
+def _usual_clock(source: Source) -> str | None:
+    """Return the column that is called time or t; T in kelvin is no time."""
+    for usual in _CLOCKS:
+        for name, column in source.columns.items():
+            if name.casefold() == usual and (not column.unit or _is_time(column.unit)):
+                return name
+    return None
+
+
+def _is_time(unit: str) -> bool:
+    try:
+        return measures(unit_of(unit), "s")
+    except ValueError:
+        return False
+
+
+def _column(file: Path, source: Source, name: str, key: str) -> Column:
+    """Return a column by its name, or by its title with the unit behind it."""
+    found = source.columns.get(name) or source.columns.get(split_title(name)[0])
+    if found is not None:
+        return found
+    many = [other for other in source.columns if other.rpartition("@")[0] == name]
+    near = many or get_close_matches(name, source.columns, n=3, cutoff=0.5)
+    hint = f"is it {' or '.join(map(repr, near))}? " if near else ""
+    there = _listing(source.columns)
+    raise FileError(f"{file} has no column {quoted(name)} ({key}): {hint}{there}")
+
+
+def _listing(columns: Mapping[str, Column]) -> str:
+    names = list(columns)
+    more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+    return f"its columns are {', '.join(names[:_SHOWN])}{more}" if names else "it has no columns"

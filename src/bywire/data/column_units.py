@@ -1,0 +1,92 @@
+"""Units as measurement files write them: titles such as ``p [bar]``, and conversion to SI."""
+
+from __future__ import annotations
+
+import re
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core import units
+
+_POWER = r"[A-Za-zµμΩ°%_]+(?:(?:\*\*|\^)-?[0-9])?"
+_UNIT = re.compile(rf"(?:1|(?:1/)?{_POWER}(?:[*/· ]{_POWER})*)")
+_LONGEST = 60  # characters: no unit is longer, and the pattern stays quick on hostile text
+_SI = (
+    "1", "s", "m", "rad", "m/s", "rad/s", "N", "Pa", "N*m", "A", "V", "W", "ohm", "Hz",
+    "m/s**2", "m**2", "m**3", "m**3/s", "kg", "K",
+)  # fmt: skip
+
+
+def split_title(title: str) -> tuple[str, str]:
+    """Return name and unit of a column's title; the unit is empty where none is written.
+
+    Examples
+    --------
+    >>> split_title("p_mc [bar]"), split_title("pedal")
+    (('p_mc', 'bar'), ('pedal', ''))
+    """
+    cut = max(title.rfind("["), title.rfind("("))
+    if cut >= 0 and title[-1] in "])":
+        return title[:cut].rstrip(), title[cut + 1 : -1].strip()
+    return title, ""
+
+
+@cache
+def unit_of(text: str) -> Any:
+    """Return the unit that a text names: a product of names, nothing that is computed.
+
+    Raises
+    ------
+    ValueError
+        When it is no known unit.
+    """
+    plain = re.sub(r"(?<=N)(?=m\b)", "*", "1" if text == "-" else text)
+    if len(text) > _LONGEST or not _UNIT.fullmatch(plain):
+        raise ValueError(text)
+    try:
+        unit = unit_of_symbol(plain.replace("%", "percent").replace("·", "*").replace(" ", "*"))
+        base_of(unit)
+    except Exception:  # pint has many ways to refuse a name
+        raise ValueError(text) from None
+    return unit
+
+
+def unit_of_symbol(symbol: str) -> Any:
+    """Return the unit of a symbol that is known to be one; ``"1"`` is a pure number's."""
+    return units.registry().Unit("" if symbol == "1" else symbol)
+
+
+def base_of(unit: Any) -> Any:
+    """Return the base units; radians stay, so that rpm is no frequency in Hz."""
+    return units.registry().Quantity(1.0, unit).to_base_units().units
+
+
+@cache
+def si_symbol(unit: Any) -> str:
+    """Return the SI unit of a unit's quantity."""
+    base = base_of(unit)
+    return next((s for s in _SI if base_of(unit_of_symbol(s)) == base), f"{base:~C}")
+
+
+def measures(unit: Any, symbol: str) -> bool:
+    """Return whether a unit measures the quantity of an SI unit."""
+    return bool(base_of(unit) == base_of(unit_of_symbol(symbol)))
+
+
+def converted(values: NDArray[np.float64], unit: Any, symbol: str) -> NDArray[np.float64]:
+    """Return values in an SI unit."""
+    quantity = units.registry().Quantity(values, unit)
+    return np.asarray(quantity.to(unit_of_symbol(symbol)).magnitude)
+
+
+def convert_in_place(values: NDArray[np.float64], unit: Any, symbol: str) -> None:
+    """Turn values into an SI unit where they lie, for arrays of which there is no room for two."""
+    zero, one = converted(np.array([0.0, 1.0]), unit, symbol)
+    slope = float(f"{one - zero:.15g}")  # 0.001 for mm, and not its neighbor
+    if slope != 1.0:
+        values *= slope
+    if zero:
+        values += zero

@@ -1,0 +1,138 @@
+"""What a file format offers: how to tell it, to read columns of it, and to write it."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Progress = Callable[[str, float], None]
+"""called with a label and the finished share, 0 to 1"""
+
+
+@dataclass(frozen=True)
+class Column:
+    """A column of numbers in a file.
+
+    Parameters
+    ----------
+    name
+        What the file calls it.
+    unit
+        Its unit as the file writes it; empty where it says none.
+    length
+        How many numbers it holds; None where only reading would tell.
+    clock
+        Column that holds its instants, where the file says so.
+    label
+        Description, where the file gives one.
+    """
+
+    name: str
+    unit: str = ""
+    length: int | None = None
+    clock: str | None = None
+    label: str = ""
+
+
+class Source(Protocol):
+    """An open file of columns."""
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        """Every column of numbers by its name, clocks among them."""
+        ...
+
+    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
+        """Return the numbers of some columns, each of shape ``(row,)`` and free to be changed.
+
+        Raises
+        ------
+        FileError
+            When the file is damaged, with the place.
+        """
+        ...
+
+    def place(self, name: str, row: int) -> str:
+        """Return where a row of a column stands, as errors say it."""
+        ...
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """How to read a file that does not say it itself.
+
+    Parameters
+    ----------
+    decimal
+        Decimal mark of a text table, ``"."`` or ``","``; found out where it is empty.
+    skip_lines
+        Lines before the header of a text table.
+    """
+
+    decimal: str = ""
+    skip_lines: int = 0
+
+
+@dataclass(frozen=True)
+class FileFormat:
+    """A format of measurement files.
+
+    Parameters
+    ----------
+    name
+        What users call it.
+    title
+        What errors call a file of it, with its article.
+    endings
+        Endings of its files, in lower case with the dot.
+    recognizes
+        Tells a file by its first 1024 bytes.
+    open
+        Opens a file for reading; raises FileError for one that is damaged.
+    write
+        Writes a dataset whole to a path that is moved into place afterwards.
+    has_many_axes
+        Whether its files hold signals on different instants.
+    """
+
+    name: str
+    title: str
+    endings: tuple[str, ...]
+    recognizes: Callable[[bytes], bool]
+    open: Callable[[Path, ReadOptions], AbstractContextManager[Source]]
+    write: Callable[[xr.Dataset, Path, Progress], None]
+    has_many_axes: bool = field(default=False)
+
+
+def library(name: str, what: str) -> ModuleType:
+    """Return an optional library.
+
+    Raises
+    ------
+    FileError
+        When it is not installed; names the extra that brings it.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        raise FileError(
+            f"{what} need the library {name.partition('.')[0]}, which is not installed: "
+            "pip install 'bywire[measurements]'"
+        ) from None
+
+
+def no_progress(label: str, share: float) -> None:
+    """Show nothing."""

@@ -1,0 +1,106 @@
+"""Find the format of a measurement file, by what it holds as well as by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from pathlib import Path
+
+from bywire.core.discovery import declared, pick
+from bywire.core.errors import FileError, quoted
+from bywire.data import formats
+from bywire.data.file_format import FileFormat
+
+_HEAD = 1024
+
+
+@cache
+def all_formats() -> Mapping[str, FileFormat]:
+    """Return every format: the ``FORMAT`` of each module in ``formats``."""
+    return declared(formats, "FORMAT", FileFormat)
+
+
+def find_format(name: str) -> FileFormat:
+    """Return one format.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    return pick(all_formats(), name, "file format")
+
+
+def format_to_read(path: Path, name: str = "") -> FileFormat:
+    """Return the format in which a file is to be read.
+
+    Parameters
+    ----------
+    path
+        The file.
+    name
+        Format that the user names; else the ending decides among those that fit the content.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read, is empty, or is not what its ending or the name says.
+    UnknownNameError
+        When there is no such format.
+    """
+    wanted = [find_format(name)] if name else _of_ending(path)
+    head = _head(path)
+    if not head:
+        raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
+    holds = [one for one in all_formats().values() if one.recognizes(head)]
+    for one in wanted or holds:
+        if one in holds:
+            return one
+    if not wanted:
+        raise FileError(f"{path} holds no known format: known are {_names()}")
+    said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
+    if holds:
+        found, hint = holds[0].title, f"rename it, or say format = {holds[0].name!r}"
+    else:
+        found = f"something else (it begins with {quoted(head[:8])})"
+        hint = "export it again from the program that measured"
+    raise FileError(f"{path} holds {found}, not {wanted[0].title} as {said} says: {hint}")
+
+
+def format_to_write(path: Path, name: str = "") -> FileFormat:
+    """Return the format in which a file is to be written, by its ending or by name.
+
+    Raises
+    ------
+    FileError
+        When the ending belongs to no format.
+    UnknownNameError
+        When there is no such format.
+    """
+    if name:
+        return find_format(name)
+    for one in _of_ending(path):
+        return one
+    endings = ", ".join(dict.fromkeys(e for one in all_formats().values() for e in one.endings))
+    raise FileError(f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}")
+
+
+def _of_ending(path: Path) -> list[FileFormat]:
+    return [one for one in all_formats().values() if path.suffix.lower() in one.endings]
+
+
+def _names() -> str:
+    return ", ".join(all_formats())
+
+
+def _head(path: Path) -> bytes:
+    try:
+        if path.exists() and not path.is_file():
+            raise FileError(f"{path} is not a file: give the path of a measurement file")
+        with path.open("rb") as stream:
+            return stream.read(_HEAD)
+    except (OSError, ValueError) as error:  # ValueError: a null character in the path
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise FileError(
+            f"{path} cannot be read ({reason}): check the path and its permissions"
+        ) from None

@@ -1,0 +1,1 @@
+"""Formats of measurement files, one a module, each with its ``FORMAT``."""

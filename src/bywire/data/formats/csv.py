@@ -1,0 +1,159 @@
+"""CSV: text tables, read block by block, of which only the chosen columns are kept."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError
+from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
+from bywire.data.growing_columns import GrowingColumns
+from bywire.data.text_dialect import HEAD, Dialect, dialect_of
+from bywire.data.text_rows import strict_columns
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_BLOCK = 1 << 24  # bytes
+_ROWS = 1 << 16  # that are written at a time
+_OTHER_TEXT = (b"\xff\xfe", b"\xfe\xff")  # UTF-16: text still, and refused as such
+
+
+class TextSource:
+    """An open text table."""
+
+    def __init__(self, path: Path, dialect: Dialect) -> None:
+        self._path = path
+        self._dialect = dialect
+        self._index = _names(dialect)
+        self._width = 1
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        """Every column by its title, or by its number from 1 where it has none."""
+        return {n: Column(n, self._dialect.units[k]) for n, k in self._index.items()}
+
+    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
+        """Return the numbers of some columns; blank cells become NaN."""
+        indices = [self._index[name] for name in names]
+        size = self._path.stat().st_size
+        found = GrowingColumns(len(names), 0)
+        line, done = self._dialect.first_line, self._dialect.start
+        for block in _blocks(self._path, self._dialect.start):
+            columns = _fast(block, self._dialect, indices)
+            if columns is None:
+                columns = strict_columns(self._path, block, line, self._dialect, indices)
+            done += len(block)
+            if not found.rows:  # as many rows as bytes promise, and a hundredth more
+                expected = 1.01 * len(columns[0]) * (size - self._dialect.start) / len(block)
+                found = GrowingColumns(len(names), int(expected) + 1)
+            found.append(columns)
+            line += block.count(b"\n")
+            progress(f"reading {self._path.name}", done / max(size, 1))
+        return dict(zip(names, found.finished(), strict=True))
+
+    def place(self, name: str, row: int) -> str:
+        """Return the line of a row."""
+        seen = -1
+        with self._path.open("rb") as stream:
+            stream.seek(self._dialect.start)
+            for line, text in enumerate(stream, self._dialect.first_line):
+                seen += bool(text.strip())
+                if seen == row:
+                    return f"line {line}"
+        return f"row {row + 1}"
+
+
+def _names(dialect: Dialect) -> dict[str, int]:
+    """Return the index of every column by its name; a title that stands twice tells its number."""
+    titles = dialect.titles or ("",) * dialect.width
+    found = {}
+    for k, title in enumerate(titles):
+        plain = title or str(k + 1)
+        found[f"{plain}@{k + 1}" if titles.count(title) > 1 and title else plain] = k
+    return found
+
+
+def _blocks(path: Path, start: int) -> Iterator[bytes]:
+    """Yield the rest of a file in blocks of whole lines."""
+    with path.open("rb") as stream:
+        stream.seek(start)
+        rest = b""
+        while block := stream.read(_BLOCK):
+            block = rest + block
+            cut = block.rfind(b"\n") + 1
+            rest = block[cut:]
+            if len(rest) > HEAD:
+                raise FileError(f"{path}: a line is longer than {HEAD} bytes: is this a table?")
+            if cut:
+                yield block[:cut]
+        if rest.strip():
+            yield rest
+
+
+def _fast(
+    block: bytes, dialect: Dialect, indices: Sequence[int]
+) -> list[NDArray[np.float64]] | None:
+    """Return the columns of a block without a flaw; None where each line needs a look."""
+    import pandas as pd
+
+    lines = block.count(b"\n") + (not block.endswith(b"\n"))
+    whole = block.count(dialect.separator.encode()) == lines * (dialect.width - 1)
+    if not whole or b'"' in block or b"\0" in block:
+        return None
+    options: dict[str, Any] = {"float_precision": "round_trip"}
+    if tuple(map(int, pd.__version__.split(".")[:2])) >= (3, 1):
+        options = {}  # rounds right by default, and warns of the option
+    try:
+        frame = pd.read_csv(
+            io.BytesIO(block), header=None, sep=dialect.separator, decimal=dialect.decimal,
+            usecols=sorted(set(indices)), dtype=np.float64, keep_default_na=False,
+            na_values=["", "nan", "NaN"], engine="c", **options,
+        )  # fmt: skip
+    except (ValueError, OverflowError):  # the strict reader finds the cell, and says it better
+        return None
+    found = [frame[k].to_numpy(dtype=np.float64) for k in indices]
+    is_whole = all(len(one) == lines and not np.isinf(one).any() for one in found)
+    return found if is_whole else None
+
+
+@contextmanager
+def _open(path: Path, options: ReadOptions) -> Iterator[TextSource]:
+    with path.open("rb") as stream:
+        head = stream.read(HEAD)
+    yield TextSource(path, dialect_of(path, head, options.decimal, options.skip_lines))
+
+
+def _recognizes(head: bytes) -> bool:
+    return head.startswith(_OTHER_TEXT) or b"\0" not in head
+
+
+def write_table(dataset: xr.Dataset, path: Path, progress: Progress, separator: str) -> None:
+    """Write signals on one time axis as a text table, every number exactly."""
+    import pandas as pd
+
+    names = [str(name) for name in dataset.data_vars]
+    time = dataset["time"]
+    titles = [f"{n} [{dataset[n].attrs.get('units', '1')}]" for n in ["time", *names]]
+    with path.open("w", encoding="utf-8", newline="") as stream:
+        csv.writer(stream, delimiter=separator, lineterminator="\n").writerow(titles)
+        for begin in range(0, time.size, _ROWS):
+            part = slice(begin, begin + _ROWS)
+            values = {n: dataset[n].values[part] for n in ["time", *names]}
+            frame = pd.DataFrame(values)
+            frame.to_csv(stream, sep=separator, header=False, index=False, lineterminator="\n")
+            progress(f"writing {path.name}", min(1.0, (begin + _ROWS) / time.size))
+
+
+def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
+    write_table(dataset, path, progress, ",")
+
+
+FORMAT = FileFormat("csv", "a text table", (".csv", ".txt"), _recognizes, _open, _write)

@@ -1,0 +1,173 @@
+"""MAT files of version 7.3, and other HDF5 files: read and written by h5py, array by array."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError
+from bywire.data.declared_size import require_possible
+from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
+from bywire.data.matlab_layout import Part, columns_of, described, parts_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_VALUES = 1 << 22  # that are read at a time
+_DEEPEST, _MOST = 8, 10_000  # groups in groups; objects in a file
+_LONGEST = 1000  # characters of a text
+_USER_BLOCK = 512
+_HEADER = b"MATLAB 7.3 MAT-file, written by bywire".ljust(116) + bytes(8) + b"\x00\x02IM"
+_HDF5 = b"\x89HDF\r\n\x1a\n"
+_WHAT = "MAT files of version 7.3"
+
+
+class Mat73Source:
+    """An open HDF5 file; its groups are structs."""
+
+    def __init__(self, path: Path, file: Any) -> None:
+        self._path = path
+        self._is_matlab = file.userblock_size >= _USER_BLOCK
+        self._arrays: dict[str, Any] = {}
+        self._texts: dict[str, str] = {}
+        self._walk(file, "", 0, library("h5py", _WHAT))
+        self._parts: dict[str, Part] = {}
+        for name, array in self._arrays.items():
+            self._parts |= parts_of(name, self._shape(array))
+        columns = columns_of(self._parts, self._texts)
+        self.columns: Mapping[str, Column] = {n: self._with_unit(c) for n, c in columns.items()}
+
+    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
+        """Return the numbers of some columns."""
+        found = {}
+        for k, name in enumerate(names):
+            part = self._parts[name]
+            array = self._arrays[part.array]
+            self._require_possible(part.array, array)
+            numbers = np.empty(part.length)
+            for begin in range(0, part.length, _VALUES):
+                piece = slice(begin, min(begin + _VALUES, part.length))
+                numbers[piece] = array[self._index(array, part, piece)]
+                progress(f"reading {self._path.name}", (k + piece.stop / part.length) / len(names))
+            found[name] = numbers
+        return found
+
+    def place(self, name: str, row: int) -> str:
+        """Return the index of a value, counted from 1 as in MATLAB."""
+        return f"index {row + 1}"
+
+    def _walk(self, group: Any, prefix: str, depth: int, h5py: Any) -> None:
+        """Find arrays and texts; links are not followed, neither out of the file nor within."""
+        for name in group:
+            if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
+                continue
+            one = group[name]
+            if isinstance(one, h5py.Group):
+                if depth < _DEEPEST:
+                    self._walk(one, f"{prefix}{name}.", depth + 1, h5py)
+            elif isinstance(one, h5py.Dataset) and one.dtype.kind in "iufb" and one.shape:
+                if _attribute(one, "MATLAB_class") == "char":
+                    self._texts[f"{prefix}{name}"] = self._text(one)
+                else:
+                    self._arrays[f"{prefix}{name}"] = one
+            if len(self._arrays) + len(self._texts) > _MOST:
+                raise FileError(f"{self._path} holds more than {_MOST} arrays: choose another file")
+
+    def _text(self, array: Any) -> str:
+        if array.size > _LONGEST or array.dtype != np.uint16:
+            return ""
+        self._require_possible("a text", array)
+        codes = np.asarray(array[()]).astype("<u2").reshape(-1)
+        return codes.tobytes().decode("utf-16-le", "replace")
+
+    def _with_unit(self, column: Column) -> Column:
+        """Return a column with the unit that its array's attribute says, where no struct does."""
+        array = self._arrays[self._parts[column.name].array]
+        unit = column.unit or _attribute(array, "units") or _attribute(array, "unit")
+        label = column.label or _attribute(array, "long_name")
+        return Column(column.name, unit, column.length, column.clock, label)
+
+    def _shape(self, array: Any) -> tuple[int, ...]:
+        """Return the shape in MATLAB, which counts the other way round."""
+        return tuple(array.shape[::-1]) if self._is_matlab else tuple(array.shape)
+
+    def _index(self, array: Any, part: Part, piece: slice) -> tuple[Any, ...]:
+        if part.index is not None:
+            return (part.index, piece) if self._is_matlab else (piece, part.index)
+        long = max(range(array.ndim), key=lambda axis: array.shape[axis])
+        return tuple(piece if axis == long else 0 for axis in range(array.ndim))
+
+    def _require_possible(self, name: str, array: Any) -> None:
+        if array.is_virtual or array.external:
+            raise FileError(
+                f"{self._path}: {name!r} lies in other files, which are not opened: save it whole"
+            )
+        declared = max(array.nbytes, math.prod(array.chunks or (0,)) * array.dtype.itemsize)
+        require_possible(self._path, repr(name), declared, array.id.get_storage_size())
+
+
+def _attribute(one: Any, name: str) -> str:
+    """Return a short text that is an attribute; nothing where it is something else."""
+    if name not in one.attrs or math.prod(one.attrs.get_id(name).shape or ()) > 1:
+        return ""
+    value = one.attrs[name]
+    text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
+    return str(text)[:_LONGEST] if isinstance(text, str) else ""
+
+
+@contextmanager
+def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
+    h5py = library("h5py", _WHAT)
+    try:
+        with h5py.File(path, "r") as file:
+            yield Mat73Source(path, file)
+    # The library tells a damaged file by any of these, depending on what is damaged.
+    except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise FileError(
+            f"{path} is a damaged HDF5 file ({reason}): copy or save it again"
+        ) from None
+
+
+def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
+    h5py = library("h5py", _WHAT)
+    texts = described(dataset, path)
+    with h5py.File(path, "w", userblock_size=_USER_BLOCK) as file:
+        for k, (name, variable) in enumerate(dataset.variables.items()):
+            numbers = np.asarray(variable.values, dtype=np.float64).reshape(1, -1)
+            made = file.create_dataset(str(name), data=numbers, compression="gzip", shuffle=True,
+                                       compression_opts=1)  # fmt: skip
+            made.attrs["MATLAB_class"] = np.bytes_("double")
+            progress(f"writing {path.name}", (k + 1) / len(dataset.variables))
+        for struct, fields in texts.items():
+            group = file.create_group(struct)
+            group.attrs["MATLAB_class"] = np.bytes_("struct")
+            for name, text in fields.items():
+                codes = np.frombuffer(text.encode("utf-16-le"), dtype="<u2").reshape(-1, 1)
+                _write_text(group, name, text, codes)
+    with path.open("r+b") as stream:
+        stream.write(_HEADER)
+
+
+def _write_text(group: Any, name: str, text: str, codes: NDArray[np.uint16]) -> None:
+    """Write a text as MATLAB does: one number for each character, in a column."""
+    if not text:
+        made = group.create_dataset(name, data=np.array([0, 0], dtype=np.uint64))
+        made.attrs["MATLAB_empty"] = np.uint8(1)
+    else:
+        made = group.create_dataset(name, data=codes)
+        made.attrs["MATLAB_int_decode"] = np.int32(2)
+    made.attrs["MATLAB_class"] = np.bytes_("char")
+
+
+FORMAT = FileFormat(
+    "mat73", "an HDF5 file", (".mat", ".h5", ".hdf5"),
+    lambda head: head[:8] == _HDF5 or head[512:520] == _HDF5,
+    _open, _write, has_many_axes=True,
+)  # fmt: skip

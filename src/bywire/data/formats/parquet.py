@@ -1,0 +1,145 @@
+"""Parquet: tables by columns; only the chosen ones are read, a batch of rows at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError
+from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_ROWS = 1 << 17  # that are read or written at a time
+_LARGEST_FOOTER = 100 * 2**20  # bytes: of text in the file's description
+_UNIT, _LABEL = b"unit", b"label"
+_WHAT = "Parquet files"
+
+
+class ParquetSource:
+    """An open Parquet file."""
+
+    def __init__(self, path: Path, file: Any) -> None:
+        self._path = path
+        self._file = file
+        self.columns = _columns(file)
+        kinds = {one.name: str(one.type) for one in file.schema_arrow}
+        self._instants = {name for name, kind in kinds.items() if kind.startswith("timestamp")}
+        self._origins: dict[str, int] = {}
+
+    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
+        """Return the numbers of some columns; null becomes NaN."""
+        rows = self._file.metadata.num_rows
+        found = {name: np.empty(rows) for name in names}
+        begin = 0
+        try:
+            for batch in self._file.iter_batches(batch_size=_ROWS, columns=list(names)):
+                end = begin + batch.num_rows
+                if end > rows:
+                    raise FileError(f"{self._path} holds more rows than the {rows} that it says")
+                for name in names:
+                    found[name][begin:end] = self._numbers(name, batch.column(name))
+                begin = end
+                progress(f"reading {self._path.name}", end / rows)
+        except FileError:
+            raise
+        except Exception as error:  # Arrow has an error class of its own for every layer
+            raise _damaged(self._path, error) from None
+        if begin != rows:
+            raise FileError(f"{self._path} holds {begin} rows and says {rows}: it is damaged")
+        return found
+
+    def place(self, name: str, row: int) -> str:
+        """Return the row, counted from 0 as pandas does."""
+        return f"row {row}"
+
+    def _numbers(self, name: str, column: Any) -> NDArray[Any]:
+        """Return the numbers of a batch; instants as counts of their unit from the first one."""
+        import pyarrow as pa
+        import pyarrow.compute as pc
+
+        if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
+            column = column.cast(pa.int64())
+        if name in self._instants and column.null_count < len(column):
+            # Since 1970 they are so many nanoseconds that a number would lose the last digits.
+            first = self._origins.setdefault(name, column.drop_null()[0].as_py())
+            column = pc.subtract(column, first)
+        if column.null_count:
+            column = column.cast(pa.float64(), safe=False)
+        return np.asarray(column.to_numpy(zero_copy_only=False))
+
+
+def _columns(file: Any) -> Mapping[str, Column]:
+    import pyarrow as pa
+
+    found = {}
+    names = list(file.schema_arrow.names)
+    for one in file.schema_arrow:
+        kind = one.type
+        is_clock = pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
+        is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
+        if names.count(one.name) > 1 or not (is_number or is_clock or pa.types.is_boolean(kind)):
+            continue
+        notes = one.metadata or {}
+        unit = kind.unit if is_clock else notes.get(_UNIT, b"").decode("utf-8", "replace")
+        label = notes.get(_LABEL, b"").decode("utf-8", "replace")
+        found[one.name] = Column(one.name, unit, file.metadata.num_rows, None, label)
+    return found
+
+
+def _damaged(path: Path, error: Exception) -> FileError:
+    reason = " ".join(str(error).split())[:200]
+    return FileError(f"{path} is a damaged Parquet file ({reason}): copy or export it again")
+
+
+@contextmanager
+def _open(path: Path, options: ReadOptions) -> Iterator[ParquetSource]:
+    parquet = library("pyarrow.parquet", _WHAT)
+    try:
+        file = parquet.ParquetFile(
+            path, buffer_size=1 << 20, pre_buffer=False, page_checksum_verification=True,
+            thrift_string_size_limit=_LARGEST_FOOTER,
+        )  # fmt: skip
+        source = ParquetSource(path, file)
+    except Exception as error:  # Arrow has an error class of its own for every layer
+        raise _damaged(path, error) from None
+    with file:
+        yield source
+
+
+def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
+    pa, parquet = library("pyarrow", _WHAT), library("pyarrow.parquet", _WHAT)
+    names = ["time", *map(str, dataset.data_vars)]
+    fields = [
+        pa.field(n, pa.from_numpy_dtype(dataset[n].dtype), metadata=_notes(dataset[n].attrs))
+        for n in names
+    ]
+    schema = pa.schema(fields)
+    size = dataset["time"].size
+    with parquet.ParquetWriter(
+        path, schema, write_page_checksum=True, use_dictionary=False
+    ) as writer:
+        for begin in range(0, size, _ROWS):
+            part = slice(begin, begin + _ROWS)
+            arrays = [pa.array(dataset[n].values[part]) for n in names]
+            writer.write_batch(pa.record_batch(arrays, schema=schema))
+            progress(f"writing {path.name}", min(1.0, (begin + _ROWS) / size))
+
+
+def _notes(attributes: Mapping[str, Any]) -> dict[bytes, bytes]:
+    return {
+        _UNIT: str(attributes.get("units", "1")).encode(),
+        _LABEL: str(attributes.get("long_name", "")).encode(),
+    }
+
+
+FORMAT = FileFormat(
+    "parquet", "a Parquet file", (".parquet", ".pq"),
+    lambda head: head[:4] == b"PAR1", _open, _write,
+)  # fmt: skip

@@ -1,0 +1,154 @@
+"""The lag between two measured signals, by correlation, to a fraction of a sample."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.core import units
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.data.alignment import resample
+
+_LEAST = 8  # samples in which two shifted signals must overlap to be compared
+
+
+@dataclass(frozen=True)
+class Lag:
+    """By how much one signal follows another.
+
+    Parameters
+    ----------
+    value
+        How much later the second signal shows what the first showed [s].
+    correlation
+        Correlation coefficient at that lag, -1 to 1; negative for signals of opposite sign.
+    at_limit
+        Whether the lag lies at the end of the range that was searched, and so is none.
+    """
+
+    value: float
+    correlation: float
+    at_limit: bool
+
+
+def estimate_lag(
+    measurement: xr.Dataset,
+    first: str,
+    second: str,
+    *,
+    largest: str | float = 0.1,
+    interval: str | float | None = None,
+) -> Lag:
+    """Estimate the lag of a signal behind another from what both measured.
+
+    The correlation coefficient over the overlap is taken at every whole sample; its highest
+    magnitude is then refined between samples, with a cubic spline through the second signal.
+
+    Parameters
+    ----------
+    measurement
+        What `read_measurement` returns.
+    first, second
+        Names of two signals of the same event.
+    largest
+        Largest lag to search for in both directions, text with a unit or [s].
+    interval
+        Step at which they are compared, text with a unit or [s]; by default that of the one
+        with fewer samples.
+
+    Raises
+    ------
+    ParameterError
+        When a signal does not move, has gaps, or the overlap is too short for such a lag.
+    UnknownNameError
+        For an unknown signal.
+
+    Notes
+    -----
+    A first-order difference in how the two sensors respond counts as lag too. To undo a lag
+    that was found, give it as ``delay`` in the mapping of the second signal.
+    """
+    reach = units.parse(largest, "s", "largest")
+    if interval is None:
+        aligned = resample(measurement, _coarsest(measurement, first, second), [first, second])
+    else:
+        aligned = resample(measurement, interval, [first, second])
+    step = aligned.report.interval
+    a, b = (aligned.dataset[name].values for name in (first, second))
+    for name, values in ((first, a), (second, b)):
+        if np.isnan(values).any():
+            raise ParameterError(
+                f"{name} has gaps or missing values: choose a piece without them, for instance "
+                "measurement.sel(time=slice(0, 10))"
+            )
+        if np.ptp(values) == 0.0:
+            raise ParameterError(f"{name} does not move: a lag cannot be seen in it")
+    most = int(np.ceil(reach / step))
+    if not most >= 1 or a.size - most < _LEAST:
+        raise ParameterError(
+            f"largest = {reach:g} s is not admissible: it must be at least a step, {step:g} s, and "
+            f"leave an overlap of {_LEAST} steps in {a.size * step:g} s"
+        )
+    rough = _coefficients(a, b, most)
+    k = int(np.argmax(np.abs(rough)))
+    shift, coefficient = _refined(a, b, k - most, float(np.sign(rough[k])))
+    return Lag(shift * step, coefficient, k in (0, 2 * most))
+
+
+def _coarsest(measurement: xr.Dataset, first: str, second: str) -> float:
+    """Return the longer of the median steps of two signals [s]."""
+    steps = []
+    for name in (first, second):
+        if name not in measurement.data_vars:
+            raise unknown_name("signal", name, map(str, measurement.data_vars))
+        (dim,) = measurement[name].dims
+        steps.append(float(np.median(np.diff(measurement[dim].values))))
+    return max(steps)
+
+
+def _coefficients(
+    a: NDArray[np.float64], b: NDArray[np.float64], most: int
+) -> NDArray[np.float64]:
+    """Return the correlation coefficients over the overlap at shifts of -most to most samples."""
+    from scipy.signal import correlate
+
+    a, b = a - a.mean(), b - b.mean()
+    n = a.size
+    middle = slice(n - 1 - most, n + most)
+    ones = np.ones(n)
+
+    def summed(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Sum of y[i + shift] x[i] over the overlap."""
+        return np.asarray(correlate(y, x, mode="full", method="fft"))[middle]
+
+    count = n - np.abs(np.arange(-most, most + 1))
+    sum_a, sum_b = summed(a, ones), summed(ones, b)
+    var_a = summed(a**2, ones) - sum_a**2 / count
+    var_b = summed(ones, b**2) - sum_b**2 / count
+    floor = 1e-12 * max(float((a**2).sum()), 1e-300) * max(float((b**2).sum()), 1e-300)
+    product = np.maximum(var_a * var_b, floor)
+    return np.asarray((summed(a, b) - sum_a * sum_b / count) / np.sqrt(product))
+
+
+def _refined(
+    a: NDArray[np.float64], b: NDArray[np.float64], shift: int, sign: float
+) -> tuple[float, float]:
+    """Return shift in samples and coefficient at the highest point around a whole shift."""
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import minimize_scalar
+
+    n = a.size
+    spline = CubicSpline(np.arange(n), b)
+    first, last = max(0, 1 - shift), min(n, n - 1 - shift)
+    index = np.arange(first, last)
+
+    def loss(s: float) -> float:
+        return -sign * float(np.corrcoef(a[index], spline(index + s))[0, 1])
+
+    found = minimize_scalar(
+        loss, bounds=(shift - 1.0, shift + 1.0), method="bounded", options={"xatol": 1e-6}
+    )
+    return float(found.x), -sign * float(found.fun)

@@ -1,0 +1,179 @@
+"""Measurement files as datasets in SI: every signal on the instants at which it was measured.
+
+Signals that were measured at the same instants share a dimension. The dimension of most signals
+is ``time``; others have ``time_NAME``, with the name of their first signal. Nothing is resampled
+here: `bywire.data.alignment.resample` brings signals to one time axis, and says what it did.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError, InputError, ParameterError, quoted
+from bywire.data.column_choice import Chosen, choose
+from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
+from bywire.data.format_registry import format_to_read
+from bywire.data.mapping import MeasurementMapping
+from bywire.data.mapping_file import read_mapping
+from bywire.data.mapping_tables import mapping_from
+from bywire.data.time_axis import AxisKey, instants
+
+LARGEST = 8 * 2**30
+"""bytes of numbers that are read at most, unless more is asked for"""
+
+
+def read_measurement(
+    path: str | Path,
+    mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None = None,
+    *,
+    signals: Sequence[str] | None = None,
+    progress: Progress = no_progress,
+    largest: int = LARGEST,
+) -> xr.Dataset:
+    """Read a measurement file.
+
+    Parameters
+    ----------
+    path
+        CSV, TSV, Parquet, MAT (5 or 7.3), ASAM MDF 4 or NetCDF file.
+    mapping
+        What its columns mean: a mapping, its tables, or the path of a mapping file. Without it
+        every column is read under its own name; the file then has to say units and instants.
+    signals
+        Names of the signals to read; all of the mapping by default.
+    progress
+        Called with a label and the finished share.
+    largest
+        Most bytes of numbers to read; more is refused before anything is read. Of a text table
+        only reading tells how many there are.
+
+    Returns
+    -------
+    xarray.Dataset
+        Variables of shape ``(time,)``, or ``(time_NAME,)`` for signals on other instants, with
+        ``units`` (SI), ``long_name``, ``column`` and, where known, ``delay`` [s], ``valid_min``
+        and ``valid_max``; attributes ``source`` and ``format``. What was not measured is NaN.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read, is damaged, or is not what its name says.
+    UnknownNameError
+        For a column, signal or format that is not there, with the nearest.
+    UnitError
+        When a unit is missing, unknown or contradicts that of the file.
+    ParameterError
+        When an entry of the mapping is not admissible.
+    """
+    file = Path(path)
+    meaning = _mapping(mapping)
+    kind = format_to_read(file, meaning.format)
+    try:
+        with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as source:
+            chosen = choose(file, source, meaning, signals)
+            _require_room(file, source, chosen, largest)
+            dataset = _dataset(file, source, chosen, progress)
+    except InputError:
+        raise
+    except MemoryError:
+        raise FileError(f"{file} does not fit into memory: read fewer signals at a time") from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(f"{file} cannot be read ({reason}): it may be damaged or cut") from None
+    dataset.attrs = {"source": file.name, "format": kind.name}
+    return dataset
+
+
+def _mapping(
+    mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None,
+) -> MeasurementMapping:
+    if isinstance(mapping, MeasurementMapping):
+        return mapping
+    if isinstance(mapping, Mapping):
+        return mapping_from(mapping)
+    return MeasurementMapping() if mapping is None else read_mapping(mapping)
+
+
+def _require_room(
+    file: Path, source: Source, chosen: Sequence[Chosen], largest: int
+) -> None:
+    """Refuse what would not fit, before anything is read."""
+    names = {c.column for c in chosen} | {c.clock.column for c in chosen if c.clock.column}
+    size = 8 * sum(source.columns[name].length or 0 for name in names)
+    if size > largest:
+        raise FileError(
+            f"{file} says that it holds {size / 2**30:.3g} GiB of numbers in {len(names)} columns, "
+            f"and {largest / 2**30:.3g} GiB are read at most: choose fewer signals, or check the "
+            "file where it is much smaller"
+        )
+
+
+def _dataset(
+    file: Path, source: Source, chosen: Sequence[Chosen], progress: Progress
+) -> xr.Dataset:
+    clocks = [c.clock.column for c in chosen if c.clock.column]
+    names = list(dict.fromkeys([*clocks, *(c.column for c in chosen)]))
+    values = source.read(names, progress)
+    keys = [AxisKey(c.clock, len(values[c.column]), c.mapping.delay) for c in chosen]
+    dims = _dimensions(chosen, keys)
+    # Numbers are turned into SI where they lie, unless they are needed once more as they are.
+    uses = Counter([c.column for c in chosen] + [k.clock.column for k in dims])
+    axes = {}
+    for key in dims:
+        column = _taken(values, uses, key.clock.column) if key.clock.column else None
+        axes[key] = instants(file, source, key, column)
+    variables = {}
+    for one, key in zip(chosen, keys, strict=True):
+        numbers = _timed(file, one, _taken(values, uses, one.column), axes[key].size)
+        one.to_si(numbers)
+        variables[one.mapping.name] = (dims[key], numbers, one.attributes())
+    # Indexes of pandas that share the array: from the array, xarray would copy it.
+    coords: dict[str, Any] = {
+        dims[key]: (dims[key], pd.Index(axis, copy=False, name=dims[key]),
+                    {"units": "s", "long_name": "time"})
+        for key, axis in axes.items()
+    }  # fmt: skip
+    return xr.Dataset(variables, coords=coords)
+
+
+def _taken(
+    values: dict[str, NDArray[np.float64]], uses: Counter[str], name: str
+) -> NDArray[np.float64]:
+    """Return numbers that may be changed: themselves at their last use, before that a copy."""
+    uses[name] -= 1
+    return values[name].copy() if uses[name] else values.pop(name)
+
+
+def _timed(
+    file: Path, one: Chosen, numbers: NDArray[np.float64], count: int
+) -> NDArray[np.float64]:
+    """Return the numbers that have instants; those behind a shorter clock must be blank."""
+    if not np.isnan(numbers[count:]).all():
+        raise FileError(
+            f"{file}, column {one.column!r}: it has numbers after the last instant of "
+            f"{one.clock.column!r}: give the signal its own time in a mapping"
+        )
+    return numbers[:count]
+
+
+def _dimensions(chosen: Sequence[Chosen], keys: Sequence[AxisKey]) -> dict[AxisKey, str]:
+    """Return the dimension of every time axis; that of most signals is ``time``."""
+    main = Counter(keys).most_common(1)[0][0]
+    found: dict[AxisKey, str] = {main: "time"}
+    for one, key in zip(chosen, keys, strict=True):
+        found.setdefault(key, f"time_{one.mapping.name}")
+    for one in chosen:
+        if one.mapping.name in found.values():
+            raise ParameterError(
+                f"signal {quoted(one.mapping.name)} has the name of the instants of signals: give "
+                "it another one in a mapping"
+            )
+    return found

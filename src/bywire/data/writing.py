@@ -1,0 +1,131 @@
+"""Datasets of signals to measurement files, whole or not at all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import secrets
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from bywire.core.errors import FileError, InputError
+from bywire.data.file_format import FileFormat, Progress, no_progress
+from bywire.data.format_registry import format_to_write
+
+
+def write_measurement(
+    dataset: xr.Dataset,
+    path: str | Path,
+    *,
+    format: str = "",
+    overwrite: bool = False,
+    progress: Progress = no_progress,
+) -> Path:
+    """Write signals as a measurement file, in SI, every number exactly.
+
+    Parameters
+    ----------
+    dataset
+        Variables with one dimension each, whose coordinate holds the instants [s]; ``units``
+        are SI, a pure number's where there are none.
+    path
+        Where to; the ending chooses the format.
+    format
+        Name of the format, in place of the ending's: ``"mat73"`` for MAT 7.3.
+    overwrite
+        Whether a file that is there may be replaced.
+    progress
+        Called with a label and the finished share.
+
+    Returns
+    -------
+    pathlib.Path
+        The file; it appears when it is complete.
+
+    Raises
+    ------
+    FileError
+        When the format cannot hold the signals, a file is there already, or it cannot be
+        written.
+    UnknownNameError
+        When there is no such format.
+    """
+    target = Path(path)
+    kind = format_to_write(target, format)
+    require_free(target, overwrite=overwrite)
+    _require_fit(dataset, target, kind)
+    ready = _with_units(dataset)
+    # The ending stays: some libraries append their own to a file without it.
+    scratch = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
+    try:
+        kind.write(ready, scratch, progress)
+        os.replace(scratch, target)
+    except InputError:
+        raise
+    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(
+            f"cannot write {target}: {reason}: choose a folder that you may write to"
+        ) from None
+    finally:
+        with contextlib.suppress(OSError, ValueError):
+            scratch.unlink(missing_ok=True)
+    return target
+
+
+def _with_units(dataset: xr.Dataset) -> xr.Dataset:
+    """Return a dataset in which every signal and its instants have a unit."""
+    ready = dataset.copy()
+    for name, signal in ready.data_vars.items():
+        ready[name].attrs.setdefault("units", "1")
+        ready[signal.dims[0]].attrs.setdefault("units", "s")
+    return ready
+
+
+def require_free(target: Path, *, overwrite: bool) -> None:
+    """Refuse a path where there is something already, unless it may be replaced.
+
+    Raises
+    ------
+    FileError
+        When there is a file that may not be replaced, or a folder; when its folder is not
+        there.
+    """
+    with contextlib.suppress(OSError, ValueError):  # writing to it will say what is wrong
+        if target.is_dir():
+            raise FileError(f"{target} is a folder: name a file in it")
+        if target.exists() and not overwrite:
+            raise FileError(f"{target} is there already: name another file, or use --force")
+        if not target.parent.is_dir():
+            raise FileError(f"cannot write {target}: there is no folder {target.parent}: make it")
+
+
+def _require_fit(dataset: xr.Dataset, target: Path, kind: FileFormat) -> None:
+    if not dataset.data_vars:
+        raise FileError(f"cannot write {target}: there is no signal")
+    for name, signal in dataset.data_vars.items():
+        if signal.ndim != 1 or signal.dims[0] not in dataset.coords:
+            dims = ", ".join(map(str, signal.dims)) or "none"
+            raise FileError(
+                f"cannot write {target}: {name} has the dimensions {dims}: a measurement file "
+                "holds signals over time; choose one case of each"
+            )
+        if not np.issubdtype(signal.dtype, np.number) and signal.dtype != np.bool_:
+            raise FileError(f"cannot write {target}: {name} holds {signal.dtype}, no numbers")
+        unit = dataset[signal.dims[0]].attrs.get("units", "s")
+        if unit != "s":
+            raise FileError(f"cannot write {target}: the instants of {name} are in {unit!r}, not s")
+    axes = sorted({str(signal.dims[0]) for signal in dataset.data_vars.values()})
+    if kind.has_many_axes or axes == ["time"]:
+        return
+    if len(axes) == 1:
+        raise FileError(
+            f"cannot write {target}: the signals' dimension is {axes[0]!r}: rename it 'time'"
+        )
+    raise FileError(
+        f"cannot write {target}: the signals were measured at different instants "
+        f"({', '.join(axes)}), and a {kind.name} file has one time: bring them to one time axis "
+        "(bywire convert --rate, or resample), or write mat, mdf4 or netcdf"
+    )

@@ -1,0 +1,80 @@
+"""How the curves of a loop look over a range: by value, the worst one emphasized and named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import Normalize
+from matplotlib.figure import Figure
+
+from bywire.analysis.loop_curves import Family, LoopCurve
+from bywire.report import style
+from bywire.report.channel import FloatArray
+from bywire.report.wording import amount, in_display_unit
+
+Points = Callable[[LoopCurve], tuple[FloatArray, FloatArray]]
+_COLORS = "cividis"  # made for any kind of color vision
+_BRIGHTEST = 0.9  # of the color map: what is brighter cannot be seen on white
+
+
+def draw_family(
+    axes: Axes, family: Family, points: Points, *, stable_only: bool = False, label: str = ""
+) -> None:
+    """Draw one line per curve; unstable loops dashed, the worst one on top with its value.
+
+    Parameters
+    ----------
+    axes
+        Where to draw.
+    family
+        Curves.
+    points
+        Abscissa and ordinate of a curve.
+    stable_only
+        Leave out unstable loops, for quantities that mean nothing there.
+    label
+        What the legend calls a single curve.
+    """
+    for k, curve in enumerate(family.curves):
+        stable = curve.margins.stable
+        if stable_only and not stable:
+            continue
+        top = k == family.worst
+        color = style.BLUE if not family.name else style.VERMILLION if top else _color(family, k)
+        axes.plot(
+            *points(curve), color=color, linestyle="-" if stable else "--",
+            linewidth=1.8 if top else 0.9, zorder=3.5 if top else 3.0,
+            label=_name(family, label) if top else "_",
+        )  # fmt: skip
+
+
+def value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
+    """Put the scale of the varied parameter beside the panels; nothing for a single curve."""
+    if not family.name or len(family.curves) < 2:
+        return
+    factor, _ = in_display_unit(1.0, family.unit)
+    colors = mpl.colormaps[_COLORS].resampled(256)
+    shown = mpl.colors.ListedColormap(colors(np.linspace(0.0, _BRIGHTEST, 256)))
+    norm = Normalize(factor * min(family.values), factor * max(family.values))
+    bar = figure.colorbar(ScalarMappable(norm, shown), ax=panels, aspect=40, pad=0.02)
+    bar.ax.tick_params(labelsize=style.TEXT_SIZE)
+    bar.set_label(style.axis_label(family.name, family.unit), fontsize=style.TEXT_SIZE)
+
+
+def _name(family: Family, label: str) -> str:
+    curve = family.curves[family.worst]
+    state = "" if curve.margins.stable else "unstable"
+    if not family.name:
+        return style.plain(f"{label}, {state}" if state else label)
+    value = amount(family.values[family.worst], family.unit, 3)
+    return style.plain(f"worst: {family.name} = {value}" + (f", {state}" if state else ""))
+
+
+def _color(family: Family, k: int) -> tuple[float, float, float, float]:
+    low, high = min(family.values), max(family.values)
+    share = (family.values[k] - low) / (high - low) if high > low else 0.0
+    return mpl.colormaps[_COLORS](_BRIGHTEST * share)

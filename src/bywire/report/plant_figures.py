@@ -1,0 +1,60 @@
+"""Figures of a plant's linear models: the frequency response of every output."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from bywire.analysis.linear_model import LinearModel
+from bywire.core.quantities import display_unit
+from bywire.core.units import convert
+from bywire.report.bode import Response, bode
+from bywire.report.files import save_figure
+from bywire.report.wording import unit_text
+
+_POINTS = 400
+_DECADES = 3.0
+_APART = 16  # of the points that show a model beside the first one
+
+
+def write_figures(
+    out: Path, name: str, models: Mapping[str, LinearModel], band: float
+) -> list[Path]:
+    """Write a figure for every output that answers the first input, and return the files.
+
+    Parameters
+    ----------
+    out
+        Folder.
+    name
+        What the files' names begin with.
+    models
+        Label -> model, of the same inputs and outputs.
+    band
+        End of the frequencies [Hz].
+
+    Raises
+    ------
+    FileError
+        When a file cannot be written.
+    """
+    f = np.geomspace(band * 10.0**-_DECADES, band, _POINTS)
+    first = next(iter(models.values()))
+    values = {label: model.response(f) for label, model in models.items()}
+    taken, files = first.input_units[0], []
+    for row, (signal, given) in enumerate(zip(first.outputs, first.output_units, strict=True)):
+        if not any(np.any(one[:, row, 0]) for one in values.values()):
+            continue
+        shown = display_unit(given)
+        scale = convert(1.0, given, shown) / convert(1.0, taken, display_unit(taken))
+        unit = f"{unit_text(shown) or '1'}/{unit_text(display_unit(taken)) or '1'}"
+        lines = []
+        for k, (label, one) in enumerate(values.items()):
+            # Points on top of a line: models that agree would hide each other.
+            some = slice(None) if k == 0 else slice(k * _APART // 2, None, _APART)
+            path = f"{label}, {signal} by {first.inputs[0]}"
+            lines.append(Response(path, f[some], scale * one[some, row, 0], measured=k > 0))
+        files.append(save_figure(bode(lines, gain_unit=unit), out / f"{name}-{signal}.png"))
+    return files

@@ -1,0 +1,182 @@
+"""Files that are cut, flipped or made to exhaust the reader: they read, or one error says why."""
+
+import struct
+import zlib
+
+import numpy as np
+import pytest
+from measurement_files import FORMATS, NEEDS, file_of, measurement
+from scipy.io import savemat
+
+from bywire.core.errors import FileError, InputError
+from bywire.data.measurement import read_measurement
+
+CUTS, FLIPS = 20, 50
+HUGE = 10**15
+
+
+@pytest.fixture(params=list(FORMATS))
+def name(request):
+    if request.param in NEEDS:
+        pytest.importorskip(NEEDS[request.param])
+    return request.param
+
+
+def outcomes(path, contents):
+    """Return how often contents of a file were read, and the errors of the others."""
+    read, errors = 0, []
+    for content in contents:
+        path.write_bytes(content)
+        try:
+            read_measurement(path)
+            read += 1
+        except InputError as error:
+            errors.append(str(error))
+    return read, errors
+
+
+def test_cut_files(tmp_path, name):
+    path = file_of(tmp_path, name, measurement(60))
+    whole = path.read_bytes()
+    read, errors = outcomes(path, [whole[: k * len(whole) // CUTS] for k in range(CUTS)])
+    assert read <= (CUTS // 2 if name in ("csv", "tsv") else 1)  # a row may end at the cut
+    assert all(str(path) in error for error in errors)
+    assert "is empty (0 bytes)" in errors[0]
+
+
+def test_flipped_bytes(tmp_path, name):
+    path = file_of(tmp_path, name, measurement(60))
+    whole = path.read_bytes()
+    rng = np.random.default_rng(11)
+    contents = []
+    for k in range(FLIPS):
+        content = bytearray(whole)
+        reach = min(2048, len(whole)) if k % 2 else len(whole)
+        content[int(rng.integers(reach))] ^= int(rng.integers(1, 256))
+        contents.append(bytes(content))
+    _, errors = outcomes(path, contents)
+    assert errors
+    assert all(str(path) in error and "\n" not in error for error in errors)
+
+
+@pytest.mark.parametrize("ending", [".csv", ".parquet", ".mat", ".mf4", ".nc"])
+def test_noise(tmp_path, ending):
+    path = tmp_path / f"noise{ending}"
+    path.write_bytes(np.random.default_rng(0).bytes(4000))
+    with pytest.raises(FileError, match="holds something else"):
+        read_measurement(path)
+
+
+def mat_element(shape, data, flags=6):
+    """Return the content of an array element of a MAT file."""
+    head = struct.pack("<IIII", 6, 8, flags, 0) + struct.pack("<IIii", 5, 8, *shape)
+    return head + struct.pack("<II", 0x10001, ord("y")) + data
+
+
+def mat_file(path, element, kind=14, declared=None):
+    """Write a MAT file of one element."""
+    size = len(element) if declared is None else declared
+    header = b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM"
+    path.write_bytes(header + struct.pack("<II", kind, size) + element)
+    return path
+
+
+def test_mat_elements_that_lie(tmp_path):
+    path = tmp_path / "a.mat"
+    numbers = struct.pack("<II", 9, 16) + bytes(16)
+    lies = [
+        mat_element((1, 2**30), numbers),  # more numbers than are stored
+        mat_element((1, -2), numbers),
+        mat_element((1, 2), struct.pack("<II", 99, 16) + bytes(16)),  # of no type: SciPy crashes
+        mat_element((1, 2), struct.pack("<II", 9, 2**31) + bytes(16)),
+    ]
+    for element in lies:
+        with pytest.raises(FileError, match="damaged MAT file"):
+            read_measurement(mat_file(path, element))
+    with pytest.raises(FileError, match="are declared, the file ends before"):
+        read_measurement(mat_file(path, lies[0], declared=2**31))
+    bomb = struct.pack("<II", 14, 2**31) + mat_element((1, 2**28), struct.pack("<II", 9, 2**31))
+    with pytest.raises(FileError, match="exhaust memory"):
+        read_measurement(mat_file(path, zlib.compress(bomb), kind=15))
+    true = mat_element((1, 2), numbers)
+    with pytest.raises(FileError, match="does not say when it was measured"):
+        read_measurement(mat_file(path, true))  # sound, but for a time
+
+
+def test_mat_files_with_a_name_twice(tmp_path):
+    savemat(tmp_path / "a.mat", {"y": np.arange(3.0)})
+    data = (tmp_path / "a.mat").read_bytes()
+    (tmp_path / "a.mat").write_bytes(data + data[128:])
+    with pytest.raises(FileError, match="'y' twice"):
+        read_measurement(tmp_path / "a.mat")
+
+
+def test_hdf5_arrays_that_were_never_written(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        for key in ("time", "y"):
+            file.create_dataset(key, (HUGE,), "f8", chunks=(1000,)).attrs["unit"] = "s"
+    with pytest.raises(FileError, match=r"holds 1.49e\+07 GiB"):
+        read_measurement(tmp_path / "a.h5")
+    with pytest.raises(FileError, match="exhaust memory"):
+        read_measurement(tmp_path / "a.h5", {"rate": "1 Hz"}, signals=["y"], largest=9 * HUGE)
+
+
+def test_hdf5_arrays_in_other_files_are_not_opened(tmp_path):
+    h5py = pytest.importorskip("h5py")
+    (tmp_path / "secret").write_bytes(bytes(800))
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        outer = [(str(tmp_path / "secret"), 0, 800)]
+        file.create_dataset("y", (100,), "f8", external=outer).attrs["unit"] = "m"
+    with pytest.raises(FileError, match="lies in other files"):
+        read_measurement(tmp_path / "a.h5", {"rate": "1 Hz"})
+
+
+def test_netcdf_counts_that_lie(tmp_path):
+    path = tmp_path / "a.nc"
+    measurement().to_netcdf(path, format="NETCDF3_CLASSIC", engine="netcdf4")
+    data = path.read_bytes()
+    at = data.index(struct.pack(">II", 12, 3))  # the attributes of the first variable
+    path.write_bytes(data[:at] + struct.pack(">II", 12, 2**31) + data[at + 8 :])
+    with pytest.raises(FileError, match="2147483648 entries are declared, the file ends before"):
+        read_measurement(path)
+
+
+def mdf_with(tmp_path, block, offset, layout, value):
+    """Return an MDF file in which a field of its first block of a kind has another value."""
+    path = file_of(tmp_path, "mdf4")
+    data = bytearray(path.read_bytes())
+    at = data.index(block)
+    wanted = at if value == "itself" else value
+    struct.pack_into(layout, data, at + offset, wanted)
+    path.write_bytes(data)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("block", "offset", "layout", "value", "text"),
+    [
+        (b"##DG", 24, "<Q", "itself", "linked in a circle"),
+        (b"##CN", 24, "<Q", "itself", "linked in a circle"),
+        (b"##DG", 32, "<Q", 2**40, "leads out of the file"),
+        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "records of .* bytes are declared"),
+        (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches beyond its record"),
+        (b"##CN", 8, "<Q", HUGE, "does not fit into the file"),
+    ],
+)
+def test_mdf_blocks_that_lie(tmp_path, block, offset, layout, value, text):
+    pytest.importorskip("asammdf")
+    with pytest.raises(FileError, match=text):
+        read_measurement(mdf_with(tmp_path, block, offset, layout, value))
+
+
+@pytest.mark.parametrize(
+    ("head", "text"),
+    [(b"UnFinMF ", "was not finished"), (b"MDF     3.30    ", "is MDF 3.30: convert it to MDF 4")],
+)
+def test_other_mdf_files(tmp_path, head, text):
+    pytest.importorskip("asammdf")
+    path = file_of(tmp_path, "mdf4")
+    path.write_bytes(head + path.read_bytes()[len(head) :])
+    with pytest.raises(FileError, match=text):
+        read_measurement(path)

@@ -1,0 +1,149 @@
+"""Figures of linear analysis: what they mark, and what they leave out of unstable loops."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+
+from bywire.analysis.agreement import Agreement
+from bywire.analysis.locus import Border, Locus
+from bywire.analysis.loop_curves import Family, LoopCurve
+from bywire.analysis.robustness import UNSTABLE, LoopMargins
+from bywire.core.errors import ParameterError
+from bywire.report.agreement_report import agreement_table, verdict
+from bywire.report.differences import differences
+from bywire.report.loop_gain import loop_gain
+from bywire.report.margins_table import margins_table
+from bywire.report.nichols import nichols
+from bywire.report.nyquist import nyquist
+from bywire.report.pole_map import pole_map
+from bywire.report.root_locus import root_locus
+from bywire.report.sensitivity import sensitivity
+
+FREQUENCY = np.geomspace(1e-2, 10.0, 400)
+CHARTS = (nyquist, nichols, sensitivity, loop_gain)
+
+
+def curve(gain: float) -> LoopCurve:
+    """Return k/(s (s + 1)^2), unstable from k = 2 on, whose phase is -180 degrees at 1 rad/s."""
+    s = 2j * np.pi * FREQUENCY
+    L = gain / (s * (s + 1.0) ** 2)
+    if gain >= 2.0:
+        return LoopCurve(FREQUENCY, L, UNSTABLE, math.nan)
+    S = 1.0 / (1.0 + L)
+    k = int(np.flatnonzero(np.abs(L) > 1.0)[-1])
+    margins = LoopMargins(
+        gain=2.0 / gain, phase=180.0 + math.degrees(np.unwrap(np.angle(L))[k]),
+        crossover=float(FREQUENCY[k]), delay=0.1, disk=2.0 / float(np.abs(2.0 * S - 1.0).max()),
+        sensitivity=float(np.abs(S).max()), complementary=float(np.abs(1.0 - S).max()),
+        bandwidth=0.2, stable=True,
+    )  # fmt: skip
+    return LoopCurve(FREQUENCY, L, margins, 1.0 / (2.0 * np.pi))
+
+
+def legend_of(figure: Figure) -> str:
+    legends = [axes.get_legend() for axes in figure.axes if axes.get_legend() is not None]
+    legends += figure.legends
+    return "\n".join(text.get_text() for legend in legends for text in legend.get_texts())
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+def test_a_single_curve_has_its_margins_marked(chart) -> None:
+    text = legend_of(chart(Family((curve(0.5),))))
+    marked = {nyquist: "gain margin 4", nichols: "gain margin 4", loop_gain: "gain margin 4"}
+    assert marked.get(chart, "usual limit 2") in text
+    assert "worst" not in text
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+def test_the_worst_of_a_range_is_named(chart) -> None:
+    family = Family((curve(0.5), curve(1.0)), "brake.gain", "1", (0.5, 1.0))
+    assert "worst: brake.gain = 1" in legend_of(chart(family))
+
+
+def test_an_unstable_loop_has_no_disk_and_no_sensitivity() -> None:
+    family = Family((curve(0.5), curve(3.0)), "brake.gain", "1", (0.5, 3.0))
+    figure = nyquist(family)
+    assert "brake.gain = 3, unstable" in legend_of(figure)
+    assert not any(isinstance(patch, Circle) for patch in figure.axes[0].patches)
+    (free,) = (p for p in nyquist(Family((curve(0.5),))).axes[0].patches if isinstance(p, Circle))
+    assert free.center[0] + free.radius < 0.0
+    drawn = [line for line in sensitivity(family).axes[0].lines if len(line.get_xdata()) == 400]
+    assert len(drawn) == 1
+
+
+def test_the_nichols_chart_shades_what_the_curve_only_touches() -> None:
+    """At the gain margin's phase the shaded area ends below the curve's own distance."""
+    one = curve(1.0)
+    phase, size = one.phase, 20.0 * np.log10(np.abs(one.L))
+    figure = nichols(Family((one,)))
+    (shaded,) = (
+        c for c in figure.axes[0].collections if c.get_zorder() == pytest.approx(0.9)
+    )  # fmt: skip
+    (area,) = [path for path in shaded.get_paths() if len(path)]
+    inside = area.contains_points(np.column_stack([phase, size]), radius=-0.5)
+    assert not inside.any()
+    assert area.contains_point((-180.0, 0.0))
+
+
+def test_poles_are_drawn_once_a_pair_and_unstable_ones_stand_out() -> None:
+    rates = np.array([0.0, -5.0, -3 + 4j, -3 - 4j, 1 + 2j, 1 - 2j])
+    left = pole_map(rates, 0.01, 1.0).axes[0]
+    crosses = [line for line in left.lines if line.get_marker() == "x"]
+    assert sorted(len(line.get_xdata()) for line in crosses) == [1, 2]
+    assert len({line.get_color() for line in crosses}) == 2
+
+
+def test_a_locus_marks_its_border_and_shows_all_that_grows() -> None:
+    values = np.linspace(-1.0, 2.0, 7)
+    poles = np.stack([values + 3j, values - 3j], axis=1)
+    border = Border(0.0, 3j, False)
+    found = Locus("brake.gain", "1", values, poles, 0.0, values <= 0.0, (border,))
+    figure = root_locus(found, math.nan)
+    assert "unstable above brake.gain = 0: it swings at 0.477 Hz" in legend_of(figure)
+    assert all(axes.get_xlim()[1] > 2.0 for axes in figure.axes[:2])
+
+
+def test_differences_below_the_tolerance_are_seen_as_such() -> None:
+    f = np.array([1.0, 10.0])
+    figure = differences(f, {"limits": (np.array([0.0, np.nan]), f)}, (0.01, 0.1))
+    (line,) = [one for one in figure.axes[0].lines if len(one.get_xdata()) == 2
+               and one.get_label() == "limits"]  # fmt: skip
+    np.testing.assert_allclose(line.get_ydata(), [1e-4, np.nan])
+    with pytest.raises(ParameterError, match="at least one cause"):
+        differences(f, {}, (0.01, 0.1))
+
+
+def test_the_agreement_table_names_what_has_no_number() -> None:
+    def values(*size: float) -> np.ndarray:
+        return np.array(size)
+
+    found = Agreement(
+        values(1.0, 2.0),
+        {"": values(0.0, 1e-3), "limits": values(0.0, -3.0), "friction": values(-0.5, np.nan),
+         "all": values(-0.5, np.nan)},
+        {"": values(0.0, 0.01), "limits": values(0.0, 0.0), "friction": values(170.0, np.nan),
+         "all": values(170.0, np.nan)},
+        values(0.0, 0.0), values(0.0, 0.0),
+    )  # fmt: skip
+    rows = [[cell.text for cell in row] for row in agreement_table(found).rows]
+    assert rows[2] == ["friction", "-0.500 dB +170.00°", "-"]
+    assert rows[-1] == ["largest", "friction", "friction"]
+    small = replace(found, gain=dict.fromkeys(found.gain, values(0.0, 0.0)),
+                    phase=dict.fromkeys(found.phase, values(0.0, 0.05)))  # fmt: skip
+    assert small.largest == ["", ""]
+    assert "agree: largest differences 0.001 dB" in verdict(found)
+    assert "DO NOT" in verdict(replace(found, gain=found.gain | {"": values(0.0, 0.02)}))
+
+
+def test_the_margins_table_says_what_is_unstable() -> None:
+    found = [curve(0.5).margins, UNSTABLE]
+    rows = margins_table(found, "brake.gain", "1", (0.5, 3.0)).rows
+    assert [row[0].text for row in rows] == ["0.5", "3"]
+    assert [row[-1].verdict for row in rows] == ["none", "bad"]
+    assert rows[1][1].text == "not defined"
