@@ -8,7 +8,7 @@ from typing import Any
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.benchmark import frequency, measurement_files, wedge_brake
+from bywire.benchmark import frequency, identification, measurement_files, wedge_brake
 from bywire.benchmark.engine import ensemble, single_and_sensitivities
 from bywire.benchmark.others import others
 from bywire.benchmark.processes import processes
@@ -47,6 +47,7 @@ def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
         "wedge brake": lambda: wedge_brake.measured(wedge),
         "frequency responses": lambda: frequency.measured(wedge),
         "measurement files": measurement_files.measured,
+        "identification": lambda: identification.measured(par),
         "start-up": processes,
     }
     here = machine()

@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_TOGETHER = (1, 8, 64)  # neighbors summed up
+_BLOCKS = 10  # per unknown, at least
+_KEPT = 0.9  # of the square of the Jacobian, at least
 _LEVEL = 0.01  # of the test whether residuals are white
 
 
@@ -38,7 +41,9 @@ def uncertainty(
 
     White residuals: :math:`s^2 (J^T J)^{-1}`. Where neighbors go together, the sandwich
     :math:`(J^T J)^{-1} J^T \Gamma J (J^T J)^{-1}` with the autocovariance :math:`\Gamma` of an
-    autoregressive model of the residuals; fewer of them then count as independent.
+    autoregressive model of the residuals; fewer of them then count as independent. Slow errors
+    may hide below white noise: the same is asked of sums of neighbors, and the largest answer
+    counts.
 
     Parameters
     ----------
@@ -49,26 +54,53 @@ def uncertainty(
     instruments
         Of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
     prior_rows
-        Last rows that are prior knowledge, with a standard deviation of one by construction.
+        Last rows that are independent, with a standard deviation of one: prior knowledge.
     """
     n, p = jacobian.shape
-    data = slice(0, n - prior_rows)
     Z = jacobian if instruments is None else instruments
-    bread = np.linalg.pinv(Z.T @ jacobian)
-    r, Zd = residuals[data], Z[data]
-    freedom = max(n - p, 1)
-    known = Z[n - prior_rows :].T @ Z[n - prior_rows :]
-    colored = not is_white(r)
-    if not colored:
-        middle = float(residuals @ residuals) / freedom * (Zd.T @ Zd)
-        return Uncertainty(bread @ (middle + known) @ bread.T, float(freedom), False)
+    data = slice(0, n - prior_rows)
+    size = np.sqrt(np.sum(jacobian**2, axis=0))
+    scale = np.where(size > 0.0, size, 1.0)
+    bread = np.linalg.pinv((Z.T @ jacobian) / np.outer(scale, scale))
+    known = (Z[n - prior_rows :].T @ Z[n - prior_rows :]) / np.outer(scale, scale)
+    found = []
+    for together in _TOGETHER:
+        r, rows = _blocks(residuals[data], together), _blocks(Z[data] / scale, together)
+        if together > 1 and not _still_told(r, rows, Z[data] / scale):
+            break
+        middle, freedom, colored = _spread(r, rows, p)
+        if not found or colored:
+            covariance = bread @ (middle + known) @ bread.T
+            found.append(Uncertainty(covariance, freedom, colored))
+    worst = max(found, key=lambda one: float(np.sum(np.log(np.diag(one.covariance) + 1e-300))))
+    return Uncertainty(worst.covariance / np.outer(scale, scale), worst.freedom, worst.colored)
+
+
+def _blocks(values: Array, together: int) -> Array:
+    """Return sums of neighbors, scaled so that white noise keeps its size."""
+    count = len(values) // together
+    parts = values[: count * together].reshape(count, together, *values.shape[1:])
+    return np.asarray(parts.sum(axis=1) / np.sqrt(together))
+
+
+def _still_told(r: Array, rows: Array, whole: Array) -> bool:
+    """Return whether blocks are many, and short beside what the Jacobian does."""
+    kept = np.sum(rows**2, axis=0) >= _KEPT * np.sum(whole**2, axis=0)
+    return bool(r.size >= _BLOCKS * rows.shape[1] and kept.all())
+
+
+def _spread(r: Array, rows: Array, unknowns: int) -> tuple[Array, float, bool]:
+    """Return the scores' covariance, degrees of freedom, and whether neighbors go together."""
+    n = r.size
+    if is_white(r):
+        freedom = max(n - unknowns, 1)
+        return float(r @ r) / freedom * (rows.T @ rows), float(freedom), False
     model = autoregression(r)
-    spread = _filtered(Zd[::-1], model.coefficients)
-    middle = model.variance * (spread.T @ spread)
+    spread = _filtered(rows[::-1], model.coefficients)
     independent = min(n * float(np.mean(r**2)) / model.at_zero_frequency, float(n))
-    left = max(independent - p, 1.0)
-    middle = middle * (independent / left)
-    return Uncertainty(bread @ (middle + known) @ bread.T, left, True)
+    left = max(independent - unknowns, 1.0)
+    middle = model.variance * (spread.T @ spread) * (independent / left)
+    return middle, left, True
 
 
 @dataclass(frozen=True)

@@ -32,10 +32,13 @@ class Problem:
     evaluate
         ``evaluate(values) -> (residuals, jacobian)``, shapes (n,) and (n, p), weighted so that
         residuals are of size one where the noise is as assumed.
+    apart
+        Last rows that are independent of all others and taken to be weighted rightly.
     """
 
     unknowns: tuple[Unknown, ...]
     evaluate: Callable[[Array], tuple[Array, Array]]
+    apart: int = 0
 
     def held(self, index: int) -> Problem:
         """Return the problem with one unknown held at its start."""
@@ -46,7 +49,7 @@ class Problem:
             r, J = self.evaluate(np.insert(values, index, value))
             return r, np.delete(J, index, axis=1)
 
-        return Problem(rest, evaluate)
+        return Problem(rest, evaluate, self.apart)
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,9 @@ class Solution:
     cost: float
 
 
-def solve(problem: Problem, start: Array, loss: Loss = "linear", most: int = 60) -> Solution:
+def solve(
+    problem: Problem, start: Array, loss: Loss = "linear", most: int = 60, share: float = 1e-11
+) -> Solution:
     """Return the nearest minimum (trust region with bounds, SciPy).
 
     Parameters
@@ -76,6 +81,8 @@ def solve(problem: Problem, start: Array, loss: Loss = "linear", most: int = 60)
         How large residuals count; beyond size one a robust loss grows slower.
     most
         Evaluations at most.
+    share
+        Of the cost: the search ends when a step gains less.
 
     Raises
     ------
@@ -112,7 +119,7 @@ def solve(problem: Problem, start: Array, loss: Loss = "linear", most: int = 60)
     inner = np.clip(start / scale, low + margin, high - margin)
     found = optimize.least_squares(
         residuals, inner, jacobian, bounds=(low, high), loss=loss, x_scale="jac",
-        xtol=1e-9, ftol=1e-11, gtol=1e-9, max_nfev=most,
+        xtol=1e-9, ftol=share, gtol=1e-9, max_nfev=most,
     )  # fmt: skip
     return Solution(np.asarray(found.x) * scale, float(found.cost))
 
@@ -180,7 +187,7 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
         weight = np.sqrt(_slope(r, loss))
         r, J = r * weight, J * weight[:, None]
     scale = np.array([u.scale for u in problem.unknowns])
-    sure = uncertainty(J * scale, r, prior_rows=priors)
+    sure = uncertainty(J * scale, r, prior_rows=priors + problem.apart)
     found = Estimate(
         unknowns=problem.unknowns,
         values=solution.values,

@@ -8,7 +8,7 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 _SAME = 0.01  # of the lowest cost: minima that count as one
+_ENDED = 1e-5  # of the cost: enough to tell minima apart; the best one is polished later
 
 
 class _StoppedError(Exception):
@@ -85,8 +86,8 @@ def search(
     KeyboardInterrupt
         When interrupted; finished starts are in the store.
     """
-    keys = [_key(problem, start, loss) for start in starts]
     known = _read(store)
+    keys = _keys(problem, starts, loss) if store is not None else [""] * len(starts)
     found = {k: known[key] for k, key in enumerate(keys) if key in known}
     stop = threading.Event()
 
@@ -95,11 +96,11 @@ def search(
             raise _StoppedError
         return problem.evaluate(values)
 
-    guarded = Problem(problem.unknowns, evaluate)
+    guarded = replace(problem, evaluate=evaluate)
     failed = 0
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         jobs = {
-            pool.submit(solve, guarded, start, loss): k
+            pool.submit(solve, guarded, start, loss, share=_ENDED): k
             for k, start in enumerate(starts)
             if k not in found
         }
@@ -124,15 +125,21 @@ def search(
     return Search(tuple(found[k] for k in sorted(found)), failed)
 
 
-def _key(problem: Problem, start: Array, loss: Loss) -> str:
-    """Return what tells one search from another: names, bounds, start, and its residuals."""
+def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
+    """Return what tells one search from another: unknowns, their residuals, and the start."""
     digest = hashlib.sha256(f"{loss} {problem.unknowns}".encode())
-    digest.update(start.tobytes())
-    try:
-        digest.update(np.round(problem.evaluate(start)[0], 9).tobytes())
-    except SolverError:
-        digest.update(b"failed")
-    return digest.hexdigest()
+    for start in starts:
+        try:
+            digest.update(np.round(problem.evaluate(start)[0], 9).tobytes())
+            break
+        except SolverError:
+            continue
+    keys = []
+    for start in starts:
+        own = digest.copy()
+        own.update(start.tobytes())
+        keys.append(own.hexdigest())
+    return keys
 
 
 def _read(store: Path | None) -> dict[str, Solution]:

@@ -31,6 +31,7 @@ _ROUNDS = 12  # of Newton for the shift in time
 _LEAD = 0.05  # s of rest before the measured onset
 _SMOOTHED = 0.006  # s: the converter's noise on the current
 _BEGUN = 0.02  # of a slip: before, that noise would decide when the model breaks away
+_BEGUN_AT = 2e3  # Pa: of a long one
 _RESTED = 1.0  # s of rest from which the ramp of the current is read
 
 
@@ -66,6 +67,8 @@ class Fitted:
         Computed less measured pressure [Pa], shape (n,).
     slopes
         Their derivatives by the unknowns with the shift at its best, shape (n, p).
+    by_current
+        Derivative of the residuals by an offset of the current [Pa/A], shape (n,).
     breakaway, breakaway_slopes
         Measured less computed current at the instant of breaking away [A], and its
         derivatives, shape (p,).
@@ -77,6 +80,7 @@ class Fitted:
 
     residuals: Array
     slopes: Array
+    by_current: Array
     breakaway: float
     breakaway_slopes: Array
     current: float
@@ -121,6 +125,7 @@ class Shooting:
     ) -> None:
         self.par = par.replace({"drive.mode": "current-source"})
         self.names = tuple(u.name for u in unknowns)
+        self.count = len(self.names)
         self.model, self.step = MotorcycleBrake(), step
         self._error = EquationError(Equation(self.model, "omega", "alpha"), self.par, unknowns)
 
@@ -138,42 +143,71 @@ class Shooting:
         per_ampere = e[1] - e[0]
         return -e[0] / per_ampere, -slopes[0] / per_ampere
 
-    def fit(self, shot: Shot, values: Array) -> Fitted:
-        """Run one slip and lay it over the measured one."""
-        slip, interval = shot.slip, float(f"{shot.time[1] - shot.time[0]:.9g}")
-        t: Array = np.arange(shot.time.size, dtype=float) * interval
+    def run(self, shot: Shot, values: Array) -> tuple[Run, float, Array]:
+        """Return the run of one slip, the current [A] it breaks away at, and its derivatives.
+
+        The current grows as it did before the slip; once the slip has begun it follows the
+        measured one, which dips where the shaft turns quickly.
+        """
+        slip, interval, t = shot.slip, _interval(shot), _clock(shot)
         current, current_slopes = self.breakaway(slip.rest, slip.direction, values)
         rate, level = shot.line
-        ramp = current + rate * (t + interval)  # just beyond breaking away
+        middle = t + 0.5 * interval  # what is held over an interval, without lag
+        ramp = current + rate * middle
         par = self.par.replace(dict(zip(self.names, values.tolist(), strict=True)))
         rest = max(slip.rest, 0.0)
         run = Run(
             self.model, par, state_at(rest, par), memory_at(rest, par),
             partial(_held, ramp, interval), (t.size - 1) * interval, self.step, interval,
         )  # fmt: skip
-        # Where the shaft turns quickly the current dips below its ramp: follow the measured one,
-        # once the slip has begun.
         alone = simulate(run, ("p_mc",))["p_mc"]
-        shift = _best_shift(shot, alone, interval)
-        dip = _dip(np.interp(t + shift, t, shot.current - level - rate * t), interval)
-        dip[np.abs(alone - alone[0]) < _BEGUN * np.abs(alone - alone[0]).max()] = 0.0
-        run = replace(run, stimulus=partial(_held, ramp + dip, interval))
+        shift = _best_shift(shot, alone)
+        dip = _dip(np.interp(middle + shift, t, shot.current - level - rate * t), interval)
+        travel = np.abs(alone - alone[0])
+        dip[travel < min(_BEGUN * travel.max(), _BEGUN_AT)] = 0.0
+        return replace(run, stimulus=partial(_held, ramp + dip, interval)), current, current_slopes
+
+    def fit(self, shot: Shot, values: Array) -> Fitted:
+        """Run one slip and lay it over the measured one."""
+        run, current, current_slopes = self.run(shot, values)
         found = simulate_with_sensitivities(run, [*self.names, "stimulus.i_set"], ("p_mc",))
-        p = found.trajectory["p_mc"]
-        slopes = found.derivatives[:, 0, :-1]
-        slopes = slopes + found.derivatives[:, 0, -1:] * current_slopes
-        shift = _best_shift(shot, p, interval)
-        r, v = _laid_over(shot, p, shift, interval)
+        slopes, by_current = found.derivatives[:, 0, :-1], found.derivatives[:, 0, -1:]
+        slopes = np.hstack((slopes + by_current * current_slopes, by_current))
+        r, v, shift = overlaid(shot, found.trajectory["p_mc"])
+        t, (rate, level) = _clock(shot), shot.line
         at = t - shift
         J = np.column_stack([np.interp(at, t, column) for column in slopes.T])
         J[at < 0.0] = 0.0
         shift_slopes = (v @ J) / max(float(v @ v), 1e-300)
+        J = J - np.outer(v, shift_slopes)
         return Fitted(
-            residuals=r, slopes=J - np.outer(v, shift_slopes),
+            residuals=r, slopes=J[:, :-1], by_current=J[:, -1],
             breakaway=level + rate * shift - current,
-            breakaway_slopes=rate * shift_slopes - current_slopes,
+            breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
             current=current, onset=float(shot.time[0] + shift),
         )  # fmt: skip
+
+
+def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
+    """Return computed less measured pressure, the computed speed, and the shift between them.
+
+    Parameters
+    ----------
+    p
+        Computed pressure [Pa], shape (n,); moved in time to where it lies best.
+    """
+    shift = _best_shift(shot, p)
+    r, v = _laid_over(shot, p, shift)
+    return r, v, shift
+
+
+def _interval(shot: Shot) -> float:
+    return float(f"{shot.time[1] - shot.time[0]:.9g}")
+
+
+def _clock(shot: Shot) -> Array:
+    """Return the time since the first row [s], shape (n,)."""
+    return np.arange(shot.time.size, dtype=float) * _interval(shot)
 
 
 def _held(ramp: Array, interval: float, at: Array) -> Array:
@@ -186,17 +220,17 @@ def _held(ramp: Array, interval: float, at: Array) -> Array:
 
 def _dip(beside: Array, interval: float) -> Array:
     """Return how far the current leaves its ramp, smoothed over a few samples."""
-    width = max(int(_SMOOTHED / interval), 1)
-    padded = np.pad(beside, (width // 2, width - 1 - width // 2), mode="edge")
+    width = 2 * int(0.5 * _SMOOTHED / interval) + 1
+    padded = np.pad(beside, width // 2, mode="edge")
     return np.convolve(padded, np.ones(width) / width, mode="valid")
 
 
-def _best_shift(shot: Shot, p: Array, interval: float) -> float:
+def _best_shift(shot: Shot, p: Array) -> float:
     """Return by how much later the computed slip lies on the measured one [s] (Gauss, Newton)."""
-    t = np.arange(p.size, dtype=float) * interval
+    t = _clock(shot)
     shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
     for _ in range(_ROUNDS):
-        r, v = _laid_over(shot, p, shift, interval)
+        r, v = _laid_over(shot, p, shift)
         size = float(v @ v)
         if size == 0.0:
             break
@@ -207,11 +241,11 @@ def _best_shift(shot: Shot, p: Array, interval: float) -> float:
     return shift
 
 
-def _laid_over(shot: Shot, p: Array, shift: float, interval: float) -> tuple[Array, Array]:
+def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
     """Return computed less measured pressure with the computed one later, and its speed."""
-    t = np.arange(p.size, dtype=float) * interval
+    t = _clock(shot)
     at = t - shift
-    v = np.interp(at, t, np.gradient(p, interval))
+    v = np.interp(at, t, np.gradient(p, _interval(shot)))
     v[(at <= 0.0) | (at >= t[-1])] = 0.0
     return np.interp(at, t, p) - shot.pressure, v
 

@@ -43,16 +43,18 @@ def stribeck_band(
     ----------
     Dardanelli, Alli, Savaresi (2010), eq. (16), Fig. 4.
     """
-    names = [u.name.removeprefix("seal.") for u in found.unknowns]
+    seal = [k for k, u in enumerate(found.unknowns) if u.name.startswith("seal.")]
+    unknowns = [found.unknowns[k] for k in seal]
+    names = [u.name.removeprefix("seal.") for u in unknowns]
     value = np.array([[_torque(par, w, p) for w in omega] for p in pressures])
     slopes = []
-    for name, unknown in zip(names, found.unknowns, strict=True):
+    for name, unknown in zip(names, unknowns, strict=True):
         by = _SHARE * unknown.scale
         up = par.replace({name: getattr(par, name) + by})
         moved = np.array([[_torque(up, w, p) for w in omega] for p in pressures])
         slopes.append((moved - value) / by)
     G = np.array(slopes)
-    variance = np.einsum("ipw,ij,jpw->pw", G, found.covariance, G)
+    variance = np.einsum("ipw,ij,jpw->pw", G, found.covariance[np.ix_(seal, seal)], G)
     half = 0.5 * np.diff(found.intervals(), axis=1).ravel() / found.deviations
     reach = float(half[0]) * np.sqrt(np.maximum(variance, 0.0))
     axes = ("pressure", "omega")

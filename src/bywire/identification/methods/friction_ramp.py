@@ -24,15 +24,19 @@ from bywire.identification.multistart import search
 from bywire.identification.output_error import even_interval
 from bywire.identification.replay import replayed
 from bywire.identification.slip_shooting import Shooting, Shot, cut_out
-from bywire.identification.slips import Slip, find_slips, noise_of
+from bywire.identification.slips import find_slips, noise_of
 from bywire.identification.stribeck_band import stribeck_band
-from bywire.identification.unknown import parameters_of, scattered
+from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
 
 Array = NDArray[np.float64]
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
-_LIMIT_REPLAY, _LIMIT_RESIDUAL = 0.1, 5.0
+_ZERO, _RIPPLE = "offset.i", "offset.i_ripple"
+# The search of several starts: coarse in time, and the beginnings of slips, whose cost has fewer
+# minima. The best one is then fitted in full.
+_QUICK_STEP, _QUICK_LENGTH = 1e-4, 1.5  # s
+_LIMIT_REPLAY, _LIMIT_RESIDUAL = 0.1, 1.2
 
 
 class Options(ParameterSet):
@@ -43,9 +47,17 @@ class Options(ParameterSet):
     longest: Duration
     """how much of a slip is compared"""
     scatter: Current
-    """standard deviation of the current at which the piston breaks away"""
+    """standard deviation of the current from slip to slip: of its measurement, and of what
+    breaks the piston away"""
+    zero: Current
+    """standard deviation of the zero of the current's sensor, which all slips share"""
+    ripple: Current
+    """standard deviation of by how much more than its mean the current is where the piston breaks
+    away: it does so at a peak of the current's ripple"""
     sigma_p: Annotated[float, Unit("Pa", 2e3), Field(ge=0)]
     """noise of the pressure in synthetic measurements"""
+    sigma_i: Annotated[float, Unit("A", 1e-2), Field(ge=0)]
+    """noise of the measured current in synthetic measurements, beside the control's own"""
     step: Duration
     """substep of the slips' runs"""
 
@@ -70,28 +82,28 @@ def identify(
     ----------
     Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see ``slip_shooting``.
     """
-    t, p = data["time"].values, data["p_mc"].values
-    i = data["i"].values
-    slips = find_slips(p, even_interval(t), options.least)
-    if not slips:
-        raise ParameterError(
-            f"the pressure shows no slip of more than {options.least / 1e5:g} bar: friction cannot "
-            "be learned from it; ramp the current slowly, up and down, without dither"
-        )
-    shots = cut_out(t, p, i, slips, options.longest)
-    unknowns = parameters_of(par, [f"seal.{name}" for name in _NAMES])
-    sigma = max(noise_of(p), 1.0)
-    shooting = Shooting(par, unknowns, options.step)
-    problem = Problem(unknowns, partial(_residuals, shooting, shots, sigma, options.scatter))
+    shots = shots_of(data, options)
+    known = {_ZERO: options.zero, _RIPPLE: options.ripple}
+    unknowns = (
+        *parameters_of(par, [f"seal.{name}" for name in _NAMES]),
+        *(Unknown(k, 0.0, scale=v, unit="A", prior=(0.0, v)) for k, v in known.items()),
+    )
     starts = scattered(unknowns, effort.starts, effort.spread, effort.seed)
-    found = search(problem, starts, "linear", effort.progress, effort.store, effort.threads)
-    best = estimate(problem, start=found.best.values)
+    quick = options.replace(
+        {"step": max(_QUICK_STEP, options.step), "longest": min(_QUICK_LENGTH, options.longest)}
+    )
+    found = search(
+        _problem(data, par, quick, unknowns), starts, "linear", effort.progress, effort.store,
+        effort.threads,
+    )  # fmt: skip
+    best = estimate(_problem(data, par, options, unknowns), start=found.best.values)
     values = best.parameters()
     own = par.replace(values)
-    whole = _replay(data, own, options.step)
+    shift = best[_ZERO] if _ZERO in best.names else 0.0
+    whole = _replay(data.assign(i=data["i"] - shift), own, options.step)
     error = whole["modeled"] - whole["measured"]
-    nrmse = float(np.sqrt((error**2).mean()) / (p.max() - p.min()))
-    notes = [_counted(slips), f"{found.reached} of {effort.starts} starts reached the minimum"]
+    nrmse = float(np.sqrt((error**2).mean()) / np.ptp(data["p_mc"].values))
+    notes = [_counted(shots), f"{found.reached} of {effort.starts} starts reached the minimum"]
     return Identified(
         estimates={"seal friction": best},
         parameters=values,
@@ -111,23 +123,77 @@ def identify(
     )  # fmt: skip
 
 
+def _problem(
+    data: xr.Dataset, par: MotorcycleParameters, options: Options, unknowns: tuple[Unknown, ...]
+) -> Problem:
+    shots = shots_of(data, options)
+    sigma = max(noise_of(data["p_mc"].values), 1.0)
+    shooting = Shooting(par, unknowns[: len(_NAMES)], options.step)
+    evaluate = partial(_residuals, shooting, shots, sigma, options.scatter)
+    return Problem(unknowns, evaluate, apart=len(shots))
+
+
+def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
+    """Return the measured slips.
+
+    Raises
+    ------
+    ParameterError
+        When there is none.
+    """
+    t, p, i = (data[name].values for name in ("time", "p_mc", "i"))
+    slips = find_slips(p, even_interval(t), options.least)
+    if not slips:
+        raise ParameterError(
+            f"the pressure shows no slip of more than {options.least / 1e5:g} bar: friction cannot "
+            "be learned from it; ramp the current slowly, up and down, without dither"
+        )
+    return cut_out(t, p, i, slips, options.longest)
+
+
 def _residuals(
     shooting: Shooting, shots: list[Shot], sigma: float, scatter: float, values: Array
 ) -> tuple[Array, Array]:
     """Return what the slips' shapes and their breakaway currents say, weighted."""
+    seal, zero, ripple = values[: shooting.count], values[-2], values[-1]
     residuals, slopes, breakaway, breakaway_slopes = [], [], [], []
     for shot in shots:
-        one = shooting.fit(shot, values)
-        residuals.append(one.residuals / sigma)
-        slopes.append(one.slopes / sigma)
-        breakaway.append(one.breakaway / scatter)
-        breakaway_slopes.append(one.breakaway_slopes / scatter)
+        one, way = shooting.fit(shot, seal), shot.slip.direction
+        whiten = _Whitening(one.by_current * (scatter / sigma))
+        r = one.residuals - way * ripple * one.by_current
+        none = np.zeros(r.size)
+        residuals.append(whiten(r / sigma))
+        slopes.append(
+            whiten(np.column_stack((one.slopes, none, -way * one.by_current)) / sigma)
+        )
+        breakaway.append((one.breakaway - zero + way * ripple) / scatter)
+        breakaway_slopes.append(np.array([*one.breakaway_slopes, -1.0, way]) / scatter)
     return np.concatenate((*residuals, breakaway)), np.vstack((*slopes, *breakaway_slopes))
 
 
-def _counted(slips: Sequence[Slip]) -> str:
-    up = sum(s.direction > 0 for s in slips)
-    return f"{up} slips up, {len(slips) - up} down"
+class _Whitening:
+    r"""Makes residuals independent that share an error of the measured current.
+
+    With a current that is off by one standard deviation d along a slip, their covariance is
+    :math:`I + d d^T`; its inverse root is :math:`I - (1 - 1 / \sqrt{1 + d^T d}) u u^T` with u along
+    d.
+    """
+
+    def __init__(self, d: Array) -> None:
+        size = float(d @ d)
+        self._u = d / np.sqrt(size) if size > 0.0 else d
+        self._share = 1.0 - 1.0 / np.sqrt(1.0 + size)
+
+    def __call__(self, values: Array) -> Array:
+        """Return residuals or their Jacobian, shape (n,) or (n, p), made independent."""
+        along = self._u @ values
+        taken = np.outer(self._u, along).reshape(values.shape)
+        return np.asarray(values - self._share * taken)
+
+
+def _counted(shots: Sequence[Shot]) -> str:
+    up = sum(shot.slip.direction > 0 for shot in shots)
+    return f"{up} slips up, {len(shots) - up} down"
 
 
 def _replay(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
@@ -147,10 +213,12 @@ def _stribeck(par: MotorcycleParameters, found: Estimate) -> Curve:
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
     """Return the ramp of eq. (17) without dither, simulated, with the sensor's noise."""
     case = friction_ramp.EXPERIMENT.cases(par, friction_ramp.EXPERIMENT.defaults, None)[0]
-    made = simulate(as_run(case, 20e-6), ("i_meas", "p_mc"))
-    noise = np.random.default_rng(seed).normal(0.0, options.sigma_p, made.time.size)
+    made = simulate(as_run(case, 20e-6), ("i", "p_mc"))
+    random = np.random.default_rng(seed)
+    noise = random.normal(0.0, options.sigma_p, made.time.size)
+    noise_i = random.normal(random.normal(0.0, options.zero), options.sigma_i, made.time.size)
     return xr.Dataset(
-        {"i": ("time", made["i_meas"], {"units": "A"}),
+        {"i": ("time", made["i"] + noise_i, {"units": "A"}),
          "p_mc": ("time", made["p_mc"] + noise, {"units": "Pa"})},
         {"time": ("time", made.time, {"units": "s"})},
     )  # fmt: skip
@@ -163,7 +231,10 @@ METHOD = Method(
     experiment="friction-ramp",
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,
-    defaults=Options(least=0.2e5, longest=6.0, scatter=5e-3, sigma_p=2e3, step=20e-6),
+    defaults=Options(
+        least=0.2e5, longest=6.0, scatter=2e-3, zero=2e-3, ripple=3e-3, sigma_p=2e3,
+        sigma_i=3e-3, step=20e-6,
+    ),
     identify=identify,
     synthetic=synthetic,
     unknowns=tuple(f"seal.{name}" for name in _NAMES),

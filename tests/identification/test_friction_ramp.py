@@ -1,0 +1,100 @@
+"""Friction from the slow ramp: slips found, parameters recovered, what cannot be told is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bywire.catalog.registry import parameters
+from bywire.core.errors import ParameterError
+from bywire.identification.method import Effort
+from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
+from bywire.identification.slip_shooting import Shooting
+from bywire.identification.slips import find_slips, noise_of
+from bywire.identification.unknown import parameters_of
+
+PAR = parameters("dardanelli2010")
+OPTIONS = METHOD.defaults
+OFF = {"T_pr": 1.3, "f_cfr_p": 0.75, "f_cfr_n": 1.2, "k_brk_p": 0.9, "k_brk_n": 1.1, "c": 1.3}
+
+
+@pytest.fixture(scope="module")
+def data() -> xr.Dataset:
+    return METHOD.synthetic(PAR, OPTIONS, 1)
+
+
+def test_slips_are_found_where_they_are(data: xr.Dataset) -> None:
+    assert isinstance(OPTIONS, Options)
+    p = data["p_mc"].values
+    assert noise_of(p) == pytest.approx(2e3, rel=0.03)
+    slips = find_slips(p, 1e-3, OPTIONS.least)
+    assert [s.direction for s in slips] == [1, 1, 1, 1, 1, 1, -1]
+    assert np.diff([s.rest for s in slips[:-1]]).min() > 0.5e5
+    assert find_slips(np.random.default_rng(0).normal(0.0, 2e3, 5000), 1e-3, 0.2e5) == []
+
+
+def test_derivatives_of_a_slip(data: xr.Dataset) -> None:
+    """Residuals with their best shift, and breakaway, against central differences.
+
+    On a current without dip: that a dip is met earlier or later is not differentiated.
+    """
+    assert isinstance(OPTIONS, Options)
+    shot = shots_of(data, OPTIONS)[3]
+    rate, level = shot.line
+    shot = replace(shot, current=level + rate * (shot.time - shot.time[0]))
+    unknowns = parameters_of(PAR, ["seal.T_pr", "seal.f_cfr_p", "seal.k_brk_p", "seal.c"])
+    shooting = Shooting(PAR, unknowns)  # type: ignore[arg-type]
+    at = np.array([u.start for u in unknowns])
+    found = shooting.fit(shot, at)
+    for k in range(at.size):
+        by = np.zeros(at.size)
+        by[k] = 1e-3 * at[k]
+        up, down = shooting.fit(shot, at + by), shooting.fit(shot, at - by)
+        wanted = (up.residuals - down.residuals) / (2.0 * by[k])
+        error = np.abs(found.slopes[:, k] - wanted)
+        assert error.max() < 0.1 * np.abs(wanted).max()
+        assert np.sqrt(np.mean(error**2)) < 0.05 * np.sqrt(np.mean(wanted**2))
+        wanted = (up.breakaway - down.breakaway) / (2.0 * by[k])
+        assert found.breakaway_slopes[k] == pytest.approx(wanted, rel=0.05, abs=2e-4 / at[k])
+
+
+def test_from_starts_30_per_cent_off(data: xr.Dataset) -> None:
+    """Eight of ten starts reach the minimum, and it is the truth within 2 per cent."""
+    off = PAR.replace({f"seal.{n}": getattr(PAR.seal, n) * f for n, f in OFF.items()})  # type: ignore[attr-defined]
+    found = METHOD.identify(data, off, OPTIONS, Effort(starts=10, spread=0.3))
+    share = next(c.value for c in found.checks if c.name == "starts_at_minimum")
+    assert share >= 0.8
+    for name in OFF:
+        truth = getattr(PAR.seal, name)  # type: ignore[attr-defined]
+        assert found.parameters[f"seal.{name}"] == pytest.approx(truth, rel=0.02), name
+    kept = found.estimates["seal friction"].kept
+    assert [k.unknown.name for k in kept] == ["seal.mu_T"]
+    assert all(check.holds for check in found.checks)
+    ramp, stribeck = found.curves
+    assert float(np.abs(ramp.data["modeled"] - ramp.data["measured"]).mean()) < 1e5
+    width = stribeck.data["high"] - stribeck.data["low"]
+    assert float(width.max()) > 0.0
+
+
+def test_a_damping_that_is_not_as_told_is_found_out(data: xr.Dataset) -> None:
+    wrong = PAR.replace({"master_cylinder.k_damp": 1.6e4})
+    found = METHOD.identify(data, wrong, OPTIONS, Effort(starts=1))
+    residual = next(c for c in found.checks if c.name == "residual_over_noise")
+    assert not residual.holds
+
+
+def test_a_ramp_up_alone_does_not_tell_the_release(data: xr.Dataset) -> None:
+    up = data.isel(time=slice(0, 25000))
+    found = METHOD.identify(up, PAR, OPTIONS, Effort(starts=1))
+    untold = {k.unknown.name for k in found.estimates["seal friction"].kept}
+    assert {"seal.f_cfr_n", "seal.k_brk_n"} <= untold
+    assert "seal.f_cfr_n" not in found.parameters
+
+
+def test_a_record_without_slips_is_refused(data: xr.Dataset) -> None:
+    smooth = data.assign(p_mc=data["p_mc"] * 0.0 + 1e5)
+    with pytest.raises(ParameterError, match=r"no slip of more than 0\.2 bar"):
+        METHOD.identify(smooth, PAR, OPTIONS, Effort(starts=1))
