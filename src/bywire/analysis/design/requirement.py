@@ -47,7 +47,7 @@ FIGURES: Mapping[str, Kind] = {
     "complementary_peak": Kind("1", 0.0, math.inf, "largest magnitude of L/(1 + L)"),
     "overshoot": Kind("%", 0.0, math.inf, "of the unit step at the sampling instants"),
     "settling_time": Kind("s", 0.0, math.inf, "of the unit step, to 2 % of its height"),
-    "steady_state_error": Kind("%", 0.0, math.inf, "what is left of a unit step in the end"),
+    "steady_state_error": Kind("%", 0.0, math.inf, "what is left of a unit step after ten periods of the bandwidth"),
 }
 """figures that can be required"""
 
