@@ -11,8 +11,6 @@ from bywire.analysis.design.linear_case import NOMINAL
 from bywire.analysis.design.optimizer import Problem
 from bywire.analysis.design.requirement import Requirement
 
-STEADY = 0.05
-"""mean error that counts as none where zero is required [% of the step]; converters round"""
 _LEAST = -3.0
 
 
@@ -107,10 +105,7 @@ def _on_bench(one: Requirement, found: BenchFigures) -> float:
         return min((one.slack(v) for v in values if not math.isnan(v)), default=math.inf)
     if one.figure not in STEP_FIGURES or not found.step:
         return math.inf
-    value = found.step[one.figure]
-    if one.figure == "steady_state_error" and one.limit == 0.0 and not math.isnan(value):
-        return (STEADY - value) / STEADY
-    return one.slack(value)
+    return one.slack(found.step[one.figure])
 
 
 def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:

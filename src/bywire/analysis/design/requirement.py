@@ -15,6 +15,9 @@ _TEXT = re.compile(r"\s*([A-Za-z][\w -]*?)\s*(<=|>=|<|>)\s*(.+?)\s*", re.DOTALL)
 _ZERO = 1e-3
 """What counts as zero where the limit is zero; all figures that can be zero are in %."""
 
+STEADY = 0.05
+"""Steady-state error that counts as none where zero is required [%]; converters round."""
+
 
 @dataclass(frozen=True)
 class Kind:
@@ -47,7 +50,9 @@ FIGURES: Mapping[str, Kind] = {
     "complementary_peak": Kind("1", 0.0, math.inf, "largest magnitude of L/(1 + L)"),
     "overshoot": Kind("%", 0.0, math.inf, "of the unit step at the sampling instants"),
     "settling_time": Kind("s", 0.0, math.inf, "of the unit step, to 2 % of its height"),
-    "steady_state_error": Kind("%", 0.0, math.inf, "what is left of a unit step after ten periods of the bandwidth"),
+    "steady_state_error": Kind(
+        "%", 0.0, math.inf, "what is left of a unit step after ten periods of the bandwidth"
+    ),
 }
 """figures that can be required"""
 
@@ -80,7 +85,7 @@ class Requirement:
 
     def slack(self, value: float) -> float:
         """Return how far a value is on the right side, as a share of the limit; NaN is not."""
-        limit = self.limit or _ZERO
+        limit = self.limit or (STEADY if self.figure == "steady_state_error" else _ZERO)
         found = self.sense * (value - limit) / limit
         return -math.inf if math.isnan(found) else found
 

@@ -229,7 +229,8 @@ def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ..
         )
     for edge in (options.k_g_min, options.k_g_max):
         if math.isclose(k_best, edge, rel_tol=1e-3):
-            found.append(f"the optimum lies at the edge, k_g = {1e3 * edge:g} mm/rad: widen the range")
+            at = f"k_g = {1e3 * edge:g} mm/rad"
+            found.append(f"the optimum lies at the edge, {at}: widen the range")
     return tuple(found)
 
 
