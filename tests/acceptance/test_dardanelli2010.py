@@ -36,6 +36,14 @@ REQUIRED = {
         for suffix in ("", "@table1")
     ),
     *(f"dither.{wave}.thd" for wave in ("sine", "square", "triangle")),
+    *(
+        f"table3.identified.{key}" for key in ("k_brk_p", "f_cfr_p", "c", "f_cfr_n", "k_brk_n")
+    ),
+    *(
+        f"table4.{region}.identified.{key}"
+        for region in ("low", "medium", "high")
+        for key in ("K", "zero", "T1", "T2", "T_L")
+    ),
     "fig6.peak", "fig6.change", "fig6.change.theoretical",
     *(
         f"fig7.{key}{suffix}"
@@ -57,6 +65,11 @@ DISAGREEMENTS = {
     "fig5.loop_area_ratio", "fig5.removed_above",  # "totally removed"
     "fig7.bandwidth", "fig7.bandwidth@table1",  # 10 Hz
     "table4.medium.corner", "table4.medium.corner@table1",  # slower than identified
+    *(  # the paper's two steps on our brake
+        f"table4.{region}.identified.{key}"
+        for region in ("low", "medium", "high")
+        for key in ("K", "zero", "T2", "T_L")
+    ),
 }  # fmt: skip
 BY_CONSTRUCTION = re.compile(
     r"(table2|calibrated|table3)\.\w+|table4\.\w+\.T[12]|fig3\.bandwidth|fig7\.(crossover|phase_margin)"
@@ -216,3 +229,19 @@ def test_report_shows_every_figure_and_progress_every_part(
     for title in ("In short", "Tolerances"):
         assert f"<h2>{title}</h2>" in html
     assert [label for label, share in STAGES if share == 1.0] == list(PARTS)
+
+
+def test_identified_values_come_back_and_tell_what_is_disagreed_on(items: Items) -> None:
+    """Friction put in is found from its own ramp; the paper's two steps find no air."""
+    for name in ("k_brk_p", "f_cfr_p", "c", "f_cfr_n", "k_brk_n"):
+        item = items[f"table3.identified.{name}"]
+        assert item["computed"] == pytest.approx(item["stated"], rel=0.02), name
+        assert item["agrees"] is None
+    for region in ("low", "medium", "high"):
+        step, own = items[f"table4.{region}.K"], items[f"table4.{region}.identified.K"]
+        assert own["computed"] == pytest.approx(step["computed"], rel=0.03), region
+        zero, pole = (items[f"table4.{region}.identified.{key}"]["computed"] for key in
+                      ("zero", "T_L"))  # fmt: skip
+        assert zero > pole  # the other order than Table 4's
+        assert items[f"table4.{region}.eq21.T1"]["computed"] == pytest.approx(pole, rel=0.15)
+    assert items["fig6.misfit.identified"]["computed"] < 0.1

@@ -50,3 +50,44 @@ def identify(
         starts or (16 if study is None else 1), seed, synthetic, study,
     )  # fmt: skip
     raise typer.Exit(execute("identify_command", method, wanted, out, json))
+
+
+def replay(
+    measurement: Annotated[Path, typer.Argument(help="Measurement file.", show_default=False)],
+    bench: Annotated[Path, typer.Option(help="Bench file (TOML), or an experiment's name.")],
+    map_: Map = None,
+    set_: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
+    ] = None,
+    input_: Annotated[
+        list[str] | None,
+        typer.Option("--input", metavar="STIMULUS=SIGNAL", help="What drives the model."),
+    ] = None,
+    output: Annotated[
+        list[str] | None,
+        typer.Option("--output", metavar="SIGNAL", help="What is compared; by default all."),
+    ] = None,
+    case: Annotated[str, typer.Option(help="Run of the experiment; the first by default.")] = "",
+    tolerance: Annotated[
+        list[str] | None,
+        typer.Option(help="Tolerance, e.g. 'nrmse <= 5 %', 'p_mc.max_error <= 2 bar'."),
+    ] = None,
+    segments: Annotated[
+        str, typer.Option(help="Judge stretches: auto (steps and holds), or a TOML file.")
+    ] = "",
+    track: Annotated[
+        list[str] | None,
+        typer.Option(help="Track a drifting parameter as well, e.g. mu_B."),
+    ] = None,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Drive the model with a measured demand and compare; status 1 if a tolerance is missed."""
+    from bywire.cli.replay_command import Wanted
+
+    wanted = Wanted(
+        measurement, bench, map_, changes(set_), changes(input_, "--input"), output or [], case,
+        tolerance or [], segments, track or [],
+    )  # fmt: skip
+    raise typer.Exit(execute("replay_command", wanted, out, json))

@@ -126,8 +126,8 @@ def _measured(chosen: Chosen, wanted: Wanted, progress: Progress) -> tuple[Measu
     method = chosen.method
     if wanted.synthetic is None:
         found = measured(
-            wanted.measurements, wanted.mapping, method.signals, gaps=method.gaps,
-            progress=progress,
+            wanted.measurements, wanted.mapping, method.signals,
+            optional=method.optional, gaps=method.gaps, progress=progress,
         )  # fmt: skip
         return found, ", ".join(path.name for path in wanted.measurements)
     progress("simulated experiment", 0.0)

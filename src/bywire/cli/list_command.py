@@ -49,7 +49,7 @@ def execute(as_text: bool) -> None:
 
 
 def _method(one: Method) -> str:
-    signals = ", ".join(f"{name} [{unit}]" for name, unit in one.signals.items())
+    signals = ", ".join(f"{name} [{unit or 'any'}]" for name, unit in one.signals.items())
     return f"{one.summary}; needs {signals} ({one.assembly or 'any'})"
 
 

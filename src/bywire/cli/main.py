@@ -14,7 +14,7 @@ from bywire.cli.bench_commands import (
     run,
 )
 from bywire.cli.data_commands import convert
-from bywire.cli.identification_commands import identify
+from bywire.cli.identification_commands import identify, replay
 from bywire.cli.loop_commands import (
     agreement_command,
     frequency_response_command,
@@ -49,6 +49,7 @@ app.command("study")(study_command)
 app.command("design")(design_command)
 app.command("convert")(convert)
 app.command("identify")(identify)
+app.command("replay")(replay)
 
 
 @app.callback(invoke_without_command=True)

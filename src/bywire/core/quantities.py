@@ -38,6 +38,7 @@ DISPLAY_UNITS = {
     "m**3": "ml",
     "m**2": "mm**2",
     "m/rad": "mm/rad",
+    "N/Pa": "N/bar",
 }
 
 

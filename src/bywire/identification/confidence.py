@@ -63,7 +63,7 @@ def uncertainty(
     scale = np.where(size > 0.0, size, 1.0)
     bread = np.linalg.pinv((Z.T @ jacobian) / np.outer(scale, scale))
     known = (Z[n - prior_rows :].T @ Z[n - prior_rows :]) / np.outer(scale, scale)
-    found = []
+    found: list[Uncertainty] = []
     for together in _TOGETHER:
         r, rows = _blocks(residuals[data], together), _blocks(Z[data] / scale, together)
         if together > 1 and not _still_told(r, rows, Z[data] / scale):

@@ -144,17 +144,27 @@ class Method:
     experiment
         The bench's experiment that gives such a measurement.
     signals
-        What must be measured: name -> SI unit.
+        What must be measured: name -> SI unit; an empty one admits any.
     options, defaults
         Settings with units and ranges.
     identify
         ``identify(data, par, options, effort) -> Identified``; data has the signals over
-        ``time`` [s], evenly spaced.
+        ``time`` [s], evenly spaced. ``par`` is None for a method of any assembly.
     synthetic
         ``synthetic(par, options, seed) -> data``: the experiment simulated, with the sensors'
         noise; what stands in for a measurement.
     unknowns
         Names of the parameters that it can find.
+    several
+        Whether data may hold several records, see ``bywire.identification.records``: each is
+        evenly spaced, and the method splits them.
+    gaps
+        Whether it takes data in which samples are missing (NaN).
+    optional
+        What it uses where it is measured: name -> SI unit.
+    truth
+        ``truth(par, options) -> {label: value}``: what ``synthetic`` puts in, of estimates that
+        are no parameters of the assembly.
     """
 
     name: str
@@ -167,6 +177,10 @@ class Method:
     identify: Callable[[xr.Dataset, Any, Any, Effort], Identified]
     synthetic: Callable[[Any, Any, int], xr.Dataset]
     unknowns: tuple[str, ...] = ()
+    several: bool = False
+    gaps: bool = False
+    optional: Mapping[str, str] = field(default_factory=dict)
+    truth: Callable[[Any, Any], Mapping[str, float]] | None = None
 
     def require_signals(self, data: xr.Dataset) -> None:
         """Raise ``UnknownNameError`` when a signal is missing, with the nearest ones."""

@@ -4,20 +4,25 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from bywire.analysis.motorcycle_linear import theoretical
 from bywire.analysis.rational import Rational
 from bywire.bench.kpis import step_response
 from bywire.bench.result import Result
+from bywire.identification.braking_records import averaged
 from bywire.report.panels import Panel, Trace
 from bywire.report.style import Role
 from bywire.report.time_traces import time_traces
 from bywire.reproduction import dardanelli2010_facts as facts
+from bywire.reproduction.dardanelli2010_identified import identified_model
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.reproduction.dardanelli2010_table4 import step_peak
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis, selected
+
+Array = NDArray[np.float64]
 
 HEIGHT = facts.FIG6_STEP.value
 START = facts.FIG6_START.value * BAR
@@ -48,6 +53,7 @@ def part(runs: Runs) -> Part:
     for name, suffix in SETS.items():
         items += _nonlinear(runs, name, suffix, final, rise)
     step = runs.settled_step(MAIN, START, HEIGHT)
+    items.append(_misfit(step.recordings["run"], before(step)))
     text = (
         "The nonlinear brake, dither on, starts where its pressure has settled at 25 bar. It rises "
         "less and more slowly than Table 4's model; eq. (15), which knows no friction, has Table "
@@ -95,6 +101,26 @@ def _rise_time(model: Rational) -> float:
     return step_response.rise_time(response).value
 
 
+def _own(name: str, start: float, t: Array) -> list[tuple[str, Array, str]]:
+    """Return the step of the model identified on our brake, which is of the main set."""
+    if name != MAIN:
+        return []
+    step = start + HEIGHT * identified_model("medium").step(t)
+    return [("identified", step, "identified, our brake")]
+
+
+def _misfit(run: xr.Dataset, start: float) -> Item:
+    """Return how far the identified model is off the step that it was not fitted to."""
+    t = run["time"].values
+    error = run["p_mc"].values - (start + HEIGHT * identified_model("medium").step(t))
+    means = averaged(error[t >= 0.0], round(1.0 / (run["time"].values[1] - run["time"].values[0])
+                                            / parameters(MAIN).ecu.dither.f_dit))  # fmt: skip
+    return found(
+        "fig6.misfit.identified", "bar", float(np.sqrt(np.mean(means**2))) / BAR,
+        "rms over 4 s, dither averaged: nonlinear brake less the model identified on it",
+    )
+
+
 def _exhibit(step: Result, name: str, label: str) -> Exhibit:
     """Return Fig. 6 for one parameter set."""
     run = step.recordings["run"]
@@ -107,6 +133,7 @@ def _exhibit(step: Result, name: str, label: str) -> Exhibit:
             for key, values, long_name in (
                 ("nonlinear", run["p_mc"].values, "nonlinear brake with dither"),
                 ("theory", start + HEIGHT * theory.step(t), "eq. (15)"),
+                *_own(name, start, t),
                 (
                     "table4",
                     start + HEIGHT * facts.table4_model("medium").step(t),
@@ -116,9 +143,12 @@ def _exhibit(step: Result, name: str, label: str) -> Exhibit:
         },
         coords={"time": t},
     )
+    traces = [Trace("nonlinear"), Trace("theory", Role.SIMULATED), Trace("table4", Role.SECOND)]
+    if "identified" in shown:
+        traces.append(Trace("identified", Role.SET_POINT))
     panel = Panel(
         "pressure",
-        (Trace("nonlinear"), Trace("theory", Role.SIMULATED), Trace("table4", Role.SECOND)),
+        tuple(traces),
         height=2.4,
     )
     return Exhibit(

@@ -8,6 +8,7 @@ from bywire.control import dither
 from bywire.plant import ball_screw_gear, seal_friction
 from bywire.report.stribeck_curve import stribeck_curve
 from bywire.reproduction import dardanelli2010_facts as facts
+from bywire.reproduction import dardanelli2010_friction
 from bywire.reproduction.dardanelli2010_runs import MAIN, Runs, parameters
 from bywire.reproduction.dardanelli2010_tolerances import ABOUT, PRINTED
 from bywire.reproduction.item import Fact, Item, compared
@@ -40,15 +41,17 @@ def part(runs: Runs) -> Part:
         ),
         _viscous(par.seal.mu_T / par.gear.k_g),
         _eq19(),
+        *dardanelli2010_friction.items(),
     ]  # fmt: skip
     text = (
         "Table 3 is used as published; only the preload T_pr, which it omits, is ours. Where the "
         "curves are vertical the piston sticks: the torque is anything between both ends."
-    )
+    ) + dardanelli2010_friction.text()
     exhibit = Exhibit(
         "fig4", stribeck_curve(curve), "Fig. 4: friction torque at the motor shaft over speed."
     )
-    return Part("Table 3 and Figure 4: friction", text, tuple(items), (exhibit,))
+    return Part("Table 3 and Figure 4: friction", text, tuple(items),
+                (exhibit, dardanelli2010_friction.exhibit()))  # fmt: skip
 
 
 def _viscous(mu_F: float) -> Item:

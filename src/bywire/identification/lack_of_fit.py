@@ -1,0 +1,55 @@
+"""Whether what a model leaves over depends on the conditions: a test of nested models."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.identification.confidence import autoregression, is_white
+from bywire.identification.method import Check
+
+Array = NDArray[np.float64]
+
+_LEVEL = 1e-3  # of a false alarm
+
+
+def lack_of_fit(
+    name: str, residuals: Array, weights: Array, richer: Array, unknowns: int, note: str
+) -> Check:
+    r"""Return how much better a richer model would fit, as Fisher's F.
+
+    .. math:: F = \frac{(S - S_r) / (r - p)}{S_r / (n - r)}
+
+    with S the weighted sum of squares that is left over, S_r what a model with r columns leaves of
+    it, which contains the p unknowns of the fitted one to first order. Where neighboring readings
+    go together it is divided by how much stronger slow noise is than the average. It is of size
+    one where nothing is missing; chance exceeds the limit once in a thousand times.
+
+    Parameters
+    ----------
+    name
+        Of the check.
+    residuals
+        One per reading, in the order of time, in its unit, shape (n,).
+    weights
+        Of the readings, shape (n,): one over their scatter.
+    richer
+        Columns of the richer model, shape (n, r).
+    unknowns
+        p.
+    note
+        What the richer model can do that the fitted one cannot.
+    """
+    from scipy import stats
+
+    e, A = residuals * weights, richer * weights[:, None]
+    r = int(np.linalg.matrix_rank(A))
+    more, left = r - unknowns, e.size - r
+    if more < 1 or left < 1:
+        return Check(name, 0.0, note=f"too few readings to tell: {note}")
+    rest = e - A @ np.linalg.lstsq(A, e, rcond=None)[0]
+    within = max(float(rest @ rest) / left, 1e-300)
+    # What a richer model bends is slow: there colored noise is larger than on the average.
+    slow = 1.0 if is_white(rest) else autoregression(rest).at_zero_frequency / within
+    value = float(e @ e - rest @ rest) / more / (within * max(slow, 1.0))
+    return Check(name, value, limit=float(stats.f.isf(_LEVEL, more, left)), note=note)

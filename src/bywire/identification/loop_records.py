@@ -1,0 +1,135 @@
+"""What records of a current loop share: steps between levels, their noise, checks and curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.parameters import ParameterSet
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import estimate
+from bywire.identification.method import Check, Curve, Identified
+from bywire.identification.output_error import Trial, moved_run, output_error
+from bywire.identification.unknown import parameters_of
+from bywire.simulation.run import simulate
+
+Array = NDArray[np.float64]
+
+_MISFIT = 1.3  # a closed loop's own noise is 1.04 of the sensor's, which is known within 10 %
+
+
+def levels(
+    low: float, high: float, duration: float, dwell: float, interval: float, seed: int
+) -> Callable[[Array], Array]:
+    """Return a signal that steps between random levels, drawn from a seed.
+
+    Parameters
+    ----------
+    low, high
+        Ends of the range.
+    duration, dwell, interval
+        Length, time from step to step, sample time [s].
+    """
+    every = max(round(dwell / interval), 1)
+    count = int(np.ceil(duration / (every * interval))) + 1
+    values = np.random.default_rng(seed).uniform(low, high, count)
+    values[0] = 0.5 * (low + high)
+
+    def at(t: Array) -> Array:
+        index = np.floor(np.round(t / interval, 6) / every).astype(int)
+        return np.asarray(values[np.clip(index, 0, count - 1)])
+
+    return at
+
+
+def noise_of_levels(answer: Array, demand: Array) -> float:
+    """Return the noise of an answer [its unit], from differences while the demand rests.
+
+    Parameters
+    ----------
+    answer, demand
+        Shape (n,).
+    """
+    still = np.convolve(np.diff(demand) == 0.0, np.ones(3), mode="valid") == 3
+    second = np.diff(answer, 3)[: still.size]
+    chosen = second[still] if still.sum() > 10 else second
+    # Third differences of white noise have 20 times its variance.
+    return max(float(np.median(np.abs(chosen))) / (0.6745 * math.sqrt(20.0)), 1e-9)
+
+
+def require_steps(data: xr.Dataset, name: str, label: str) -> None:
+    """Refuse a record whose demand does not move.
+
+    Raises
+    ------
+    UnknownNameError
+        When the demand is missing.
+    ParameterError
+        When it does not step.
+    """
+    if name not in data:
+        raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    if float(np.ptp(data[name].values)) > 0.0:
+        return
+    raise ParameterError(
+        f"{name} of record {label or '1'} does not move: an answer at rest tells neither winding "
+        "nor gains; step it between several levels, the rotor locked"
+    )
+
+
+def identified_loop(
+    trials: Sequence[Trial], par: ParameterSet, names: Sequence[str]
+) -> Identified:
+    """Return a closed loop's parameters from its runs.
+
+    Parameters
+    ----------
+    trials
+        Records beside the loop's model.
+    par
+        Where the search begins.
+    names
+        Unknown parameters.
+
+    Raises
+    ------
+    ParameterError
+        When nothing can be estimated.
+    """
+    found = estimate(output_error(trials, parameters_of(par, names)))
+    return Identified(
+        estimates={"current loop": found}, parameters=found.parameters(),
+        checks=checks_of(trials, found), curves=tuple(as_curve(t, found) for t in trials),
+    )  # fmt: skip
+
+
+def checks_of(trials: Sequence[Trial], found: Estimate) -> tuple[Check, ...]:
+    """Return whether nothing but noise is left."""
+    return (
+        Check("residual_over_noise", found.rms, limit=_MISFIT,
+              note="1 where nothing but the sensor's noise is left"),
+    )  # fmt: skip
+
+
+def as_curve(one: Trial, found: Estimate) -> Curve:
+    """Return the measured current of a trial beside the modeled one."""
+    signal = next(iter(one.measured))
+    shared = {
+        u.name: float(v)
+        for u, v in zip(found.unknowns, found.values, strict=True)
+        if u.trial in ("", one.label)
+    }
+    made = simulate(moved_run(one.run, shared), (signal,))
+    attrs = {"units": "A", "long_name": "current"}
+    data = xr.Dataset(
+        {"measured": ("time", one.measured[signal], attrs),
+         "modeled": ("time", made[signal], attrs)},
+        {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
+    )  # fmt: skip
+    name = f"current-{one.label}" if one.label else "current"
+    return Curve(name, "Current: measured, and modeled with the estimates.", data, "time")

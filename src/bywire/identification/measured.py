@@ -1,0 +1,151 @@
+"""Measurement files as a method or a replay takes them: SI, one even time axis, all signals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from bywire.core.errors import ParameterError, UnitError, unknown_name
+from bywire.data.alignment import AlignmentReport, resample
+from bywire.data.column_units import measures, unit_of_symbol
+from bywire.data.file_format import Progress, no_progress
+from bywire.data.mapping_file import read_mapping
+from bywire.data.measurement import read_measurement
+from bywire.identification.records import joined
+
+_UNEVEN = 1e-3  # of a step
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A measurement and what was done to it.
+
+    Parameters
+    ----------
+    data
+        Signals over ``time`` [s], evenly spaced within every record.
+    notes
+        What the user should know: resampling, missing samples.
+    """
+
+    data: xr.Dataset
+    notes: tuple[str, ...]
+
+
+def measured(
+    paths: Sequence[str | Path],
+    mapping: str | Path | None = None,
+    signals: Mapping[str, str] | None = None,
+    *,
+    optional: Mapping[str, str] | None = None,
+    interval: float | None = None,
+    gaps: bool = False,
+    progress: Progress = no_progress,
+) -> Measured:
+    """Read one measurement, or several records of it.
+
+    Parameters
+    ----------
+    paths
+        Files; several of them become records, named by the files.
+    mapping
+        File that says what their columns mean.
+    signals
+        What must be there: name -> SI unit; all that there is by default.
+    optional
+        What is taken too where it is there.
+    interval
+        Wanted step [s]; by default the median one of the record.
+    gaps
+        Whether samples may be missing.
+    progress
+        Called with a label and the finished share.
+
+    Raises
+    ------
+    InputError
+        When a file cannot be read, a signal is missing or measures something else.
+    """
+    meaning = None if mapping is None else read_mapping(mapping)
+    records, notes = {}, []
+    for path in map(Path, paths):
+        data = read_measurement(path, meaning, progress=progress)
+        if signals is not None:
+            too = {n: unit for n, unit in (optional or {}).items() if n in data}
+            data = data[list(require(data, {**signals, **too}, str(path)))]
+        even, said = as_even(data, interval)
+        notes += [f"{path.name}: {text}" for text in said]
+        _require_whole(even, path, gaps)
+        label = path.stem if path.stem not in records else str(path)
+        records[label] = even
+    return Measured(joined(records), tuple(notes))
+
+
+def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[str, ...]:
+    """Return the wanted signals' names, ``record`` with them where it is there.
+
+    Raises
+    ------
+    UnknownNameError
+        When one is missing, with the nearest.
+    UnitError
+        When one measures something else.
+    """
+    there = [str(name) for name in data.data_vars]
+    for name, unit in signals.items():
+        if name not in there:
+            raise unknown_name(f"signal (needed of {where}; --map can name it)", name, there)
+        found = str(data[name].attrs.get("units", "1"))
+        if unit not in ("", found) and not measures(unit_of_symbol(found), unit):
+            raise UnitError(f"{where}: {name} is in {found}, but {unit} is wanted: check the map")
+    return (*signals, *(("record",) if "record" in there and "record" not in signals else ()))
+
+
+def as_even(data: xr.Dataset, interval: float | None = None) -> tuple[xr.Dataset, list[str]]:
+    """Return signals on one evenly spaced axis, as they are where they lie on one already.
+
+    Parameters
+    ----------
+    data
+        What ``read_measurement`` gives.
+    interval
+        Wanted step [s]; the median one by default.
+    """
+    steps = {str(dim): np.diff(data[dim].values) for dim in data.dims}
+    if "record" in data and set(steps) == {"time"} and interval is None:
+        return data, []  # made by us: each record is even, time jumps between them
+    middle = min(float(np.median(d)) for d in steps.values() if d.size)
+    step = float(f"{middle if interval is None else interval:.9g}")
+    if len(steps) == 1 and np.abs(next(iter(steps.values())) - step).max() <= _UNEVEN * step:
+        (dim,) = steps
+        return data if dim == "time" else data.rename({dim: "time"}), []
+    if "record" in data:
+        raise ParameterError("several records in one file cannot be resampled: give a file each")
+    found = resample(data, step)
+    return found.dataset, [_said(found.report)]
+
+
+def _said(report: AlignmentReport) -> str:
+    missing = max(one.excluded for one in report.channels)
+    left_out = f"; {missing} of them in gaps and left out" if missing else ""
+    return (
+        f"resampled to {report.samples} samples every {1e3 * report.interval:.6g} ms (its own "
+        f"instants are not evenly spaced){left_out}"
+    )
+
+
+def _require_whole(data: xr.Dataset, path: Path, gaps: bool) -> None:
+    if gaps:
+        return
+    for name, signal in data.data_vars.items():
+        missing = np.flatnonzero(np.isnan(signal.values))
+        if missing.size:
+            at = float(data["time"].values[missing[0]])
+            raise ParameterError(
+                f"{path}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
+                "record there, or fill it knowingly with 'bywire convert --exclude nothing'"
+            )

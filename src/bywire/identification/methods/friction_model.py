@@ -1,0 +1,220 @@
+"""Which friction law a record supports: Coulomb, viscous, asymmetric, with pressure, Stribeck."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Literal
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+from numpy.typing import NDArray
+from pydantic import Field
+
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.identification.friction_models import LAWS, find_law, laws_for
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.model_choice import Choice, choose
+from bywire.identification.records import split
+
+Array = NDArray[np.float64]
+Share = Annotated[float, Unit("1", 0.01), Field(ge=0, lt=1)]
+Size = Annotated[float, Unit("N", 10.0), Field(ge=0)]
+
+_BINS, _MISFIT = 12, 0.05
+
+
+class Truth(ParameterSet):
+    """The friction of simulated records, in N and m/s."""
+
+    F_p: Size
+    """Coulomb friction, forward"""
+    F_n: Size
+    """Coulomb friction, backward"""
+    f: Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0)]
+    """friction over pressure"""
+    d: Annotated[float, Unit("N*s/m", 10.0), Field(ge=0)]
+    """viscous friction"""
+    k: Annotated[float, Unit("1", 1.5), Field(ge=1)]
+    """breakaway over Coulomb friction"""
+    v_s: Annotated[float, Unit("m/s", 0.01), Field(gt=0)]
+    """Stribeck velocity"""
+    noise: Size
+    """standard deviation of the sensor's noise"""
+
+
+class Options(ParameterSet):
+    """Which laws, and which samples."""
+
+    law: Literal[
+        "choose", "coulomb", "viscous", "asymmetric", "pressure", "stribeck",
+        "stribeck-asymmetric", "stribeck-pressure",
+    ]  # fmt: skip
+    """one of the laws, or all compared on data held out"""
+    slowest: Share
+    """of the fastest speed: slower samples stick or turn round, and are left out"""
+    pressures: tuple[Annotated[float, Unit("Pa")], ...]
+    """pressures of simulated records"""
+    v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]
+    """fastest speed of simulated records"""
+    f_motion: Frequency
+    """frequency of their motion"""
+    duration: Duration
+    """their length"""
+    interval: Duration
+    """their sample time"""
+    truth: Truth
+
+
+def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> Identified:
+    """Choose a friction law and return its parameters.
+
+    Parameters
+    ----------
+    data
+        ``friction``: force or torque, friction alone, of the motion's sign; ``speed``; where it
+        is measured ``pressure`` [Pa]. Several records help: whole ones are then held out.
+
+    Raises
+    ------
+    ParameterError
+        When too few samples slide both ways, or the law wanted needs a pressure that varies.
+
+    References
+    ----------
+    Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30 (7), section 2: the laws.
+    """
+    records = _sliding(split(data), options.slowest)
+    whole = xr.concat(list(records.values()), "time", combine_attrs="override")
+    known = laws_for(whole)
+    wanted = known if options.law == "choose" else (find_law(options.law),)
+    if wanted[0] not in known:
+        raise ParameterError(
+            f"law {options.law!r} needs a measured pressure that varies by 20 % at least"
+        )
+    choice = choose([law.candidate() for law in wanted], records, "friction")
+    best = choice.chosen
+    law = find_law(best.candidate.name)
+    unit = str(whole["friction"].attrs.get("units", "1"))
+    values = [best.estimate[u.label] if u.label in best.estimate.names else u.start
+              for u in law.unknowns(whole)]  # fmt: skip
+    predicted, _ = law.predict(whole, np.array(values))
+    return Identified(
+        estimates={law.name: best.estimate},
+        parameters={},
+        figures=_figures(choice, unit),
+        checks=(
+            Check("misfit_over_friction", _misfit(whole, predicted), limit=_MISFIT,
+                  note="systematic: mean of what is left in classes of speed, over the friction"),
+            Check("validation_over_training", best.validation_error / best.training_error,
+                  limit=1.5, note="error on data held out over that on data fitted"),
+        ),
+        curves=(_curve(whole, predicted),),
+        notes=(f"held out: {choice.held_out}; chosen is the simplest law within a standard error "
+               "of the best",),
+    )  # fmt: skip
+
+
+def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.Dataset]:
+    names = ("friction", "speed", "pressure")
+    found = {}
+    for label, one in records.items():
+        kept = one[[n for n in names if n in one]]
+        v = np.abs(kept["speed"].values)
+        good = np.all([np.isfinite(kept[n].values) for n in kept.data_vars], axis=0)
+        rows = np.flatnonzero(good & (v > slowest * np.nanmax(v)))
+        found[label] = kept.isel(time=rows)
+    signs = np.concatenate([np.sign(one["speed"].values) for one in found.values()])
+    if min(np.sum(signs > 0), np.sum(signs < 0)) < 20:
+        raise ParameterError(
+            "fewer than 20 samples slide one of both ways: move to and fro, or lower "
+            "--option slowest"
+        )
+    return found
+
+
+def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
+    lowest = [min(getattr(j, name) for j in choice.judged) for name in ("aic", "bic")]
+    found = {}
+    for one in choice.judged:
+        name = one.candidate.name
+        found[f"{name}: held-out error"] = (one.validation_error, unit)
+        found[f"{name}: AIC less the least"] = (one.aic - lowest[0], "1")
+        found[f"{name}: BIC less the least"] = (one.bic - lowest[1], "1")
+    return found
+
+
+def _misfit(whole: xr.Dataset, predicted: Array) -> float:
+    """Return the root mean square of class means of the residual, over that of the friction."""
+    F, v = whole["friction"].values, whole["speed"].values
+    means = []
+    for way in (v > 0, v < 0):
+        order = np.flatnonzero(way)[np.argsort(np.abs(v[way]))]
+        means += [float(np.mean((F - predicted)[part]))
+                  for part in np.array_split(order, _BINS) if part.size]  # fmt: skip
+    return float(np.sqrt(np.mean(np.square(means))) / np.sqrt(np.mean(F**2)))
+
+
+def _curve(whole: xr.Dataset, predicted: Array) -> Curve:
+    attrs = {"units": whole["friction"].attrs.get("units", "1"), "long_name": "friction"}
+    number = pd.Index(np.arange(predicted.size, dtype=float), name="sample")
+    return Curve(
+        "friction",
+        "Friction while it slides: measured, and of the chosen law.",
+        xr.Dataset(
+            {"measured": ("sample", whole["friction"].values, attrs),
+             "modeled": ("sample", predicted, attrs)},
+            {"sample": ("sample", number, {"units": "1", "long_name": "sample"})},
+        ),
+        "sample",
+    )  # fmt: skip
+
+
+def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
+    """Return a sine of the speed at each pressure, with the friction of the truth and noise."""
+    from bywire.identification.records import joined
+
+    random, truth = np.random.default_rng(seed), options.truth
+    t = np.arange(0.0, options.duration, options.interval)
+    v = options.v_max * np.sin(2.0 * np.pi * options.f_motion * t + 0.1)
+    fall = 1.0 + (truth.k - 1.0) * np.exp(-np.abs(v) / truth.v_s)
+    records = {}
+    for k, p in enumerate(options.pressures):
+        dry = np.where(v > 0, truth.F_p, truth.F_n) + truth.f * p
+        F = np.sign(v) * dry * fall + truth.d * v + truth.noise * random.standard_normal(t.size)
+        records[f"level_{k}"] = xr.Dataset(
+            {"friction": ("time", F, {"units": "N"}), "speed": ("time", v, {"units": "m/s"}),
+             "pressure": ("time", np.full(t.size, p), {"units": "Pa"})},
+            {"time": ("time", t, {"units": "s"})},
+        )  # fmt: skip
+    return joined(records)
+
+
+def known_values(par: None, options: Options) -> dict[str, float]:
+    """Return what simulated records are made of, under the laws' names."""
+    found = options.truth.leaves()
+    found.pop("noise")
+    return found | {"F_c": options.truth.F_p}
+
+
+METHOD = Method(
+    name="friction-model",
+    assembly="",
+    summary=f"which of {len(LAWS)} friction laws a record supports, judged on data held out",
+    experiment="",
+    signals={"friction": "", "speed": ""},
+    options=Options,
+    defaults=Options(
+        law="choose", slowest=0.02, pressures=(5e5, 15e5, 25e5, 35e5), v_max=0.1, f_motion=0.5,
+        duration=8.0, interval=0.01,
+        truth=Truth(F_p=20.0, F_n=20.0, f=2e-5, d=60.0, k=1.6, v_s=0.01, noise=1.0),
+    ),
+    identify=identify,
+    synthetic=synthetic,
+    several=True,
+    gaps=True,
+    optional={"pressure": "Pa"},
+    truth=known_values,
+)  # fmt: skip

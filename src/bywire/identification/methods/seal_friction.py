@@ -1,0 +1,192 @@
+"""Friction of a sealed piston from strokes at several pressures: it grows with pressure."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from pydantic import Field
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Force, Frequency, Position, Unit
+from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.method import Check, Effort, Identified, Method
+from bywire.identification.records import joined, split
+from bywire.identification.seal_curves import friction_line, sliding_force
+from bywire.identification.stroke_groups import (
+    grouped,
+    half_widths,
+    pressure_between,
+    require_told,
+)
+from bywire.identification.unknown import Unknown
+
+Array = NDArray[np.float64]
+ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
+
+_MISFIT = 0.1
+
+
+class Truth(ParameterSet):
+    """The piston of simulated measurements."""
+
+    A: Annotated[float, Unit("m**2", 5e-4), Field(gt=0)]
+    """area"""
+    F_0: Force
+    """friction without pressure"""
+    f: ForcePerPressure
+    """friction over pressure"""
+    sigma_group: Force
+    """scatter of the force from record to record and direction to direction"""
+    sigma_stroke: Force
+    """scatter from stroke to stroke"""
+    sigma_F: Force
+    """noise of the force"""
+
+
+class Options(ParameterSet):
+    """Which part of the strokes counts."""
+
+    x_low: Position
+    """travel from which strokes count"""
+    x_high: Position
+    """travel up to which they do"""
+    slowest: Annotated[float, Unit("m/s", 5e-3), Field(gt=0)]
+    """speed above which the piston slides"""
+    cutoff: Frequency
+    """corner of the low-pass before the travel is differentiated"""
+    zero: Literal["known", "free"]
+    """zero of the force sensor: taken as right, or estimated"""
+    pressures: tuple[Annotated[float, Unit("Pa")], ...]
+    """chamber pressures of simulated records"""
+    interval: Duration
+    """sample time of simulated records"""
+    truth: Truth
+
+
+def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> Identified:
+    r"""Return area and friction.
+
+    .. math::
+        F = A p + s\,(F_0 + f p) + F_{off}, \qquad s = \mathrm{sgn}(v)
+
+    The mean force of all strokes of a record in one direction is one measured value, since
+    whatever one record has in common is no independent evidence. The pressure is that of each
+    direction: a regulator holds it higher while the piston moves against it.
+
+    Parameters
+    ----------
+    data
+        ``x``: travel [m], outward positive; ``p``: chamber pressure [Pa]; ``F``: force on the rod
+        [N], positive against the pressure; several records.
+
+    Raises
+    ------
+    ParameterError
+        When there are no strokes, one direction alone, or one pressure alone.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (16): Coulomb friction affine in the pressure.
+    """
+    records = split(data)
+    how = ((options.x_low, options.x_high), options.slowest, options.cutoff)
+    groups = [g for one in records.values() for g in grouped(one, *how)]
+    require_told(groups)
+    s, p, F = (np.array([getattr(g, n) for g in groups]) for n in ("direction", "p", "F"))
+    columns = {"A": p, "F_0": s.astype(float), "f": s * p}
+    if options.zero == "free":
+        columns["F_off"] = np.ones(p.size)
+    W = np.column_stack(list(columns.values()))
+    sigma = _misfit(W, F)
+    start = np.linalg.lstsq(W, F, rcond=None)[0]
+    unknowns = tuple(_unknown(n, v, F, p) for n, v in zip(columns, start, strict=True))
+    problem = Problem(unknowns, lambda values: ((W @ values - F) / sigma, W / sigma))
+    found = estimate(problem)
+    friction = float(np.mean(found["F_0"] + found["f"] * p))
+    loop = np.polyfit(*half_widths(groups), 1)
+    return Identified(
+        estimates={"seal friction": found},
+        parameters={},
+        figures={
+            "force_over_pressure": (found["A"], "N/Pa"),
+            "loop_half_width_at_0": (float(loop[1]), "N"),
+            "loop_half_width_over_pressure": (float(loop[0]), "N/Pa"),
+            "pressure_between_directions": (pressure_between(groups), "Pa"),
+        },
+        checks=(
+            Check("misfit_over_friction", sigma / friction, limit=_MISFIT,
+                  note="what the line leaves of the mean forces, over the mean friction"),
+            Check("stroke_scatter", float(np.sqrt(np.mean([g.scatter**2 for g in groups]))), "N",
+                  note="from stroke to stroke"),
+        ),
+        curves=(friction_line(found, groups), sliding_force(records, found, *how)),
+        notes=(f"{sum(g.count for g in groups)} strokes in {len(groups)} groups of record and "
+               "direction",
+               "loop half widths leave out that the pressure differs between the directions"),
+    )  # fmt: skip
+
+
+def _unknown(name: str, start: float, F: Array, p: Array) -> Unknown:
+    unit = {"A": "m**2", "f": "N/Pa"}.get(name, "N")
+    scale = float(np.ptp(F) / np.ptp(p)) * {"A": 1.0, "f": 0.1}.get(name, 0.0)
+    return Unknown(name, float(start), scale=scale or 0.1 * float(np.abs(F).max()), unit=unit)
+
+
+def _misfit(W: Array, F: Array) -> float:
+    left = F - W @ np.linalg.lstsq(W, F, rcond=None)[0]
+    return max(float(np.sqrt(left @ left / max(F.size - W.shape[1], 1))), 1e-9)
+
+
+def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
+    """Return strokes to and fro at each pressure, with the scatter that real seals show."""
+    random, truth = np.random.default_rng(seed), options.truth
+    t = np.arange(0.0, 40.0, options.interval)
+    low, high = options.x_low, options.x_high
+    reach = 0.6 * (high - low)
+    phase = (t / 10.0) % 1.0  # there and back in 10 s
+    x = 0.5 * (low + high) + reach * (1.0 - 4.0 * np.abs(phase - 0.5))
+    s = np.where(phase < 0.5, 1.0, -1.0)
+    stroke = np.floor(t / 5.0).astype(int)
+    records = {}
+    for k, level in enumerate(options.pressures):
+        own = truth.sigma_group * random.standard_normal(2)[(s > 0).astype(int)]
+        each = truth.sigma_stroke * random.standard_normal(stroke[-1] + 1)[stroke]
+        p = level + 1e3 * random.standard_normal(t.size) + 3e3 * s
+        F = truth.A * p + s * (truth.F_0 + truth.f * p) + own + each
+        F = F + truth.sigma_F * random.standard_normal(t.size)
+        records[f"level_{k}"] = xr.Dataset(
+            {"x": ("time", x, {"units": "m"}), "p": ("time", p, {"units": "Pa"}),
+             "F": ("time", F, {"units": "N"})},
+            {"time": ("time", t, {"units": "s"})},
+        )  # fmt: skip
+    return joined(records)
+
+
+def known(par: None, options: Options) -> dict[str, float]:
+    """Return what simulated records are made of."""
+    truth = options.truth
+    return {"A": truth.A, "F_0": truth.F_0, "f": truth.f, "F_off": 0.0}
+
+
+METHOD = Method(
+    name="seal-friction",
+    assembly="",
+    summary="friction of a sealed piston over pressure, from strokes both ways (2010, eq. 16)",
+    experiment="",
+    signals={"F": "N", "x": "m", "p": "Pa"},
+    options=Options,
+    defaults=Options(
+        x_low=5e-3, x_high=30e-3, slowest=5e-3, cutoff=5.0, zero="known",
+        pressures=(1e5, 3e5, 5e5, 7e5), interval=0.01,
+        truth=Truth(A=4.9e-4, F_0=4.0, f=8e-6, sigma_group=0.3, sigma_stroke=0.1, sigma_F=0.05),
+    ),
+    identify=identify,
+    synthetic=synthetic,
+    unknowns=("A", "F_0", "f"),
+    several=True,
+    gaps=True,
+    truth=known,
+)  # fmt: skip

@@ -1,0 +1,213 @@
+r"""Which of several models to take: by what they predict of data that they were not fitted to.
+
+Information criteria are given beside it, with the likelihood of residuals that go together
+(an autoregressive model of the richest candidate's residuals): :math:`AIC = n \ln s^2 + 2 k`,
+:math:`BIC = n \ln s^2 + k \ln n`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError
+from bywire.identification.confidence import autoregression
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.unknown import Unknown
+
+Array = NDArray[np.float64]
+Predict = Callable[[xr.Dataset, Array], tuple[Array, Array]]
+
+_BLOCKS = 10  # of a single record
+_FOLDS = 5
+_RECORDS = 3  # from so many on, whole records are held out
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model that may explain a signal.
+
+    Parameters
+    ----------
+    name
+        What it is called.
+    unknowns
+        ``unknowns(data) -> (Unknown, ...)``: what it is fitted by, with starts from the data.
+    predict
+        ``predict(data, values) -> (prediction, jacobian)``, shapes (n,) and (n, p).
+    """
+
+    name: str
+    unknowns: Callable[[xr.Dataset], tuple[Unknown, ...]]
+    predict: Predict
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A candidate with its figures.
+
+    Parameters
+    ----------
+    candidate, estimate
+        The model, fitted to all data.
+    training_error, validation_error
+        Root mean square of what is left of data it was fitted to, and of data held out, in the
+        unit of the signal.
+    excess, excess_error
+        Mean over the folds of its held-out error less that of the best candidate, and the
+        standard error of that mean.
+    aic, bic
+        Less is better; differences count.
+    """
+
+    candidate: Candidate
+    estimate: Estimate
+    training_error: float
+    validation_error: float
+    excess: float
+    excess_error: float
+    aic: float
+    bic: float
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What was chosen.
+
+    Parameters
+    ----------
+    judged
+        Candidates in their order, the simplest first.
+    chosen
+        The simplest whose held-out error exceeds the least by no more than one standard error.
+    held_out
+        What was held out, in words.
+    """
+
+    judged: tuple[Judged, ...]
+    chosen: Judged
+    held_out: str
+
+
+def choose(
+    candidates: Sequence[Candidate], records: Mapping[str, xr.Dataset], signal: str
+) -> Choice:
+    """Choose a model by prediction of held-out data.
+
+    With three records or more, each is held out in turn; else blocks of the records, two at a
+    time far apart. Errors are compared fold by fold, so that what makes one fold hard for all
+    candidates does not hide which is better.
+
+    Parameters
+    ----------
+    candidates
+        The simplest first.
+    records
+        By label, each over ``time``; without NaN.
+    signal
+        What is predicted.
+
+    Raises
+    ------
+    ParameterError
+        When a candidate cannot be fitted, or there is too little data to hold some out.
+
+    References
+    ----------
+    Breiman, Friedman, Olshen, Stone (1984), section 3.4.3: the rule of one standard error.
+    """
+    folds, held_out = _folds(records)
+    everything = list(records.values())
+    estimates = [_fitted(c, everything, signal) for c in candidates]
+    left = [_left(c, e, everything, signal) for c, e in zip(candidates, estimates, strict=True)]
+    richest = max(range(len(candidates)), key=lambda k: len(estimates[k].unknowns))
+    coefficients = autoregression(left[richest]).coefficients
+    errors = np.array([[_held_out(c, fold, signal) for fold in folds] for c in candidates])
+    best = int(np.argmin(np.sqrt(np.mean(errors**2, axis=1))))
+    judged = []
+    for k, (candidate, found) in enumerate(zip(candidates, estimates, strict=True)):
+        more = errors[k] - errors[best]
+        scatter = float(more.std(ddof=1)) / math.sqrt(len(folds))
+        n, unknowns = left[k].size, len(found.unknowns) + 1  # the noise's variance is one
+        s2 = _innovation_variance(left[k], coefficients)
+        judged.append(
+            Judged(
+                candidate, found, float(np.sqrt(np.mean(left[k] ** 2))),
+                float(np.sqrt(np.mean(errors[k] ** 2))), float(more.mean()), scatter,
+                n * math.log(s2) + 2 * unknowns, n * math.log(s2) + unknowns * math.log(n),
+            )
+        )  # fmt: skip
+    chosen = next(j for j in judged if j.excess <= j.excess_error)
+    return Choice(tuple(judged), chosen, held_out)
+
+
+@dataclass(frozen=True)
+class _Fold:
+    training: list[xr.Dataset]
+    held: list[xr.Dataset]
+
+
+def _folds(records: Mapping[str, xr.Dataset]) -> tuple[list[_Fold], str]:
+    parts = list(records.values())
+    if len(parts) >= _RECORDS:
+        found = [_Fold([r for r in parts if r is not one], [one]) for one in parts]
+        return found, f"each of {len(parts)} records in turn"
+    blocks = [
+        one.isel(time=rows) for one in parts
+        for rows in np.array_split(np.arange(one.sizes["time"]), _BLOCKS)
+    ]  # fmt: skip
+    if min(b.sizes["time"] for b in blocks) < 2:
+        raise ParameterError("too few samples to hold some out: measure longer, or more records")
+    found = []
+    for k in range(_FOLDS):
+        held = [b for j, b in enumerate(blocks) if j % _FOLDS == k]
+        found.append(_Fold([b for j, b in enumerate(blocks) if j % _FOLDS != k], held))
+    return found, f"blocks of {len(parts)} record{'s' * (len(parts) > 1)}, a fifth at a time"
+
+
+def _fitted(candidate: Candidate, parts: Sequence[xr.Dataset], signal: str) -> Estimate:
+    whole = xr.concat(parts, "time", combine_attrs="override")
+    unknowns, y = candidate.unknowns(whole), whole[signal].values
+    size = max(float(np.std(y)), 1e-300)
+
+    def evaluate(values: Array) -> tuple[Array, Array]:
+        predicted, slopes = candidate.predict(whole, values)
+        return (predicted - y) / size, slopes / size
+
+    return estimate(Problem(unknowns, evaluate))
+
+
+def _left(
+    candidate: Candidate, found: Estimate, parts: Sequence[xr.Dataset], signal: str
+) -> Array:
+    values = _values(candidate, found, xr.concat(parts, "time", combine_attrs="override"))
+    return np.concatenate(
+        [one[signal].values - candidate.predict(one, values)[0] for one in parts]
+    )
+
+
+def _values(candidate: Candidate, found: Estimate, whole: xr.Dataset) -> Array:
+    """Return all values of a candidate, those that the data does not tell at their starts."""
+    known = dict(zip(found.names, found.values.tolist(), strict=True))
+    return np.array([known.get(u.label, u.start) for u in candidate.unknowns(whole)])
+
+
+def _held_out(candidate: Candidate, fold: _Fold, signal: str) -> float:
+    found = _fitted(candidate, fold.training, signal)
+    whole = xr.concat(fold.training, "time", combine_attrs="override")
+    values = _values(candidate, found, whole)
+    left = [one[signal].values - candidate.predict(one, values)[0] for one in fold.held]
+    return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
+
+
+def _innovation_variance(left: Array, coefficients: Array) -> float:
+    from scipy import signal
+
+    white = signal.lfilter(coefficients, [1.0], left)[coefficients.size - 1 :]
+    return max(float(np.mean(white**2)), 1e-300)

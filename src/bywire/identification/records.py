@@ -1,0 +1,77 @@
+"""Several records of one experiment in one measurement, one after the other.
+
+The signal ``record`` numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the
+Climate and Forecast conventions write it. Time goes on from one record to the next, so that any
+file can hold them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pandas as pd
+import xarray as xr
+
+from bywire.core.errors import ParameterError
+
+RECORD = "record"
+"""the signal that numbers the records"""
+
+
+def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
+    """Return records as one measurement; a single one stays as it is.
+
+    Parameters
+    ----------
+    records
+        By label; each over ``time`` [s], with the same signals.
+
+    Raises
+    ------
+    ParameterError
+        When there is none, or one has other signals than the first.
+    """
+    if not records:
+        raise ParameterError("no record is given: one at least is needed")
+    first, *others = records
+    if not others:
+        return records[first]
+    wanted = set(map(str, records[first].data_vars))
+    parts, times, start = [], [], 0.0
+    for number, (label, one) in enumerate(records.items()):
+        if set(map(str, one.data_vars)) != wanted:
+            differing = ", ".join(sorted(wanted ^ set(map(str, one.data_vars))))
+            raise ParameterError(
+                f"records {first} and {label} differ in their signals ({differing}): records of "
+                "one experiment have the same ones"
+            )
+        t = one["time"].values - one["time"].values[0]
+        times.append(start + t)
+        start = float(times[-1][-1] + (t[1] - t[0] if t.size > 1 else 1.0))
+        parts.append(one.assign({RECORD: ("time", np.full(t.size, float(number)))}))
+    whole = xr.concat(parts, "time", combine_attrs="override")
+    axis = pd.Index(np.concatenate(times), name="time")
+    whole = whole.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
+    names = " ".join(label.replace(" ", "_") for label in records)
+    whole[RECORD].attrs = {"units": "1", "long_name": "record", "flag_meanings": names}
+    return whole
+
+
+def split(data: xr.Dataset) -> dict[str, xr.Dataset]:
+    """Return the records of a measurement by label, each with a time that begins at zero.
+
+    Without the signal ``record`` it is one record without a name, as it is.
+    """
+    if RECORD not in data:
+        return {"": data}
+    numbers = data[RECORD].values
+    names = str(data[RECORD].attrs.get("flag_meanings", "")).split()
+    found = {}
+    for number in np.unique(numbers[np.isfinite(numbers)]):
+        k = int(number)
+        one = data.isel(time=np.flatnonzero(numbers == number)).drop_vars(RECORD)
+        axis = pd.Index(np.round(one["time"].values - one["time"].values[0], 12), name="time")
+        label = names[k] if 0 <= k < len(names) else f"record_{k}"
+        found[label] = one.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
+    return found

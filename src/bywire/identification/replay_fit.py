@@ -1,0 +1,143 @@
+"""How well a replay fits: figures over stretches of a record, judged against tolerances."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Verdict, check, judge
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.data.lag import estimate_lag
+from bywire.identification.replay_segments import Segment
+
+Array = NDArray[np.float64]
+
+_LARGEST_LAG = 0.25  # of a stretch
+
+
+@dataclass(frozen=True)
+class SegmentFit:
+    """How well one signal is met over one stretch.
+
+    Parameters
+    ----------
+    segment, signal
+        Where, and what.
+    kpis
+        Its figures.
+    verdicts
+        Tolerances that apply to it.
+    """
+
+    segment: Segment
+    signal: str
+    kpis: tuple[Kpi, ...]
+    verdicts: tuple[Verdict, ...]
+
+
+def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
+    """Return the figures of one signal over one stretch.
+
+    Parameters
+    ----------
+    pair
+        ``measured`` and ``modeled`` over ``time`` [s]; where one is NaN nothing is compared.
+    segment
+        The stretch.
+
+    Returns
+    -------
+    tuple of Kpi
+        ``rmse``, ``nrmse`` (over the range of the whole record), ``vaf`` (variance accounted
+        for), ``max_error``, ``bias``, ``lag`` (model behind measurement, by correlation).
+
+    Raises
+    ------
+    ParameterError
+        When the stretch holds fewer than two samples.
+    """
+    part = pair.sel(time=slice(segment.start - 1e-9, segment.stop + 1e-9))
+    y, m = part["measured"].values, part["modeled"].values
+    there = np.isfinite(y) & np.isfinite(m)
+    if there.sum() < 2:
+        raise ParameterError(
+            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, holds "
+            f"{int(there.sum())} samples: two at least are needed"
+        )
+    y, m = y[there], m[there]
+    error = m - y
+    whole = pair["measured"].values[np.isfinite(pair["measured"].values)]
+    span, unit = float(np.ptp(whole)), str(pair["measured"].attrs.get("units", "1"))
+    rmse = float(np.sqrt(np.mean(error**2)))
+    variance = float(np.var(y))
+    lag, lag_note = _lag(part, there)
+    still = "the measured signal does not move"
+    return (
+        Kpi("rmse", rmse, unit, "Root mean square of modeled less measured."),
+        Kpi("nrmse", 100.0 * rmse / span if span else math.nan, "%",
+            "That over the measured range of the whole record.", "" if span else still),
+        Kpi("vaf", 100.0 * (1.0 - float(np.var(error)) / variance) if variance else math.nan, "%",
+            "Variance accounted for: 1 less that of the error over that of the measurement.",
+            "" if variance else still),
+        Kpi("max_error", float(np.abs(error).max()), unit, "Largest magnitude of the error."),
+        Kpi("bias", float(error.mean()), unit, "Mean of modeled less measured."),
+        Kpi("lag", lag, "s", "By how much the model is later, by correlation.", lag_note),
+    )  # fmt: skip
+
+
+def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
+    if not there.all():
+        return math.nan, "the measured signal has gaps"
+    t = part["time"].values
+    try:
+        found = estimate_lag(
+            part, "measured", "modeled", largest=_LARGEST_LAG * float(t[-1] - t[0])
+        )
+    except ParameterError as error:
+        return math.nan, str(error)
+    if found.at_limit:
+        return math.nan, "no lag stands out"
+    return found.value, f"correlation {found.correlation:.4f}"
+
+
+def judged(
+    outputs: Mapping[str, xr.Dataset], segments: Sequence[Segment]
+) -> tuple[SegmentFit, ...]:
+    """Return the figures of all signals over all stretches, with the verdicts.
+
+    A tolerance named ``nrmse`` holds for every signal, ``p_mc.nrmse`` for one.
+
+    Raises
+    ------
+    UnknownNameError
+        When a tolerance names no figure or signal.
+    """
+    found = []
+    for segment in segments:
+        figures = {name: fit_figures(pair, segment) for name, pair in outputs.items()}
+        _require_known(segment, figures)
+        for name, kpis in figures.items():
+            shared = {k: v for k, v in segment.tolerances.items() if "." not in k}
+            own = {
+                key.removeprefix(f"{name}."): text
+                for key, text in segment.tolerances.items()
+                if key.startswith(f"{name}.")
+            }
+            wanted = {**shared, **own}
+            check(wanted, {k.name: k.unit for k in kpis})
+            found.append(SegmentFit(segment, name, kpis, judge(wanted, kpis)))
+    return tuple(found)
+
+
+def _require_known(segment: Segment, figures: Mapping[str, Sequence[Kpi]]) -> None:
+    names = [f"{name}.{k.name}" for name, kpis in figures.items() for k in kpis]
+    known = dict.fromkeys([*(name.partition(".")[2] for name in names), *names])
+    for name in segment.tolerances:
+        if name not in known:
+            raise unknown_name("figure", name, known)

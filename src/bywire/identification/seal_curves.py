@@ -1,0 +1,73 @@
+"""What shows a seal's friction: the line over pressure, and the force while it slides."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+import xarray as xr
+
+from bywire.identification.estimate import Estimate
+from bywire.identification.method import Curve
+from bywire.identification.output_error import even_interval
+from bywire.identification.stroke_groups import Group
+from bywire.identification.strokes import find_strokes, velocity
+
+
+def friction_line(found: Estimate, groups: Sequence[Group]) -> Curve:
+    """Return friction over pressure with its band, and what each group says of it."""
+    offset = found["F_off"] if "F_off" in found.names else 0.0
+    seen = {g.p: g.direction * (g.F - found["A"] * g.p - offset) for g in groups}
+    p = np.union1d(np.linspace(0.0, 1.1 * max(seen), 60), list(seen))
+    places = [found.names.index(n) for n in ("F_0", "f") if n in found.names]
+    rows = np.column_stack((np.ones(p.size), p))[:, : len(places)]
+    value = rows @ found.values[places]
+    variance = np.einsum("ni,ij,nj->n", rows, found.covariance[np.ix_(places, places)], rows)
+    half = 0.5 * float(np.diff(found.intervals()[0])[0]) / float(found.deviations[0])
+    reach = half * np.sqrt(variance)
+    attrs = {"units": "N", "long_name": "friction"}
+    return Curve(
+        "friction",
+        "Friction over pressure with its 95 % band; points: each record, each direction.",
+        xr.Dataset(
+            {"value": ("p", value, attrs), "low": ("p", value - reach, attrs),
+             "high": ("p", value + reach, attrs),
+             "measured": ("p", np.array([seen.get(float(v), np.nan) for v in p]), attrs)},
+            {"p": ("p", p, {"units": "Pa", "long_name": "pressure"})},
+        ),
+        "p",
+    )  # fmt: skip
+
+
+def sliding_force(
+    records: Mapping[str, xr.Dataset],
+    found: Estimate,
+    stretch: tuple[float, float],
+    slowest: float,
+    cutoff: float,
+) -> Curve:
+    """Return the force while it slides, measured and modeled, record after record."""
+    offset = found["F_off"] if "F_off" in found.names else 0.0
+    measured, modeled = [], []
+    for one in records.values():
+        x, p, F = (one[name].values for name in ("x", "p", "F"))
+        v = velocity(x, even_interval(one["time"].values), cutoff)
+        model = np.full(F.size, np.nan)
+        for stroke in find_strokes(x, v, *stretch, slowest):
+            k = stroke.rows
+            rubs = found["F_0"] + found["f"] * p[k]
+            model[k] = found["A"] * p[k] + stroke.direction * rubs + offset
+        measured.append(np.where(np.isfinite(model), F, np.nan))
+        modeled.append(model)
+    attrs = {"units": "N", "long_name": "force"}
+    number = np.arange(sum(m.size for m in measured), dtype=float)
+    return Curve(
+        "strokes",
+        "Force while the piston slides: measured, and of the model.",
+        xr.Dataset(
+            {"measured": ("sample", np.concatenate(measured), attrs),
+             "modeled": ("sample", np.concatenate(modeled), attrs)},
+            {"sample": ("sample", number, {"units": "1", "long_name": "sample"})},
+        ),
+        "sample",
+    )  # fmt: skip

@@ -1,0 +1,209 @@
+"""Transfer function (22) from steps and sines: what is put in comes back, what lacks is said."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import control
+import numpy as np
+import pytest
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.dithered_plant import dithered_plant
+from bywire.analysis.motorcycle_linear import with_slow_pair
+from bywire.catalog.registry import parameters
+from bywire.core.errors import ParameterError
+from bywire.identification.braking_fit import fit, five_of
+from bywire.identification.braking_records import REGIONS, block_of, regions_of, step_at
+from bywire.identification.method import Effort, Identified
+from bywire.identification.methods.braking_dynamics import METHOD, pair_shows, truth
+from bywire.identification.records import joined, split
+from bywire.identification.sine_lines import lines, measured_points
+from bywire.identification.slow_pair import NAMES, log_response, response
+
+Array = NDArray[np.float64]
+
+PAR = parameters("dardanelli2010")
+EQ22 = METHOD.defaults.replace({"plant": "eq-22"})
+VALUES = np.array([1.02e6, 1.66, 0.127, 0.0223, 1.53])
+SEEDS = range(1, 7)
+
+
+@pytest.fixture(scope="module")
+def data() -> dict[int, xr.Dataset]:
+    return {seed: METHOD.synthetic(PAR, EQ22, seed) for seed in SEEDS}
+
+
+def identified(record: xr.Dataset, **changes: object) -> Identified:
+    return METHOD.identify(record, PAR, EQ22.replace(changes), Effort())
+
+
+def test_response_equals_python_control_and_its_derivatives_differences() -> None:
+    t = np.arange(3000) * 1e-3
+    u = np.where(t < 1.0, 0.0, 0.35) + 0.1 * np.sin(2.0 * math.pi * 3.0 * t)
+    y, J = response(VALUES, u, 1e-3, 20)
+    system = with_slow_pair(*VALUES).transfer_function()
+    wanted = control.forced_response(system, t, u).outputs
+    np.testing.assert_allclose(y, wanted[::20], atol=1e-7 * np.ptp(wanted))
+    f = np.array([0.3, 2.0, 15.0])
+    G, slopes = log_response(VALUES, f)
+    np.testing.assert_allclose(np.exp(G), with_slow_pair(*VALUES).response(f), rtol=1e-12)
+    for k in range(5):
+        by = np.zeros(5)
+        by[k] = 1e-5 * VALUES[k]
+        up, down = (response(VALUES + sign * by, u, 1e-3, 20)[0] for sign in (1.0, -1.0))
+        difference = (up - down) / (2.0 * by[k])
+        assert np.abs(J[:, k] - difference).max() < 1e-7 * np.abs(difference).max()
+        up, down = (log_response(VALUES + sign * by, f)[0] for sign in (1.0, -1.0))
+        np.testing.assert_allclose(slopes[:, k], (up - down) / (2.0 * by[k]), rtol=1e-7)
+
+
+def test_lines_beside_a_dither_30_times_their_size() -> None:
+    t = np.arange(4000) * 1e-3
+    w = 2.0 * math.pi * np.array([1.234, 7.89])
+    dither = 3.0 * np.sin(2.0 * math.pi * 50.0 * t)
+    u = 0.1 * np.sin(w[0] * t) + 0.07 * np.cos(w[1] * t) + dither
+    y = 0.2 * np.sin(w[0] * t - 1.0) + 0.007 * np.cos(w[1] * t - 2.0) + 0.1 * dither + 5.0
+    found = lines(u, 1e-3, 1.0, 15.0, (50.0,))
+    np.testing.assert_allclose(found, [1.234, 7.89], rtol=1e-6)
+    points = measured_points(u, y, 1e-3, found, (50.0,))
+    np.testing.assert_allclose(np.exp(points.log_gain), [2.0 * np.exp(-1j), 0.1 * np.exp(-2j)],
+                               rtol=1e-5)  # fmt: skip
+
+
+def test_steps_are_told_from_sines() -> None:
+    t = np.linspace(0.0, 1.0, 200)
+    assert step_at(np.where(t < 0.3, 1.0, 2.0)) == 60
+    # Half a period is the sine that two levels explain best.
+    assert step_at(np.cos(math.pi * t)) is None
+    assert step_at(np.ones(50)) is None
+    assert block_of(1e-3, 50.0) == 20
+    assert block_of(1e-3, 40.0) == 25
+    assert block_of(1e-3, 30.0) == 100
+    with pytest.raises(ParameterError, match="cannot be averaged"):
+        block_of(1e-3, 49.7)
+
+
+def deviations(data: dict[int, xr.Dataset], fitted: object) -> Array:
+    """Return errors over told standard deviations, shape (seeds, 15)."""
+    wanted, rows = truth(PAR, EQ22), []
+    for record in data.values():
+        found: dict[str, float] = {}
+        for estimate in fitted(record):  # type: ignore[operator]
+            error = dict(zip(estimate.names, estimate.values, strict=True))
+            size = dict(zip(estimate.names, estimate.deviations, strict=True))
+            found |= {k: (error[k] - wanted[k]) / size[k] for k in error if k in wanted}
+        rows.append([found[k] for k in wanted])
+    return np.array(rows)
+
+
+def test_what_is_put_in_comes_back(data: dict[int, xr.Dataset]) -> None:
+    z = deviations(data, lambda record: identified(record).estimates.values())
+    assert np.abs(z).max() < 4.0
+    assert 0.5 < np.mean(z**2) < 1.8
+    assert np.all(np.abs(z.mean(axis=0)) < 3.0 / math.sqrt(len(z)))
+
+
+def test_intervals_that_forget_the_current_s_noise_would_lie(data: dict[int, xr.Dataset]) -> None:
+    """The gate above can fail: residuals over seconds go together and count as independent."""
+
+    def forgetful(record: xr.Dataset) -> list[object]:
+        found = []
+        for region in regions_of(split(record), (10e5, 35e5), 50.0):
+            steps = tuple(replace(step, sigma_i=0.0) for step in region.steps)
+            found.append(fit(replace(region, steps=steps), PAR, joint=True, turns=1))
+        return found
+
+    few = {seed: data[seed] for seed in (1, 2, 3)}
+    assert np.mean(deviations(few, forgetful) ** 2) > 2.0
+
+
+def test_two_steps_in_turn_agree_with_all_at_once(data: dict[int, xr.Dataset]) -> None:
+    turns, joint = (identified(data[1], fit=how, turns=40).estimates for how in
+                    ("two-step", "joint"))  # fmt: skip
+    for region in REGIONS:
+        a, b = turns[region], joint[region]
+        for name in b.names:
+            width = b.deviations[b.names.index(name)]
+            assert abs(a[name] - b[name]) < 4.0 * width, name
+    once = identified(data[1], fit="two-step", turns=1).estimates["low"]
+    assert any("do not agree yet" in note for note in once.notes)
+
+
+def test_a_slow_pair_of_either_order() -> None:
+    """A response that creeps on: the zero above the pole, as air that fills slowly has it."""
+    options = EQ22.replace({"f_zero": 0.13, "f_pole": 0.1})
+    found = METHOD.identify(METHOD.synthetic(PAR, options, 3), PAR, options, Effort())
+    for region in REGIONS:
+        five = five_of(found.estimates[region])
+        assert five["tau_L"] < five["T_L"]
+        assert 1.0 / (2.0 * math.pi * five["T_L"]) == pytest.approx(0.1, rel=0.2)
+
+
+def test_a_pair_that_is_not_there_is_said(data: dict[int, xr.Dataset]) -> None:
+    options = EQ22.replace({"f_zero": 0.1, "f_pole": 0.1})
+    record = METHOD.synthetic(PAR, options, 1)
+    found = METHOD.identify(record, PAR, options, Effort())
+    assert not any(pair_shows(e) for e in found.estimates.values())
+    assert any("model = 'eq-21'" in note for note in found.notes)
+    assert all(pair_shows(e) for e in identified(data[1]).estimates.values())
+    plain = METHOD.identify(record, PAR, options.replace({"model": "eq-21"}), Effort())
+    wanted = truth(PAR, options)
+    for region, estimate in plain.estimates.items():
+        assert estimate.kept == ()
+        for name in ("K", "T1", "T2"):
+            k = estimate.names.index(f"{region}:{name}")
+            error = abs(estimate.values[k] - wanted[f"{region}:{name}"])
+            assert error < 4.0 * estimate.deviations[k], name
+
+
+def test_a_brake_that_answers_late_is_found_out(data: dict[int, xr.Dataset]) -> None:
+    records = split(data[1])
+    late = {k: r.assign(p_mc=("time", np.roll(r["p_mc"].values, 20))) for k, r in records.items()}
+    late = {k: r.isel(time=slice(20, None)) for k, r in late.items()}
+    found = identified(joined(late))
+    assert not any(c.holds for c in found.checks if c.name.endswith("misfit_sines"))
+    assert all(c.holds for c in identified(data[1]).checks)
+
+
+def test_what_lacks_is_named(data: dict[int, xr.Dataset]) -> None:
+    records = split(data[1])
+    steps = {k: r for k, r in records.items() if "step" in k}
+    sines = {k: r for k, r in records.items() if "step" not in k}
+    with pytest.raises(ParameterError, match=r"no step response at low .* K, tau_L and T_L"):
+        identified(joined(sines))
+    with pytest.raises(ParameterError, match="T1 and T2 cannot be estimated"):
+        identified(joined(steps), fit="two-step")
+    alone = identified(joined(steps)).estimates["low"]
+    whole = identified(data[1]).estimates["low"]
+    T2 = [e.deviations[e.names.index("low:T2")] for e in (alone, whole)]
+    assert T2[0] > 3.0 * T2[1]
+    first = records["low_step"]
+    with pytest.raises(ParameterError, match=r"must be >= 0\.2 s"):
+        identified(first.isel(time=slice(900, None)))
+    still = first.assign(i=("time", np.full(first.sizes["time"], 1.0)))
+    with pytest.raises(ParameterError, match="neither steps nor has a sine"):
+        identified(still)
+    stuck = first.assign(p_mc=("time", 5e5 + np.random.default_rng(0).normal(
+        0.0, 2e3, first.sizes["time"])))  # fmt: skip
+    with pytest.raises(ParameterError, match="hardly answers the step at low pressure"):
+        identified(stuck)
+    with pytest.raises(ParameterError, match="no true values"):
+        truth(PAR, METHOD.defaults)
+
+
+def test_the_whole_brake_s_gain_is_that_of_its_dithered_motion() -> None:
+    """Measured through converters and filters, against the linear model of the periodic motion."""
+    options = METHOD.defaults.replace({"model": "eq-21"})
+    found = METHOD.identify(METHOD.synthetic(PAR, options, 1), PAR, options, Effort())
+    gain = found.figures["medium.K"][0]
+    assert gain == pytest.approx(dithered_plant(PAR, 25e5).gain, rel=0.03)  # type: ignore[arg-type]
+    assert set(five_of(found.estimates["high"])) == set(NAMES)
+    assert {c.name for c in found.curves} == {
+        f"{region}-{part}" for region in REGIONS for part in ("gain", "phase", "step")
+    }
+    # Friction makes the gain depend on the amplitude: no linear model fits step and sines.
+    assert all(c.holds for c in found.checks if c.name.endswith("misfit_step"))
+    assert not all(c.holds for c in found.checks)

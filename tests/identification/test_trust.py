@@ -1,0 +1,109 @@
+"""The study of trust: a sound method passes, bias and false intervals are found out."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Force
+from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.method import Effort, Identified, Method
+from bywire.identification.trust import trust
+from bywire.identification.unknown import Unknown
+
+
+class Options(ParameterSet):
+    """One number."""
+
+    F: Force
+
+
+def level(seen: xr.Dataset, par: None, options: Options, effort: Effort, *, off: float = 0.0,
+          overlap: int = 1) -> Identified:  # fmt: skip
+    """Estimate a level; off adds a bias, overlap counts every sample several times."""
+    y = np.repeat(seen["F"].values, overlap)
+    unknown = Unknown("F", 1.0, scale=1.0, unit="N")
+    found = estimate(Problem((unknown,), lambda v: (v[0] - y, np.ones((y.size, 1)))))
+    return Identified({"level": replace(found, values=found.values + off)}, {})
+
+
+def made(par: None, options: Options, seed: int) -> xr.Dataset:
+    if seed == 13:
+        raise ParameterError("no luck")
+    noise = np.random.default_rng(seed).standard_normal(40)
+    t = np.arange(40.0)
+    return xr.Dataset({"F": ("time", options.F + noise)}, {"time": t})
+
+
+METHOD = Method(
+    name="level", assembly="", summary="a level", experiment="", signals={"F": "N"},
+    options=Options, defaults=Options(F=5.0), identify=level, synthetic=made,
+    truth=lambda par, options: {"F": options.F},
+)  # fmt: skip
+SEEDS = range(100, 180)
+
+
+def test_a_sound_method_is_trusted() -> None:
+    found = trust(METHOD, None, METHOD.defaults, SEEDS)
+    (one,) = found.recovered
+    assert found.holds
+    assert one.unit == "N"
+    assert one.count == 80
+    assert one.claimed == pytest.approx(one.scatter, rel=0.25)
+    # The mean of 40 values of unit variance.
+    assert one.claimed == pytest.approx(40**-0.5, rel=0.05)
+
+
+def test_bias_and_false_intervals_are_found_out() -> None:
+    biased = replace(METHOD, identify=partial(level, off=0.1))
+    found = trust(biased, None, METHOD.defaults, SEEDS)
+    assert not found.holds
+    assert found.recovered[0].bias_in_errors > 3.0
+    # Every sample counted four times: one standard deviation is claimed to be half of it. The
+    # autocovariance of the residuals would tell, were the repeats next to each other.
+    shuffled = replace(METHOD, identify=_four_times)
+    found = trust(shuffled, None, METHOD.defaults, SEEDS)
+    assert not found.holds
+    assert found.recovered[0].coverage < 0.85
+
+
+def _four_times(seen: xr.Dataset, par: None, options: Options, effort: Effort) -> Identified:
+    one = level(seen, par, options, effort).estimates["level"]
+    return Identified({"level": replace(one, covariance=one.covariance / 4.0)}, {})
+
+
+def test_failures_are_told() -> None:
+    found = trust(METHOD, None, METHOD.defaults, range(11, 15))
+    assert [o.seed for o in found.failed] == [13]
+    assert "no luck" in found.failed[0].error
+    assert not found.holds
+
+
+def test_a_study_goes_on_from_its_store(tmp_path: Path) -> None:
+    store, seen = tmp_path / "experiments.jsonl", []
+
+    def counted(par: None, options: Options, seed: int) -> xr.Dataset:
+        seen.append(seed)
+        if seed == 103:
+            raise KeyboardInterrupt
+        return made(par, options, seed)
+
+    watched = replace(METHOD, synthetic=counted)
+    with pytest.raises(KeyboardInterrupt):
+        trust(watched, None, METHOD.defaults, range(100, 106), store=store)
+    store.write_text(store.read_text() + '{"key": "cut o')
+    seen.clear()
+    again = replace(METHOD, synthetic=lambda p, o, s: (seen.append(s), made(p, o, s))[1])
+    found = trust(again, None, METHOD.defaults, range(100, 106), store=store)
+    assert seen == [103, 104, 105]
+    assert found.recovered == trust(METHOD, None, METHOD.defaults, range(100, 106)).recovered
+    other = trust(again, None, Options(F=7.0), range(100, 102), store=store)
+    assert other.recovered[0].truth == 7.0
+    assert seen[3:] == [100, 101]
