@@ -117,6 +117,25 @@ def test_instruments_take_away_the_bias_of_noise(axis: ModuleType) -> None:
     assert bias[1] < 0.2 * bias[0]
 
 
+def test_weights_count_samples_by_their_noise(axis: ModuleType) -> None:
+    """A stretch that is measured badly hardly counts; left alone it spoils the estimate."""
+    data = axis.measured()
+    spoiled = data["v"].values.copy()
+    bad = slice(4000, 6000)
+    spoiled[bad] += np.random.default_rng(1).normal(0.0, 3.0, 2000) + 1.0
+    motion = moving(data.assign(v=("time", spoiled)))
+    weights = np.ones(data.sizes["time"])
+    weights[bad] = 1e-4
+    unknowns = parameters_of(axis.TRUTH, axis.NAMES)
+    plain, weighted = (
+        inverse_dynamics(equation(axis), axis.TRUTH, unknowns, motion, weights=w)
+        for w in (None, weights)
+    )
+    error = [abs(found["T_p"] - axis.TRUTH.T_p) for found in (plain, weighted)]
+    assert error[0] > 0.1
+    assert error[1] < 0.02
+
+
 def test_output_error_recovers_parameters_and_the_start(
     axis: ModuleType, data: xr.Dataset
 ) -> None:

@@ -37,6 +37,7 @@ def inverse_dynamics(
     *,
     bandwidth: float | None = None,
     instruments: xr.Dataset | None = None,
+    weights: Array | None = None,
 ) -> Estimate:
     r"""Solve an equation of motion for parameters.
 
@@ -61,6 +62,9 @@ def inverse_dynamics(
         to about twice that, so that they are independent. None for all samples as they are.
     instruments
         A simulation of the same experiment, filtered alike.
+    weights
+        How much each sample counts, the inverse of its variance up to a factor, shape (n,); all
+        alike by default.
 
     Raises
     ------
@@ -76,6 +80,7 @@ def inverse_dynamics(
     keep = _thinned(data, equation, interval, bandwidth)
     seen = evaluate.columns(data)
     other = None if instruments is None else evaluate.columns(instruments)
+    root = np.ones(keep.size) if weights is None else np.sqrt(weights[keep])
     values = np.array([u.start for u in unknowns])
     scale = np.array([u.scale for u in unknowns])
 
@@ -84,7 +89,7 @@ def inverse_dynamics(
         table = np.column_stack((e, W * scale))
         if bandwidth is not None:
             table = low_passed(table, interval, bandwidth)
-        return table[keep, 0], table[keep, 1:]
+        return table[keep, 0] * root, table[keep, 1:] * root[:, None]
 
     for _ in range(_ROUNDS):
         e, W = rows(seen)
