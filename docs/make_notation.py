@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any
 
 from bywire import assemblies, control, plant
+from bywire.analysis.linear.plant_registry import all_plants
 from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.plant_registry import all_plants
 from bywire.bench.kpis.registry import families
 from bywire.bench.registry import all_experiments
 from bywire.bench.stimuli.registry import entries as stimuli

@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import bywire
-from bywire.analysis.closed_loop import closed_loop
+from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.loop_registry import find_loop
 
 parser = ArgumentParser(description="Design an LQG regulator for the pressure loop.")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 
 
 def model_of(A, B, C, D=None, period: float = 0.0) -> LinearModel:

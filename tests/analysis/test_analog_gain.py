@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.analog_gain import analog_gain
 from bywire.analysis.design.loop_figures import LoopFigures
+from bywire.analysis.linear.analog_gain import analog_gain
 from bywire.analysis.loop_registry import find_loop
 from bywire.analysis.robustness import margins
 from bywire.catalog.registry import parameters

@@ -7,13 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.averaged_map import PeriodicModel, dithered_loop, periodic_model, unrounded
-from bywire.analysis.dithered_plant import dithered_plant
-from bywire.analysis.frequency_response import frequency_response
+from bywire.analysis.dither.averaged_map import (
+    PeriodicModel,
+    dithered_loop,
+    periodic_model,
+    unrounded,
+)
+from bywire.analysis.dither.dithered_plant import dithered_plant
+from bywire.analysis.dither.periodic_orbit import find_orbit, period_of
 from bywire.analysis.loop import Point
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.periodic_orbit import find_orbit, period_of
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.catalog.registry import entry
 from bywire.core.errors import ParameterError, SolverError

@@ -19,9 +19,9 @@ from bywire.analysis.design.optimizer import Problem
 from bywire.analysis.design.requirement import read
 from bywire.analysis.design.trial import Trial
 from bywire.analysis.design.verification import verify
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.robustness import margins
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping

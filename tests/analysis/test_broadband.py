@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.broadband import Broadband, broadband_response
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.broadband import Broadband, broadband_response
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.catalog.registry import main_set, parameters
 from bywire.core.errors import ParameterError
 from systems.describing import SATURATION, Saturation, at_rest, saturation

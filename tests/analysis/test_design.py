@@ -13,9 +13,9 @@ from bywire.analysis.design.designer import Design, design
 from bywire.analysis.design.linear_case import NOMINAL, LinearCase, cases_of
 from bywire.analysis.design.loop_figures import LoopFigures
 from bywire.analysis.design.requirement import FIGURES, read
+from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop_registry import all_loops, find_loop
 from bywire.analysis.pressure_loop import PressureLoop
-from bywire.analysis.rational import first_orders
 from bywire.analysis.robustness import margins
 from bywire.catalog.registry import main_set, parameters
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError

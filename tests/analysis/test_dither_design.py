@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.dither_choice import best_of, candidates, crossing, least
-from bywire.analysis.dither_ramp import area_ratios
-from bywire.analysis.dither_reach import (
+from bywire.analysis.dither.choice import best_of, candidates, crossing, least
+from bywire.analysis.dither.ramp import area_ratios
+from bywire.analysis.dither.reach import (
     admissible_frequencies,
     attenuation,
     breakaway_torques,
@@ -18,7 +18,7 @@ from bywire.analysis.dither_reach import (
     reach,
     waveform,
 )
-from bywire.analysis.dither_trial import Trial, tried
+from bywire.analysis.dither.trial import Trial, tried
 from bywire.analysis.studies import dither
 from bywire.catalog.registry import entry
 from bywire.control.dither import breakaway_current

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.analysis.drive_train_limits import active, around, failures
-from bywire.analysis.drive_train_options import DEFAULTS
+from bywire.analysis.sizing.drive_train_limits import active, around, failures
+from bywire.analysis.sizing.drive_train_options import DEFAULTS
 from bywire.analysis.study_registry import find_study
 from bywire.catalog.registry import parameters
 from bywire.core.errors import ParameterError

@@ -9,9 +9,9 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.closed_loop import closed_loop
-from bywire.analysis.frequency_response import frequency_response
-from bywire.analysis.response_dataset import Sweep, response_data
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.response.dataset import Sweep, response_data
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.assemblies.wedge_start import memory_at, state_at

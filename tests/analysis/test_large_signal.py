@@ -8,13 +8,19 @@ import numpy as np
 import pytest
 
 from bywire.analysis.design.describing_function import loop_gain
-from bywire.analysis.frequency_response import frequency_response
-from bywire.analysis.large_signal import Variant, narrowest, variants_over, widths, with_widths
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.measured_bandwidth import complex_values
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.large_signal import (
+    Variant,
+    narrowest,
+    variants_over,
+    widths,
+    with_widths,
+)
+from bywire.analysis.response.measured_bandwidth import complex_values
+from bywire.analysis.response.saturation import Saturation
 from bywire.analysis.robustness import margins
-from bywire.analysis.saturation import Saturation
 from bywire.catalog.registry import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

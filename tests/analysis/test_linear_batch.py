@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bywire.analysis.linear_batch import linearize_many
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.linear_batch import linearize_many
+from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.loop_registry import find_loop
 from bywire.catalog.registry import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError

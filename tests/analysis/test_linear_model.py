@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.errors import ParameterError, UnknownNameError
 
 

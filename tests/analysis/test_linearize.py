@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.linearize import linearize
-from bywire.analysis.motorcycle_linear import linear_model, theoretical
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.motorcycle_linear import linear_model, theoretical
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at, travel_at

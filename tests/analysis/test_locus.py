@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import locus, locus_of
 from bywire.analysis.loop_curves import loop_curve
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.rates import rates
 from bywire.analysis.robustness import margins
 from bywire.catalog.registry import main_set, parameters
 from bywire.core.errors import ParameterError

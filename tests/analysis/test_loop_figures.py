@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.analysis.harmonics import amplitudes, total_distortion
 from bywire.analysis.loop_width import closed_above, widths
+from bywire.analysis.response.harmonics import amplitudes, total_distortion
 from bywire.analysis.stick_slip import jumps
 from bywire.bench.kpis.hysteresis import Loop
 

@@ -4,7 +4,7 @@ import control
 import numpy as np
 import pytest
 
-from bywire.analysis.motorcycle_linear import (
+from bywire.analysis.linear.motorcycle_linear import (
     linear_model,
     theoretical,
     theoretical_transfer_function,

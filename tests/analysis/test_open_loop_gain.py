@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.analysis.closed_loop import closed_loop
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.open_loop import open_loop
 from bywire.analysis.margins import margin
-from bywire.analysis.open_loop import open_loop
 from bywire.analysis.pressure_loop import PressureLoop
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_parameters import WedgeParameters
@@ -81,7 +81,7 @@ def test_what_cannot_be_cut() -> None:
 
 def test_pressure_loop_agrees_with_its_chain() -> None:
     """The motorcycle's loop cut at the measured pressure, against the chain of its parts."""
-    from bywire.analysis.motorcycle_linear import theoretical
+    from bywire.analysis.linear.motorcycle_linear import theoretical
     from bywire.assemblies import motorcycle_trim as trim
     from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 

@@ -8,12 +8,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.channels import with_channels
-from bywire.analysis.linearize import linearize
-from bywire.analysis.motorcycle_linear import theoretical, two_pole, two_pole_error, with_slow_pair
-from bywire.analysis.plant_registry import all_plants, find_plant
-from bywire.analysis.reduction_error import reduction_error
-from bywire.analysis.wedge_linear import (
+from bywire.analysis.linear.channels import with_channels
+from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.motorcycle_linear import (
+    theoretical,
+    two_pole,
+    two_pole_error,
+    with_slow_pair,
+)
+from bywire.analysis.linear.plant_registry import all_plants, find_plant
+from bywire.analysis.linear.wedge_linear import (
     MECHANICAL,
     SMOOTH,
     full,
@@ -22,6 +26,7 @@ from bywire.analysis.wedge_linear import (
     rigid,
     rigid_rate,
 )
+from bywire.analysis.reduction.error import reduction_error
 from bywire.assemblies.motorcycle_trim import holding_current, travel_at
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_start import force_for

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 from small_linear_models import model_of
 
-from bywire.analysis.channels import with_channels
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.channels import with_channels
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.motorcycle_linear import linear_model
+from bywire.analysis.linear.transfer import transfer
+from bywire.analysis.linear.wedge_linear import full
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.motorcycle_linear import linear_model
-from bywire.analysis.reduction import reduce
-from bywire.analysis.reduction_error import reduction_error
-from bywire.analysis.residualized import residualized
-from bywire.analysis.transfer import transfer
-from bywire.analysis.wedge_linear import full
+from bywire.analysis.reduction.error import reduction_error
+from bywire.analysis.reduction.reduce import reduce
+from bywire.analysis.reduction.residualized import residualized
 from bywire.catalog.registry import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

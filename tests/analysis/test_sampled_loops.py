@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from bywire.analysis.closed_loop import closed_loop
 from bywire.analysis.current_loop import current_loop
-from bywire.analysis.frequency_response import frequency_response
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.measured_bandwidth import complex_values, fall
 from bywire.analysis.pressure_loop import PressureLoop, cancelling_pi
-from bywire.analysis.rational import first_orders
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.measured_bandwidth import complex_values, fall
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at

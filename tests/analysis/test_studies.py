@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.analysis import actuator_demand
-from bywire.analysis.actuator_trial import sine_figures
-from bywire.analysis.drive_train_answer import Demand
-from bywire.analysis.drive_train_design import answer, closing_speed, redesigned
+from bywire.analysis.sizing import actuator_demand
+from bywire.analysis.sizing.actuator_trial import sine_figures
+from bywire.analysis.sizing.drive_train_answer import Demand
+from bywire.analysis.sizing.drive_train_design import answer, closing_speed, redesigned
 from bywire.analysis.studies import actuator_sizing, drive_train
 from bywire.analysis.study import Map, Mark
 from bywire.analysis.study_registry import all_studies

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from small_linear_models import model_of
 
+from bywire.analysis.linear.minimal import Realization, minimal
+from bywire.analysis.linear.motorcycle_linear import linear_model, theoretical
+from bywire.analysis.linear.transfer import transfer
+from bywire.analysis.linear.wedge_linear import INPUTS, full, mechanical
 from bywire.analysis.loop_registry import all_loops, find_loop
-from bywire.analysis.minimal import Realization, minimal
-from bywire.analysis.motorcycle_linear import linear_model, theoretical
-from bywire.analysis.transfer import transfer
-from bywire.analysis.wedge_linear import INPUTS, full, mechanical
 from bywire.catalog.registry import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.closed_loop import closed_loop
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.assemblies.wedge_start import force_for, memory_at, state_at, travel_for

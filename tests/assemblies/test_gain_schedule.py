@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.analysis.closed_loop import closed_loop
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop_registry import find_loop
 from bywire.analysis.pressure_loop import PressureLoop
-from bywire.analysis.rational import first_orders
 from bywire.assemblies import motorcycle_ecu
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters

@@ -11,8 +11,8 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.dithered_plant import dithered_plant
-from bywire.analysis.motorcycle_linear import with_slow_pair
+from bywire.analysis.dither.dithered_plant import dithered_plant
+from bywire.analysis.linear.motorcycle_linear import with_slow_pair
 from bywire.catalog.registry import parameters
 from bywire.core.errors import ParameterError
 from bywire.identification.braking_fit import fit, five_of

@@ -67,7 +67,7 @@ def test_the_actuation_force_tells_it_within_the_wedge_friction(
     at = np.interp(one["time"].values, t, truth)
     rows = settled(one, truth, t)
     known = par.leaves()
-    most = known["wedge_friction.mu_R"] * data["F_N"] + known["wedge_friction.mu_INT"] * np.tan(
+    most = known["wedge_friction.mu_R"] * data["F_N"] + known["wedge_friction.mu_int"] * np.tan(
         known["wedge.alpha"]
     ) * (data["f_1"] + data["f_2"])
     bound = np.array([

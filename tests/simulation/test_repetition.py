@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.catalog.registry import parameters
 from bywire.simulation import window as part
 from bywire.simulation.ensemble import LaneKernel

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from wedge_runs import FRICTIONLESS, TAN_ALPHA, brake, drive
 
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.linearize import linearize
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_start import memory_at, state_at, travel_for
 from bywire.plant import brake_heart, roller_screw

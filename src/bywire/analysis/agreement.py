@@ -10,9 +10,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop import Loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.core.parameters import ParameterSet
 
 Array = NDArray[np.float64]

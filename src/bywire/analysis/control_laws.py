@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.assemblies.motorcycle_parameters import EcuParameters
 from bywire.control import current_pi, low_pass_2, pressure_pid
 from bywire.core.signals import signals_of, zeros

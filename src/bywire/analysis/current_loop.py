@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Literal
 
-from bywire.analysis.closed_loop import closed_loop
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.analysis.loop_curves import varied
 from bywire.core.errors import ParameterError

@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.analog_gain import analog_gain
-from bywire.analysis.closed_loop import closed_loop
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.analog_gain import analog_gain
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.open_loop import open_loop
 from bywire.analysis.loop_schedule import LoopSchedule
-from bywire.analysis.open_loop import open_loop
-from bywire.analysis.saturation import Saturation
+from bywire.analysis.response.saturation import Saturation
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.run import Run

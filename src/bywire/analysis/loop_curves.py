@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.analysis.robustness import LoopMargins
 from bywire.core.errors import ParameterError

@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis import control_laws
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.rational import Rational
 from bywire.analysis.margins import Margin, margin
-from bywire.analysis.rational import Rational
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at

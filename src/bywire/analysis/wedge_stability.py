@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from bywire.analysis.drive_train_design import redesigned
+from bywire.analysis.linear.wedge_linear import full, mechanical, rigid_rate
 from bywire.analysis.locus import Border, locus
 from bywire.analysis.loops.moment import LOOP
-from bywire.analysis.wedge_linear import full, mechanical, rigid_rate
+from bywire.analysis.sizing.drive_train_design import redesigned
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.errors import InputError
 from bywire.plant import wedge

@@ -7,12 +7,12 @@ from statistics import median
 
 import numpy as np
 
-from bywire.analysis.closed_loop import closed_loop
-from bywire.analysis.frequency_response import frequency_response
-from bywire.analysis.linear_batch import linearize_many
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.linear_batch import linearize_many
+from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.benchmark.engine import interleaved, ratio, timed
 from bywire.benchmark.peers.python_control import by_differences, nonlinear_system

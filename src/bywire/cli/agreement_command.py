@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from bywire.analysis.agreement import EVERYTHING, GAIN, NOTHING, PHASE, Agreement, agreement
-from bywire.analysis.frequency_response import require_stable
+from bywire.analysis.response.frequency_response import require_stable
 from bywire.cli import output
 from bywire.cli.loop_choice import Chosen, choose, spread, subject
 from bywire.cli.output_folder import require_folder

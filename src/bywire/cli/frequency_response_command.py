@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.large_signal import Variant, widths, with_widths
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.large_signal import Variant, widths, with_widths
 from bywire.cli import output
 from bywire.cli.loop_choice import Chosen, choose, spread, subject
 from bywire.cli.output_folder import require_folder

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
+from bywire.analysis.linear.plant_registry import all_plants
 from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.plant_registry import all_plants
 from bywire.cli import linearize_command, plant_command, plant_locus
 from bywire.core.errors import ParameterError, unknown_name
 

@@ -6,8 +6,8 @@ import json
 from collections.abc import Iterable
 from textwrap import wrap
 
+from bywire.analysis.linear.plant_registry import all_plants
 from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.plant_registry import all_plants
 from bywire.analysis.study_registry import all_studies
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.registry import all_experiments

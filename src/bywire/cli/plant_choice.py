@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import get_args
 
-from bywire.analysis.linearize import Friction
+from bywire.analysis.linear.linearize import Friction
+from bywire.analysis.linear.plant import Plant, PlantPoint
+from bywire.analysis.linear.plant_registry import find_plant
 from bywire.analysis.loop import Quantity
-from bywire.analysis.plant import Plant, PlantPoint
-from bywire.analysis.plant_registry import find_plant
 from bywire.bench.values import number, parsed
 from bywire.catalog.registry import entry, main_set
 from bywire.core.errors import ParameterError, UnitError, unknown_name

@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.reduction import Reduced
-from bywire.analysis.reduction_error import reduction_error
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.reduction.error import reduction_error
+from bywire.analysis.reduction.reduce import Reduced
 from bywire.cli import output, reduction_choice
 from bywire.cli.output_folder import require_folder
 from bywire.cli.plant_choice import ChosenPlant, choose

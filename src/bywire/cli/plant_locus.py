@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Locus, locus_of
 from bywire.cli import output
 from bywire.cli.locus_object import locus_object

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.reduction import TOLERANCE, Reduced, reduce
-from bywire.analysis.reduction_error import ReductionError
-from bywire.analysis.transfer import transfer
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.transfer import transfer
+from bywire.analysis.reduction.error import ReductionError
+from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
 

@@ -7,10 +7,10 @@ from typing import Any, cast
 
 import xarray as xr
 
-from bywire.analysis.broadband import Broadband, broadband_response
-from bywire.analysis.frequency_response import frequency_response, require_stable
-from bywire.analysis.large_signal import Variant, variants_over
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.broadband import Broadband, broadband_response
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response, require_stable
+from bywire.analysis.response.large_signal import Variant, variants_over
 from bywire.cli.loop_choice import Chosen, over_range
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.large_signal import Variant, narrowest
+from bywire.analysis.response.large_signal import Variant, narrowest
 from bywire.report.table_text import table_text
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount

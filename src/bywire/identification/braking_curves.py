@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.motorcycle_linear import theoretical, with_slow_pair
+from bywire.analysis.linear.motorcycle_linear import theoretical, with_slow_pair
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import travel_at
 from bywire.identification.braking_fit import five_of

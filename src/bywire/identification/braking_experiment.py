@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.motorcycle_linear import two_pole, with_slow_pair
-from bywire.analysis.rational import Rational
+from bywire.analysis.linear.motorcycle_linear import two_pole, with_slow_pair
+from bywire.analysis.linear.rational import Rational
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, travel_at
 from bywire.bench.experiment import Case

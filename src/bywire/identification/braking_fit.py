@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.motorcycle_linear import two_pole
+from bywire.analysis.linear.motorcycle_linear import two_pole
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import travel_at
 from bywire.core.errors import ParameterError

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.bench.bench import Bench
+from bywire.bench.registry import all_experiments, find_experiment
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -25,7 +26,8 @@ def parameter_file(
     Parameters
     ----------
     experiment
-        Experiment that the file runs.
+        Experiment that the file runs; another one of the same assembly where it wants more than
+        parameters.
     parameters
         Name of the parameter set that the changes are made to.
     par
@@ -36,26 +38,49 @@ def parameter_file(
     comment
         First line.
     """
+    wanted, left_out, problem = _accepted(experiment, parameters, changes)
+    notes = comment.splitlines()
+    if problem:
+        for other in _alternatives(experiment):
+            found, left, trouble = _accepted(other, parameters, changes)
+            if not trouble:
+                notes.append(f"experiment {experiment!r} wants more than this file says: {problem}")
+                experiment, wanted, left_out = other, found, left
+                break
+    lines = [f"# {line}" for line in notes]
+    lines += [f'experiment = "{experiment}"', f'parameters = "{parameters}"', "", "[set]"]
+    lines += [f'"{name}" = {_written(name, value, par)}' for name, value in wanted.items()]
+    lines += [
+        f"# the experiment sets this itself: {name} = {_written(name, changes[name], par)}"
+        for name in left_out
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _accepted(
+    experiment: str, parameters: str, changes: Mapping[str, Any]
+) -> tuple[dict[str, Any], list[str], str]:
+    """Return the changes that take effect, the others' names, and why none of it runs."""
+    wanted: dict[str, Any] = dict(changes)
     left_out: list[str] = []
-    wanted = dict(changes)
-    problem = ""
     while True:
         try:
             Bench(experiment, parameters, overrides=wanted)
-            break
         except InputError as error:
             found = _WITHOUT_EFFECT.match(str(error))
             if found is None or found[1] not in wanted:
-                problem = str(error).splitlines()[0]
-                break
-            left_out.append(f"{found[1]} = {_written(found[1], wanted.pop(found[1]), par)}")
-    lines = [f"# {line}" for line in comment.splitlines()]
-    if problem:
-        lines.append(f"# experiment {experiment!r} wants more than this file says: {problem}")
-    lines += [f'experiment = "{experiment}"', f'parameters = "{parameters}"', "", "[set]"]
-    lines += [f'"{name}" = {_written(name, value, par)}' for name, value in wanted.items()]
-    lines += [f"# the experiment sets this itself: {text}" for text in left_out]
-    return "\n".join(lines) + "\n"
+                return wanted, left_out, str(error).splitlines()[0]
+            left_out.append(found[1])
+            wanted.pop(found[1])
+            continue
+        return wanted, left_out, ""
+
+
+def _alternatives(experiment: str) -> list[str]:
+    """Return the other experiments of the same assembly that bring all they need."""
+    assembly = find_experiment(experiment).assembly
+    return [one.name for one in all_experiments().values()
+            if one.assembly == assembly and one.driven_unit is None]  # fmt: skip
 
 
 def _written(name: str, value: Any, par: ParameterSet) -> str:

@@ -19,6 +19,7 @@ from bywire.identification.replay_segments import Segment
 Array = NDArray[np.float64]
 
 _LARGEST_LAG = 0.25  # of a stretch
+_FIRST_LAG = 8.0  # samples
 
 
 @dataclass(frozen=True)
@@ -92,18 +93,24 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
 
 
 def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
+    """Return the lag nearest to zero at which both go together best, and a note.
+
+    A periodic signal looks alike a period later: the range of lags grows until it holds a peak.
+    """
     if not there.all():
         return math.nan, "the measured signal has gaps"
     t = part["time"].values
-    try:
-        found = estimate_lag(
-            part, "measured", "modeled", largest=_LARGEST_LAG * float(t[-1] - t[0])
-        )
-    except ParameterError as error:
-        return math.nan, str(error)
-    if found.at_limit:
-        return math.nan, "no lag stands out"
-    return found.value, f"correlation {found.correlation:.4f}"
+    step, most = float(t[1] - t[0]), _LARGEST_LAG * float(t[-1] - t[0])
+    reach = max(_FIRST_LAG * step, 0.02 * most)
+    while reach < most:
+        try:
+            found = estimate_lag(part, "measured", "modeled", largest=reach, interval=step)
+        except ParameterError as error:
+            return math.nan, str(error)
+        if not found.at_limit and found.correlation > 0.0:
+            return found.value, f"correlation {found.correlation:.4f}"
+        reach *= 2.0
+    return math.nan, "no lag stands out"
 
 
 def judged(

@@ -7,7 +7,8 @@ import json
 import multiprocessing
 import os
 import signal
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -91,11 +92,12 @@ def experiments(
     done = {o.seed: o for o in _read(store, key) if o.seed in set(wanted)}
     missing = [seed for seed in wanted if seed not in done]
     one = partial(experiment, method, par, options, chosen)
-    for outcome in _made(one, missing, processes or os.cpu_count() or 1):
-        done[outcome.seed] = outcome
-        _append(store, key, outcome)
-        if progress is not None:
-            progress("experiments", len(done) / len(wanted))
+    with closing(_made(one, missing, processes or os.cpu_count() or 1)) as made:
+        for outcome in made:
+            done[outcome.seed] = outcome
+            _append(store, key, outcome)
+            if progress is not None:
+                progress("experiments", len(done) / len(wanted))
     return tuple(done[seed] for seed in wanted)
 
 
@@ -124,7 +126,7 @@ def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int
 
 def _made(
     one: Callable[[int], Outcome], seeds: Sequence[int], processes: int
-) -> Iterator[Outcome]:
+) -> Generator[Outcome, None, None]:
     if processes < 2 or len(seeds) < 2:
         yield from map(one, seeds)
         return

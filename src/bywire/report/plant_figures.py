@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 from bywire.report.bode import Response, bode

@@ -10,8 +10,8 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
+from bywire.analysis.linear.rates import STILL
 from bywire.analysis.locus import Border, Locus
-from bywire.analysis.rates import STILL
 from bywire.report import style
 from bywire.report.pole_map import slow_radius
 from bywire.report.s_plane import draw_plane, planes, shown_radius

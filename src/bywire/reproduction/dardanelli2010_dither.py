@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.harmonics import total_distortion
+from bywire.analysis.response.harmonics import total_distortion
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.reproduction.dardanelli2010_fig5 import WITH, Loops
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, Runs, parameters

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bywire.analysis.rational import Rational, first_orders
+from bywire.analysis.linear.rational import Rational, first_orders
 from bywire.catalog.dardanelli2010 import SOURCE
 from bywire.reproduction.item import Fact
 

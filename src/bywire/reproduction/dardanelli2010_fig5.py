@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.harmonics import amplitudes
 from bywire.analysis.loop_width import closed_above
+from bywire.analysis.response.harmonics import amplitudes
 from bywire.analysis.stick_slip import jumps
 from bywire.bench.bench import Bench
 from bywire.bench.kpis import hysteresis

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.motorcycle_linear import theoretical
-from bywire.analysis.rational import Rational
+from bywire.analysis.linear.motorcycle_linear import theoretical
+from bywire.analysis.linear.rational import Rational
 from bywire.bench.kpis import step_response
 from bywire.bench.result import Result
 from bywire.identification.braking_records import averaged

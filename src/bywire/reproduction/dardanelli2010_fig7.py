@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 
 from bywire.analysis.margins import bandwidth
-from bywire.analysis.measured_bandwidth import complex_values, fall
 from bywire.analysis.pressure_loop import BAND, PressureLoop, cancelling_pi
+from bywire.analysis.response.measured_bandwidth import complex_values, fall
 from bywire.bench.result import Result
 from bywire.report.bode import Response, bode
 from bywire.report.step_marks import StepFacts, StepLimits

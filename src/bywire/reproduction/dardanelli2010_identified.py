@@ -7,8 +7,8 @@ from functools import cache
 
 import numpy as np
 
-from bywire.analysis.motorcycle_linear import theoretical, with_slow_pair
-from bywire.analysis.rational import Rational
+from bywire.analysis.linear.motorcycle_linear import theoretical, with_slow_pair
+from bywire.analysis.linear.rational import Rational
 from bywire.identification.braking_fit import five_of
 from bywire.identification.method import Effort, Identified
 from bywire.identification.methods import braking_dynamics

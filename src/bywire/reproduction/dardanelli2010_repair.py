@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from scipy.optimize import brentq
 
-from bywire.analysis.motorcycle_linear import theoretical
+from bywire.analysis.linear.motorcycle_linear import theoretical
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import travel_at
 from bywire.catalog.registry import entry

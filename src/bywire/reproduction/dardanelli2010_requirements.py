@@ -7,9 +7,9 @@ from typing import Literal
 import numpy as np
 
 from bywire.analysis.design.bench_figures import bench_figures
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.robustness import margins
 from bywire.bench.bench import Bench
 from bywire.report.bode import Response, bode

@@ -7,10 +7,10 @@ from functools import cache
 
 import xarray as xr
 
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop import Point
 from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_ecu import Stimulus
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at

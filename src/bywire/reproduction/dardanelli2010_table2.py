@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.motorcycle_linear import theoretical, two_pole_error
-from bywire.analysis.rational import Rational
+from bywire.analysis.linear.motorcycle_linear import theoretical, two_pole_error
+from bywire.analysis.linear.rational import Rational
 from bywire.report.bode import Response, bode
 from bywire.reproduction import dardanelli2010_facts as facts
 from bywire.reproduction.dardanelli2010_runs import BAR, MAIN, PRINTED, SETS, Runs, parameters

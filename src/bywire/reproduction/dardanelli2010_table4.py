@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.measured_bandwidth import complex_values, fall
-from bywire.analysis.motorcycle_linear import theoretical
-from bywire.analysis.rational import Rational
+from bywire.analysis.linear.motorcycle_linear import theoretical
+from bywire.analysis.linear.rational import Rational
+from bywire.analysis.response.measured_bandwidth import complex_values, fall
 from bywire.assemblies.motorcycle_trim import travel_at
 from bywire.report.bode import Response, bode
 from bywire.reproduction import dardanelli2010_facts as facts

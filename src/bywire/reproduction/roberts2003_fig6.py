@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop_registry import find_loop
 from bywire.analysis.margins import bandwidth
-from bywire.analysis.response_dataset import Sweep
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
 from bywire.reproduction import roberts2003_facts as facts
 from bywire.reproduction import roberts2003_frequency as frequency
 from bywire.reproduction import roberts2003_frequency_facts as stated

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.harmonics import amplitudes
 from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.response.harmonics import amplitudes
 from bywire.reproduction.item import Item, found
 from bywire.reproduction.roberts2003_frequency import changed
 from bywire.simulation.run import simulate

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.linearize import linearize
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_start import memory_at, state_at, travel_for
 from bywire.reproduction import roberts2003_facts as facts

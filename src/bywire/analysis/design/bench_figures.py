@@ -14,11 +14,11 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
-from bywire.analysis.frequency_response import frequency_response
 from bywire.analysis.loop import Loop
-from bywire.analysis.measured_bandwidth import fall
-from bywire.analysis.response_dataset import Sweep
-from bywire.analysis.response_window import common_interval, nyquist
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.measured_bandwidth import fall
+from bywire.analysis.response.window import common_interval, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.running import as_run

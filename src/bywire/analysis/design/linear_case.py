@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from itertools import product
 
 from bywire.analysis.design.loop_figures import LoopFigures
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.interrupts import interrupts_deferred

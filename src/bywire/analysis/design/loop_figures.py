@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.analysis.design.requirement import Requirement
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bywire.analysis.saturation import Saturation
+from bywire.analysis.response.saturation import Saturation
 
 CAUSES: Mapping[str, Mapping[str, Any]] = {
     "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,

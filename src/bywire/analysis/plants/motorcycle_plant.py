@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.plant import Plant, PlantPoint
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.plant import Plant, PlantPoint
 from bywire.analysis.plants.motorcycle_point import AT, linear
 from bywire.core.parameters import ParameterSet
 

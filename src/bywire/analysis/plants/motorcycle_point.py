@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any, cast
 
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.linearize import linearize
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.plant import PlantPoint
 from bywire.analysis.loop import Quantity
-from bywire.analysis.plant import PlantPoint
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from bywire.analysis.channels import with_channels
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.plant import Plant, PlantPoint
+from bywire.analysis.linear.channels import with_channels
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.plant import Plant, PlantPoint
+from bywire.analysis.linear.wedge_linear import OUTPUTS, mechanical
 from bywire.analysis.plants.wedge_point import AT, whole
-from bywire.analysis.wedge_linear import OUTPUTS, mechanical
 from bywire.core.parameters import ParameterSet
 
 

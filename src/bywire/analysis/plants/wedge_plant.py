@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.analysis.plant import Plant
+from bywire.analysis.linear.plant import Plant
 from bywire.analysis.plants.wedge_point import AT, whole
 
 PLANT = Plant(

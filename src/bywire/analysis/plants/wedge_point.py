@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.linear_model import LinearModel
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.plant import PlantPoint
+from bywire.analysis.linear.wedge_linear import force_for_current, full
 from bywire.analysis.loop import Quantity
-from bywire.analysis.plant import PlantPoint
-from bywire.analysis.wedge_linear import force_for_current, full
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.assemblies.wedge_start import force_for
 from bywire.core.errors import ParameterError
@@ -21,7 +21,7 @@ AT = (MOMENT, FORCE, CURRENT)
 
 
 def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
-    """Return the whole plant at an operating point, see `bywire.analysis.wedge_linear.full`.
+    """Return the whole plant at an operating point, see `bywire.analysis.linear.wedge_linear.full`.
 
     Raises
     ------

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.channels import with_channels
-from bywire.analysis.linear_model import LinearModel
-from bywire.analysis.plant import Plant, PlantPoint
+from bywire.analysis.linear.channels import with_channels
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.plant import Plant, PlantPoint
+from bywire.analysis.linear.wedge_linear import INPUTS, OUTPUTS, mechanical, rigid
 from bywire.analysis.plants.wedge_point import AT, whole
-from bywire.analysis.wedge_linear import INPUTS, OUTPUTS, mechanical, rigid
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 

@@ -10,8 +10,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bywire.analysis import actuator_trial
-from bywire.analysis.actuator_demand import (
+from bywire.analysis.sizing import actuator_trial
+from bywire.analysis.sizing.actuator_demand import (
     Course,
     breakaway_current,
     geared,
@@ -19,7 +19,7 @@ from bywire.analysis.actuator_demand import (
     sine,
     step,
 )
-from bywire.analysis.actuator_map import SIZES, mapped, sizes_of
+from bywire.analysis.sizing.actuator_map import SIZES, mapped, sizes_of
 from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import highest_pressure

@@ -8,15 +8,15 @@ from typing import cast
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.dither_choice import NAMES, Candidate, best_of, candidates
-from bywire.analysis.dither_map import Grid, figures_of, mapped
-from bywire.analysis.dither_options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.analysis.dither_ramp import area_ratios
-from bywire.analysis.dither_reach import admissible_frequencies
-from bywire.analysis.dither_tables import by_frequency, by_pressure, law
-from bywire.analysis.dither_trial import FIGURES, Trial, tried
-from bywire.analysis.dither_waveforms import compared
-from bywire.analysis.dithered_plant import dithered_plant
+from bywire.analysis.dither.choice import NAMES, Candidate, best_of, candidates
+from bywire.analysis.dither.dithered_plant import dithered_plant
+from bywire.analysis.dither.map import Grid, figures_of, mapped
+from bywire.analysis.dither.options import ASSUMPTIONS, DEFAULTS, Options
+from bywire.analysis.dither.ramp import area_ratios
+from bywire.analysis.dither.reach import admissible_frequencies
+from bywire.analysis.dither.tables import by_frequency, by_pressure, law
+from bywire.analysis.dither.trial import FIGURES, Trial, tried
+from bywire.analysis.dither.waveforms import compared
 from bywire.analysis.study import Found, Map, Mark, Progress, Study
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import highest_pressure

@@ -11,11 +11,11 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.drive_train_answer import Answer, Demand
-from bywire.analysis.drive_train_design import answer
-from bywire.analysis.drive_train_limits import active, around
-from bywire.analysis.drive_train_map import mapped
-from bywire.analysis.drive_train_options import ASSUMPTIONS, DEFAULTS, Options
+from bywire.analysis.sizing.drive_train_answer import Answer, Demand
+from bywire.analysis.sizing.drive_train_design import answer
+from bywire.analysis.sizing.drive_train_limits import active, around
+from bywire.analysis.sizing.drive_train_map import mapped
+from bywire.analysis.sizing.drive_train_options import ASSUMPTIONS, DEFAULTS, Options
 from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.kpis.kpi import Kpi

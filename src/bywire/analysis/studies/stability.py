@@ -10,7 +10,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bywire.analysis.drive_train_options import Count, Slope
+from bywire.analysis.sizing.drive_train_options import Count, Slope
 from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study, variable
 from bywire.analysis.wedge_stability import brake, controlled, moment_borders, motion, neutral
 from bywire.assemblies.wedge_parameters import WedgeParameters

@@ -107,7 +107,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
         figures=_figures(choice, unit),
         checks=(
             Check("misfit_over_friction", _misfit(whole, predicted), limit=_MISFIT,
-                  note="systematic: mean of what is left in classes of speed, over the friction"),
+                  note="what is left on average at a speed or a pressure, over the friction"),
             Check("validation_over_training", best.validation_error / best.training_error,
                   limit=1.5, note="error on data held out over that on data fitted"),
         ),
@@ -147,14 +147,21 @@ def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
 
 
 def _misfit(whole: xr.Dataset, predicted: Array) -> float:
-    """Return the root mean square of class means of the residual, over that of the friction."""
+    """Return the root mean square of class means of the residual, over that of the friction.
+
+    Classes of speed each way, and of pressure each way; the larger of both.
+    """
     F, v = whole["friction"].values, whole["speed"].values
-    means = []
-    for way in (v > 0, v < 0):
-        order = np.flatnonzero(way)[np.argsort(np.abs(v[way]))]
-        means += [float(np.mean((F - predicted)[part]))
-                  for part in np.array_split(order, _BINS) if part.size]  # fmt: skip
-    return float(np.sqrt(np.mean(np.square(means))) / np.sqrt(np.mean(F**2)))
+    keys = [np.abs(v)] + ([whole["pressure"].values] if "pressure" in whole else [])
+    found = []
+    for key in keys:
+        means = []
+        for way in (v > 0, v < 0):
+            order = np.flatnonzero(way)[np.argsort(key[way], kind="stable")]
+            means += [float(np.mean((F - predicted)[part]))
+                      for part in np.array_split(order, _BINS) if part.size]  # fmt: skip
+        found.append(float(np.sqrt(np.mean(np.square(means)))))
+    return max(found) / float(np.sqrt(np.mean(F**2)))
 
 
 def _curve(whole: xr.Dataset, predicted: Array) -> Curve:

@@ -1,0 +1,1 @@
+"""Linear models: operating points, exact Jacobians, sampled loops."""

@@ -1,0 +1,243 @@
+"""A linear model as plain data: matrices with names and units, continuous or sampled."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import ParameterError, unknown_name
+
+Array = NDArray[np.float64]
+
+_ON_BORDER = 1e-6  # poles this close to the border of stability are integrators
+_COUPLED = 1e-9  # of the largest entry of A: below it a dropped state does not act on the others
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    r"""Deviations from an operating point.
+
+    .. math:: \dot x = A x + B u, \quad y = C x + D u
+
+    or, with a sample time, :math:`x_{k+1} = A x_k + B u_k`. Units are SI.
+
+    Parameters
+    ----------
+    name
+        What figures and messages call it.
+    A, B, C, D
+        Matrices, shapes (n, n), (n, nu), (ny, n), (ny, nu).
+    states, inputs, outputs
+        Names, in the order of rows and columns.
+    state_units, input_units, output_units
+        Their SI units.
+    rate
+        dx/dt at the operating point, shape (n,); zero in equilibrium.
+    period
+        Sample time [s]; 0 for a continuous model.
+    """
+
+    name: str
+    A: Array
+    B: Array
+    C: Array
+    D: Array
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    state_units: tuple[str, ...]
+    input_units: tuple[str, ...]
+    output_units: tuple[str, ...]
+    rate: Array
+    period: float = 0.0
+
+    def state_space(self) -> Any:
+        """Return it as ``control.StateSpace`` with named signals."""
+        import control
+
+        return control.ss(
+            self.A,
+            self.B,
+            self.C,
+            self.D,
+            self.period,
+            states=list(self.states),
+            inputs=list(self.inputs),
+            outputs=list(self.outputs),
+            name=self.name,
+        )
+
+    def transfer_function(self, input: str = "", output: str = "") -> Any:
+        """Return one path as ``control.TransferFunction`` with named signals.
+
+        What cancels exactly is left out. `bywire.analysis.linear.transfer.transfer` has its
+        zeros, poles and gain, without the rounding of polynomials.
+
+        Parameters
+        ----------
+        input, output
+            Names of the signals; the first ones where empty.
+
+        Raises
+        ------
+        UnknownNameError
+            When a name is unknown.
+        ParameterError
+            When polynomials cannot hold the model to 0.1 %.
+        """
+        from bywire.analysis.linear.transfer import transfer
+
+        return transfer(self, input, output).transfer_function()
+
+    def poles(self) -> NDArray[np.complex128]:
+        """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
+        found = np.linalg.eigvals(self.A).astype(np.complex128)
+        return found[np.argsort(np.abs(found))]
+
+    @property
+    def nyquist(self) -> float:
+        """Half the sampling frequency [Hz]; infinite for a continuous model."""
+        return 0.5 / self.period if self.period else math.inf
+
+    @property
+    def is_stable(self) -> bool:
+        """Whether no pole lies outside the unit circle, or right of the imaginary axis.
+
+        Integrators that a loop does not move (a disc's angle, memory that is only recorded) have
+        poles on the border and do not count.
+        """
+        poles = self.poles()
+        if self.period:
+            return bool(np.abs(poles).max() < 1.0 + _ON_BORDER)
+        return bool(poles.real.max() < _ON_BORDER * np.abs(poles).max())
+
+    def reduced(self, states: Sequence[str], *, held: bool = False) -> LinearModel:
+        """Return the model with some of its states only.
+
+        Parameters
+        ----------
+        states
+            States to keep.
+        held
+            Whether the others are held at the operating point, as a locked rotor; else they
+            must not act on the kept ones or on the outputs.
+
+        Raises
+        ------
+        UnknownNameError
+            When a state is unknown.
+        ParameterError
+            When a dropped state acts on what is kept.
+        """
+        for name in states:
+            if name not in self.states:
+                raise unknown_name("state", name, self.states)
+        kept = [self.states.index(name) for name in states]
+        dropped = [k for k in range(len(self.states)) if k not in kept]
+        coupled = (
+            np.max(np.abs(self.A[np.ix_(kept, dropped)]), initial=0.0)
+            > _COUPLED * np.max(np.abs(self.A), initial=0.0)
+        ) or bool(np.any(self.C[:, dropped]))
+        if coupled and not held:
+            names = ", ".join(self.states[k] for k in dropped)
+            raise ParameterError(
+                f"{self.name}: the dropped states ({names}) act on what is kept: keep them, or "
+                "hold them with held=True"
+            )
+        return LinearModel(
+            self.name,
+            self.A[np.ix_(kept, kept)],
+            self.B[kept],
+            self.C[:, kept],
+            self.D,
+            tuple(states),
+            self.inputs,
+            self.outputs,
+            tuple(self.state_units[k] for k in kept),
+            self.input_units,
+            self.output_units,
+            self.rate[kept],
+            self.period,
+        )
+
+    def together(self, inputs: Sequence[str]) -> LinearModel:
+        """Return the model with some inputs moving as one, named after the first of them."""
+        columns = [self.inputs.index(name) for name in inputs]
+        first = columns[0]
+        return replace(
+            self,
+            B=self.B[:, columns].sum(axis=1, keepdims=True),
+            D=self.D[:, columns].sum(axis=1, keepdims=True),
+            inputs=(self.inputs[first],),
+            input_units=(self.input_units[first],),
+        )
+
+    def sampled(self, period: float) -> LinearModel:
+        r"""Return the exact model at sampling instants of inputs that are held between them.
+
+        .. math:: A_d = e^{A T}, \quad B_d = \int_0^T e^{A t} dt \, B
+
+        Parameters
+        ----------
+        period
+            Sample time T [s].
+        """
+        from scipy.linalg import expm
+
+        n = len(self.A)
+        acting = np.flatnonzero(self.B.any(axis=0))  # an exponential's cost is that of all columns
+        size = n + acting.size
+        whole = np.zeros((size, size))
+        whole[:n, :n], whole[:n, n:] = self.A, self.B[:, acting]
+        step = expm(whole * period)
+        B = np.zeros_like(self.B)
+        B[:, acting] = step[:n, n:]
+        return LinearModel(
+            self.name,
+            step[:n, :n],
+            B,
+            self.C,
+            self.D,
+            self.states,
+            self.inputs,
+            self.outputs,
+            self.state_units,
+            self.input_units,
+            self.output_units,
+            self.rate,
+            period,
+        )
+
+    def response(self, frequencies: Array) -> NDArray[np.complex128]:
+        """Return the frequency response.
+
+        Parameters
+        ----------
+        frequencies
+            Frequencies [Hz], shape (m,).
+
+        Returns
+        -------
+        numpy.ndarray
+            Shape (m, ny, nu).
+        """
+        s = 2j * np.pi * np.asarray(frequencies, dtype=float)
+        z = np.exp(s * self.period) if self.period else s
+        k = self.effective()
+        eye, A, B = np.eye(len(k)), self.A[np.ix_(k, k)], self.B[k].astype(complex)
+        inner = np.linalg.solve(z[:, None, None] * eye - A, B)
+        return np.asarray(self.C[:, k] @ inner + self.D)
+
+    def effective(self) -> list[int]:
+        """Return the states that inputs reach and that reach outputs: the others cost time only."""
+        forward, backward = self.B.any(axis=1), self.C.any(axis=0)
+        coupled = self.A != 0
+        for _ in range(len(self.states)):
+            forward = forward | coupled[:, forward].any(axis=1)
+            backward = backward | coupled[backward].any(axis=0)
+        return np.flatnonzero(forward & backward).tolist()

@@ -1,0 +1,196 @@
+"""Exact linear models of any model of the protocol: Jacobians by algorithmic differentiation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from functools import cache
+from itertools import combinations
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.smooth_functions import SmoothFunctions, smooth_functions, vector
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+
+Array = NDArray[np.float64]
+
+Friction = Literal["removed", "sliding", "stuck"]
+_TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
+
+
+def linearize(
+    model: Model,
+    par: ParameterSet,
+    state: NamedTuple,
+    memory: NamedTuple,
+    *,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    friction: Friction | Mapping[str, Friction] = "removed",
+) -> LinearModel:
+    r"""Return the Jacobians of a model's smooth part at an operating point.
+
+    .. math:: m_k(x) \dot x_k = f_k(x, u) \;\Rightarrow\;
+        A_{kj} = \partial (f_k / m_k) / \partial x_j
+
+    Valid for small motions in which no contact opens or closes, and off the one-sided limits.
+    Closed contacts act with their stiffness and damping. Dry friction is set-valued and has no
+    derivative at rest.
+
+    Parameters
+    ----------
+    model, par
+        The system and its parameters.
+    state, memory
+        Operating point: the model's State, and the Memory that the tasks hold.
+    inputs
+        Fields of Memory that drive the continuous part, for instance ``("i_source",)``.
+    outputs
+        Fields of Output or State; where both have one of that name, what is recorded.
+    friction
+        ``"removed"``: as if there were none. ``"sliding"``: for motion about steady sliding, the
+        force of the sliding direction with its slope; every friction's velocity must be nonzero.
+        ``"stuck"``: every velocity with friction stays zero. Or one of these by the name of each
+        velocity, removed where it is not named.
+
+    Raises
+    ------
+    UnknownNameError
+        When an input, an output or a velocity with friction is unknown.
+    ParameterError
+        When a contact just touches, a friction is at rest with ``friction="sliding"``, or moves
+        with ``"stuck"``.
+
+    Notes
+    -----
+    The Jacobian is exact: ``x`` and the value-only ``xe`` of the protocol are the same here.
+    """
+    _require_known("input", inputs, model.Memory._fields)
+    _require_known("output", outputs, (*model.State._fields, *model.Output._fields))
+    functions = smooth_functions(model, par)
+    K = _stiffness(model, functions, state, vector(par))
+    directions, moving = _frictions(model, state, friction)
+    values = functions.plant(list(state), list(memory), vector(par), K, directions, moving)
+    A, B, C, D, rate = (np.array(value, dtype=float) for value in values)
+    C, D = _rows(model, outputs, C, D)
+    columns = [model.Memory._fields.index(name) for name in inputs]
+    B, D = B[:, columns], D[:, columns]
+    states, held = signals_of(model.State), signals_of(model.Memory)
+    known = states | signals_of(model.Output)
+    return LinearModel(
+        model.name, A, B, C, D,
+        tuple(states), tuple(inputs), tuple(outputs),
+        tuple(signal.unit for signal in states.values()),
+        tuple(held[name].unit for name in inputs),
+        tuple(known[name].unit for name in outputs),
+        rate[:, 0],
+    )  # fmt: skip
+
+
+def _rows(model: Model, outputs: Sequence[str], C: Array, D: Array) -> tuple[Array, Array]:
+    """Return the rows of the outputs; a state that is not recorded is its own output."""
+    recorded, states = model.Output._fields, model.State._fields
+    rows, direct = np.zeros((len(outputs), len(states))), np.zeros((len(outputs), D.shape[1]))
+    for k, name in enumerate(outputs):
+        if name in recorded:
+            rows[k], direct[k] = C[recorded.index(name)], D[recorded.index(name)]
+        else:
+            rows[k, states.index(name)] = 1.0
+    return rows, direct
+
+
+def _frictions(
+    model: Model, state: NamedTuple, friction: Friction | Mapping[str, Friction]
+) -> tuple[list[float], list[float]]:
+    """Return the direction of every friction, 0 where removed, and 0 for velocities that stick."""
+    if isinstance(friction, str):
+        friction = dict.fromkeys(model.frictions, friction)
+    _require_known("velocity with friction", tuple(friction), model.frictions)
+    directions, moving = [0.0 for _ in model.frictions], [1.0 for _ in model.frictions]
+    for k, name in enumerate(model.frictions):
+        kind = friction.get(name, "removed")
+        if kind == "sliding":
+            directions[k] = math.copysign(1.0, _direction(name, state))
+        elif kind == "stuck":
+            _require_rest(name, state)
+            moving[k] = 0.0
+    return directions, moving
+
+
+def _direction(name: str, state: NamedTuple) -> float:
+    speed = float(getattr(state, name))
+    if speed == 0.0:
+        raise ParameterError(
+            f"{name} = 0: friction at rest has no slope; give a sliding speed, or use "
+            "friction='removed'"
+        )
+    return speed
+
+
+def _require_rest(name: str, state: NamedTuple) -> None:
+    speed = float(getattr(state, name))
+    if speed != 0.0:
+        raise ParameterError(f"{name} = {speed:g}: what moves is not stuck; use friction='sliding'")
+
+
+def _stiffness(
+    model: Model, functions: SmoothFunctions, state: NamedTuple, p: list[float]
+) -> Array:
+    """Return the stiffness of the contacts that are closed at a state, zero for open ones."""
+    found = functions.contacts(list(state), p)
+    *matrices, gaps = map(np.array, found if isinstance(found, tuple) else (found,))
+    blocks, at = [], 0
+    for C in matrices:
+        d = gaps[at : at + len(C), 0]
+        left, slack, K = _active(C, d)
+        if left < _TOUCH:
+            raise ParameterError(
+                f"{model.name}: contact {at + int(np.argmin(slack))} just touches "
+                "at the operating point: choose a point at which it is clearly open or closed"
+            )
+        blocks.append(K)
+        at += len(C)
+    return block_diag(*blocks) if blocks else np.zeros((0, 0))
+
+
+def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
+    """Return what the closed contacts of a group leave: the subset whose least slack is largest.
+
+    Returns
+    -------
+    tuple
+        Least slack, by how much each contact is closed or open [m], and the closed contacts'
+        stiffness.
+    """
+    stiffness = C.diagonal()
+    best: tuple[float, Array, Array] = (-math.inf, d, C)
+    for closed in _subsets(len(d)):
+        K = np.zeros_like(C)
+        if closed.size:
+            K[closed[:, None], closed] = np.linalg.inv(C[closed[:, None], closed])
+        F = K @ d
+        slack = C @ F - d
+        slack[closed] = (stiffness * F)[closed]
+        least = float(slack.min())
+        if least > best[0]:
+            best = (least, slack, K)
+    return best
+
+
+@cache
+def _subsets(n: int) -> tuple[NDArray[np.intp], ...]:
+    chosen = (s for size in range(n + 1) for s in combinations(range(n), size))
+    return tuple(np.array(s, dtype=np.intp) for s in chosen)
+
+
+def _require_known(kind: str, names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise unknown_name(kind, name, known)

@@ -1,0 +1,140 @@
+"""Exact linear models of sampled loops, cut open at what a controller reads or hands on."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.sampled_system import Jacobians, SampledSystem, sampled_system
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+
+
+def open_loop(
+    model: Model,
+    par: ParameterSet,
+    state: NamedTuple,
+    memory: NamedTuple,
+    *,
+    cut: str,
+    stimulus: NamedTuple | None = None,
+    locked: tuple[str, ...] = (),
+) -> LinearModel:
+    """Return the loop gain L of a sampled loop with its delays, filters and other loops.
+
+    The loop is cut where one controller reads a state or hands a value on; everything else stays
+    closed. Margins of L (negative feedback: the closed loop has 1 + L) are those of the real loop
+    at that place.
+
+    Parameters
+    ----------
+    model, par, state, memory, stimulus, locked
+        As in ``closed_loop``.
+    cut
+        Field of State that a controller reads, or field of Memory that it hands to the plant or
+        to another controller.
+
+    Returns
+    -------
+    LinearModel
+        One input and one output, both ``cut``; sampled with the period of its controller.
+
+    Raises
+    ------
+    UnknownNameError
+        When the field is unknown.
+    ParameterError
+        When no controller reads or writes the field, several do, another one runs more slowly,
+        or nobody takes what is handed on.
+    """
+    fields = model.Memory._fields
+    system = sampled_system(model, par, (state, memory, stimulus), (), (), locked)
+    states = system.plant.states
+    if cut not in (*states, *fields):
+        raise unknown_name("field of state and memory", cut, (*states, *fields))
+    if cut in states:
+        first, C = _cut_reading(system, states.index(cut), cut)
+    else:
+        first, C = _cut_writing(system, fields.index(cut), cut)
+    size = len(states) + len(fields)
+    A, B = np.eye(size), np.zeros((size, 1))
+    for f in range(system.common):
+        tick = first
+        if f > 0:
+            X, M, _ = system.in_a_row(system.due(f))
+            tick = [X, M, np.zeros((len(fields), 1))]
+        F, G = system.step(tick)
+        A, B = F @ A, F @ B + G
+    held = signals_of(model.Memory)
+    unit = (signals_of(model.State) | held)[cut].unit
+    return LinearModel(
+        f"{model.name}, cut at {cut}", A, B, -C, np.zeros((1, 1)),
+        (*system.plant.states, *(f"{name}[k]" for name in fields)), (cut,), (cut,),
+        (*system.plant.state_units, *(held[name].unit for name in fields)), (unit,), (unit,),
+        np.zeros(size), system.common * system.frame,
+    )  # fmt: skip
+
+
+def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobians, Any]:
+    """Return the first tick with the input in place of a state, and the row of the state."""
+    readers = [k for k, (X, _, _) in enumerate(system.ticks) if X[:, column].any()]
+    owner = _alone(system, readers, f"{cut} cannot be cut: exactly one controller must read it")
+    n_m, n_x = system.ticks[0][0].shape
+    X, M, U = np.zeros((n_m, n_x)), np.eye(n_m), np.zeros((n_m, 1))
+    for k in system.due(0):
+        M_x, M_m, _ = system.ticks[k]
+        read = np.zeros((n_m, 1))
+        if k == owner:
+            read, M_x = M_x[:, column : column + 1], M_x.copy()
+            M_x[:, column] = 0.0
+        X, M, U = M_x + M_m @ X, M_m @ M, M_m @ U + read
+    row = np.zeros((1, n_x + n_m))
+    row[0, column] = 1.0
+    return [X, M, U], row
+
+
+def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, Any]:
+    """Return the first tick with the input in place of a field, and the row of what it wrote."""
+    kept = np.zeros(system.ticks[0][1].shape[1])
+    kept[row] = 1.0
+    writers = [
+        k for k, (X, M, _) in enumerate(system.ticks)
+        if X[row].any() or not np.array_equal(M[row], kept)
+    ]  # fmt: skip
+    owner = _alone(system, writers, f"{cut} cannot be cut: exactly one controller must write it")
+    later = system.due(0)[owner + 1 :]
+    taken = system.plant.B[:, row].any() or any(
+        np.delete(system.ticks[k][1][:, row], row).any() for k in later
+    )
+    if not taken:
+        raise ParameterError(
+            f"{cut} cannot be cut: neither the plant nor another controller takes it from "
+            f"{system.names[owner]}; cut a state that this controller reads"
+        )
+    X, M, _ = system.in_a_row(system.due(0)[: owner + 1])
+    written = np.concatenate([X[row], M[row]])[None]
+    U = np.zeros((M.shape[0], 1))
+    X[row], M[row], U[row] = 0.0, 0.0, 1.0
+    for k in later:
+        M_x, M_m, _ = system.ticks[k]
+        X, M, U = M_x + M_m @ X, M_m @ M, M_m @ U
+    return [X, M, U], written
+
+
+def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
+    """Return the one task of a list, which must run only once in the common period."""
+    if len(tasks) != 1:
+        found = ", ".join(system.names[k] for k in tasks) or "none"
+        raise ParameterError(f"{refusal}, found {found}")
+    (owner,) = tasks
+    if system.every[owner] != system.common:
+        often = system.common // system.every[owner]
+        raise ParameterError(
+            f"{refusal}, and no other may run more slowly: {system.names[owner]} runs {often} "
+            "times while the slowest one runs once"
+        )
+    return owner

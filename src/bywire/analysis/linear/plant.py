@@ -1,0 +1,67 @@
+"""The plant of a brake without its controllers: where it is linearized, what moves and answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import Friction
+from bywire.analysis.loop import Quantity
+from bywire.core.parameters import ParameterSet
+
+
+@dataclass(frozen=True)
+class PlantPoint:
+    """Where a plant is linearized, and what its dry friction does there.
+
+    Parameters
+    ----------
+    quantity, value
+        What the operating point is given by, and its value [SI].
+    friction
+        As in `bywire.analysis.linear.linearize.linearize`.
+    speed
+        Motor speed [rad/s], positive toward clamping; nonzero for sliding friction only.
+    """
+
+    quantity: Quantity
+    value: float
+    friction: Friction = "removed"
+    speed: float = 0.0
+
+
+@dataclass(frozen=True)
+class Plant:
+    """A plant.
+
+    Parameters
+    ----------
+    name
+        What the command line calls it.
+    assembly
+        What it is the plant of.
+    summary
+        One line for listings.
+    at
+        What its operating point may be given by; the first one is usual.
+    model
+        ``model(par, point) -> LinearModel``.
+    band
+        Frequency [Hz] up to which it is usually looked at.
+    whole
+        The model that this one simplifies, of the same inputs and outputs; None for the exact one.
+    """
+
+    name: str
+    assembly: str
+    summary: str
+    at: tuple[Quantity, ...]
+    model: Callable[[ParameterSet, PlantPoint], LinearModel]
+    band: float
+    whole: Callable[[ParameterSet, PlantPoint], LinearModel] | None = None
+
+    @property
+    def usual(self) -> PlantPoint:
+        """Where it is usually looked at."""
+        return PlantPoint(self.at[0], self.at[0].default)

@@ -1,0 +1,173 @@
+"""Frequency response of a nonlinear sampled loop, sine by sine, over frequency and amplitude."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.response.cases import Cases, cases_of
+from bywire.analysis.response.dataset import Sweep, as_dataset
+from bywire.analysis.response.window import interval, require_measurable, sine_window
+from bywire.analysis.response.window_scatter import spread_of
+from bywire.core.errors import ParameterError
+from bywire.core.signals import signals_of
+from bywire.simulation.repetition import Repeated, repeat
+from bywire.simulation.run import Run
+
+Array = NDArray[np.float64]
+
+HARMONICS = 9
+"""highest harmonic that counts as distortion"""
+STILL = 1e-12
+"""peak to peak, as a share of the output's usual magnitude, up to which it counts as still"""
+
+
+def require_stable(closed: LinearModel) -> None:
+    """Refuse a loop whose response would grow without end.
+
+    Raises
+    ------
+    ParameterError
+        With its poles.
+    """
+    if closed.is_stable:
+        return
+    outside = [z for z in closed.poles() if abs(z) > 1.0]
+    rates = ", ".join(f"{math.log(abs(z)) / closed.period:.3g}" for z in outside)
+    raise ParameterError(
+        f"{closed.name}: the closed loop is unstable and has no frequency response; its poles "
+        f"outside the unit circle grow with {rates} 1/s"
+    )
+
+
+def frequency_response(
+    run: Run,
+    sweep: Sweep,
+    progress: Callable[[str, float], None] | None = None,
+    *,
+    points: Sequence[Run] | None = None,
+    lanes: bool = True,
+) -> xr.Dataset:
+    """Measure the response at every frequency, amplitude and variant.
+
+    Parameters
+    ----------
+    run
+        The loop: model, parameters, start, and the stimulus whose value at time zero is the mean
+        that the sine is added to. Its duration and recording interval are not used.
+    sweep
+        Frequencies, amplitudes, variants.
+    progress
+        Called with ``"frequency response"`` and the finished share, 0 to 1.
+    points
+        Variants with operating points of their own, in place of the sweep's variations: runs of
+        the same model with the same choices and sample times.
+    lanes
+        False: one sine after another on one core, as in a simulator without ensembles.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
+        input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
+        (share of the output's power, its mean left out, at the excited line), ``scatter`` (of the
+        complex amplitude, see ``window_scatter``), ``windows``, ``settled`` (0 or 1), and
+        ``share_FLAG`` for every flag and saturation. Gain and phase are NaN where the output does
+        not move at all: what sticks has no gain. Where it never repeats, they are means of the
+        last windows.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is unknown.
+    ParameterError
+        When frequencies or amplitudes are not positive, or a frequency is above half the rate at
+        which the slowest controller samples.
+    SolverError
+        When a trajectory leaves the numbers.
+    """
+    require_measurable(run, sweep)
+    cases = cases_of(run, sweep, points)
+    plans = [sine_window(run, f, sweep) for f in sweep.frequencies]
+    names, stop = list(run.par.leaves()), threading.Event()
+    least = STILL * signals_of(run.model.Output)[sweep.output].nominal
+
+    def measure(plan: tuple[float, int]) -> dict[str, Array]:
+        window, periods = plan
+        own = replace(run, duration=window, record=interval(run))
+        found = _repeated(own, sweep, cases, periods, lanes, stop)
+        measured = _measured(found, cases.sizes, periods, least)
+        measured |= sweep.shares(found.values, cases.matrix, names)
+        return {name: value.reshape(cases.shape) for name, value in measured.items()}
+
+    done: list[dict[str, Array]] = []
+    pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
+    try:
+        for k, one in enumerate(pool.map(measure, plans)):
+            done.append(one)
+            if progress is not None:
+                progress("frequency response", (k + 1) / len(plans))
+    except KeyboardInterrupt:
+        stop.set()  # for the threads, which it does not reach
+        raise
+    finally:  # waits for what runs, and starts nothing more
+        pool.shutdown(cancel_futures=True)
+    return as_dataset(run, sweep, [periods / window for window, periods in plans], done)
+
+
+def _repeated(
+    own: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
+) -> Repeated:
+    """Run all amplitudes and variants at one frequency until they repeat."""
+    columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
+    schedule = own.schedule()
+    apart, f = schedule.stimulus_frames * schedule.frame, periods / own.duration
+
+    def sines(which: NDArray[np.int64], first: int, last: int) -> Array:
+        rows = np.repeat(cases.rest[which, None], last - first, axis=1)
+        wave = np.sin(2.0 * math.pi * f * (np.arange(first, last) * apart))
+        rows[:, :, columns] += (cases.sizes[which, None] * wave)[:, :, None]
+        return rows
+
+    rows = round(own.duration / own.record)
+    wave = 2j / rows * np.exp(-2j * math.pi * periods / rows * np.arange(rows))
+
+    def figures(window: Array) -> NDArray[np.complex128]:
+        # A matrix product would start the threads of a linear algebra library within ours.
+        return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
+
+    return repeat(
+        own, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
+        starts=cases.starts, lanes=lanes, stop=stop,
+    )  # fmt: skip
+
+
+def _measured(found: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:
+    """Return the figures of all cases at one frequency, shape (cases,) each."""
+    outputs = found.values[:, :, 0]
+    count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
+    # The window holds whole periods: harmonics are lines of its Fourier transform.
+    spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
+    lines = 2.0 / outputs.shape[1] * spectrum
+    moves = np.ptp(outputs, axis=1) > least
+    last = np.where(moves, np.abs(lines[:, 0]), np.nan)
+    value, scatter = (one[:, 0] for one in spread_of(found.figures, found.repeats))
+    return {
+        "gain": np.where(moves, np.abs(value), np.nan) / sizes,
+        "phase": np.where(moves, np.degrees(np.angle(value)), np.nan),
+        "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / last,
+        "coherence": 0.5 * last**2 / np.where(moves, np.var(outputs, axis=1), np.nan),
+        "scatter": np.where(moves, scatter, np.nan),
+        "windows": found.windows.astype(float),
+        "settled": found.repeats.astype(float),
+        "unsettled_substeps": found.unsettled.astype(float),
+    }

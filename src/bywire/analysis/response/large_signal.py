@@ -1,0 +1,145 @@
+r"""Bandwidth and crossover of a measured loop by amplitude, small and large signal.
+
+The controller is linear between its limits. Be C_r its response to the set point and C_y that to
+the output, both plants' linear closed loop T_0 and loop gain L_0 tell their ratio H, whatever
+friction and limits make of the rest:
+
+.. math:: H = \frac{C_r}{C_y} = T_0 \frac{1 + L_0}{L_0}, \qquad L = \frac{T}{H - T}
+
+with the closed loop T measured by sines of one amplitude: L is the loop gain's describing function.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.design.describing_function import phase_margin
+from bywire.analysis.loop import Loop, Point
+from bywire.analysis.response.measured_bandwidth import complex_values, fall
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.parameters import ParameterSet
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A loop at an operating point.
+
+    Parameters
+    ----------
+    loop, par, value
+        Loop, parameters and operating point [SI].
+    label
+        Value of what is varied [SI]; NaN where nothing is.
+    """
+
+    loop: Loop
+    par: ParameterSet
+    value: float
+    label: float = math.nan
+
+    @property
+    def point(self) -> Point:
+        """The operating point, ready to run."""
+        return self.loop.point(self.par, self.value)
+
+    def linear(self, frequencies: Array) -> Complex:
+        """Return the response of the linear closed loop, shape (frequencies,)."""
+        return self.loop.closed(self.par, self.value).response(frequencies)[:, 0, 0]
+
+    def gain(self, closed: Complex, frequencies: Array) -> Complex:
+        """Return the loop gain behind a measured closed response, both of shape (n,)."""
+        T = self.linear(frequencies)
+        L = self.loop.gain(self.par, self.value).response(frequencies)[:, 0, 0]
+        H = T * (1.0 + L) / L
+        return np.asarray(closed / (H - closed))
+
+
+def variants_over(base: Variant, name: str, values: Sequence[float]) -> list[Variant]:
+    """Return the cases of a range of one parameter, or of the operating quantity.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no such number.
+    ParameterError
+        When there is no value, or one is not admissible.
+    """
+    loop, par, value = base.loop, base.par, base.value
+    if not values:
+        raise ParameterError(f"{name}: give at least one value")
+    if name == loop.at.name:
+        return [Variant(loop, par, one, one) for one in values]
+    if name not in par.leaves():
+        raise unknown_name("parameter", name, [loop.at.name, *par.leaves()])
+    return [Variant(loop, par.replace({name: one}), value, one) for one in values]
+
+
+@dataclass(frozen=True)
+class Width:
+    """Figures of a closed loop at one amplitude.
+
+    Parameters
+    ----------
+    bandwidth
+        Frequency at which the gain has fallen 3 dB below that of the linear loop at standstill
+        [Hz]; 0 where it is below from the lowest frequency on, infinity beyond the highest.
+    crossover, phase_margin
+        Of the loop gain's describing function [Hz, degree]; NaN where the frequencies hold no
+        crossover or more than one controller acts, crossover infinity beyond the highest.
+    """
+
+    bandwidth: float
+    crossover: float
+    phase_margin: float
+
+
+def width(variant: Variant, one: xr.Dataset) -> Width:
+    """Return the figures of one variant and amplitude.
+
+    Parameters
+    ----------
+    variant
+        What was measured.
+    one
+        Its response over ``frequency``; see ``frequency_response``.
+    """
+    start = float(np.abs(variant.linear(np.zeros(1))[0]))
+    values, f = complex_values(one), one["frequency"].values
+    bandwidth, known = fall(one["gain"].values, f, start), np.isfinite(values)
+    if not variant.loop.single or not known.any():
+        return Width(bandwidth, math.nan, math.nan)
+    margin, crossover = phase_margin(variant.gain(values[known], f[known]), f[known])
+    return Width(bandwidth, crossover, margin)
+
+
+def widths(variants: Sequence[Variant], found: xr.Dataset) -> list[list[Width]]:
+    """Return the figures of every variant and, within it, amplitude."""
+    return [
+        [width(one, found.isel(variant=k, amplitude=j)) for j in range(found.sizes["amplitude"])]
+        for k, one in enumerate(variants)
+    ]
+
+
+def with_widths(found: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dataset:
+    """Return a response with bandwidth, crossover and phase margin by variant and amplitude."""
+    units = {"bandwidth": "Hz", "crossover": "Hz", "phase_margin": "degree"}
+    rows = {
+        name: [[getattr(one, name) for one in row] for row in figures] for name in units
+    }
+    return found.assign(
+        {name: (("variant", "amplitude"), rows[name], {"units": units[name]}) for name in units}
+    )
+
+
+def narrowest(found: xr.Dataset, amplitude: int) -> int:
+    """Return the variant with the smallest bandwidth at an amplitude; the first of several."""
+    return int(np.argmin(found["bandwidth"].values[:, amplitude]))

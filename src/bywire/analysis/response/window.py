@@ -1,0 +1,104 @@
+"""Windows over which a periodic response is evaluated, and which requests can be measured."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Sequence
+
+from bywire.analysis.response.dataset import Sweep
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.signals import signals_of
+from bywire.core.units import shown
+from bywire.simulation.run import Run
+
+_LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
+_CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
+
+
+def require_measurable(run: Run, sweep: Sweep) -> None:
+    """Refuse unknown signals, and frequencies and amplitudes that cannot be measured.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is unknown.
+    ParameterError
+        When frequencies or amplitudes are not positive, or a frequency is above half the rate at
+        which the slowest controller samples.
+    """
+    for name in sweep.inputs:
+        if name not in run.model.Stimulus._fields:
+            raise unknown_name("signal of the stimulus", name, run.model.Stimulus._fields)
+    for name in sweep.recorded:
+        if name not in run.model.Output._fields:
+            raise unknown_name("signal", name, run.model.Output._fields)
+    unit = signals_of(run.model.Stimulus)[sweep.inputs[0]].unit
+    wanted = (("frequencies", sweep.frequencies, "Hz"), ("amplitudes", sweep.amplitudes, unit))
+    for kind, values, symbol in wanted:
+        if not len(values) or not all(math.isfinite(v) and v > 0 for v in values):
+            given = ", ".join(shown(float(v), symbol) for v in values) or "none"
+            raise ParameterError(f"{kind} = {given}: positive numbers are wanted")
+    limit, highest = nyquist(run), max(sweep.frequencies)
+    if highest >= limit:
+        raise ParameterError(
+            f"frequency {highest:g} Hz is not below the Nyquist frequency of the controller, "
+            f"{limit:g} Hz: ask for lower frequencies"
+        )
+
+
+def nyquist(run: Run) -> float:
+    """Return the slowest controller's Nyquist frequency [Hz]: any may take the input."""
+    return 0.5 / max(task.period for task in run.model.tasks(run.par))
+
+
+def interval(run: Run) -> float:
+    """Return the sample time of the fastest task [s]: the excitation steps with it."""
+    return min(task.period for task in run.model.tasks(run.par))
+
+
+def common_interval(run: Run, whole: Sequence[float]) -> float:
+    """Return the shortest time [s] that holds whole sample times and periods.
+
+    Parameters
+    ----------
+    whole
+        Frequencies [Hz] whose periods count too.
+    """
+    periods = [task.period for task in run.model.tasks(run.par)] + [1.0 / w for w in whole]
+    return math.lcm(*(round(period / run.step) for period in periods)) * run.step
+
+
+def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
+    """Return length [s] and periods of the window that comes closest to a frequency [Hz]."""
+    common = common_interval(run, sweep.whole)
+    least = max(sweep.least, math.ceil(sweep.shortest * f))
+    choices = []
+    for n in range(least, least + _CHOICES):
+        length = max(round(n / f / common), 1) * common
+        whole = max(round(f * length), 1)
+        # Rounded: of windows that fit alike, the shortest.
+        choices.append((round(abs(whole / length / f - 1.0), 9), length, whole))
+    _, length, whole = min(choices)
+    return length, whole
+
+
+def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
+    """Return length [s] of a window with a line near every frequency, and their numbers.
+
+    Frequencies are multiples of 1/length; between two of them at least one line is left.
+
+    Raises
+    ------
+    ParameterError
+        When the frequencies do not ascend.
+    """
+    f = list(sweep.frequencies)
+    apart = [b - a for a, b in itertools.pairwise(f)]
+    if any(step <= 0 for step in apart):
+        raise ParameterError(f"frequencies = {f}: write them in ascending order")
+    common = common_interval(run, sweep.whole)
+    wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
+    # Half a line more: rounded to lines, neighbors keep one between them.
+    length = math.ceil(wanted * 1.25 / common) * common
+    return length, [math.floor(one * length + 0.5) for one in f]

@@ -1,0 +1,71 @@
+"""``bywire replay``: tables, tolerances, tracking, refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import Outcome, no_half_files, refused
+
+import bywire as package
+from bywire.data.writing import write_measurement
+
+Bywire = Callable[..., Outcome]
+
+
+@pytest.fixture(scope="module")
+def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the file of a braking whose brake has less friction than the parameter set's."""
+    bench = package.Bench(
+        "moment-pulses", "roberts2003", overrides={"wedge.mu_B": 0.32},
+        options={"t_hold": 0.3, "pulses": 3},
+    )  # fmt: skip
+    run = package.run(bench).recording[["M_set", "y_M", "F_N", "x", "Omega"]]
+    noise = np.random.default_rng(1).standard_normal(run.sizes["time"])
+    run["y_M"] = ("time", run["y_M"].values + 2.0 * noise, run["y_M"].attrs)
+    return write_measurement(run, tmp_path_factory.mktemp("replay") / "stop.csv")
+
+
+def test_right_parameters_pass_and_the_report_is_complete(
+    bywire: Bywire, stop: Path, tmp_path: Path
+) -> None:
+    outcome = bywire(
+        "replay", stop, "--bench", "moment-pulses", "--set", "wedge.mu_B=0.32", "--output", "y_M",
+        "--output", "x", "--tolerance", "nrmse <= 2 %", "--tolerance", "x.max_error <= 0.01 mm",
+        "--segments", "auto", "--track", "mu_B", "--out", tmp_path, "--json",
+    )  # fmt: skip
+    assert outcome.status == 0, outcome.err
+    found = outcome.object
+    assert found["holds"]
+    assert {s["name"] for s in found["segments"]} >= {"hold-1", "move-1"}
+    assert {Path(f).name for f in found["files"]} == {
+        "y_M.png", "x.png", "track-wedge.mu_B.png", "report.html", "replay.nc", "replay.json",
+    }  # fmt: skip
+    assert all(Path(f).stat().st_size > 500 for f in found["files"])
+    no_half_files(tmp_path)
+    tracked = found["tracked"]["wedge.mu_B"]
+    assert tracked["low"][-1] < 0.32 < tracked["high"][-1]
+    assert "All tolerances are met" in (tmp_path / "report.html").read_text()
+
+
+def test_wrong_parameters_miss_the_tolerance(bywire: Bywire, stop: Path) -> None:
+    outcome = bywire(
+        "replay", stop, "--bench", "moment-pulses", "--output", "x", "--tolerance", "nrmse <= 2 %",
+    )  # fmt: skip
+    assert outcome.status == 1
+    assert "missed: nrmse <= 2 %" in " ".join(outcome.out.split())
+
+
+def test_refusals(bywire: Bywire, stop: Path) -> None:
+    base = ("replay", stop, "--bench")
+    refused(bywire(*base, "moment-pulse"), "moment-pulses")
+    moment = (*base, "moment-pulses")
+    refused(bywire(*moment, "--input", "M_st=M_set"), "M_set")
+    refused(bywire(*moment, "--output", "theta_9"), "theta_1")
+    refused(bywire(*moment, "--tolerance", "nrmse"), "nrmse <= 5 %")
+    refused(bywire(*moment, "--tolerance", "nmrse <= 5 %"), "nrmse")
+    refused(bywire(*moment, "--track", "alpha"), "wedge.mu_B")
+    refused(bywire(*base, "open-loop"), "nothing measured drives the model")
+    refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")

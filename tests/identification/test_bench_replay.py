@@ -1,0 +1,154 @@
+"""Replay of a bench's own recording gives it back; figures and segments by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import bywire
+from bywire.core.errors import ParameterError, UnitError, UnknownNameError
+from bywire.identification.bench_replay import replay
+from bywire.identification.replay_fit import fit_figures, judged
+from bywire.identification.replay_segments import Segment, found_in, read_segments
+
+STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})
+
+
+@pytest.fixture(scope="module")
+def stop() -> xr.Dataset:
+    return bywire.run(STOP).recording
+
+
+@pytest.fixture(scope="module")
+def ramp() -> xr.Dataset:
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", options={"source": "current", "duration": 0.6},
+        stimulus={"kind": "step", "start": 1.0, "end": 3.0, "t_step": 0.2},
+    )  # fmt: skip
+    return bywire.run(bench).recording
+
+
+def test_a_wedge_recording_gives_itself_back(stop: xr.Dataset) -> None:
+    """Its clock begins 50 ms before zero, as the experiment's parking does."""
+    found = replay(STOP, stop, {"M_set": "M_set"}, ["y_M", "x", "i_1"])
+    for pair in found.outputs.values():
+        span = float(np.ptp(pair["measured"].values))
+        assert np.abs(pair["modeled"] - pair["measured"]).max() < 1e-9 * span
+
+
+def test_a_motorcycle_starts_at_the_measured_pressure(ramp: xr.Dataset) -> None:
+    """The part after the first slip, from a pressure of its own."""
+    later = ramp[["i", "p_mc"]].sel(time=slice(0.0, None)).rename(i="current")
+    later = later.assign_coords(time=later["time"] + 7.0)
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+    )  # fmt: skip
+    found = replay(bench, later, {"i_set": "current"})
+    assert list(found.outputs) == ["p_mc"]
+    pair = found.outputs["p_mc"]
+    assert float(np.ptp(pair["measured"].values)) > 5e5
+    assert float(np.abs(pair["modeled"] - pair["measured"]).max()) < 0.02e5
+    assert "starts at the measured p_mc" in found.notes[0]
+
+
+def test_wrong_parameters_show(ramp: xr.Dataset) -> None:
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", overrides={"master_cylinder.A_mc": 2e-4},
+        stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+    )  # fmt: skip
+    found = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
+    (fit,) = judged(found.outputs, [Segment("all", 0.0, 0.6, {"nrmse": "<= 5 %"})])
+    assert not fit.verdicts[0].met
+
+
+def test_figures_by_hand() -> None:
+    t = 1e-3 * np.arange(2000)
+    measured, modeled = np.sin(20.0 * t), np.sin(20.0 * (t - 0.0123)) + 0.1
+    pair = xr.Dataset(
+        {"measured": ("time", measured, {"units": "Pa"}),
+         "modeled": ("time", modeled, {"units": "Pa"})}, {"time": ("time", t, {"units": "s"})},
+    )  # fmt: skip
+    found = {k.name: k.value for k in fit_figures(pair, Segment("all", 0.0, 2.0))}
+    error = modeled - measured
+    assert found["rmse"] == pytest.approx(np.sqrt(np.mean(error**2)))
+    assert found["nrmse"] == pytest.approx(100.0 * found["rmse"] / np.ptp(measured))
+    assert found["vaf"] == pytest.approx(100.0 * (1.0 - np.var(error) / np.var(measured)))
+    assert found["max_error"] == pytest.approx(np.abs(error).max())
+    assert found["lag"] == pytest.approx(0.0123, abs=2e-5)
+    flat = pair.assign(measured=pair["measured"] * 0.0)
+    still = {k.name: k for k in fit_figures(flat, Segment("all", 0.0, 2.0))}
+    assert np.isnan(still["vaf"].value)
+    assert "does not move" in still["vaf"].note
+
+
+def test_tolerances_by_segment_and_signal() -> None:
+    t = 1e-3 * np.arange(1000)
+    attrs = {"units": "Pa"}
+    good = xr.Dataset({"measured": ("time", t, attrs), "modeled": ("time", t + 1e-3, attrs)},
+                      {"time": ("time", t, {"units": "s"})})  # fmt: skip
+    bad = good.assign(modeled=("time", np.where(t < 0.5, t, t + 0.5), attrs))
+    parts = [Segment("a", 0.0, 0.4, {"nrmse": "<= 5 %"}),
+             Segment("b", 0.6, 0.9, {"nrmse": "<= 5 %", "bad.max_error": "<= 1 Pa"})]  # fmt: skip
+    found = judged({"good": good, "bad": bad}, parts)
+    met = {(f.segment.name, f.signal): [v.met for v in f.verdicts] for f in found}
+    assert met == {("a", "good"): [True], ("a", "bad"): [True], ("b", "good"): [True],
+                   ("b", "bad"): [False, True]}  # fmt: skip
+    with pytest.raises(UnknownNameError, match="nrmse"):
+        judged({"good": good}, [Segment("a", 0.0, 0.4, {"nmrse": "<= 5 %"})])
+    with pytest.raises(UnitError):
+        judged({"good": good}, [Segment("a", 0.0, 0.4, {"max_error": "<= 1 A"})])
+    with pytest.raises(ParameterError, match="holds 0 samples"):
+        judged({"good": good}, [Segment("late", 5.0, 6.0)])
+
+
+def test_steps_and_holds_are_found() -> None:
+    t = 1e-3 * np.arange(3000)
+    ramped = np.clip((t - 2.0) / 0.5, 0.0, 1.0)
+    demand = xr.DataArray(np.where(t < 1.0, 0.0, 1.0) + ramped, {"time": t}, ("time",))
+    found = found_in(demand, {"nrmse": "<= 5 %"})
+    assert [one.name for one in found] == ["hold-1", "move-1", "hold-2", "move-2", "hold-3"]
+    starts = [one.start for one in found]
+    np.testing.assert_allclose(starts, [0.0, 1.0, 1.1, 2.02, 2.6], atol=0.03)
+    assert found[-1].stop == pytest.approx(2.999)
+
+
+def test_files_of_segments(tmp_path: Path) -> None:
+    path = tmp_path / "segments.toml"
+    path.write_text(
+        '[tolerances]\nnrmse = "<= 10 %"\n[segments.apply]\nstart = "0 s"\nstop = "500 ms"\n'
+        '[segments.apply.tolerances]\nlag = "<= 5 ms"\n'
+    )
+    (one,) = read_segments(path, {"vaf": ">= 90 %"})
+    assert (one.start, one.stop) == (0.0, 0.5)
+    assert one.tolerances == {"vaf": ">= 90 %", "nrmse": "<= 10 %", "lag": "<= 5 ms"}
+    for text, wanted in (
+        ('[segments.a]\nstart = "1 s"\nstop = "0 s"\n', "start must lie before stop"),
+        ('[segments.a]\nstart = "1 s"\n', "stop is missing"),
+        ('[segments.a]\nbegin = "1 s"\n', "'begin'"),
+        ('[segment.a]\nstart = "1 s"\n', "'segment'"),
+        ("[segments]\n", "no segment"),
+        ("a = ", "give a TOML file"),
+    ):
+        path.write_text(text)
+        with pytest.raises((ParameterError, UnknownNameError, bywire.core.errors.FileError),
+                           match=wanted):  # fmt: skip
+            read_segments(path, {})
+
+
+def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+    )  # fmt: skip
+    with pytest.raises(ParameterError, match="nothing measured drives the model"):
+        replay(bench, ramp[["i", "p_mc"]])
+    with pytest.raises(UnknownNameError, match="i_set"):
+        replay(bench, ramp[["i", "p_mc"]], {"i_st": "i"})
+    with pytest.raises(UnitError, match="p_mc is measured in Pa, but A is wanted"):
+        replay(bench, ramp[["i", "p_mc"]], {"i_set": "p_mc"})
+    gap = ramp[["i", "p_mc"]].copy(deep=True)
+    gap["i"][40] = np.nan
+    with pytest.raises(ParameterError, match="i drives the model and misses 1 samples"):
+        replay(bench, gap, {"i_set": "i"})

@@ -1,0 +1,82 @@
+"""The friction law that a record was made with is chosen, and its parameters come back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from bywire.core.errors import ParameterError
+from bywire.identification.friction_models import LAWS
+from bywire.identification.method import Effort
+from bywire.identification.methods.friction_model import METHOD, Options
+from bywire.identification.model_choice import choose
+from bywire.identification.records import split
+from bywire.identification.trust import trust
+
+MADE: Mapping[str, Mapping[str, float]] = {
+    "coulomb": {"f": 0.0, "d": 0.0, "k": 1.0},
+    "viscous": {"f": 0.0, "k": 1.0},
+    "asymmetric": {"F_n": 24.0, "f": 0.0, "k": 1.0},
+    "pressure": {"k": 1.0},
+    "stribeck": {"f": 0.0},
+    "stribeck-asymmetric": {"F_n": 24.0, "f": 0.0},
+    "stribeck-pressure": {},
+}
+SEEDS = (1, 2, 3)
+SHORT = METHOD.defaults.replace({"duration": 4.0, "interval": 0.02})
+
+
+def options_for(law: str) -> Options:
+    return SHORT.replace({f"truth.{name}": v for name, v in MADE[law].items()})
+
+
+@pytest.mark.parametrize("law", MADE)
+def test_the_law_that_made_the_record_is_chosen(law: str) -> None:
+    """Never a simpler one; now and then the noise makes a richer one look better."""
+    options, names = options_for(law), [one.name for one in LAWS]
+    found = [
+        next(iter(METHOD.identify(METHOD.synthetic(None, options, s), None, options, Effort())
+                  .estimates)) for s in SEEDS
+    ]  # fmt: skip
+    assert sum(name == law for name in found) >= 2
+    assert all(names.index(name) >= names.index(law) for name in found)
+
+
+def test_training_error_alone_would_take_the_richest() -> None:
+    options = options_for("coulomb").replace({"pressures": (5e5,), "interval": 0.01})
+    data = split(METHOD.synthetic(None, options, 1))
+    plain = [law.candidate() for law in LAWS if not law.pressure]
+    one = next(iter(data.values())).isel(time=slice(3, None))
+    found = choose(plain, {"one": one}, "friction")
+    training = [j.training_error for j in found.judged]
+    assert np.argmin(training) == len(plain) - 1
+    assert found.chosen.candidate.name == "coulomb"
+    assert found.chosen.bic == min(j.bic for j in found.judged)
+    assert found.held_out == "blocks of 1 record, a fifth at a time"
+
+
+def test_parameters_come_back() -> None:
+    found = trust(METHOD, None, SHORT.replace({"law": "stribeck-pressure"}), range(50, 60))
+    assert {r.label for r in found.recovered} == {"F_c", "f", "d", "k", "v_s"}
+    assert found.holds, found.recovered
+
+
+def test_a_wrong_law_is_found_out() -> None:
+    data = METHOD.synthetic(None, METHOD.defaults, 1)
+    wrong = METHOD.defaults.replace({"law": "viscous"})
+    checks = {c.name: c for c in METHOD.identify(data, None, wrong, Effort()).checks}
+    assert not checks["misfit_over_friction"].holds
+    right = {c.name: c for c in METHOD.identify(data, None, METHOD.defaults, Effort()).checks}
+    assert all(c.holds for c in right.values())
+
+
+def test_too_little_is_refused() -> None:
+    data = METHOD.synthetic(None, METHOD.defaults, 1)
+    one_way = data.assign(speed=np.abs(data["speed"]), friction=np.abs(data["friction"]))
+    with pytest.raises(ParameterError, match="move to and fro"):
+        METHOD.identify(one_way, None, METHOD.defaults, Effort())
+    with_pressure = METHOD.defaults.replace({"law": "pressure"})
+    with pytest.raises(ParameterError, match="needs a measured pressure"):
+        METHOD.identify(data.drop_vars("pressure"), None, with_pressure, Effort())
