@@ -65,7 +65,8 @@ def replay(
     bench
         Its experiment gives model, start, and what is not measured.
     data
-        Measured signals over ``time`` [s], SI; resampled where the model's steps want it.
+        Measured signals over ``time`` [s], SI; resampled where the model's steps want it. The
+        run begins with the record; a time that begins before zero is taken as the experiment's.
     inputs
         Stimulus of the model -> measured signal; by default all of the same name.
     outputs
@@ -177,6 +178,8 @@ def _on_grid(
 ) -> tuple[xr.Dataset, Case, tuple[str, ...]]:
     """Return data on instants at which the model can be recorded, and the case aligned to them."""
     interval = even_interval(data["time"].values)
+    # A clock that begins before zero is the experiment's own: part of its settling was recorded.
+    case = replace(case, settle=max(case.settle + min(float(data["time"].values[0]), 0.0), 0.0))
     try:
         return data, case.aligned(bench.step, interval), ()
     except StepError:
@@ -198,11 +201,12 @@ def _run(bench: Bench, case: Case, data: xr.Dataset, driven: Mapping[str, str]) 
     interval = case.record
     columns = {name: data[signal].values for name, signal in driven.items()}
     fields = case.model.Stimulus._fields
+    begin = min(float(data["time"].values[0]), 0.0)
 
     def stimulus(t: Array) -> Array:
         """Measured values held from one sample to the next; the first one while it settles."""
         rows = np.zeros((t.size, len(fields)))
-        given = case.stimulus(t - case.settle)
+        given = case.stimulus(t - case.settle + begin)
         index = np.floor((t - case.settle) / interval + 1e-6).astype(int)
         for k, name in enumerate(fields):
             if name in columns:

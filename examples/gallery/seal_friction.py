@@ -1,0 +1,59 @@
+"""Friction of a sealed piston: why it grows with pressure, and what the loop alone gets wrong.
+
+A seal is pressed on by the pressure that it holds: its friction is F_0 + f p, as in eq. (16) of
+Dardanelli, Alli, Savaresi (2010). The usual way to find it is half the height of the loop of force
+over travel. Where a regulator lets the pressure differ between the two directions, part of that
+height is pressure times area: here it differs by 0.06 bar, which adds 1.5 N.
+
+With --data it takes measured records (x [mm], p [bar], F [N] over t, any file of `bywire convert`).
+"""
+
+from argparse import ArgumentParser
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bywire.identification.measured import measured
+from bywire.identification.method import Effort
+from bywire.identification.methods.seal_friction import METHOD
+
+parser = ArgumentParser(description="Identify the friction of a sealed piston.")
+parser.add_argument("--data", type=Path, nargs="+", help="records, one per pressure")
+parser.add_argument("--map", type=Path, help="what their columns mean")
+parser.add_argument("--out", type=Path, help="folder for the figure")
+arguments = parser.parse_args()
+
+options = METHOD.defaults
+if arguments.data:
+    data = measured(arguments.data, arguments.map, METHOD.signals, gaps=True).data
+else:
+    data = METHOD.synthetic(None, options, 1)
+result = METHOD.identify(data, None, options, Effort())
+found = result.estimates["seal friction"]
+print(found)
+loop_0, loop_f, between = (
+    result.figures[name][0]
+    for name in ("loop_half_width_at_0", "loop_half_width_over_pressure",
+                 "pressure_between_directions")
+)  # fmt: skip
+print(f"loop: {loop_0:.2f} N + {1e5 * loop_f:.2f} N/bar; pressure differs {between / 1e5:.3f} bar")
+
+line = result.curves[0].data
+if arguments.out:
+    figure = Figure(figsize=(7.0, 4.5), layout="constrained")
+    axes = figure.subplots()
+    bar = line["p"] / 1e5
+    axes.fill_between(bar, line["low"], line["high"], alpha=0.3, label="95 % band")
+    axes.plot(bar, line["value"], label="friction")
+    axes.plot(bar, line["measured"], "ko", markersize=4, label="records, each direction")
+    axes.plot(bar, loop_0 + loop_f * line["p"], "--", label="half the loop")
+    axes.set(xlabel="pressure [bar]", ylabel="friction [N]", ylim=(0, None))
+    axes.legend()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    figure.savefig(arguments.out / "seal_friction.png", dpi=150)
+
+# What the loop shows too much is half of the difference in pressure, times the area.
+level = np.array([3e5, 6e5])
+excess = loop_0 + loop_f * level - found["F_0"] - found["f"] * level
+assert np.all(np.abs(excess - 0.5 * between * found["A"]) < 0.25 * np.abs(excess))
