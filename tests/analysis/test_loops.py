@@ -93,9 +93,22 @@ def test_margins_are_those_of_the_library(name: str) -> None:
     _, phase, _, _, crossover, _ = control.stability_margins(response, returnall=True)
     k = int(np.argmin(np.abs(crossover - 2.0 * math.pi * found.crossover)))
     assert found.phase == pytest.approx(float(phase[k]), abs=0.2)
-    disk, _, _ = control.disk_margins(gain.state_space(), omega)
+    system = gain.state_space()
+    factor, own, *_ = control.stability_margins(system)
+    if math.isfinite(found.gain):
+        assert factor == pytest.approx(found.gain, rel=1e-3)
+    assert own == pytest.approx(float(np.min(np.abs(phase))), abs=0.2)
+    disk, _, _ = control.disk_margins(system, omega)
     assert found.disk == pytest.approx(float(disk), rel=1e-3)
     assert found.stable
+
+
+def test_a_closed_state_space_has_the_steady_gain_and_no_integrators() -> None:
+    loop, par = of("moment")
+    model = loop.closed(par, loop.at.default)
+    system = model.state_space()
+    assert float(system.dcgain()) == pytest.approx(1.0, abs=1e-9)
+    assert np.abs(system.poles()).max() < 0.999 < np.abs(model.poles()).max()
 
 
 @pytest.mark.parametrize("name", ["moment", "pressure"])

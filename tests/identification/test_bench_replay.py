@@ -10,9 +10,9 @@ import xarray as xr
 
 import bywire
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
-from bywire.identification.bench_replay import replay
-from bywire.identification.replay_fit import fit_figures, judged
-from bywire.identification.replay_segments import Segment, found_in, read_segments
+from bywire.identification.replaying.bench_replay import replay
+from bywire.identification.replaying.fit import fit_figures, judged
+from bywire.identification.replaying.segments import Segment, found_in, read_segments
 
 STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})
 

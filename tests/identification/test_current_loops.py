@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bywire.catalog.registry import parameters
 from bywire.core.errors import ParameterError
-from bywire.identification.loop_records import levels, noise_of_levels
+from bywire.identification.electrics.loop_records import levels, noise_of_levels
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.methods import current_loop, drive_current_loop, motor_winding
 from bywire.identification.records import joined

@@ -12,8 +12,8 @@ from bywire.catalog.registry import parameters
 from bywire.core.errors import ParameterError
 from bywire.identification.method import Effort
 from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
-from bywire.identification.slip_shooting import Shooting
-from bywire.identification.slips import find_slips, noise_of
+from bywire.identification.stick_slip.shooting import Shooting
+from bywire.identification.stick_slip.slips import find_slips, noise_of
 from bywire.identification.unknown import parameters_of
 
 PAR = parameters("dardanelli2010")

@@ -9,7 +9,7 @@ import xarray as xr
 import bywire
 from bywire.catalog.registry import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.identification.tracking import track
+from bywire.identification.replaying.tracking import track
 
 NOISE = {"y_M": 2.0, "F_N": 10.0, "F_M": 5.0, "x": 2e-6, "Omega": 0.1}
 FADING = np.linspace(0.38, 0.31, 8)

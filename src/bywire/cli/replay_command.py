@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from bywire.bench.bench import Bench
-    from bywire.identification.replay_segments import Segment
-    from bywire.identification.tracking import Track
+    from bywire.identification.replaying.segments import Segment
+    from bywire.identification.replaying.tracking import Track
     from bywire.report.replay_report import Replay
 
 _SIGNS = ("<=", ">=", "<", ">")
@@ -43,10 +43,10 @@ class Wanted:
 
 def execute(wanted: Wanted, out: Path | None, as_json: bool) -> int:
     """Replay a measurement and return the exit status: 1 when a tolerance is missed."""
-    from bywire.identification.bench_replay import replay
     from bywire.identification.measured import measured
-    from bywire.identification.replay_fit import judged
-    from bywire.identification.tracking import track
+    from bywire.identification.replaying.bench_replay import replay
+    from bywire.identification.replaying.fit import judged
+    from bywire.identification.replaying.tracking import track
     from bywire.report.replay_report import Replay
 
     bench = _bench(wanted.bench, wanted.changes)
@@ -109,7 +109,7 @@ def _tolerances(texts: Sequence[str]) -> dict[str, str]:
 def _segments(
     wanted: str, inputs: xr.Dataset, tolerances: Mapping[str, str]
 ) -> list[Segment]:
-    from bywire.identification.replay_segments import found_in, read_segments, whole_record
+    from bywire.identification.replaying.segments import found_in, read_segments, whole_record
 
     if not wanted:
         return whole_record(inputs["time"].values, tolerances)

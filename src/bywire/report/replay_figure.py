@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
-from bywire.identification.replay_fit import SegmentFit
+from bywire.identification.replaying.fit import SegmentFit
 from bywire.report import style
 from bywire.report.channel import channel
 from bywire.report.decimation import decimate

@@ -9,8 +9,8 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from bywire.bench.bench import Bench
-from bywire.identification.bench_replay import Replayed
-from bywire.identification.replay_fit import SegmentFit
+from bywire.identification.replaying.bench_replay import Replayed
+from bywire.identification.replaying.fit import SegmentFit
 from bywire.report.files import save_figure
 from bywire.report.page import Banner, FigureBlock, Listing, Section, TableBlock, write_page
 from bywire.report.replay_figure import replay_figure

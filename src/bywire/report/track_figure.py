@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
-from bywire.identification.tracking import Track
+from bywire.identification.replaying.tracking import Track
 from bywire.report import style
 
 

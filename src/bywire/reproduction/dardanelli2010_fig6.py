@@ -10,7 +10,7 @@ from bywire.analysis.linear.motorcycle_linear import theoretical
 from bywire.analysis.linear.rational import Rational
 from bywire.bench.kpis import step_response
 from bywire.bench.result import Result
-from bywire.identification.braking_records import averaged
+from bywire.identification.braking.records import averaged
 from bywire.report.panels import Panel, Trace
 from bywire.report.style import Role
 from bywire.report.time_traces import time_traces

@@ -9,7 +9,7 @@ import numpy as np
 
 from bywire.analysis.linear.motorcycle_linear import theoretical, with_slow_pair
 from bywire.analysis.linear.rational import Rational
-from bywire.identification.braking_fit import five_of
+from bywire.identification.braking.fit import five_of
 from bywire.identification.method import Effort, Identified
 from bywire.identification.methods import braking_dynamics
 from bywire.report.bode import Response, bode

@@ -57,16 +57,26 @@ class LinearModel:
     period: float = 0.0
 
     def state_space(self) -> Any:
-        """Return it as ``control.StateSpace`` with named signals."""
+        """Return it as ``control.StateSpace`` with named signals, for any of its methods.
+
+        States that no input reaches or no output sees are left out: integrators among them would
+        spoil margins and steady gains. Each state is in a unit of its own, a power of two of SI,
+        so that entries are of like size.
+        """
         import control
 
+        from bywire.analysis.linear.minimal import state_scale
+
+        k = self.effective()
+        A, B, C = self.A[np.ix_(k, k)], self.B[k], self.C[:, k]
+        scale = state_scale(A, B, C)
         return control.ss(
-            self.A,
-            self.B,
-            self.C,
+            A * scale / scale[:, None],
+            B / scale[:, None],
+            C * scale,
             self.D,
             self.period,
-            states=list(self.states),
+            states=[self.states[j] for j in k],
             inputs=list(self.inputs),
             outputs=list(self.outputs),
             name=self.name,

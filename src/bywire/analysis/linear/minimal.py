@@ -59,15 +59,33 @@ def minimal(system: Realization) -> Realization:
 
 def scaled(system: Realization) -> Realization:
     """Return it with its states in units of similar weight: powers of two, no rounding."""
+    size = state_scale(system.A, system.b[:, None], system.c[None])
+    A = system.A * size / size[:, None]
+    return Realization(A, system.b / size, system.c * size, system.d)
+
+
+def state_scale(A: Array, B: Array, C: Array) -> Array:
+    """Return units of the states, powers of two, in which the entries of A, B, C are alike.
+
+    Parameters
+    ----------
+    A, B, C
+        Matrices, shapes (n, n), (n, nu), (ny, n).
+
+    Returns
+    -------
+    numpy.ndarray
+        Shape (n,); the model in these units is A_ij s_j / s_i, B_i / s_i, C_j s_j.
+    """
     from scipy.linalg import matrix_balance
 
-    n = len(system.A)
+    n = len(A)
     if n == 0:
-        return system
+        return np.ones(0)
     whole = np.zeros((n + 1, n + 1))
-    whole[:n, :n], whole[:n, n], whole[n, :n] = system.A, system.b, system.c
-    balanced: Any = matrix_balance(whole, permute=False)[0]
-    return Realization(balanced[:n, :n], balanced[:n, n], balanced[n, :n], system.d)
+    whole[:n, :n], whole[:n, n], whole[n, :n] = A, np.abs(B).max(axis=1), np.abs(C).max(axis=0)
+    scale: Any = matrix_balance(whole, permute=False, separate=True)[1][0]
+    return np.asarray(scale[:n] / scale[n])
 
 
 def zeros(system: Realization) -> tuple[NDArray[np.complex128], float]:

@@ -14,14 +14,14 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Frequency, Pressure, Unit
-from bywire.identification.braking_curves import curves_of
-from bywire.identification.braking_experiment import demands, eq22_of, of_brake, of_eq22
-from bywire.identification.braking_fit import fit, five_of, over_frequency, unknowns_of
-from bywire.identification.braking_records import Region, regions_of
+from bywire.identification.braking.curves import curves_of
+from bywire.identification.braking.experiment import demands, eq22_of, of_brake, of_eq22
+from bywire.identification.braking.fit import fit, five_of, over_frequency, unknowns_of
+from bywire.identification.braking.records import Region, regions_of
+from bywire.identification.braking.slow_pair import NAMES, response
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check, Effort, Identified, Method
 from bywire.identification.records import joined, split
-from bywire.identification.slow_pair import NAMES, response
 
 _MISFIT_STEP, _MISFIT_SINES = 0.05, 0.1
 

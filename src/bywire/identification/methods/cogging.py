@@ -17,21 +17,21 @@ from bywire.bench.experiments import slow_rotation
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.angle_orders import standing_out
-from bywire.identification.cogging_fit import (
+from bywire.identification.differentiation import differentiated, low_passed
+from bywire.identification.drive_train.angle_orders import standing_out
+from bywire.identification.drive_train.cogging_fit import (
     CoggingFit,
     Turning,
     cogging_problem,
     same_both_ways,
     slope_as_known,
 )
-from bywire.identification.differentiation import differentiated, low_passed
+from bywire.identification.drive_train.steady_motion import windows
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
 from bywire.identification.simulated_record import Sensor, sensed, turned
-from bywire.identification.steady_motion import windows
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 

@@ -15,7 +15,7 @@ from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Torque, Unit
-from bywire.identification.loop_records import (
+from bywire.identification.electrics.loop_records import (
     identified_loop,
     levels,
     noise_of_levels,

@@ -14,7 +14,7 @@ from bywire.bench.rig_case import check_current, shaft_case
 from bywire.bench.running import as_run
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
-from bywire.identification.loop_records import (
+from bywire.identification.electrics.loop_records import (
     identified_loop,
     levels,
     noise_of_levels,

@@ -16,9 +16,9 @@ from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import force_cycle
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification import force_current
-from bywire.identification.common_axis import on_common_axis
-from bywire.identification.force_current import Reading, Squeeze, branches, law, squeeze
+from bywire.identification.drive_train import force_current
+from bywire.identification.drive_train.common_axis import on_common_axis
+from bywire.identification.drive_train.force_current import Reading, Squeeze, branches, law, squeeze
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method

@@ -22,10 +22,10 @@ from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import search
 from bywire.identification.output_error import even_interval
-from bywire.identification.replay import replayed
-from bywire.identification.slip_shooting import Shooting, Shot, cut_out
-from bywire.identification.slips import find_slips, noise_of
-from bywire.identification.stribeck_band import stribeck_band
+from bywire.identification.replaying.replay import replayed
+from bywire.identification.stick_slip.shooting import Shooting, Shot, cut_out
+from bywire.identification.stick_slip.slips import find_slips, noise_of
+from bywire.identification.stick_slip.stribeck_band import stribeck_band
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
 

@@ -15,19 +15,19 @@ from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Unit, Voltage
-from bywire.identification.least_squares import estimate
-from bywire.identification.loop_records import (
+from bywire.identification.electrics.loop_records import (
     as_curve,
     checks_of,
     levels,
     noise_of_levels,
     require_steps,
 )
+from bywire.identification.electrics.winding import winding_trial
+from bywire.identification.least_squares import estimate
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import output_error
 from bywire.identification.records import split
 from bywire.identification.unknown import parameters_of
-from bywire.identification.winding import winding_trial
 from bywire.simulation.run import simulate
 
 Array = NDArray[np.float64]

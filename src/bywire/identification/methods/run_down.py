@@ -19,12 +19,8 @@ from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import run_down
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.common_axis import on_common_axis
-from bywire.identification.estimate import Estimate
-from bywire.identification.lack_of_fit import lack_of_fit
-from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.records import joined, split
-from bywire.identification.run_downs import (
+from bywire.identification.drive_train.common_axis import on_common_axis
+from bywire.identification.drive_train.run_downs import (
     INERTIA,
     NAMES,
     Reading,
@@ -35,6 +31,10 @@ from bywire.identification.run_downs import (
     read_run,
     scale_is_told,
 )
+from bywire.identification.estimate import Estimate
+from bywire.identification.lack_of_fit import lack_of_fit
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.records import joined, split
 from bywire.identification.simulated_record import Sensor, sensed, turned
 from bywire.plant.axial_bearing import AngularSpeed
 

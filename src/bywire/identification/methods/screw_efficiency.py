@@ -20,18 +20,18 @@ from bywire.bench.experiments import load_sweep
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.common_axis import on_common_axis
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.screw_strokes import Stroke, fits, strokes
-from bywire.identification.simulated_record import Sensor, sensed, turned
-from bywire.identification.steady_motion import (
+from bywire.identification.drive_train.common_axis import on_common_axis
+from bywire.identification.drive_train.screw_strokes import Stroke, fits, strokes
+from bywire.identification.drive_train.steady_motion import (
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.equation import Equation
+from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.simulated_record import Sensor, sensed, turned
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

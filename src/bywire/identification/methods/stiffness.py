@@ -20,13 +20,13 @@ from bywire.bench.rig_case import slope_of
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification import force_current, two_stages
-from bywire.identification.force_current import Reading, squeeze
+from bywire.identification.drive_train import force_current, two_stages
+from bywire.identification.drive_train.force_current import Reading, squeeze
+from bywire.identification.drive_train.steady_motion import steady_dynamics
+from bywire.identification.drive_train.two_stages import TwoStages
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
 from bywire.identification.simulated_record import Sensor, sensed, turned
-from bywire.identification.steady_motion import steady_dynamics
-from bywire.identification.two_stages import TwoStages
 from bywire.plant import shaft_encoder
 from bywire.plant.axial_bearing import AngularSpeed
 
@@ -64,7 +64,7 @@ def identify(
 
     on the sensor and in the heart, with the travel d of one nut toward the other; the free-play is
     :math:`d_c - d_t`. In the heart F is what the current says, by the law of
-    ``bywire.identification.force_current``, which is fitted to both stages at once.
+    ``bywire.identification.drive_train.force_current``, which is fitted to both stages at once.
 
     Parameters
     ----------

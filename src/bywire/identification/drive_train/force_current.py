@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.identification.differentiation import low_passed
+from bywire.identification.drive_train.steady_motion import windows
 from bywire.identification.output_error import even_interval
-from bywire.identification.steady_motion import windows
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 
@@ -63,7 +63,7 @@ class Reading:
         Low-pass of the speed [Hz].
     slowest, margin, length
         Of the closing speed [rad/s], and times [s]; see
-        :func:`bywire.identification.steady_motion.windows`.
+        :func:`bywire.identification.drive_train.steady_motion.windows`.
     speed
         Of one motor, that the current is stated at [rad/s]; the record's mean by default.
     """

@@ -11,8 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.identification.braking.sine_lines import Points, lines, measured_points
 from bywire.identification.output_error import even_interval
-from bywire.identification.sine_lines import Points, lines, measured_points
 
 Array = NDArray[np.float64]
 

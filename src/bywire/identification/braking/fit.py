@@ -11,12 +11,12 @@ from bywire.analysis.linear.motorcycle_linear import two_pole
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import travel_at
 from bywire.core.errors import ParameterError
-from bywire.identification.braking_records import BAND, Region
+from bywire.identification.braking.input_noise import Whitening
+from bywire.identification.braking.records import BAND, Region
+from bywire.identification.braking.slow_pair import NAMES, log_response, response
+from bywire.identification.braking.two_step import in_turn, restricted
 from bywire.identification.estimate import Estimate
-from bywire.identification.input_noise import Whitening
 from bywire.identification.least_squares import Problem, estimate
-from bywire.identification.slow_pair import NAMES, log_response, response
-from bywire.identification.two_step import in_turn, restricted
 from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]

@@ -13,15 +13,15 @@ from bywire.assemblies.driven_shaft import DrivenShaft
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.identification.differentiation import differentiated
-from bywire.identification.equation import Equation
-from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import Problem
-from bywire.identification.steady_motion import (
+from bywire.identification.drive_train.steady_motion import (
     Motions,
     motions,
     steady_dynamics,
     window_residuals,
 )
+from bywire.identification.equation import Equation
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Problem
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 
@@ -43,7 +43,7 @@ class Reading:
         Low-pass before the angle is differentiated [Hz].
     slowest, margin, length
         Of the motion [rad/s], and times [s]; see
-        :func:`bywire.identification.steady_motion.windows`.
+        :func:`bywire.identification.drive_train.steady_motion.windows`.
     """
 
     cutoff: float

@@ -20,7 +20,7 @@ from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.identification.equation import Equation, EquationError
-from bywire.identification.slips import Slip
+from bywire.identification.stick_slip.slips import Slip
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
 from bywire.identification.output_error import even_interval
-from bywire.identification.strokes import find_strokes, velocity
+from bywire.identification.sealing.strokes import find_strokes, velocity
 
 Array = NDArray[np.float64]
 

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 from bywire.analysis.linear.motorcycle_linear import theoretical, with_slow_pair
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import travel_at
-from bywire.identification.braking_fit import five_of
-from bywire.identification.braking_records import Region, StepRecord
+from bywire.identification.braking.fit import five_of
+from bywire.identification.braking.records import Region, StepRecord
+from bywire.identification.braking.slow_pair import response
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
-from bywire.identification.slow_pair import response
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict, check, judge
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.data.lag import estimate_lag
-from bywire.identification.replay_segments import Segment
+from bywire.identification.replaying.segments import Segment
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.errors import ParameterError
-from bywire.identification import force_current
-from bywire.identification.force_current import Squeeze, branches, law
+from bywire.identification.drive_train import force_current
+from bywire.identification.drive_train.force_current import Squeeze, branches, law
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem
 from bywire.identification.method import Check

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
+from bywire.identification.drive_train.steady_motion import Motions
 from bywire.identification.estimate import Estimate
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.method import Check
-from bywire.identification.steady_motion import Motions
 from bywire.plant import servo_motor
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.identification.slow_pair import impulse
+from bywire.identification.braking.slow_pair import impulse
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,1 @@
+"""A motor's winding and its current loop."""

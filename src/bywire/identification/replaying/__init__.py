@@ -1,0 +1,1 @@
+"""Measured demands through the model: replay, its judgment, and parameters that drift."""

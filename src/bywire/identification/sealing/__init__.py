@@ -1,0 +1,1 @@
+"""Strokes of a sealed piston, and the friction that they show."""
