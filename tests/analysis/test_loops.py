@@ -82,6 +82,7 @@ def test_agreement_tells_limits_from_causes() -> None:
     assert lost.largest == ["bearing friction"]
 
 
+@pytest.mark.filterwarnings("ignore:stability_margins. Falling back")
 @pytest.mark.parametrize("name", LOOPS)
 def test_margins_are_those_of_the_library(name: str) -> None:
     loop, par = of(name)
@@ -97,7 +98,7 @@ def test_margins_are_those_of_the_library(name: str) -> None:
     factor, own, *_ = control.stability_margins(system)
     if math.isfinite(found.gain):
         assert factor == pytest.approx(found.gain, rel=1e-3)
-    assert own == pytest.approx(float(np.min(np.abs(phase))), abs=0.2)
+    assert own == pytest.approx(found.phase, abs=0.2)
     disk, _, _ = control.disk_margins(system, omega)
     assert found.disk == pytest.approx(float(disk), rel=1e-3)
     assert found.stable

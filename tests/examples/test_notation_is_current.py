@@ -44,3 +44,9 @@ def test_links_lead_somewhere(page: Path) -> None:
             assert (page.parent / target).exists(), target
     for target in re.findall(r"`((?:src|docs|examples|benches|tests)/[\w/.-]+)`", text):
         assert (ROOT / target).exists(), target
+
+
+def test_trust_page_says_what_the_studies_say() -> None:
+    maker = runpy.run_path(str(ROOT / "docs" / "make_trust.py"))
+    written = (ROOT / "docs" / "trust.md").read_text(encoding="utf-8")
+    assert written == maker["page"](), "run: python docs/make_trust.py FOLDER"

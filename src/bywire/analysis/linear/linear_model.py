@@ -71,16 +71,10 @@ class LinearModel:
         A, B, C = self.A[np.ix_(k, k)], self.B[k], self.C[:, k]
         scale = state_scale(A, B, C)
         return control.ss(
-            A * scale / scale[:, None],
-            B / scale[:, None],
-            C * scale,
-            self.D,
-            self.period,
-            states=[self.states[j] for j in k],
-            inputs=list(self.inputs),
-            outputs=list(self.outputs),
-            name=self.name,
-        )
+            A * scale / scale[:, None], B / scale[:, None], C * scale, self.D, self.period,
+            states=[self.states[j] for j in k], inputs=list(self.inputs),
+            outputs=list(self.outputs), name=self.name,
+        )  # fmt: skip
 
     def transfer_function(self, input: str = "", output: str = "") -> Any:
         """Return one path as ``control.TransferFunction`` with named signals.

@@ -1,0 +1,75 @@
+"""Condense studies of the identification methods into docs/trust and docs/trust.md.
+
+``bywire identify METHOD --study 200 --out FOLDER/METHOD`` for each method, then
+``python docs/make_trust.py FOLDER``.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+DOCS = Path(__file__).parent
+HEAD = """# Does what is put in come back?
+
+Simulated experiments with the sensors' noise, each with its own seed, identified from starts that
+are up to 30 % off. The mean of the estimates has to lie within 3 standard errors of what was put
+in, and the share of 95 % intervals that hold it must be compatible with 90 to 99 %. Made by
+`bywire identify METHOD --study COUNT`; every outcome with its seed is in [trust/](trust/). What
+does not hold is left standing, and explained below the table.
+
+"""
+HEADING = (
+    "method", "parameter", "experiments", "bias [standard errors]", "bias [%]",
+    "intervals that hold", "claimed / real scatter", "holds",
+)  # fmt: skip
+
+
+def condensed(study: dict[str, Any]) -> dict[str, Any]:
+    """Return a study with one row of numbers per experiment."""
+    names = list(study["recovered"])
+    rows = [
+        [one["seed"], *(f"{one['values'].get(name, float('nan')):.7g}" for name in names)]
+        for one in study["experiments"]
+    ]
+    kept = {key: study[key] for key in ("method", "parameter_set", "options", "holds", "recovered")}
+    return {**kept, "columns": ["seed", *names], "experiments": rows}
+
+
+def lines(study: dict[str, Any]) -> list[str]:
+    """Return the rows of the table."""
+    rows = []
+    for name, row in study["recovered"].items():
+        bias = f"{100.0 * row['bias'] / row['truth']:+.2g}" if row["truth"] else "-"
+        cells = (
+            study["method"], name, row["count"], f"{row['bias_in_errors']:+.1f}", bias,
+            f"{100 * row['coverage']:.1f} %", f"{row['claimed'] / row['scatter']:.2f}",
+            "yes" if row["holds"] else "no",
+        )  # fmt: skip
+        rows.append("| " + " | ".join(map(str, cells)) + " |")
+    return rows
+
+
+def page() -> str:
+    """Return the page of all studies in docs/trust."""
+    table = ["| " + " | ".join(HEADING) + " |", "|---" * len(HEADING) + "|"]
+    for file in sorted((DOCS / "trust").glob("*.json")):
+        table += lines(json.loads(file.read_text()))
+    notes = DOCS / "trust" / "notes.md"
+    return HEAD + "\n".join(table) + "\n\n" + notes.read_text()
+
+
+def main(folder: Path) -> None:
+    """Write one file per method and the page."""
+    (DOCS / "trust").mkdir(exist_ok=True)
+    for file in sorted(folder.glob("*/study.json")):
+        study = condensed(json.loads(file.read_text()))
+        text = json.dumps(study).replace('"], [', '"],\n[')
+        (DOCS / "trust" / f"{study['method']}.json").write_text(text + "\n")
+    (DOCS / "trust.md").write_text(page())
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
