@@ -11,7 +11,9 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
+from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.bench.experiments import friction_ramp
 from bywire.bench.running import as_run
 from bywire.core.errors import ParameterError
@@ -21,11 +23,11 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import search
-from bywire.identification.output_error import even_interval
-from bywire.identification.replaying.replay import replayed
+from bywire.identification.output_error import even_interval, trial
 from bywire.identification.stick_slip.shooting import Shooting, Shot, cut_out
 from bywire.identification.stick_slip.slips import find_slips, noise_of
 from bywire.identification.stick_slip.stribeck_band import stribeck_band
+from bywire.identification.stick_slip.whitening import Whitening
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
 
@@ -159,7 +161,7 @@ def _residuals(
     residuals, slopes, breakaway, breakaway_slopes = [], [], [], []
     for shot in shots:
         one, way = shooting.fit(shot, seal), shot.slip.direction
-        whiten = _Whitening(one.by_current * (scatter / sigma))
+        whiten = Whitening(one.by_current * (scatter / sigma))
         r = one.residuals - way * ripple * one.by_current
         none = np.zeros(r.size)
         residuals.append(whiten(r / sigma))
@@ -171,34 +173,25 @@ def _residuals(
     return np.concatenate((*residuals, breakaway)), np.vstack((*slopes, *breakaway_slopes))
 
 
-class _Whitening:
-    r"""Makes residuals independent that share an error of the measured current.
-
-    With a current that is off by one standard deviation d along a slip, their covariance is
-    :math:`I + d d^T`; its inverse root is :math:`I - (1 - 1 / \sqrt{1 + d^T d}) u u^T` with u along
-    d.
-    """
-
-    def __init__(self, d: Array) -> None:
-        size = float(d @ d)
-        self._u = d / np.sqrt(size) if size > 0.0 else d
-        self._share = 1.0 - 1.0 / np.sqrt(1.0 + size)
-
-    def __call__(self, values: Array) -> Array:
-        """Return residuals or their Jacobian, shape (n,) or (n, p), made independent."""
-        along = self._u @ values
-        taken = np.outer(self._u, along).reshape(values.shape)
-        return np.asarray(values - self._share * taken)
-
-
 def _counted(shots: Sequence[Shot]) -> str:
     up = sum(shot.slip.direction > 0 for shot in shots)
     return f"{up} slips up, {len(shots) - up} down"
 
 
 def _replay(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
+    """Return the pressure over the whole ramp, measured and modeled."""
     own = par.replace({"drive.mode": "current-source"})
-    return replayed(own, data, {"i_set": "i"}, "p_mc", step)
+    start = max(float(data["p_mc"][0]), 0.0)
+    whole = trial(
+        MotorcycleBrake(), own, data, {"i_set": "i"}, {"p_mc": 1.0}, state=state_at(start, own),
+        memory=memory_at(start, own), step=step,
+    )  # fmt: skip
+    modeled = simulate(whole.run, ("p_mc",))["p_mc"]
+    attrs = {"units": "Pa", "long_name": "p_mc"}
+    return xr.Dataset(
+        {"measured": ("time", data["p_mc"].values, attrs), "modeled": ("time", modeled, attrs)},
+        {"time": data["time"]},
+    )
 
 
 def _stribeck(par: MotorcycleParameters, found: Estimate) -> Curve:
