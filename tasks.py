@@ -50,6 +50,8 @@ def demo() -> int:
 
 def test() -> int:
     """Run all checks, the quick ones first; stop at the first that fails."""
+    # One process per core already: more threads of the libraries would wait for each other.
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     for title, command in CHECKS.items():
         print(f"== {title}", flush=True)
         status = run(*command)
