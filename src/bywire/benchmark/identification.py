@@ -67,7 +67,7 @@ def _by_scipy(
             run, current, _ = shooting.run(shot, z * scale)
             r, _, shift = overlaid(shot, simulate(run, ("p_mc",))["p_mc"])
             rate, level = shot.line
-            parts.append(np.append(r / 2e3, (level + rate * shift - current) / 2e-3))
+            parts.append(np.append(r / 2e3, (level + rate * shift - current) / 1e-3))
         return np.concatenate(parts)
 
     bounds = (np.array([u.low for u in unknowns]) / scale, [u.high / u.scale for u in unknowns])

@@ -36,9 +36,9 @@ Array = NDArray[np.float64]
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"
 # The search of several starts: coarse in time, and the beginnings of slips, whose cost has fewer
-# minima. The best one is then fitted in full.
+# minima; weights that do not move. The best one is then fitted in full.
 _QUICK_STEP, _QUICK_LENGTH = 1e-4, 1.5  # s
-_LIMIT_REPLAY, _LIMIT_RESIDUAL = 0.1, 1.2
+_LIMIT_REPLAY, _LIMIT_RESIDUAL = 0.1, 1.1
 
 
 class Options(ParameterSet):
@@ -95,10 +95,11 @@ def identify(
         {"step": max(_QUICK_STEP, options.step), "longest": min(_QUICK_LENGTH, options.longest)}
     )
     found = search(
-        _problem(data, par, quick, unknowns), starts, "linear", effort.progress, effort.store,
+        _problem(data, par, quick, unknowns, 0.0), starts, "linear", effort.progress, effort.store,
         effort.threads,
     )  # fmt: skip
-    best = estimate(_problem(data, par, options, unknowns), start=found.best.values)
+    sigma_i = noise_of(data["i"].values)
+    best = estimate(_problem(data, par, options, unknowns, sigma_i), start=found.best.values)
     values = best.parameters()
     own = par.replace(values)
     shift = best[_ZERO] if _ZERO in best.names else 0.0
@@ -126,12 +127,17 @@ def identify(
 
 
 def _problem(
-    data: xr.Dataset, par: MotorcycleParameters, options: Options, unknowns: tuple[Unknown, ...]
+    data: xr.Dataset,
+    par: MotorcycleParameters,
+    options: Options,
+    unknowns: tuple[Unknown, ...],
+    sigma_i: float,
 ) -> Problem:
     shots = shots_of(data, options)
     sigma = max(noise_of(data["p_mc"].values), 1.0)
     shooting = Shooting(par, unknowns[: len(_NAMES)], options.step)
-    evaluate = partial(_residuals, shooting, shots, sigma, options.scatter)
+    noise = (sigma, sigma_i, options.scatter)
+    evaluate = partial(_residuals, shooting, shots, noise)
     return Problem(unknowns, evaluate, apart=len(shots))
 
 
@@ -154,22 +160,26 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
 
 
 def _residuals(
-    shooting: Shooting, shots: list[Shot], sigma: float, scatter: float, values: Array
+    shooting: Shooting, shots: list[Shot], noise: tuple[float, float, float], values: Array
 ) -> tuple[Array, Array]:
-    """Return what the slips' shapes and their breakaway currents say, weighted."""
+    """Return what the slips' shapes and their breakaway currents say, weighted.
+
+    Parameters
+    ----------
+    noise
+        Of a sample of pressure [Pa] and current [A], and the current's scatter [A].
+    """
     seal, zero, ripple = values[: shooting.count], values[-2], values[-1]
     residuals, slopes, breakaway, breakaway_slopes = [], [], [], []
     for shot in shots:
         one, way = shooting.fit(shot, seal), shot.slip.direction
-        whiten = Whitening(one.by_current * (scatter / sigma))
+        whiten = Whitening(one, *noise)
         r = one.residuals - way * ripple * one.by_current
         none = np.zeros(r.size)
-        residuals.append(whiten(r / sigma))
-        slopes.append(
-            whiten(np.column_stack((one.slopes, none, -way * one.by_current)) / sigma)
-        )
-        breakaway.append((one.breakaway - zero + way * ripple) / scatter)
-        breakaway_slopes.append(np.array([*one.breakaway_slopes, -1.0, way]) / scatter)
+        residuals.append(whiten(r))
+        slopes.append(whiten(np.column_stack((one.slopes, none, -way * one.by_current))))
+        breakaway.append((one.breakaway - zero + way * ripple) / noise[2])
+        breakaway_slopes.append(np.array([*one.breakaway_slopes, -1.0, way]) / noise[2])
     return np.concatenate((*residuals, breakaway)), np.vstack((*slopes, *breakaway_slopes))
 
 
@@ -225,7 +235,7 @@ METHOD = Method(
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,
     defaults=Options(
-        least=0.2e5, longest=6.0, scatter=2e-3, zero=2e-3, ripple=3e-3, sigma_p=2e3,
+        least=0.2e5, longest=6.0, scatter=1e-3, zero=2e-3, ripple=3e-3, sigma_p=2e3,
         sigma_i=3e-3, step=20e-6,
     ),
     identify=identify,

@@ -69,6 +69,8 @@ class Fitted:
         Their derivatives by the unknowns with the shift at its best, shape (n, p).
     by_current
         Derivative of the residuals by an offset of the current [Pa/A], shape (n,).
+    answer, speed
+        The same with the shift kept [Pa/A], and how fast the pressure moves [Pa/s], shape (n,).
     breakaway, breakaway_slopes
         Measured less computed current at the instant of breaking away [A], and its
         derivatives, shape (p,).
@@ -81,6 +83,8 @@ class Fitted:
     residuals: Array
     slopes: Array
     by_current: Array
+    answer: Array
+    speed: Array
     breakaway: float
     breakaway_slopes: Array
     current: float
@@ -179,9 +183,9 @@ class Shooting:
         J = np.column_stack([np.interp(at, t, column) for column in slopes.T])
         J[at < 0.0] = 0.0
         shift_slopes = (v @ J) / max(float(v @ v), 1e-300)
-        J = J - np.outer(v, shift_slopes)
+        answer, J = J[:, -1], J - np.outer(v, shift_slopes)
         return Fitted(
-            residuals=r, slopes=J[:, :-1], by_current=J[:, -1],
+            residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=answer, speed=v,
             breakaway=level + rate * shift - current,
             breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
             current=current, onset=float(shot.time[0] + shift),

@@ -1,33 +1,56 @@
-"""Residuals of one slip that share an error of the measured current, made independent."""
+"""Residuals of one slip freed from what errors of the measured current do to all of them."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.identification.stick_slip.shooting import Fitted
+
 Array = NDArray[np.float64]
+
+_BLOCKS = 250  # at most
 
 
 class Whitening:
-    r"""Makes residuals independent that share an error of the measured current.
+    r"""Makes means of neighboring residuals independent, of size one.
 
-    With a current that is off by one standard deviation d along a slip, their covariance is
-    :math:`I + d d^T`; its inverse root is :math:`I - (1 - 1 / \sqrt{1 + d^T d}) u u^T` with u along
-    d.
+    .. math:: \Sigma = \sigma^2 I + P H H^T P \sigma_i^2 + d d^T
+
+    with the answer H of the pressure to every sample of the current, taken from that to a lasting
+    offset as if the slip answered alike at all times; P takes off what a shift in time takes up;
+    d is an offset of one standard deviation.
 
     Parameters
     ----------
-    d
-        What an error of one standard deviation does to the residuals, shape (n,).
+    one
+        A slip of the model.
+    sigma, sigma_i
+        Noise of a sample of the pressure [Pa], and of the current [A].
+    scatter
+        Standard deviation of an offset of the current along the slip [A].
     """
 
-    def __init__(self, d: Array) -> None:
-        size = float(d @ d)
-        self._u = d / np.sqrt(size) if size > 0.0 else d
-        self._share = 1.0 - 1.0 / np.sqrt(1.0 + size)
+    def __init__(self, one: Fitted, sigma: float, sigma_i: float, scatter: float) -> None:
+        self._block = max(-(-one.residuals.size // _BLOCKS), 1)
+        answer = np.diff(self._means(one.answer), prepend=0.0)
+        count = answer.size
+        back = np.arange(count)[:, None] - np.arange(count)[None, :]
+        H = np.where(back >= 0, answer[np.clip(back, 0, count - 1)], 0.0)
+        v = self._means(one.speed)
+        H -= np.outer(v, v @ H) / max(float(v @ v), 1e-300)
+        d = self._means(one.by_current) * scatter
+        covariance = (sigma_i**2 / self._block) * (H @ H.T) + np.outer(d, d)
+        covariance[np.diag_indices(count)] += sigma**2 / self._block
+        self._root = np.linalg.cholesky(covariance)
 
     def __call__(self, values: Array) -> Array:
-        """Return residuals or their Jacobian, shape (n,) or (n, p), made independent."""
-        along = self._u @ values
-        taken = np.outer(self._u, along).reshape(values.shape)
-        return np.asarray(values - self._share * taken)
+        """Return residuals or their Jacobian, shape (n,) or (n, p), as fewer independent rows."""
+        from scipy import linalg
+
+        return np.asarray(linalg.solve_triangular(self._root, self._means(values), lower=True))
+
+    def _means(self, values: Array) -> Array:
+        count = len(values) // self._block
+        parts = values[: count * self._block].reshape(count, self._block, *values.shape[1:])
+        return np.asarray(parts.mean(axis=1))
