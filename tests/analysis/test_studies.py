@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import bywire
 from bywire.analysis.sizing import actuator_demand
@@ -194,6 +195,19 @@ def test_a_map_without_numbers_is_refused_and_marks_outside_are_left_out() -> No
     assert contour(data, shown).axes[0].get_legend() is None
     with pytest.raises(ParameterError, match="no number"):
         contour(data.assign(electrical=data["electrical"] * np.nan), shown)
+
+
+def test_the_colors_of_a_share_end_at_0_and_1() -> None:
+    def laid(values, dims, label):
+        return xr.DataArray(values, dims=dims, attrs={"units": "1", "long_name": label})
+
+    x = np.linspace(0.0, 1.0, 5)
+    share = np.clip(np.add.outer(x, x) - 0.5, 0.0, 1.0 + 4e-16)
+    axes = {name: laid(x, (name,), name) for name in ("x", "y")}
+    data = xr.Dataset({"stuck": laid(share, ("y", "x"), "stuck")}, axes)
+    bar = contour(data, Map("stuck", "x", "y", "")).axes[1]
+    assert bar.get_ylim() == (0.0, 1.0)
+    assert len(bar.patches) == 0  # no arrow of what lies beyond
 
 
 @pytest.mark.parametrize(("low", "high"), [(57.0, 380.0), (5.0, 9.0), (-3.0, 3.0), (1.0, 1.0)])

@@ -42,6 +42,11 @@ def test_requirements_from_a_file_and_a_bench_file_that_runs(bywire, tmp_path):
     assert outcome.status in (0, 1)
     assert "nonlinear bench" in outcome.out
     assert "bandwidth, sine of 1 A" in outcome.out
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "ecu.current.k_p" in page
+    assert "disk_margin &gt;= 0.5" in page
+    names = {path.name for path in (tmp_path / "out").glob("*.png")}
+    assert names == {f"current-design-{one}.png" for one in ("loop-gain", "sensitivity", "step")}
     bench = tmp_path / "out" / "current-design.toml"
     text = bench.read_text()
     assert 'motor.R_m = "0.4 ohm"' in text

@@ -67,7 +67,9 @@ def test_the_locus_of_a_plant_shows_the_neutral_point(bywire, tmp_path):
     )
     (border,) = outcome.object["locus"]["borders"]
     assert border["value"] == pytest.approx(math.tan(math.radians(20.0)), rel=1e-4)
-    assert [path.name for path in tmp_path.iterdir()] == ["wedge-rigid-locus.png"]
+    names = {path.name for path in tmp_path.iterdir()}
+    assert names == {"wedge-rigid-locus.json", "wedge-rigid-locus.png", "report.html"}
+    assert "unstable above wedge.mu_B" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
 def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
@@ -98,7 +100,7 @@ def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     assert {path.suffix for path in (tmp_path / "out").iterdir()} == {".nc", ".png", ".html"}
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     assert ">0.5 rad<" in page
-    assert "lowest coherence" in page
+    assert "power at the sine" in page
 
 
 @pytest.mark.parametrize("excitation", ["multisine", "chirp"])
@@ -129,6 +131,7 @@ def test_bandwidths_over_a_range_name_the_worst_case(bywire, tmp_path):
     assert high["largest_share_sat_current"] > 0.0
     assert found["worst"][0]["control.position.f_n"] == 15.0
     assert "Bandwidth by amplitude" in (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert (tmp_path / "screw-position-bandwidth.png").exists()
     text = bywire(*asked).out
     assert "worst: < 20 Hz for 0.25 rad at control.position.f_n = 15 Hz" in text
 
@@ -140,6 +143,14 @@ def test_a_disc_that_would_stop_is_driven_and_that_is_said(bywire):
     assert any("flywheel.law = driven" in line for line in outcome.lines)
     own = ("--set", "flywheel.law=driven", "--set", "flywheel.runout=0mm")
     assert not any("driven" in line for line in bywire(*asked, *own).lines)
+
+
+def test_a_sine_beyond_the_end_stop_is_told(bywire):
+    asked = ("frequency-response", "pressure", "--frequencies", "20 Hz", "--amplitudes")
+    outcome = bywire(*asked, "3 bar, 32 bar", "--json")
+    told = [line for line in outcome.lines if "out of the brake's range" in line]
+    assert len(told) == 1
+    assert "amplitude 32 bar" in told[0]
 
 
 def test_what_sticks_is_said_and_has_no_gain(bywire):
@@ -157,6 +168,7 @@ def test_what_sticks_is_said_and_has_no_gain(bywire):
         (("linearize", "momment"), ("did you mean 'moment'",)),
         (("margins", "moment", "--at", "20 bar"), ("moment", "N*m")),
         (("margins", "moment", "--at", "5000 Nm"), ("wedge travel",)),
+        (("linearize", "pressure", "--at", "0 bar"), ("touches its stop", "> 0 bar")),
         (("margins", "moment", "--parameters", "dardanelli2010"), ("motorcycle-brake",)),
         (("margins", "moment", "--over", "wedge.mu_B"), ("LOW:HIGH:COUNT",)),
         (("margins", "moment", "--over", "wedge.mu_B=0.6:0.2:3"), ("below",)),

@@ -29,7 +29,12 @@ def test_texts_and_figures(bywire, tmp_path):
     assert "motorcycle-plant" in outcome.out
     assert "reduced to" in outcome.out
     names = {path.name for path in (tmp_path / "out").iterdir()}
-    assert names >= {"motorcycle-plant-linear-model.json", "motorcycle-plant-p_mc.png"}
+    figure = "motorcycle-plant-p_mc.png"
+    assert names >= {"motorcycle-plant-linear-model.json", figure, "report.html"}
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    for text in ("largest error up to", "poles besides these: 1 at 0", "How it was made"):
+        assert text in page
+    assert "poles besides these: 2 at 0" in outcome.out
 
 
 def test_friction_of_a_plant(bywire):
@@ -57,6 +62,11 @@ def test_a_reduced_loop(bywire):
         (("wedge-plant", "--parameters", "dardanelli2010"), ("motorcycle-brake",)),
         (("wedge-plant", "--reduce", "99"), ("order = 99", "<= 15")),
         (("wedge-plant", "--reduce", "5 mm"), ("--reduce", "Hz")),
+        (("wedge-plant", "--reduce", "-1"), ("whole number",)),
+        (("wedge-plant", "--reduce", "2.5"), ("whole number",)),
+        (("wedge-plant", "--reduce", "1e9 Hz"), ("fastest corner",)),
+        (("wedge-plant", "--at", "30 A"), ("current = 30 A", "drive.i_max = 20 A")),
+        (("motorcycle-plant", "--at", "1000 A"), ("current = 1000 A", "end stop")),
         (("wedge-plant", "--friction", "stuck", "--reduce", "2"), ("nothing to reduce",)),
         (("moment", "--reduce", "600 Hz"), ("500 Hz",)),
         (("moment", "--friction", "stuck"), ("--friction", "wedge-plant")),

@@ -151,3 +151,14 @@ def test_bode_draws_what_exists_of_a_response() -> None:
         Response("static", np.array([0.0]), np.array([1.0 + 0j]))
     with pytest.raises(ParameterError, match="at least one"):
         bode([])
+
+
+def test_a_response_ends_where_it_has_fallen_by_the_depth() -> None:
+    fast = Response("roll-off", HERTZ, 10.0 / (1.0 + 1j * HERTZ) ** 3)
+    upper, lower = bode([fast], depth=40.0).axes
+    for axes in (upper, lower):
+        drawn = next(line for line in axes.lines if line.get_label() == "roll-off")
+        assert 0 < len(drawn.get_xdata()) < len(HERTZ)
+    shown = heights(upper)[0]
+    assert np.ptp(shown) < 40.0
+    assert len(heights(bode([fast]).axes[0])[0]) == len(HERTZ)

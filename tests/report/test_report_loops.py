@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from bywire.analysis.agreement import Agreement
+from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Border, Locus
 from bywire.analysis.loop_curves import Family, LoopCurve
 from bywire.analysis.robustness import UNSTABLE, LoopMargins
@@ -18,10 +19,11 @@ from bywire.core.errors import ParameterError
 from bywire.report.agreement_report import agreement_table, verdict
 from bywire.report.differences import differences
 from bywire.report.loop_gain import loop_gain
-from bywire.report.margins_table import margins_table
+from bywire.report.margins_table import margins_table, worst_texts
 from bywire.report.nichols import nichols
 from bywire.report.nyquist import nyquist
 from bywire.report.pole_map import pole_map
+from bywire.report.rate_table import left_out, rate_table
 from bywire.report.root_locus import root_locus
 from bywire.report.sensitivity import sensitivity
 
@@ -41,7 +43,7 @@ def curve(gain: float) -> LoopCurve:
         gain=2.0 / gain, phase=180.0 + math.degrees(np.unwrap(np.angle(L))[k]),
         crossover=float(FREQUENCY[k]), delay=0.1, disk=2.0 / float(np.abs(2.0 * S - 1.0).max()),
         sensitivity=float(np.abs(S).max()), complementary=float(np.abs(1.0 - S).max()),
-        bandwidth=0.2, stable=True,
+        bandwidth=0.2, stable=True, phase_at=float(FREQUENCY[k]),
     )  # fmt: skip
     return LoopCurve(FREQUENCY, L, margins, 1.0 / (2.0 * np.pi))
 
@@ -147,3 +149,37 @@ def test_the_margins_table_says_what_is_unstable() -> None:
     assert [row[0].text for row in rows] == ["0.5", "3"]
     assert [row[-1].verdict for row in rows] == ["none", "bad"]
     assert rows[1][1].text == "not defined"
+
+
+def test_the_worst_of_a_range_names_what_is_unstable_apart() -> None:
+    found = [curve(0.5).margins, curve(1.0).margins, UNSTABLE, UNSTABLE]
+    texts = worst_texts(found, "brake.gain", "1", (0.5, 1.0, 2.0, 3.0))
+    assert texts[0] == "unstable at 2 of 4 values of brake.gain (2 to 3)"
+    assert "gain margin 2 at brake.gain = 1" in texts
+    assert not any("not defined" in text for text in texts)
+    assert worst_texts([UNSTABLE], "brake.gain", "1", (2.0,)) == [
+        "unstable at 1 of 1 values of brake.gain (2)"
+    ]
+
+
+def test_poles_that_a_table_leaves_out_are_counted() -> None:
+    z = np.array([0.9, -0.5, 1.0, 0.0, 0.0])
+    n = len(z)
+    model = LinearModel(
+        "chain", np.diag(z), np.ones((n, 1)), np.ones((1, n)), np.zeros((1, 1)), tuple("abcde"),
+        ("u",), ("y",), ("1",) * n, ("1",), ("1",), np.zeros(n), 1e-3,
+    )  # fmt: skip
+    rows = [[cell.text for cell in row] for row in rate_table(model).rows]
+    assert len(rows) == 2
+    assert rows[1][2:] == ["500 (f_s/2)", "-"]
+    assert left_out(model) == [
+        "poles besides these: 1 at 0 (not driven, or not brought back), 2 over within a sample"
+    ]
+    own = replace(model, A=np.diag([0.9, 0.8, 0.7, 0.6, 0.5]))
+    assert left_out(own) == []
+
+
+def test_a_pole_beyond_the_plane_is_told() -> None:
+    rates = np.array([-5.0 + 0j, -400.0 + 1j * np.pi / 0.01])
+    assert "1 faster, not shown" in pole_map(rates, 0.01, 1.0).axes[0].get_title(loc="left")
+    assert "not shown" not in pole_map(rates[:1], 0.01, 1.0).axes[0].get_title(loc="left")

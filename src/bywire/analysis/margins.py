@@ -26,11 +26,14 @@ class Margin:
     crossover
         Highest frequency at which the loop gain is 1 [Hz]; NaN where it never is.
     phase
-        Phase margin there [degree]; NaN likewise.
+        Smallest phase margin of all frequencies at which the loop gain is 1 [degree]; NaN likewise.
+    at
+        Frequency at which that is read [Hz]; NaN likewise.
     """
 
     crossover: float
     phase: float
+    at: float = math.nan
 
 
 def bandwidth(response: Response, band: tuple[float, float], drop: float = math.sqrt(0.5)) -> float:
@@ -66,7 +69,8 @@ def margin(loop: Response, band: tuple[float, float]) -> Margin:
     """Return crossover and phase margin of an open loop (negative feedback not counted).
 
     The phase is followed without jumps from the band's lower end, where it counts as the value
-    between -360 and 0 degree: a loop with integral action begins near -90.
+    between -360 and 0 degree: a loop with integral action begins near -90. Of several frequencies
+    at which the gain is 1, falling or rising, the one nearest to -1 has the phase margin.
 
     Parameters
     ----------
@@ -77,16 +81,21 @@ def margin(loop: Response, band: tuple[float, float]) -> Margin:
     """
     grid = np.geomspace(*band, _POINTS)
     values = loop(grid)
-    falls = np.flatnonzero((np.abs(values[:-1]) >= 1.0) & (np.abs(values[1:]) < 1.0))
-    if falls.size == 0:
+    above = np.abs(values) >= 1.0
+    passes = np.flatnonzero(above[:-1] != above[1:])
+    falls = [int(k) for k in passes if above[k]]
+    if not falls:
         return Margin(math.nan, math.nan)
-    k = int(falls[-1])
 
     def excess(f: float) -> float:
         return float(np.abs(loop(np.array([f])))[0]) - 1.0
 
-    crossover = float(brentq(excess, grid[k], grid[k + 1]))
-    path = np.append(values[: k + 1], loop(np.array([crossover])))
-    phase = np.degrees(np.unwrap(np.angle(path)))
-    turns = 360.0 * math.ceil((phase[0] - _NEARLY_ZERO) / 360.0)
-    return Margin(crossover, 180.0 + float(phase[-1] - turns))
+    found = {}
+    for k in map(int, passes):
+        f = float(brentq(excess, grid[k], grid[k + 1]))
+        path = np.append(values[: k + 1], loop(np.array([f])))
+        phase = np.degrees(np.unwrap(np.angle(path)))
+        turns = 360.0 * math.ceil((phase[0] - _NEARLY_ZERO) / 360.0)
+        found[k] = f, 180.0 + float(phase[-1] - turns)
+    at, smallest = min(found.values(), key=lambda one: abs((one[1] + 180.0) % 360.0 - 180.0))
+    return Margin(found[falls[-1]][0], smallest, at)

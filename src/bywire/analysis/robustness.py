@@ -23,6 +23,7 @@ SENSES = {
 """figures of `LoopMargins`: 1 where more is better, -1 where less is"""
 _POINTS = 2000
 _LOWEST = 1e-2  # lower end of what is searched, Hz
+_REST = 1e-6  # where a response counts as that at rest, Hz
 
 
 @dataclass(frozen=True)
@@ -34,18 +35,20 @@ class LoopMargins:
     gain
         Smallest factor above 1 by which the loop gain may grow; inf where none makes it unstable.
     phase, crossover
-        Phase margin [degree] at the highest gain crossover [Hz].
+        Smallest phase margin of all gain crossovers [degree], and the highest of these [Hz].
     delay
-        Additional dead time that the phase margin allows [s].
+        Additional dead time that the loop can take [s].
     disk
         Disk-based margin (symmetric, skew 0): S - T of this size stays away from -1 in gain and
         phase at once; 0 to 2.
     sensitivity, complementary
         Largest magnitudes of S = 1/(1 + L) and T = L/(1 + L).
     bandwidth
-        Frequency at which the closed loop has fallen to -3 dB [Hz].
+        Frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
     stable
         Whether the closed loop is stable.
+    phase_at
+        Gain crossover at which the phase margin is read [Hz].
     """
 
     gain: float
@@ -57,6 +60,7 @@ class LoopMargins:
     complementary: float
     bandwidth: float
     stable: bool
+    phase_at: float = math.nan
 
 
 UNSTABLE = LoopMargins(
@@ -87,19 +91,17 @@ def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
     L = response(f)
     S = 1.0 / (1.0 + L)
     found = margin(response, band)
-    delay = math.nan
-    if math.isfinite(found.crossover):
-        delay = found.phase / (360.0 * found.crossover)
     return LoopMargins(
         gain=_gain_margin(gain, L),
         phase=found.phase,
         crossover=found.crossover,
-        delay=delay,
+        delay=_delay_margin(f, L),
         disk=2.0 / float(np.max(np.abs(S - L * S))),
         sensitivity=float(np.max(np.abs(S))),
         complementary=float(np.max(np.abs(L * S))),
-        bandwidth=bandwidth(lambda g: closed.response(g)[:, 0, 0], band),
+        bandwidth=bandwidth(lambda g: closed.response(g)[:, 0, 0], (_REST, highest)),
         stable=closed.is_stable,
+        phase_at=found.at,
     )  # fmt: skip
 
 
@@ -142,6 +144,17 @@ def worst(
         k = int(np.nanargmin(sizes)) if not all(map(math.isnan, sizes)) else 0
         result[field] = (getattr(found[k], field), float(values[k]))
     return result
+
+
+def _delay_margin(f: Array, L: NDArray[np.complex128]) -> float:
+    """Return the least dead time that turns a crossover of the response into -1; NaN for none."""
+    size, phase = np.log(np.abs(L)), np.degrees(np.unwrap(np.angle(-L)))
+    found = []
+    for k in np.flatnonzero(np.diff(np.signbit(size))):
+        share = size[k] / (size[k] - size[k + 1])
+        at = f[k] * (f[k + 1] / f[k]) ** share
+        found.append((phase[k] + share * (phase[k + 1] - phase[k])) % 360.0 / (360.0 * at))
+    return float(min(found, default=math.nan))
 
 
 def _gain_margin(gain: LinearModel, L: NDArray[np.complex128]) -> float:

@@ -16,7 +16,8 @@ from bywire.benchmark.engine import timed
 from bywire.benchmark.result import Result, at_least
 from bywire.identification.method import Effort
 from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
-from bywire.identification.stick_slip.shooting import Shooting, Shot, overlaid
+from bywire.identification.stick_slip.shooting import Shooting, overlaid
+from bywire.identification.stick_slip.shots import Shot
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
 

@@ -10,7 +10,7 @@ from bywire.analysis.design.designer import design
 from bywire.analysis.design.linear_case import cases_of
 from bywire.analysis.design.verification import Verification, verify
 from bywire.cli import output
-from bywire.cli.design_ending import exit_status, written
+from bywire.cli.design_ending import exit_status, reported, written
 from bywire.cli.design_inputs import (
     Wanted,
     left_to_choose,
@@ -18,10 +18,11 @@ from bywire.cli.design_inputs import (
     trial_of,
     tunables_of,
 )
-from bywire.cli.design_text import as_object, as_text
+from bywire.cli.design_text import as_object, as_parts
 from bywire.cli.loop_choice import choose, over_range
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
+from bywire.cli.verification_text import as_lines
 from bywire.core.units import shown
 
 
@@ -58,15 +59,19 @@ def execute(
                 found.gains, requirements, tunables, cases, trial, seed=wanted.seed,
                 progress=progress,
             )  # fmt: skip
-    files = []
+    files: list[Path] = []
     if out is not None:
         gains = found.gains if tried is None else tried.final.gains
         point = shown(chosen.value, chosen.loop.at.unit)
         files = [written(chosen, changes, gains, (found.status, tried), point, out)]
+        parts = as_parts(chosen, requirements, found, tried)
+        files += reported(
+            chosen, requirements, (found.status, tried), {"linear design": found.gains}, parts, out
+        )
     if as_json:
         output.result(json.dumps(as_object(chosen, requirements, found, tried, files)))
     else:
-        output.result(as_text(chosen, requirements, found, tried))
+        output.result(as_lines(as_parts(chosen, requirements, found, tried)))
     for path in files:
         output.message(f"written: {path}")
     return exit_status(found.status, tried)

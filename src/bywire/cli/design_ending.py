@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bywire.analysis.design.bench_text import bench_text
 from bywire.analysis.design.outcome import Status
+from bywire.analysis.design.requirement import Requirement
 from bywire.analysis.design.verification import Verification
 from bywire.cli import output
-from bywire.cli.loop_choice import Chosen
+from bywire.cli.loop_choice import Chosen, subject
 from bywire.core.errors import FileError
+
+if TYPE_CHECKING:
+    from bywire.cli.verification_text import Part
+    from bywire.report.design_curves import DesignCurve
+
+_STEPS, _SETTLED = 5.0, 1.2  # what is drawn of a step: periods of the bandwidth, settling times
 
 
 def written(
@@ -47,6 +58,62 @@ def written(
     except OSError as error:
         raise FileError(f"cannot write {path}: {error.strerror}") from None
     return path
+
+
+def reported(
+    chosen: Chosen,
+    requirements: Sequence[Requirement],
+    outcome: tuple[Status, Verification | None],
+    designs: Mapping[str, Mapping[str, float]],
+    parts: Sequence[Part],
+    out: Path,
+) -> list[Path]:
+    """Write figures and page of a design, and return the files.
+
+    Parameters
+    ----------
+    outcome
+        See `written`.
+    designs
+        Gains by what they are called, the retuned ones of the bench not among them.
+    parts
+        Tables and sentences of the result.
+
+    Raises
+    ------
+    FileError
+        When a file cannot be written.
+    """
+    from bywire.report.design_report import Outcome, write_design
+
+    status, tried = outcome
+    every = {"as given": {}, **designs}
+    if tried is not None and tried.tuning is not None:
+        every["retuned on the bench"] = tried.final.gains
+    curves = [_curve(chosen, label, gains) for label, gains in every.items()]
+    state = status if status != "met" or tried is None or tried.met else "not met"
+    where = "on the linear model" if tried is None else "on the nonlinear bench"
+    told = Outcome(f"requirements {state} {where}", status == state == "met")
+    return write_design(out, subject(chosen), requirements, told, curves, parts)
+
+
+def _curve(chosen: Chosen, label: str, gains: Mapping[str, float]) -> DesignCurve:
+    from bywire.analysis.design.loop_figures import LoopFigures
+    from bywire.analysis.loop_curves import loop_curve
+    from bywire.analysis.robustness import margins
+    from bywire.report.design_curves import DesignCurve
+
+    loop, par, value = chosen.loop, chosen.par.replace(gains), chosen.value
+    closed = loop.closed(par, value)
+    found = margins(loop, par, value)
+    step: NDArray[np.float64] = np.zeros(1)
+    span = 0.0
+    if found.stable:
+        figures = LoopFigures(loop.gain(par, value), closed)
+        step, settling = figures.step, figures.settling_time
+        span = max(_STEPS / figures.bandwidth, _SETTLED * settling if settling < np.inf else 0.0)
+    time = np.arange(step.size, dtype=float) * closed.period
+    return DesignCurve(label, loop_curve(loop, par, value, found), time, step, span)
 
 
 def exit_status(status: Status, tried: Verification | None) -> int:

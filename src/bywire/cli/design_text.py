@@ -4,14 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bywire.analysis.design.outcome import Design
 from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.analysis.design.verification import Verification
 from bywire.cli.loop_choice import Chosen
-from bywire.cli.verification_text import finite, number, verification_object, verification_text
+from bywire.cli.verification_text import (
+    figure_text,
+    finite,
+    number,
+    verification_object,
+    verification_parts,
+)
 from bywire.core.parameters import leaf_fields
+
+if TYPE_CHECKING:
+    from bywire.cli.verification_text import Part
 
 
 def as_object(
@@ -37,6 +46,7 @@ def as_object(
             "nominal": finite(found.nominal),
             "worst": {k: {"value": number(v), "at": at} for k, (v, at) in found.worst.items()},
             "slack": number(found.slack),
+            "kept": [one.text for one in found.kept],
             "binding": [
                 {"requirement": one.requirement.text, "at": one.case,
                  "value": number(one.value), "slack": number(one.slack)}
@@ -53,41 +63,44 @@ def as_object(
     }  # fmt: skip
 
 
-def as_text(
+def as_parts(
     chosen: Chosen,
     requirements: Sequence[Requirement],
     found: Design,
     tried: Verification | None,
-) -> str:
-    """Return what a person wants to know, in tables."""
-    from bywire.report.table_text import table_text
+) -> list[Part]:
+    """Return what a person wants to know, in tables and sentences."""
     from bywire.report.tables import text_table
     from bywire.report.wording import amount
 
     at = chosen.loop.at
     point = f"{at.name} = {amount(chosen.value, at.unit)}"
-    parts = [f"loop {chosen.loop.name} of {chosen.name} at {point}: linear design {found.status}"]
+    parts: list[Part] = [
+        f"loop {chosen.loop.name} of {chosen.name} at {point}: linear design {found.status}"
+    ]
     final = found.gains if tried is None else tried.final.gains
     heading = ["gain", "linear design"]
     rows = [[name, gain_text(chosen, name, value)] for name, value in found.gains.items()]
     if tried is not None and tried.tuning is not None:
         heading.append("retuned on the bench")
         rows = [[*row, gain_text(chosen, row[0], final[row[0]])] for row in rows]
-    parts.append(table_text(text_table(heading, rows)))
-    wanted = {one.figure: one.text for one in requirements}
+    parts.append(text_table(heading, rows))
+    wanted = {one.figure: one.text for one in (*requirements, *found.kept)}
     figures = [
         [
             name,
-            amount(found.nominal[name], kind.unit, 3),
-            amount(found.worst[name][0], kind.unit, 3),
+            figure_text(name, found.nominal[name]),
+            figure_text(name, found.worst[name][0]),
             found.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]
-        for name, kind in FIGURES.items()
+        for name in FIGURES
     ]
-    parts.append(table_text(text_table(["linear", "nominal", "worst", "at", "wanted"], figures)))
+    parts.append(text_table(["linear", "nominal", "worst", "at", "wanted"], figures))
+    parts += kept_lines(found)
     parts += [
-        f"binds: {one.requirement.text}, {amount(one.value, one.requirement.unit, 3)} at {one.case}"
+        f"{'binds' if found.binds else 'tightest'}: {one.requirement.text}, "
+        f"{figure_text(one.requirement.figure, one.value)} at {one.case}"
         for one in found.binding
     ]
     parts += [
@@ -95,8 +108,16 @@ def as_text(
         for one in found.conflicts
     ]
     if tried is not None:
-        parts.append(verification_text(chosen, found.nominal, tried))
-    return "\n".join(parts)
+        parts += verification_parts(chosen, found.nominal, tried)
+    return parts
+
+
+def kept_lines(found: Design) -> list[str]:
+    """Return what is kept besides the requirements, a sentence or none."""
+    if not found.kept:
+        return []
+    texts = ", ".join(one.text for one in found.kept)
+    return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 
 def unit_of(chosen: Chosen, name: str) -> str:

@@ -18,6 +18,7 @@ from bywire.cli.loop_choice import Chosen, choose, spread, subject
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.cli.response_variants import cases_over, measured, sustained
+from bywire.cli.response_warnings import purity, warnings
 from bywire.cli.width_text import (
     NOTE,
     figures_object,
@@ -76,11 +77,14 @@ def execute(
         found = measured(variants, sweep, excitation, progress)
     found = with_widths(found, widths(variants, found))
     response = variants[0].linear(found["frequency"].values)
-    notes = _warnings(found, unit, sweep.tolerance)
+    notes = warnings(found, variants, unit, sweep.tolerance)
     files = []
     if out is not None:
-        more = _figures(found, variants, varied, unit)
-        files = _written(chosen, found, response, [note, *notes] if note else notes, more, out)
+        heed = [note, *notes] if note else notes
+        case = _first(variants, varied, ", ")
+        file = out / f"{own.name}-bandwidth.png"
+        more, drawn = _figures(found, variants, varied, unit, file)
+        files = [*_written(chosen, found, response, heed, more, out, case), *drawn]
     if note:
         output.message(note)
     for text in notes:
@@ -104,44 +108,35 @@ def _input_unit(chosen: Chosen) -> str:
     return signals_of(point.model.Stimulus)[chosen.loop.inputs[0]].unit
 
 
-def _warnings(found: xr.Dataset, unit: str, tolerance: float) -> list[str]:
-    """Return what the user should know: what stuck, and what never repeated."""
-    texts = []
-    cases = "frequencies" if found.sizes["variant"] == 1 else "frequencies of all cases"
-    for k, size in enumerate(found["amplitude"].values):
-        one = found.isel(amplitude=k)
-        still, restless = np.isnan(one["gain"].values), one["settled"].values == 0
-        label = f"amplitude {amount(float(size), unit, 3)}"
-        if still.any():
-            texts.append(f"{label}: the output sticks at {int(still.sum())} {cases}: no gain")
-        shaken = restless & ~still
-        if shaken.any():
-            scatter = float(np.nanmax(one["scatter"].values[shaken]))
-            texts.append(
-                f"{label}: the response does not repeat itself within {100 * tolerance:g} % at "
-                f"{int(shaken.sum())} {cases} (a limit cycle, a drift, or the encoder's "
-                f"resolution): shown are means of the last windows, which scatter by up to "
-                f"{100 * scatter:.2g} %"
-            )
-    if found["unsettled_substeps"].values.any():
-        texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
-    return texts
-
-
 def _figures(
-    found: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
-) -> list[Block]:
-    """Return what a page says of bandwidths."""
+    found: xr.Dataset,
+    variants: Sequence[Variant],
+    range_: tuple[str, str],
+    unit: str,
+    file: Path,
+) -> tuple[list[Block], list[Path]]:
+    """Return what a page says of bandwidths, and the file of their figure over a range."""
     from bywire.report.bandwidth_range import bandwidth_range
+    from bywire.report.files import save_figure
     from bywire.report.page import FigureBlock, TableBlock
 
-    blocks: list[Block] = [TableBlock(figures_table(found, unit), f"{NOTE.capitalize()}.")]
-    if range_[0]:
-        figure = bandwidth_range(found, [one.label for one in variants], *range_)
-        caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
-        table = TableBlock(over_table(found, variants, range_, unit), "Bandwidth by amplitude.")
-        blocks += [FigureBlock(figure, caption), table]
-    return blocks
+    note = f"{NOTE[0].upper()}{NOTE[1:]}.{_first(variants, range_, ' Of the first case: ', '.')}"
+    blocks: list[Block] = [TableBlock(figures_table(found, unit), note)]
+    if not range_[0]:
+        return blocks, []
+    figure = bandwidth_range(found, [one.label for one in variants], *range_)
+    caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
+    table = TableBlock(over_table(found, variants, range_, unit), "Bandwidth by amplitude.")
+    return [*blocks, FigureBlock(figure, caption), table], [save_figure(figure, file)]
+
+
+def _first(
+    variants: Sequence[Variant], range_: tuple[str, str], before: str, after: str = ""
+) -> str:
+    """Return which case of a range is shown where only one is; empty without a range."""
+    if not range_[0]:
+        return ""
+    return f"{before}{range_[0]} = {amount(variants[0].label, range_[1])}{after}"
 
 
 def _written(
@@ -151,6 +146,7 @@ def _written(
     notes: list[str],
     more: list[Block],
     out: Path,
+    case: str,
 ) -> list[Path]:
     from bywire.data.netcdf import write_recording
     from bywire.report.bode import Response, bode
@@ -159,14 +155,14 @@ def _written(
 
     name = f"{chosen.loop.name}-frequency-response"
     f = found["frequency"].values
-    lines = [Response("linear, without friction", f, linear)]
+    lines = [Response(f"linear, without friction{case}", f, linear)]
     unit = found["amplitude"].attrs["units"]
     for k, size in enumerate(found["amplitude"].values):
         one = found.isel(variant=0, amplitude=k)
         value = one["gain"].values * np.exp(1j * np.radians(one["phase"].values))
-        lines.append(Response(f"amplitude {amount(float(size), unit, 3)}", f, value))
+        lines.append(Response(f"amplitude {amount(float(size), unit, 3)}", f, value, measured=True))
     figure = bode(lines)
-    method = f"Excitation: {found.attrs['excitation']}. {_coherence(found)}."
+    method = f"Excitation: {found.attrs['excitation']}. {purity(found)}."
     table = _table(found, linear, unit)
     return [
         write_recording(found, out / f"{name}.nc"),
@@ -205,7 +201,7 @@ def _text(chosen: Chosen, found: xr.Dataset, linear: Any, unit: str) -> str:
     head = f"{_head(chosen)}: gain and phase by amplitude\n"
     if found.attrs["excitation"] != "sine":
         head += f"excitation: {found.attrs['excitation']}, amplitudes are its peaks\n"
-    return f"{head}{table_text(_table(found, linear, unit))}\n{_coherence(found)}"
+    return f"{head}{table_text(_table(found, linear, unit))}\n{purity(found)}"
 
 
 def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
@@ -225,12 +221,6 @@ def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
     return text_table(heading, rows)
 
 
-def _coherence(found: xr.Dataset) -> str:
-    lowest = found["coherence"].min(dim="frequency").values[0]
-    shares = ", ".join("-" if math.isnan(one) else f"{one:.3f}" for one in lowest)
-    return f"lowest coherence: {shares}"
-
-
 def _head(chosen: Chosen) -> str:
     at = chosen.loop.at
     point = f"{at.name} = {amount(chosen.value, at.unit)}"
@@ -240,4 +230,5 @@ def _head(chosen: Chosen) -> str:
 def _cell(gain: float, phase: float) -> str:
     if not math.isfinite(gain):
         return "sticks"
-    return f"{20.0 * math.log10(gain):.2f} dB {phase:.1f}°"
+    decibel = round(20.0 * math.log10(gain), 2) + 0.0  # no negative zero
+    return f"{decibel:.2f} dB {phase:.1f}°"

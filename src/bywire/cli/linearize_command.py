@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from bywire.analysis.dither.averaged_map import PeriodicModel
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import Locus, locus
@@ -36,7 +37,7 @@ def execute(
     found = _locus(chosen, range_) if range_ else None
     less = reduction_choice.reduced(model, reduce, chosen.loop.band[1]) if reduce else None
     shaken = periodic_choice.dithered(chosen) if dither else None
-    files = [] if out is None else _written(chosen, model, found, out)
+    files = [] if out is None else _written(chosen, model, found, shaken, out)
     if shaken is not None and out is not None:
         files.append(periodic_choice.write(shaken, out, chosen.loop.name))
     if as_json:
@@ -63,7 +64,13 @@ def _locus(chosen: Chosen, range_: str) -> Locus:
     return locus(chosen.loop, chosen.par, chosen.value, name, unit, sorted(values))
 
 
-def _written(chosen: Chosen, model: LinearModel, found: Locus | None, out: Path) -> list[Path]:
+def _written(
+    chosen: Chosen,
+    model: LinearModel,
+    found: Locus | None,
+    shaken: PeriodicModel | None,
+    out: Path,
+) -> list[Path]:
     from bywire.analysis.loop_curves import varied
     from bywire.report.files import write_bytes
     from bywire.report.linearize_report import own_bandwidth, write_model
@@ -77,7 +84,8 @@ def _written(chosen: Chosen, model: LinearModel, found: Locus | None, out: Path)
         cases = varied(loop, chosen.par, chosen.value, found.name, ends)
         models += [loop.closed(*case) for case in cases]
     widest = max((own_bandwidth(one) for one in models if one.is_stable), default=float("nan"))
-    return [path, *write_model(out, subject(chosen), model, found, widest)]
+    told = None if shaken is None else (shaken, periodic_choice.head(shaken))
+    return [path, *write_model(out, subject(chosen), model, found, widest, told)]
 
 
 def as_object(chosen: Chosen, model: LinearModel) -> dict[str, Any]:
@@ -100,7 +108,8 @@ def as_object(chosen: Chosen, model: LinearModel) -> dict[str, Any]:
 
 
 def _text(chosen: Chosen, model: LinearModel, found: Locus | None) -> str:
-    from bywire.report.linearize_report import locus_texts, rate_table
+    from bywire.report.linearize_report import locus_texts
+    from bywire.report.rate_table import left_out, rate_table
     from bywire.report.table_text import table_text
 
     stable = "stable" if model.is_stable else "UNSTABLE"
@@ -109,6 +118,7 @@ def _text(chosen: Chosen, model: LinearModel, found: Locus | None) -> str:
         f"closed loop {loop.name} of {chosen.name} at {loop.at.name} = "
         f"{amount(chosen.value, loop.at.unit)}: {stable}, sampled with {model.period * 1e3:g} ms",
         table_text(rate_table(model)),
+        *left_out(model),
     ]
     if found is not None:
         lines += [f"over {found.name}:", *(f"- {text}" for text in locus_texts(found))]

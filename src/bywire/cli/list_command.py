@@ -18,6 +18,7 @@ from bywire.identification.method import Method
 from bywire.identification.method_registry import all_methods
 
 _WIDTH = 100  # characters of a line
+_NAME = 24  # columns of a name
 
 
 def execute(as_text: bool) -> None:
@@ -56,5 +57,7 @@ def _method(one: Method) -> str:
 def _entry(name: str, about: str | Iterable[str]) -> list[str]:
     """Return the lines of an entry: its summary, or names broken over several lines."""
     if isinstance(about, str):
-        return [f"  {name:<24}{about}".rstrip()]
-    return wrap(f"  {name:<24}{', '.join(about)}", _WIDTH, subsequent_indent=" " * 26)
+        return [f"  {name:<{_NAME}}  {about}".rstrip()]
+    return wrap(
+        f"  {name:<{_NAME}}  {', '.join(about)}", _WIDTH, subsequent_indent=" " * (_NAME + 4)
+    )

@@ -76,7 +76,7 @@ def _as_object(
         "loop": chosen.loop.name,
         "parameters": chosen.name,
         "operating_point": {chosen.loop.at.name: chosen.value, "unit": chosen.loop.at.unit},
-        "units": UNITS,
+        "units": {**UNITS, "phase_at": "Hz"},
     }
     if not name:
         return {**shared, "margins": rows[0]}

@@ -64,25 +64,28 @@ def write(model: PeriodicModel, out: Path, loop: str) -> Path:
 
 def text(model: PeriodicModel, band: tuple[float, float]) -> str:
     """Return what people read: the motion, its poles, the response beside them."""
-    from bywire.report.linearize_report import rate_table
+    from bywire.report.rate_table import left_out, rate_table
     from bywire.report.table_text import table_text
 
     linear = model.averaged
-    unit = signals_of(model.run.model.Output)[model.output].unit
-    stable = "stable" if linear.is_stable else "UNSTABLE"
     highest = min(band[1], 0.5 / linear.period)
     frequencies = np.geomspace(band[0], highest, 5)
     gains = ", ".join(
         f"{abs(h):.3g} at {f:.3g} Hz"
         for f, h in zip(frequencies, model.response(frequencies), strict=True)
     )
-    return "\n".join(
-        [
-            f"with friction and dither, averaged over {linear.period * 1e3:g} ms: {stable}; "
-            f"{model.output} = {amount(model.mean, unit)} in the mean, "
-            f"{amount(model.ripple, unit)} of ripple, stuck {100 * model.orbit.stuck:.3g} % of the "
-            f"time, steady gain {model.steady_gain:.4g}",
-            table_text(rate_table(linear)),
-            f"gain to small sines: {gains}",
-        ]
+    table = table_text(rate_table(linear))
+    return "\n".join([head(model), table, *left_out(linear), f"gain to small sines: {gains}"])
+
+
+def head(model: PeriodicModel) -> str:
+    """Return the motion that the model is about as a line."""
+    linear = model.averaged
+    unit = signals_of(model.run.model.Output)[model.output].unit
+    stable = "stable" if linear.is_stable else "UNSTABLE"
+    return (
+        f"with friction and dither, averaged over {linear.period * 1e3:g} ms: {stable}; "
+        f"{model.output} = {amount(model.mean, unit)} in the mean, "
+        f"{amount(model.ripple, unit)} of ripple, stuck {100 * model.orbit.stuck:.3g} % of the "
+        f"time, steady gain {model.steady_gain:.4g}"
     )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.plant import Plant, PlantPoint
@@ -14,6 +14,9 @@ from bywire.bench.values import number, parsed
 from bywire.catalog.registry import entry, main_set
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.parameters import ParameterSet
+
+if TYPE_CHECKING:
+    from bywire.report.subject import Subject
 
 
 @dataclass(frozen=True)
@@ -61,6 +64,25 @@ def choose(
     quantity, value = _operating_point(plant, at)
     kind, omega = _friction(friction, speed)
     return ChosenPlant(plant, found.name, par, PlantPoint(quantity, value, kind, omega))
+
+
+def point_text(point: PlantPoint) -> str:
+    """Return an operating point and what friction does there."""
+    from bywire.report.wording import amount
+
+    moving = f" at {point.speed:g} rad/s" if point.speed else ""
+    value = amount(point.value, point.quantity.unit)
+    return f"{point.quantity.name} = {value}, friction {point.friction}{moving}"
+
+
+def subject(chosen: ChosenPlant) -> Subject:
+    """Return what a report says of a plant and its operating point."""
+    from bywire.report.subject import Subject
+
+    plant = chosen.plant
+    return Subject(
+        plant.name, plant.summary, chosen.name, chosen.par, point_text(chosen.point)
+    )  # fmt: skip
 
 
 def _operating_point(plant: Plant, at: str) -> tuple[Quantity, float]:

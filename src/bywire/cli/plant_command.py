@@ -12,8 +12,7 @@ from bywire.analysis.reduction.error import reduction_error
 from bywire.analysis.reduction.reduce import Reduced
 from bywire.cli import output, reduction_choice
 from bywire.cli.output_folder import require_folder
-from bywire.cli.plant_choice import ChosenPlant, choose
-from bywire.report.wording import amount
+from bywire.cli.plant_choice import ChosenPlant, choose, point_text, subject
 
 
 def execute(
@@ -47,16 +46,18 @@ def _written(
     chosen: ChosenPlant, model: LinearModel, made: Reduced | None, shown: Any, out: Path
 ) -> list[Path]:
     from bywire.report.files import write_bytes
-    from bywire.report.plant_figures import write_figures
+    from bywire.report.plant_report import write_plant
 
     content = json.dumps(shown, indent=1).encode()
     path = write_bytes(out / f"{chosen.plant.name}-linear-model.json", content)
     models = {chosen.plant.name: model}
     if chosen.plant.whole is not None:
         models = {"exact": chosen.plant.whole(chosen.par, chosen.point), **models}
+    notes = _notes(chosen, model)
     if made is not None:
         models[f"reduced to {len(made.model.states)} states"] = made.model
-    return [path, *write_figures(out, chosen.plant.name, models, chosen.plant.band)]
+        notes.append(reduction_choice.head(made))
+    return [path, *write_plant(out, subject(chosen), models, chosen.plant.band, notes)]
 
 
 def _as_object(chosen: ChosenPlant, model: LinearModel, made: Reduced | None) -> dict[str, Any]:
@@ -80,24 +81,28 @@ def _as_object(chosen: ChosenPlant, model: LinearModel, made: Reduced | None) ->
 
 
 def _text(chosen: ChosenPlant, model: LinearModel, made: Reduced | None) -> str:
-    from bywire.report.linearize_report import rate_table
+    from bywire.report.rate_table import left_out, rate_table
     from bywire.report.table_text import table_text
 
-    point = chosen.point
-    moving = f" at {point.speed:g} rad/s" if point.speed else ""
     lines = [
-        f"plant {chosen.plant.name} of {chosen.name} at {point.quantity.name} = "
-        f"{amount(point.value, point.quantity.unit)}, friction {point.friction}{moving}: "
+        f"plant {chosen.plant.name} of {chosen.name} at {point_text(chosen.point)}: "
         f"{len(model.states)} states, from {', '.join(model.inputs)} to "
         f"{', '.join(model.outputs)}",
         table_text(rate_table(model)),
+        *left_out(model),
+        *_notes(chosen, model),
     ]
-    if not model.effective():
-        lines.append("nothing that the inputs reach moves an output: what friction holds, rests")
-    elif chosen.plant.whole is not None:
-        exact = chosen.plant.whole(chosen.par, point)
-        error = reduction_error(exact, model, chosen.plant.band)
-        lines.append(f"against the whole plant: {reduction_choice.error_text(error)}")
     if made is not None:
         lines.append(reduction_choice.text(made))
     return "\n".join(lines)
+
+
+def _notes(chosen: ChosenPlant, model: LinearModel) -> list[str]:
+    """Return what friction makes of the model, or how far it is from the whole plant."""
+    if not model.effective():
+        return ["nothing that the inputs reach moves an output: what friction holds, rests"]
+    if chosen.plant.whole is None:
+        return []
+    exact = chosen.plant.whole(chosen.par, chosen.point)
+    error = reduction_error(exact, model, chosen.plant.band)
+    return [f"against the whole plant: {reduction_choice.error_text(error)}"]

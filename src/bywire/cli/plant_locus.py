@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Locus, locus_of
@@ -14,7 +14,7 @@ from bywire.cli import output
 from bywire.cli.locus_object import locus_object
 from bywire.cli.loop_choice import range_of
 from bywire.cli.output_folder import require_folder
-from bywire.cli.plant_choice import ChosenPlant, choose
+from bywire.cli.plant_choice import ChosenPlant, choose, subject
 from bywire.report.wording import amount
 
 
@@ -43,7 +43,7 @@ def execute(
     found = locus_of(model, name, unit, sorted(values))
     files = [] if out is None else _written(chosen, found, out)
     if as_json:
-        shown = {"plant": plant, "parameters": chosen.name, "locus": locus_object(found)}
+        shown = _as_object(chosen, found)
         output.result(json.dumps({**shown, "files": [str(path) for path in files]}))
     else:
         output.result(_text(chosen, found))
@@ -52,11 +52,18 @@ def execute(
 
 
 def _written(chosen: ChosenPlant, found: Locus, out: Path) -> list[Path]:
-    from bywire.report.files import save_figure
-    from bywire.report.root_locus import root_locus
+    from bywire.report.files import write_bytes
+    from bywire.report.plant_report import write_plant_locus
 
-    figure = root_locus(found, math.nan)
-    return [save_figure(figure, out / f"{chosen.plant.name}-locus.png")]
+    content = json.dumps(_as_object(chosen, found), indent=1).encode()
+    path = write_bytes(out / f"{chosen.plant.name}-locus.json", content)
+    return [path, *write_plant_locus(out, subject(chosen), found)]
+
+
+def _as_object(chosen: ChosenPlant, found: Locus) -> dict[str, Any]:
+    return {
+        "plant": chosen.plant.name, "parameters": chosen.name, "locus": locus_object(found)
+    }  # fmt: skip
 
 
 def _text(chosen: ChosenPlant, found: Locus) -> str:

@@ -13,6 +13,7 @@ from bywire.analysis.reduction.error import ReductionError
 from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
+from bywire.report.wording import amount
 
 _DIGITS = 9  # of an order: more is no order
 
@@ -36,11 +37,24 @@ def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced
     UnitError
         When the band has a wrong unit.
     """
-    if text.strip().isdecimal():
+    if _is_number(text):
+        if not text.strip().isdecimal() or not int(text):
+            raise ParameterError(
+                f"--reduce {quoted(text)}: an order is a whole number >= 1; with a unit, it is a "
+                "band, for instance '150 Hz'"
+            )
         if len(text.strip()) > _DIGITS:
             raise ParameterError(f"--reduce {quoted(text)}: no model has so many states")
         return reduce(model, order=int(text), band=band)
     return reduce(model, band=number(text, "Hz", "--reduce"), tolerance=TOLERANCE)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def as_object(found: Reduced) -> dict[str, Any]:
@@ -103,20 +117,27 @@ def pairs(values: Any) -> list[list[float]]:
 def error_text(error: ReductionError) -> str:
     """Return an error over a band as a line."""
     return (
-        f"largest error up to {error.high:.4g} Hz: {100.0 * error.relative:.2g} % "
+        f"largest error up to {error.high:.4g} Hz: {_percent(error.relative)} "
         f"({error.gain:.2g} dB, {error.phase:.2g} degrees), at {error.at:.3g} Hz"
         + (f" in {error.channel[0]} by {error.channel[1]}" if error.channel[0] else "")
-        + ("" if math.isnan(error.poles) else f"; its poles there {100.0 * error.poles:.2g} % off")
+        + ("" if math.isnan(error.poles) else f"; its poles there {_percent(error.poles)} off")
     )
+
+
+def _percent(share: float) -> str:
+    return amount(100.0 * share, "percent", 2)
+
+
+def head(found: Reduced) -> str:
+    """Return order and error of a reduced model as a line."""
+    kept = f", {found.kept} of them kept as they are not stable" if found.kept else ""
+    return f"reduced to {len(found.model.states)} states{kept}; {error_text(found.error)}"
 
 
 def text(found: Reduced) -> str:
     """Return the lines on a reduced model: order, error, bound, poles."""
-    from bywire.report.linearize_report import rate_table
+    from bywire.report.rate_table import left_out, rate_table
     from bywire.report.table_text import table_text
 
-    kept = f", {found.kept} of them kept as they are not stable" if found.kept else ""
-    return "\n".join((
-        f"reduced to {len(found.model.states)} states{kept}; {error_text(found.error)}",
-        table_text(rate_table(found.model)),
-    ))  # fmt: skip
+    table = table_text(rate_table(found.model))
+    return "\n".join((head(found), table, *left_out(found.model)))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from bywire.analysis.design.schedule_designer import (
     design_schedule,
+    frozen,
     points_by_region,
     scheduled,
 )
@@ -16,11 +17,12 @@ from bywire.analysis.design.schedule_verification import verify_schedule
 from bywire.analysis.design.verification import Verification
 from bywire.analysis.loop_registry import find_loop
 from bywire.cli import output
-from bywire.cli.design_ending import exit_status, written
+from bywire.cli.design_ending import exit_status, reported, written
 from bywire.cli.design_inputs import Wanted, requirements_of, trial_of
 from bywire.cli.loop_choice import choose, over_range, spread
 from bywire.cli.progress import progress_bar
-from bywire.cli.schedule_text import as_object, as_text
+from bywire.cli.schedule_text import as_object, as_parts
+from bywire.cli.verification_text import as_lines
 from bywire.core.units import shown
 
 
@@ -58,15 +60,24 @@ def execute(
             tried = verify_schedule(
                 found, requirements, tunables, trial, seed=wanted.seed, progress=progress
             )
-    files = []
+    files: list[Path] = []
+    every = [one for values in points.values() for one in values]
+    retuned = (
+        frozen(own, chosen.par, every, tried.final.gains, requirements)
+        if tried is not None and tried.tuning is not None else ()
+    )  # fmt: skip
+    parts = as_parts(chosen, found, tried, retuned)
     if out is not None:
         gains = found.gains if tried is None else tried.final.gains
-        every = ", ".join(shown(one, own.at.unit) for own_ in points.values() for one in own_)
-        files = [written(chosen, changes, gains, (found.status, tried), every, out)]
+        where = ", ".join(shown(one, own.at.unit) for one in every)
+        files = [written(chosen, changes, gains, (found.status, tried), where, out)]
+        files += reported(
+            chosen, requirements, (found.status, tried), {"linear design": found.gains}, parts, out
+        )
     if as_json:
-        output.result(json.dumps(as_object(chosen, requirements, found, tried, files)))
+        output.result(json.dumps(as_object(chosen, requirements, found, tried, retuned, files)))
     else:
-        output.result(as_text(chosen, requirements, found, tried))
+        output.result(as_lines(parts))
     for path in files:
         output.message(f"written: {path}")
     return exit_status(found.status, tried)

@@ -4,16 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.analysis.design.schedule_designer import scheduled
 from bywire.analysis.design.schedule_outcome import Across, ScheduleDesign
 from bywire.analysis.design.verification import Verification
-from bywire.cli.design_text import gain_text, unit_of
+from bywire.cli.design_text import gain_text, kept_lines, unit_of
 from bywire.cli.loop_choice import Chosen
-from bywire.cli.verification_text import finite, number, verification_object, verification_text
+from bywire.cli.verification_text import (
+    figure_text,
+    finite,
+    number,
+    verification_object,
+    verification_parts,
+)
 from bywire.core.units import shown
+
+if TYPE_CHECKING:
+    from bywire.cli.verification_text import Part
+    from bywire.report.tables import Table
 
 _SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin", "overshoot")
 
@@ -23,6 +33,7 @@ def as_object(
     requirements: Sequence[Requirement],
     found: ScheduleDesign,
     tried: Verification | None,
+    retuned: Sequence[Across],
     files: Sequence[Path],
 ) -> dict[str, Any]:
     """Return everything as plain data; null for what is infinite or not defined."""
@@ -52,6 +63,7 @@ def as_object(
             "units": {name: kind.unit for name, kind in FIGURES.items()},
             "cases": [_case(one, at.name) for one in found.across],
             "worst": _case(found.worst, at.name),
+            "retuned": [_case(one, at.name) for one in retuned],
         },
         "bench": None if tried is None else verification_object(chosen, tried),
         "files": [str(path) for path in files],
@@ -62,20 +74,22 @@ def _case(one: Across, name: str) -> dict[str, Any]:
     return {name: one.at, "region": one.region, "slack": number(one.slack), **finite(one.figures)}
 
 
-def as_text(
+def as_parts(
     chosen: Chosen,
-    requirements: Sequence[Requirement],
     found: ScheduleDesign,
     tried: Verification | None,
-) -> str:
-    """Return what a person wants to know, in tables."""
-    from bywire.report.table_text import table_text
-    from bywire.report.tables import text_table
+    retuned: Sequence[Across],
+) -> list[Part]:
+    """Return what a person wants to know, in tables and sentences.
+
+    ``retuned`` is the loop across the regions with the gains of the bench; empty where these are
+    the linear design's.
+    """
     from bywire.report.wording import amount
 
     at, leaves = chosen.loop.at, chosen.par.leaves()
     borders = " and ".join(shown(leaves[one], at.unit) for one in scheduled(chosen.loop).borders)
-    parts = [
+    parts: list[Part] = [
         f"gain schedule of loop {chosen.loop.name} of {chosen.name}, borders at {at.name} = "
         f"{borders}: linear design {found.status}",
         _gains(chosen, found, found.gains, "linear design"),
@@ -85,36 +99,47 @@ def as_text(
     for region, one in found.regions.items():
         where = ", ".join(shown(point, at.unit) for point in found.points[region])
         bound = ", ".join(
-            f"{b.requirement.text} ({amount(b.value, b.requirement.unit, 3)})" for b in one.binding
+            f"{b.requirement.text} ({figure_text(b.requirement.figure, b.value)})"
+            for b in one.binding
         )
-        parts.append(f"{region}, designed at {where}: {one.status}; binds: {bound}")
+        word = "binds" if one.binds else "tightest"
+        parts.append(f"{region}, designed at {where}: {one.status}; {word}: {bound}")
+        parts += [f"  {line}" for line in kept_lines(one)]
         parts += [
             f"  {c.wanted.text}: at best {amount(c.best, c.wanted.unit, 3)} with {c.kept.text}"
             for c in one.conflicts
         ]
-    heading = [at.name, "region", *_SEEN, "least room"]
+    for title, across in (("linear design", found.across), ("retuned gains", retuned)):
+        if across:
+            parts.append(f"{title}, gains frozen, linear model, room as a share of the limit:")
+            parts += _frozen(chosen, across)
+    if tried is not None:
+        parts += verification_parts(chosen, found.nominal, tried)
+    return parts
+
+
+def _frozen(chosen: Chosen, across: Sequence[Across]) -> list[Part]:
+    from bywire.report.tables import text_table
+
+    at = chosen.loop.at
     rows = [
         [
-            shown(one.at, at.unit), one.region,
-            *(amount(one.figures[name], FIGURES[name].unit, 3) for name in _SEEN),
+            f"{shown(one.at, at.unit)}", one.region,
+            *(figure_text(name, one.figures[name]) for name in _SEEN),
             f"{100.0 * one.slack:+.1f} %",
         ]
-        for one in found.across
+        for one in across
     ]  # fmt: skip
-    parts.append("linear design with the gains frozen, room as a share of the limit:")
-    parts.append(table_text(text_table(heading, rows)))
-    worst = found.worst
-    parts.append(
-        f"worst at {at.name} = {shown(worst.at, at.unit)}: {100.0 * worst.slack:+.1f} % of a limit"
-    )
-    if tried is not None:
-        parts.append(verification_text(chosen, found.nominal, tried))
-    return "\n".join(parts)
+    worst = min(across, key=lambda one: one.slack)
+    where = f"{at.name} = {shown(worst.at, at.unit)}"
+    return [
+        text_table([at.name, "region", *_SEEN, "least room"], rows),
+        f"worst at {where}: {100.0 * worst.slack:+.1f} % of a limit",
+    ]
 
 
-def _gains(chosen: Chosen, found: ScheduleDesign, gains: Mapping[str, float], title: str) -> str:
+def _gains(chosen: Chosen, found: ScheduleDesign, gains: Mapping[str, float], title: str) -> Table:
     """Return a table of gains, a column for each region."""
-    from bywire.report.table_text import table_text
     from bywire.report.tables import text_table
 
     regions = scheduled(chosen.loop).regions
@@ -126,4 +151,4 @@ def _gains(chosen: Chosen, found: ScheduleDesign, gains: Mapping[str, float], ti
                     chosen, name, gains[name]
                 )
     rows = [[name, *(row.get(region, "") for region in regions)] for name, row in cells.items()]
-    return table_text(text_table([title, *regions], rows))
+    return text_table([title, *regions], rows)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 from bywire.analysis.design.bench_figures import BenchFigures
 from bywire.analysis.design.candidate import Candidate
@@ -12,15 +12,21 @@ from bywire.analysis.design.requirement import FIGURES
 from bywire.analysis.design.verification import Verification
 from bywire.cli.loop_choice import Chosen
 
+if TYPE_CHECKING:
+    from bywire.report.tables import Table
+
+    Part = str | Table
+
 _PAIRS = 6
 
 
-def verification_text(chosen: Chosen, nominal: Mapping[str, float], tried: Verification) -> str:
-    """Return tables of the linear design's figures, and of the retuned gains', on the bench.
+def verification_parts(
+    chosen: Chosen, nominal: Mapping[str, float], tried: Verification
+) -> list[Part]:
+    """Return tables and sentences on the linear design, and on the retuned gains, on the bench.
 
     ``nominal`` are the figures of the linear design's nominal model.
     """
-    from bywire.report.table_text import table_text
     from bywire.report.tables import text_table
     from bywire.report.wording import amount
 
@@ -33,28 +39,48 @@ def verification_text(chosen: Chosen, nominal: Mapping[str, float], tried: Verif
         rows += _figure_rows(chosen, f" at {label}", [one.corners.get(label) for one in shown])
     for name in ("phase_margin", "gain_margin", "disk_margin"):
         both = [nominal, tried.nominal][: len(columns)]
-        cells = [amount(one[name], FIGURES[name].unit, 3) for one in both]
+        cells = [figure_text(name, one[name]) for one in both]
         rows.append([f"{name}, linear model", *cells])
-    parts = [table_text(text_table(["nonlinear bench", *(c for c, _ in columns)], rows))]
+    parts: list[Part] = [text_table(["nonlinear bench", *(c for c, _ in columns)], rows)]
     if not tried.linear.figures.step and tried.kpis:
         kpis = [[one.name, amount(one.value, one.unit)] for one in tried.kpis]
-        parts.append(table_text(text_table([chosen.loop.proof, "final gains"], kpis)))
+        parts.append(text_table([chosen.loop.proof, "final gains"], kpis))
     labels = tried.final.corners
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
         parts.append(
             f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}"
         )
+    kept = {one.text for one in tried.kept}
     for text, slack in tried.final.slacks.items():
+        where = "kept besides" if text in kept else "on the bench"
         verdict = "met" if slack >= 0.0 else "NOT met"
-        parts.append(f"on the bench: {text} {verdict} ({100.0 * slack:+.1f} % of the limit)")
+        room = 100.0 * tried.final.room(text)
+        parts.append(f"{where}: {text} {verdict} ({room:+.1f} % of the limit)")
     conflict = tried.conflict()
     if conflict is not None:
         one, other, edge = conflict
         middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are nearly met
         pairs = "; ".join(f"{100 * a:+.1f} % and {100 * b:+.1f} %" for a, b in middle)
         parts.append(f"edge between {one} and {other}, as distance from the limits: {pairs}")
-    return "\n".join(parts)
+    return parts
+
+
+def as_lines(parts: Sequence[Part]) -> str:
+    """Return tables and sentences as text for a terminal."""
+    from bywire.report.table_text import table_text
+
+    return "\n".join(one if isinstance(one, str) else table_text(one) for one in parts)
+
+
+def figure_text(name: str, value: float) -> str:
+    """Return a figure with its unit; a gain margin as a factor and in dB."""
+    from bywire.report.wording import amount
+
+    text = amount(value, FIGURES[name].unit, 3)
+    if name == "gain_margin" and math.isfinite(value) and value > 0.0:
+        text += f" ({20.0 * math.log10(value):.3g} dB)"
+    return text
 
 
 def _figure_rows(
@@ -94,6 +120,7 @@ def verification_object(chosen: Chosen, tried: Verification) -> dict[str, Any]:
         "linear_design": _candidate(tried.linear),
         "final": _candidate(tried.final),
         "final_linear": finite(tried.nominal),
+        "kept": [one.text for one in tried.kept],
         "experiment": chosen.loop.proof,
         "kpis": {one.name: {"value": number(one.value), "unit": one.unit} for one in tried.kpis},
         "conflict": None if conflict is None else {
@@ -108,7 +135,7 @@ def _candidate(one: Candidate) -> dict[str, Any]:
         "gains": dict(one.gains),
         **_figures(one.figures),
         "corners": {label: _figures(found) for label, found in one.corners.items()},
-        "slacks": finite(one.slacks),
+        "slacks": {text: number(one.room(text)) for text in one.slacks},
     }
 
 

@@ -173,10 +173,14 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     else:
         name = column.clock or _usual_clock(source)
         if name is None:
+            before = (
+                "; where other lines stand before the table, a mapping's skip_lines tells how many"
+            )
             raise FileError(
                 f"{file} does not say when it was measured: write in a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
+                + (before if len(source.columns) == 1 else "")
             )
         found = source.columns[name]
     unit = (given.unit if given is not None else "") or found.unit

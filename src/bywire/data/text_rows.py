@@ -16,6 +16,7 @@ from bywire.core.errors import FileError, quoted
 from bywire.data.text_dialect import Dialect
 from bywire.data.text_table import SEPARATORS
 
+_STAMP = re.compile(r"[0-9]{1,4}[-/.][0-9]{1,2}[-/.][0-9]{1,4}|[0-9]{1,2}:[0-9]{2}")
 _NUMBER = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]+)?")
 _MISSING = ("", "nan", "NaN")
 
@@ -83,10 +84,16 @@ def _number(path: Path, line: int, cell: str, column: int, dialect: Dialect) -> 
     value = float(plain) if ok else math.inf
     if math.isfinite(value):
         return value
+    where = f"{path}, line {line}, column "
     label = dialect.titles[column] if dialect.titles else str(column + 1)
+    if _STAMP.match(cell):
+        raise FileError(
+            f"{where}{quoted(label)}: {quoted(cell)} is a time stamp: text tables take numbers; "
+            "write seconds from the start, or convert it to Parquet, whose time stamps are read"
+        )
     other = "," if dialect.decimal == "." else "."
     hint = f"; the decimal mark is {dialect.decimal!r} here" if other in cell else ""
     raise FileError(
-        f"{path}, line {line}, column {quoted(label)}: {quoted(cell)} is no finite number{hint}: "
+        f"{where}{quoted(label)}: {quoted(cell)} is no finite number{hint}: "
         "correct it, or leave the cell blank where nothing was measured"
     )

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -70,6 +71,7 @@ def bode(
     *,
     gain_unit: str = "1",
     marks: Mapping[str, float] | None = None,
+    depth: float = math.inf,
 ) -> Figure:
     """Draw magnitude and phase of one or several frequency responses.
 
@@ -81,6 +83,8 @@ def bode(
         What 0 dB stands for one of, as people write it (``"bar/A"``); ``"1"`` for a pure number.
     marks
         Frequencies [Hz] to mark by their label, for instance the crossover.
+    depth
+        What lies by more than this below the largest magnitude [dB] is left out.
 
     Raises
     ------
@@ -89,6 +93,7 @@ def bode(
     """
     if not responses:
         raise ParameterError("bode: no response given: give at least one")
+    responses = [_above(response, depth) for response in responses]
     figure, (upper, lower) = style.new_figure(4.6, (1.0, 1.0))
     for k, response in enumerate(responses):
         line = "o" if response.measured else ("-", "--", "-.")[k // len(style.SEQUENCE) % 3]
@@ -122,6 +127,16 @@ def bode(
     style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
+
+
+def _above(response: Response, depth: float) -> Response:
+    """Return a response up to where it falls by a depth [dB] for good."""
+    size = response.magnitude_db
+    seen = np.flatnonzero(size > np.nanmax(size, initial=-math.inf) - depth)
+    if not math.isfinite(depth) or not seen.size:
+        return response
+    end = int(seen[-1]) + 1
+    return replace(response, frequency=response.frequency[:end], value=response.value[:end])
 
 
 def _phase_ticks(responses: Sequence[Response]) -> MultipleLocator:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Literal
 
 import matplotlib as mpl
 import numpy as np
@@ -19,7 +20,9 @@ from bywire.report import style
 from bywire.report.channel import FloatArray
 from bywire.report.wording import in_display_unit
 
+_Extend = Literal["neither", "min", "max", "both"]
 _STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of a decade
+_EXACT = 1e-9  # of a step: what lies on a level
 _MOST = 14  # levels; with more the colors cannot be told apart
 _MARKERS = ("*", "o", "s", "D")
 _HATCHES = ("///", "...", "xx")
@@ -50,11 +53,16 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
     figure, (axes,) = style.new_figure(4.4)
     levels = levels_between(float(known.min()), float(known.max()))
     colors = mpl.colormaps["viridis_r"]
+    slack = _EXACT * (levels[-1] - levels[0])  # a share may be 1 and rounding
+    below, above = known.min() < levels[0] - slack, known.max() > levels[-1] + slack
+    z = np.clip(z, None if below else levels[0], None if above else levels[-1])
+    extend: _Extend = ("both" if above else "min") if below else ("max" if above else "neither")
     filled = axes.contourf(
-        x, y, z, levels=levels, extend="both", cmap=colors,
-        norm=BoundaryNorm(levels, colors.N, extend="both"), alpha=0.75,
+        x, y, z, levels=levels, extend=extend, cmap=colors,
+        norm=BoundaryNorm(levels, colors.N, extend=extend), alpha=0.75,
     )  # fmt: skip
-    axes.contour(x, y, z, levels=levels, colors="white", linewidths=0.5)
+    between = levels[0 if below else 1 : None if above else -1]
+    axes.contour(x, y, z, levels=between, colors="white", linewidths=0.5)
     bar = figure.colorbar(filled, ax=axes, ticks=levels, format="%g")
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
     bar.set_label(_label(data[shown.values]), fontsize=style.TEXT_SIZE)
@@ -69,10 +77,12 @@ def contour(data: xr.Dataset, shown: Map) -> Figure:
 
 
 def levels_between(low: float, high: float) -> list[float]:
-    """Return round levels between two numbers: even ones, or even shares above a factor of 3.
+    """Return round levels: even ones around two numbers, or shares between them above a factor 3.
 
     Examples
     --------
+    >>> levels_between(0.0, 1.0)
+    [0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 1.0]
     >>> levels_between(57.0, 240.0)
     [60.0, 80.0, 100.0, 120.0, 150.0, 200.0]
     """
@@ -84,8 +94,8 @@ def levels_between(low: float, high: float) -> list[float]:
     span = (high - low) or abs(high) or 1.0
     step = 10.0 ** math.floor(math.log10(span / 5.0))
     step *= next(f for f in (1.0, 2.0, 5.0, 10.0) if span / (f * step) <= 10.0)
-    first = math.ceil(low / step) or int(low == 0)  # no level below what cannot be negative
-    return [float(f"{k * step:.6g}") for k in range(first - 1, math.floor(high / step) + 2)]
+    first, last = math.floor(low / step + _EXACT), math.ceil(high / step - _EXACT)
+    return [float(f"{k * step:.6g}") for k in range(first, max(last, first + 2) + 1)]
 
 
 def _limits(

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from bywire.analysis.dither.averaged_map import PeriodicModel
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rates import STILL, rates
+from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import Locus
 from bywire.analysis.margins import bandwidth
 from bywire.report.bode import Response, bode
@@ -25,33 +26,15 @@ from bywire.report.page import (
     write_page,
 )
 from bywire.report.pole_map import pole_map
+from bywire.report.rate_table import left_out, rate_table
 from bywire.report.root_locus import border_text, root_locus
 from bywire.report.subject import Subject, made
-from bywire.report.tables import Table, text_table
 from bywire.report.wording import unit_text
 
 _LOWEST = 1e-2  # lower end of what is searched for the bandwidth, Hz
 _NYQUIST = 0.998  # of half the sampling frequency
 _POINTS = 600
-
-
-def rate_table(model: LinearModel) -> Table:
-    """Return the poles as a table: rate, frequency, damping ratio; of pairs one.
-
-    Parameters
-    ----------
-    model
-        Closed loop; poles of what does not move are left out.
-    """
-    rows = []
-    for s in rates(model):
-        size = abs(s)
-        if s.imag < -1e-9 or size < STILL:  # the other of a pair; what does not move
-            continue
-        figures = (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)
-        rows.append([f"{figure:.4g}" for figure in figures])
-    heading = ("real [1/s]", "imaginary [rad/s]", "frequency [Hz]", "damping ratio")
-    return text_table(heading, rows)
+_DEPTH = 80.0  # of the closed loop's gain that is shown, dB
 
 
 def own_bandwidth(model: LinearModel) -> float:
@@ -62,7 +45,12 @@ def own_bandwidth(model: LinearModel) -> float:
 
 
 def write_model(
-    out: Path, subject: Subject, model: LinearModel, found: Locus | None, widest: float
+    out: Path,
+    subject: Subject,
+    model: LinearModel,
+    found: Locus | None,
+    widest: float,
+    shaken: tuple[PeriodicModel, str] | None = None,
 ) -> list[Path]:
     """Write the figures and one page, and return the files.
 
@@ -76,6 +64,8 @@ def write_model(
         Root locus; None where none is asked for.
     widest
         Largest bandwidth over the locus [Hz].
+    shaken
+        The loop about its motion under dither, and what is said of that; None for none.
 
     Raises
     ------
@@ -88,7 +78,8 @@ def write_model(
          "Poles of the closed loop as rates; rays of equal damping ratio, circles of equal "
          "frequency, the unstable half shaded, f_s the sampling frequency. Pairs are shown by one "
          "of them."),
-        ("closed-loop", _response(model, width), "Frequency response of the closed loop."),
+        ("closed-loop", _response(model, width, shaken),
+         "Frequency response of the closed loop, down to 80 dB below its largest gain."),
     ]  # fmt: skip
     if found is not None:
         drawn.append(
@@ -97,6 +88,12 @@ def write_model(
         )  # fmt: skip
     files = [save_figure(figure, out / f"{subject.name}-{name}.png") for name, figure, _ in drawn]
     blocks: list[Block] = [TableBlock(rate_table(model), "Poles, slowest first.")]
+    blocks += [Paragraph(text) for text in left_out(model)]
+    if shaken is not None:
+        caption = "Poles with friction and dither, averaged over a dither period, slowest first."
+        own = shaken[0].averaged
+        blocks += [Paragraph(shaken[1]), TableBlock(rate_table(own), caption)]
+        blocks += [Paragraph(text) for text in left_out(own)]
     if found is not None:
         texts = locus_texts(found)
         blocks += [Paragraph(f"Stability over {found.name}:"), Listing(texts)]
@@ -119,11 +116,16 @@ def locus_texts(found: Locus) -> list[str]:
     return [border_text(border, found.name, found.unit) for border in found.borders]
 
 
-def _response(model: LinearModel, width: float) -> Figure:
+def _response(
+    model: LinearModel, width: float, shaken: tuple[PeriodicModel, str] | None
+) -> Figure:
     low = 0.01 * width if math.isfinite(width) else 1e-4 / model.period
     f = np.geomspace(low, _NYQUIST * model.nyquist, _POINTS)
     (taken,), (given,) = model.input_units, model.output_units
     unit = "1" if taken == given else f"{unit_text(given) or '1'}/{unit_text(taken) or '1'}"
-    lines = [Response("closed loop", f, model.response(f)[:, 0, 0])]
+    label = "closed loop" if shaken is None else "without friction"
+    lines = [Response(label, f, model.response(f)[:, 0, 0])]
+    if shaken is not None:
+        lines.append(Response("with friction and dither", f, shaken[0].response(f)))
     marks = {f"bandwidth {width:.3g} Hz": width} if math.isfinite(width) else {}
-    return bode(lines, gain_unit=unit, marks=marks)
+    return bode(lines, gain_unit=unit, marks=marks, depth=_DEPTH)

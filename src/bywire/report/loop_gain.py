@@ -47,11 +47,11 @@ def loop_gain(family: Family) -> Figure:
 def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
     """Draw phase margin and gain margin as the spans that they are, with their frequencies."""
     found = worst.margins
-    if math.isfinite(found.crossover):
-        text = f"phase margin {found.phase:.3g}° at {found.crossover:.3g} Hz"
-        lower.plot([found.crossover] * 2, [-180.0, found.phase - 180.0], color=style.GREEN,
+    if math.isfinite(found.phase_at):
+        text = f"phase margin {found.phase:.3g}° at {found.phase_at:.3g} Hz"
+        lower.plot([found.phase_at] * 2, [-180.0, found.phase - 180.0], color=style.GREEN,
                    linewidth=2.2, zorder=4)  # fmt: skip
-        _line(upper, lower, found.crossover, style.GREEN, text)
+        _line(upper, lower, found.phase_at, style.GREEN, text)
     if math.isfinite(found.gain):
         at = worst.phase_crossover
         text = f"gain margin {found.gain:.3g} at {at:.3g} Hz"

@@ -53,8 +53,16 @@ def margins_table(
 def worst_texts(
     found: Sequence[LoopMargins], name: str, unit: str, values: Sequence[float]
 ) -> list[str]:
-    """Return the worst of each margin and where it occurs, a text each."""
-    return [
-        f"{TITLES.get(k, k)} {amount(v, UNITS[k], 3)} at {name} = {amount(at, unit)}"
-        for k, (v, at) in worst(found, values).items()
-    ]
+    """Return where the loop is unstable, and the worst of each margin where it is stable."""
+    lost = [amount(v, unit) for v, one in zip(values, found, strict=True) if not one.stable]
+    kept = [(one, v) for v, one in zip(values, found, strict=True) if one.stable]
+    texts = []
+    if lost:
+        where = lost[0] if len(lost) == 1 else f"{lost[0]} to {lost[-1]}"
+        texts.append(f"unstable at {len(lost)} of {len(found)} values of {name} ({where})")
+    if kept:
+        texts += [
+            f"{TITLES.get(k, k)} {amount(v, UNITS[k], 3)} at {name} = {amount(at, unit)}"
+            for k, (v, at) in worst([one for one, _ in kept], [v for _, v in kept]).items()
+        ]
+    return texts

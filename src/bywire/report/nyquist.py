@@ -41,13 +41,14 @@ def nyquist(family: Family) -> Figure:
               label="-1", linestyle="none")  # fmt: skip
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    axes.set_aspect("equal")
     axes.set_xlim(_LEFT, _RIGHT)
     axes.set_ylim(-_HALF, _HALF)
+    axes.set_aspect("equal", adjustable="datalim")  # more is shown where there is room
     axes.set_xlabel("real part of L [-]")
     axes.set_ylabel("imaginary part of L [-]")
     value_bar(figure, [axes], family)
-    style.legend_above(axes)
+    figure.legend(handles=axes.get_legend_handles_labels()[0], loc="outside upper left", ncols=3,
+                  frameon=False, fontsize=style.TEXT_SIZE)  # fmt: skip
     return figure
 
 
@@ -72,11 +73,11 @@ def _disk(axes: Axes, worst: LoopCurve) -> None:
 def _crossings(axes: Axes, worst: LoopCurve) -> None:
     """Mark where phase and gain margin are read."""
     found = worst.margins
-    if math.isfinite(found.crossover):
+    if math.isfinite(found.phase_at):
         angle = math.radians(found.phase - 180.0)
         axes.plot(math.cos(angle), math.sin(angle), "o", color=style.BLACK, markersize=5, zorder=5,
                   linestyle="none",
-                  label=f"phase margin {found.phase:.3g}° at {found.crossover:.3g} Hz")  # fmt: skip
+                  label=f"phase margin {found.phase:.3g}° at {found.phase_at:.3g} Hz")  # fmt: skip
     if math.isfinite(found.gain):
         axes.plot(-1.0 / found.gain, 0.0, "s", color=style.BLACK, markersize=5, zorder=5,
                   linestyle="none",

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 from bywire.report.bode import Response, bode
-from bywire.report.files import save_figure
 from bywire.report.wording import unit_text
 
 _POINTS = 400
@@ -19,31 +18,20 @@ _DECADES = 3.0
 _APART = 16  # of the points that show a model beside the first one
 
 
-def write_figures(
-    out: Path, name: str, models: Mapping[str, LinearModel], band: float
-) -> list[Path]:
-    """Write a figure for every output that answers the first input, and return the files.
+def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[str, Figure]]:
+    """Return name and figure of every output that answers the first input.
 
     Parameters
     ----------
-    out
-        Folder.
-    name
-        What the files' names begin with.
     models
         Label -> model, of the same inputs and outputs.
     band
         End of the frequencies [Hz].
-
-    Raises
-    ------
-    FileError
-        When a file cannot be written.
     """
     f = np.geomspace(band * 10.0**-_DECADES, band, _POINTS)
     first = next(iter(models.values()))
     values = {label: model.response(f) for label, model in models.items()}
-    taken, files = first.input_units[0], []
+    taken, drawn = first.input_units[0], []
     for row, (signal, given) in enumerate(zip(first.outputs, first.output_units, strict=True)):
         if not any(np.any(one[:, row, 0]) for one in values.values()):
             continue
@@ -56,5 +44,5 @@ def write_figures(
             some = slice(None) if k == 0 else slice(k * _APART // 2, None, _APART)
             path = f"{label}, {signal} by {first.inputs[0]}"
             lines.append(Response(path, f[some], scale * one[some, row, 0], measured=k > 0))
-        files.append(save_figure(bode(lines, gain_unit=unit), out / f"{name}-{signal}.png"))
-    return files
+        drawn.append((signal, bode(lines, gain_unit=unit)))
+    return drawn

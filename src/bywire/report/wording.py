@@ -63,8 +63,8 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
 
     Examples
     --------
-    >>> amount(2.5e6, "Pa"), amount(None, "Pa"), amount(0.034, "1")
-    ('25 bar', '-', '0.034')
+    >>> amount(2.5e6, "Pa"), amount(None, "Pa"), amount(0.034, "1"), amount(1187.0, "Hz", 3)
+    ('25 bar', '-', '0.034', '1190 Hz')
     """
     if value is None:
         return "-"
@@ -72,7 +72,10 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
         return "not defined"
     number, unit = in_display_unit(float(value), symbol)
     written = unit_text(unit)
-    return f"{number:.{digits}g}" + (f" {written}" if written else "")
+    figures = f"{number:.{digits}g}"
+    if "e+" in figures:  # 1.19e+03
+        figures = f"{float(figures):g}"
+    return figures + (f" {written}" if written else "")
 
 
 def range_text(leaf: Leaf) -> str:

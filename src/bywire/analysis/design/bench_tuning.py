@@ -37,7 +37,9 @@ class Tuning:
     Parameters
     ----------
     best
-        The candidate with the largest worst slack.
+        The candidate with the largest worst slack; among those with enough of it, the one with
+        the largest worst bandwidth, and where requirements are missed, the one whose figures
+        are nearest.
     tried
         All candidates, in the order in which they ran.
     interrupted
@@ -57,7 +59,7 @@ class Tuning:
         return len(self.tried) + self.untold
 
     def curve(self, one: str, other: str) -> list[tuple[float, float]]:
-        """Return the edge of what was reached in two slacks while the rest was met.
+        """Return the edge of what was reached in two figures while the rest was met.
 
         Parameters
         ----------
@@ -67,10 +69,10 @@ class Tuning:
         Returns
         -------
         list of (float, float)
-            Pairs of slacks, none better in both than another, sorted by the first.
+            Pairs of distances from the limits, none better in both than another, by the first.
         """
         pairs = sorted(
-            ((c.slacks[one], c.slacks[other]) for c in self.tried
+            ((c.room(one), c.room(other)) for c in self.tried
              if all(s >= 0.0 for text, s in c.slacks.items() if text not in (one, other))),
             reverse=True,
         )  # fmt: skip
@@ -140,7 +142,12 @@ def tune(
         interrupted = True
         if not tried:
             raise
-    return Tuning(max(tried, key=lambda one: one.slack), tuple(tried), interrupted)
+    return Tuning(max(tried, key=standing), tuple(tried), interrupted)
+
+
+def standing(one: Candidate) -> tuple[float, float]:
+    """Return what a search prefers gains by, see `Candidate.standing`."""
+    return one.standing(_ENOUGH)
 
 
 def _candidates(

@@ -28,17 +28,35 @@ class Candidate:
         By requirement's text: share of the limit, worst amplitude and worst trial.
     corners
         Figures of further trials, by label.
+    rooms
+        The same as ``slacks``, but of a bandwidth by its frequency: what is shown. Those that are
+        not named are as ``slacks`` has them.
     """
 
     gains: Mapping[str, float]
     figures: BenchFigures
     slacks: Mapping[str, float]
     corners: Mapping[str, BenchFigures] = field(default_factory=dict)
+    rooms: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def slack(self) -> float:
         """The worst slack."""
         return min(self.slacks.values())
+
+    def room(self, text: str) -> float:
+        """Return the distance of a requirement's figure from its limit, as a share of it."""
+        return self.rooms.get(text, self.slacks[text])
+
+    def standing(self, enough: float) -> tuple[float, float]:
+        """Return what to prefer gains by, the larger the better.
+
+        Where a requirement is missed, how far the figures are off; else the worst slack, and
+        from a slack that is enough on the worst bandwidth.
+        """
+        if self.slack < 0.0:
+            return min(-1e-12, *(self.room(text) for text in self.slacks)), self.slack
+        return min(self.slack, enough), min(self.rooms.values(), default=0.0)
 
 
 def bench_slacks(
@@ -90,7 +108,18 @@ def judged(
     rows = [bench_slacks(requirements, one, linear) for one in steps]
     slacks = {one.text: min(row[one.text] for row in rows) for one in requirements}
     corners = {label: one for label, one in found.items() if label != NOMINAL}
-    return Candidate(dict(gains), found[NOMINAL], slacks, corners)
+    rooms = {one.text: _room(one, steps, slacks[one.text]) for one in requirements
+             if one.figure == "bandwidth" and one.sense > 0}  # fmt: skip
+    return Candidate(dict(gains), found[NOMINAL], slacks, corners, rooms)
+
+
+def _room(one: Requirement, found: Sequence[BenchFigures], slack: float) -> float:
+    """Return the distance of the worst bandwidth from its limit, of the same sign as its slack."""
+    values = [s.bandwidth for row in found for s in row.small]
+    if not values:
+        return slack
+    room = one.slack(min(values))
+    return max(room, 0.0) if slack >= 0.0 else min(room, slack * 1e-3)
 
 
 def _on_bench(one: Requirement, found: BenchFigures) -> float:

@@ -52,21 +52,25 @@ def loop_gain(
 def phase_margin(gain: Complex, frequencies: Array) -> tuple[float, float]:
     """Return phase margin [degree] and crossover [Hz] of a measured loop gain.
 
-    The smallest margin of all falls through 1, interpolated on logarithmic axes. NaN where the
-    measured frequencies hold none, with a crossover of infinity where the gain ends above 1: then
-    it falls only beyond them.
+    The smallest margin of all passes through 1, and the highest frequency at which the gain falls
+    to it, interpolated on logarithmic axes. NaN where the measured frequencies hold no fall, with
+    a crossover of infinity where the gain ends above 1: then it falls only beyond them.
     """
     size, phase = np.log(np.abs(gain)), np.unwrap(np.angle(-gain))
     if size[-1] >= 0.0:
         return math.nan, math.inf
-    falls = np.flatnonzero((size[:-1] >= 0.0) & (size[1:] < 0.0))
-    found = []
-    for k in falls:
+    above = size >= 0.0
+    margins, crossover = [math.nan], math.nan
+    for k in np.flatnonzero(above[:-1] != above[1:]):
         share = size[k] / (size[k] - size[k + 1])
         margin = math.degrees(phase[k] + share * (phase[k + 1] - phase[k]))
-        f = frequencies[k] * (frequencies[k + 1] / frequencies[k]) ** share
-        found.append((abs((margin + 180.0) % 360.0 - 180.0), float(f)))
-    return min(found, default=(math.nan, math.nan))
+        margins.append(abs((margin + 180.0) % 360.0 - 180.0))
+        if above[k]:
+            step = frequencies[k + 1] / frequencies[k]
+            crossover = float(frequencies[k] * step**share)
+    if math.isnan(crossover):
+        return math.nan, math.nan
+    return min(margins[1:]), crossover
 
 
 def response_of(one: xr.Dataset) -> tuple[Complex, Array]:

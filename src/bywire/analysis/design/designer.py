@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.design.confirmation import confirmed
+from bywire.analysis.design.floors import linear_floors
 from bywire.analysis.design.linear_case import LinearCase
 from bywire.analysis.design.optimizer import (
     KEPT_MISSED,
     Problem,
     Progress,
     Search,
-    confirmed,
     starts_of,
 )
 from bywire.analysis.design.outcome import MISSED, Binding, Conflict, Design, Status
@@ -39,7 +41,8 @@ def design(
     """Choose gains that meet requirements for every model with the largest room.
 
     Models are taken in as they turn out to be the worst; all of them are checked in the end. An
-    interrupt ends the search, and the best so far is returned.
+    interrupt ends the search, and the best so far is returned. What `linear_floors` names is kept
+    besides.
 
     Parameters
     ----------
@@ -63,7 +66,8 @@ def design(
     """
     if not tunables:
         raise ParameterError("nothing is left to tune: set fewer of the loop's parameters")
-    problem = Problem(tunables, tuple(requirements), tuple(cases))
+    floors = linear_floors(requirements, largest_error(cases, start))
+    problem = Problem(tunables, (*requirements, *floors), tuple(cases))
     _require_sampled(problem, start)
     first = problem.point(start)
     search, status = Search(problem, [0]), "met"
@@ -74,11 +78,20 @@ def design(
             search.best = confirmed(search, _FINE)
         if search.slack < MISSED:
             status = "infeasible"
+            search = _by_figures(search, progress)
             conflicts = _conflicts(search, progress)
     except KeyboardInterrupt:
         status = status if status == "infeasible" else "interrupted"
     z = first if search.best is None else search.best
-    return _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)
+    made = _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)
+    return replace(made, kept=floors)
+
+
+def largest_error(cases: Sequence[LinearCase], gains: Mapping[str, float]) -> float:
+    """Return the largest steady-state error over some models [%]; NaN where one is unstable."""
+    found = [case.figures(gains) for case in cases]
+    return max((one.steady_state_error if one.is_stable else np.nan for one in found),
+               key=lambda error: np.inf if np.isnan(error) else error)  # fmt: skip
 
 
 def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
@@ -109,20 +122,30 @@ def _over_all(
         search.cases, search.slack, search.seen = [*search.cases, worst], -np.inf, []
 
 
+def _by_figures(search: Search, progress: Progress | None) -> Search:
+    """Return a search by the figures themselves, from the best point seen."""
+    own = Search(search.problem, search.cases, plain=True)
+    best = own.recall()
+    if best is not None:
+        own.run([best], progress)
+    return own
+
+
 def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...]:
     """Return what every binding requirement allows of each other one."""
     problem = search.problem
     if search.best is None:
         return ()
-    slacks = problem.slacks(search.best, search.cases).min(axis=0)
+    slacks = problem.slacks(search.best, search.cases, plain=True).min(axis=0)
     bound = [int(k) for k in np.argsort(slacks) if slacks[k] <= slacks.min() + 5 * _BINDS]
     found = []
     for a in bound[:_PAIRED]:
         for b in bound[:_PAIRED]:
             if a == b:
                 continue
-            own = Search(problem, search.cases, wanted=[a], kept=[b])
-            own.run([search.best], progress)
+            own = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
+            seen = own.recall()
+            own.run([search.best if seen is None else seen], progress)
             if own.best is not None and own.slack > KEPT_MISSED:
                 gains = problem.gains(own.best)
                 best = _extreme(problem, gains, problem.requirements[a], search.cases)
@@ -150,7 +173,7 @@ def _judged(
     }
     stable = all(one.is_stable for one in found.values())
     bindings = [
-        Binding(one, label, rows[label][one.figure], found[label].slack(one))
+        Binding(one, label, rows[label][one.figure], found[label].room(one))
         for label in rows for one in problem.requirements
     ]  # fmt: skip
     bindings.sort(key=lambda one: one.slack)

@@ -16,6 +16,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
+_REST = 1e-6  # where a response counts as that at rest, Hz
 _BAND = 0.02  # of the step: half the settling band
 _MOST = 2**15  # samples of a step response: 33 s of a loop of 1 kHz
 _LEFT_AFTER = 10.0  # periods of the bandwidth: when an error counts as steady
@@ -63,35 +64,41 @@ class LoopFigures:
 
     @cached_property
     def bandwidth(self) -> float:
-        """Lowest frequency at which the closed loop has fallen to -3 dB [Hz].
+        """Lowest frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
 
         The end of the grid where it stays above.
         """
-        size = np.abs(self._T)
-        level = math.sqrt(0.5) * size[0]
+        f, size, level = self.frequencies, np.abs(self._T), self._level
+        if size[0] < level:  # a slow integrator: it falls below the grid
+            f = np.geomspace(_REST, _LOWEST, self.points)
+            size = np.abs(self.closed.response(f)[:, 0, 0])
+            size[-1] = min(size[-1], math.nextafter(level, 0.0))
         below = np.flatnonzero(size < level)
         if below.size == 0:
-            return float(self.frequencies[-1])
-        k = int(below[0])
-        return self._between(np.log(size / level), k - 1)
+            return float(f[-1])
+        return _between(f, np.log(size / level), int(below[0]) - 1)
+
+    def room(self, one: Requirement) -> float:
+        """Return the distance of a figure from its limit, as a share of it."""
+        return one.slack(float(getattr(self, one.figure)))
 
     def slack(self, one: Requirement) -> float:
-        """Return how far a requirement is met, as a share of its limit.
+        """Return how far a requirement is met, as a share of its limit: what a search climbs.
 
         For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
         the frequency itself jumps where a dip touches that level.
         """
         if one.figure != "bandwidth" or one.sense < 0:
-            return one.slack(float(getattr(self, one.figure)))
+            return self.room(one)
         f = np.append(self.frequencies[self.frequencies < one.limit], one.limit)
         size = np.append(self._T[: f.size - 1], self.closed.response(f[-1:])[:, 0, 0])
-        return float(np.min(np.abs(size)) / (math.sqrt(0.5) * abs(size[0])) - 1.0)
+        return float(np.min(np.abs(size))) / self._level - 1.0
 
     @cached_property
     def crossover(self) -> float:
         """Highest frequency at which the loop gain falls to 1 [Hz]; 0 where it never does."""
         falls = np.flatnonzero((self._size[:-1] >= 0.0) & (self._size[1:] < 0.0))
-        return self._between(self._size, int(falls[-1])) if falls.size else 0.0
+        return _between(self.frequencies, self._size, int(falls[-1])) if falls.size else 0.0
 
     @cached_property
     def phase_margin(self) -> float:
@@ -173,7 +180,19 @@ class LoopFigures:
         Not for ever: with an integrator nothing would be left, however slow it is.
         """
         last = math.ceil(_LEFT_AFTER / (self.bandwidth * self.closed.period))
-        return 100.0 * abs(1.0 - float(self.step[min(last, self.step.size - 1)]))
+        kept = self.closed.effective()
+        n = len(kept)
+        whole = np.eye(n + 1)  # the step is a state of its own: its power sums the pulses
+        whole[:n, :n] = self.closed.A[np.ix_(kept, kept)]
+        whole[:n, n] = self.closed.B[kept, 0]
+        state = np.linalg.matrix_power(whole, last)[:n, n]
+        return 100.0 * abs(1.0 - float(self.closed.C[0, kept] @ state + self.closed.D[0, 0]))
+
+    @cached_property
+    def _level(self) -> float:
+        """-3 dB below the closed loop's gain at rest."""
+        rest = self.closed.response(np.array([_REST]))[0, 0, 0]
+        return math.sqrt(0.5) * float(abs(rest))
 
     @cached_property
     def _L(self) -> Complex:
@@ -195,11 +214,13 @@ class LoopFigures:
         for k in np.flatnonzero(np.diff(np.signbit(self._size))):
             share = self._size[k] / (self._size[k] - self._size[k + 1])
             margin = math.degrees(phase[k] + share * (phase[k + 1] - phase[k]))
-            found.append((self._between(self._size, int(k)), (margin + 180.0) % 360.0 - 180.0))
+            f = _between(self.frequencies, self._size, int(k))
+            found.append((f, (margin + 180.0) % 360.0 - 180.0))
         return found
 
-    def _between(self, values: Array, k: int) -> float:
-        """Return the frequency at which logarithms pass zero between points k and k + 1."""
-        share = values[k] / (values[k] - values[k + 1])
-        low, high = self.frequencies[k], self.frequencies[k + 1]
-        return float(low * (high / low) ** share)
+
+def _between(frequencies: Array, values: Array, k: int) -> float:
+    """Return the frequency at which logarithms pass zero between points k and k + 1."""
+    share = values[k] / (values[k] - values[k + 1])
+    low, high = frequencies[k], frequencies[k + 1]
+    return float(low * (high / low) ** share)

@@ -25,7 +25,8 @@ from bywire.analysis.design.requirement import Requirement
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-_UNSTABLE = -12.0  # slack of an unstable loop, before its growth is counted
+UNSTABLE = -12.0
+"""slack of an unstable loop, before its growth is counted"""
 _LEAST, _LARGEST = -10.0, 3.0  # slacks beyond do not count as worse or better
 KEPT_MISSED = -1e3
 """below this, a search has found nothing that meets the requirements to keep"""
@@ -33,7 +34,6 @@ _STEP = 1e-5  # of differences, share of a range
 _SAMPLES, _STARTS = 64, 3
 _ITERATIONS = 40
 _SIMPLEX = 25  # evaluations per gain
-_CONFIRMED, _ALIKE = 40, 1e-3  # points looked at anew, and how far apart
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Problem:
     tunables: Mapping[str, tuple[float, float]]
     requirements: tuple[Requirement, ...]
     cases: tuple[LinearCase, ...]
-    _known: dict[tuple[bytes, int], Array] = field(default_factory=dict, repr=False)
+    _known: dict[tuple[bytes, int], tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     @property
     def evaluations(self) -> int:
@@ -78,20 +78,30 @@ class Problem:
             found.append(share)
         return np.array(found)
 
-    def slacks(self, z: Array, cases: Sequence[int]) -> Array:
-        """Return the slack of every requirement for some cases, shape (cases, requirements)."""
-        return np.array([self._of(z, k) for k in cases])
+    def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
+        """Return the slack of every requirement for some cases, shape (cases, requirements).
 
-    def _of(self, z: Array, k: int) -> Array:
+        ``plain``: a bandwidth by its frequency, see `LoopFigures.room`.
+        """
+        return np.array([self._of(z, k)[int(plain)] for k in cases])
+
+    def points_seen(self, cases: Sequence[int]) -> list[Array]:
+        """Return all points that were computed for every one of some cases."""
+        keys = [{z for z, k in self._known if k == one} for one in cases]
+        return [np.frombuffer(z) for z in sorted(set.intersection(*keys))]
+
+    def _of(self, z: Array, k: int) -> tuple[Array, Array]:
         key = (np.round(z, 12).tobytes(), k)
         if key not in self._known:
             found = self.cases[k].figures(self.gains(z))
             if found.is_stable:
-                slacks = [found.slack(one) for one in self.requirements]
-                self._known[key] = np.clip(slacks, _LEAST, _LARGEST)
+                both = [[found.slack(one) for one in self.requirements],
+                        [found.room(one) for one in self.requirements]]  # fmt: skip
+                slacks, rooms = np.clip(both, _LEAST, _LARGEST)
             else:
-                worse = _UNSTABLE - 10.0 * (found.growth - 1.0)
-                self._known[key] = np.full(len(self.requirements), worse)
+                worse = UNSTABLE - 10.0 * (found.growth - 1.0)
+                slacks = rooms = np.full(len(self.requirements), worse)
+            self._known[key] = slacks, rooms
         return self._known[key]
 
 
@@ -113,6 +123,9 @@ class Search:
         Best point found so far and its worst slack, also after an interrupt.
     seen
         Slack and place of every point that was looked at.
+    plain
+        Whether a bandwidth counts by its frequency: where requirements cannot be met, the room of
+        the magnitude up to the limit says nothing of how far the frequency itself can go.
     """
 
     problem: Problem
@@ -122,6 +135,13 @@ class Search:
     best: Array | None = None
     slack: float = -math.inf
     seen: list[tuple[float, Array]] = field(default_factory=list)
+    plain: bool = False
+
+    def recall(self) -> Array | None:
+        """Return the best of all points that any search over these cases has seen."""
+        for z in self.problem.points_seen(self.cases):
+            self._judged(z)
+        return self.best
 
     def run(self, starts: Sequence[Array], progress: Progress | None = None) -> None:
         """Climb from each start, then from the best with a simplex and once more."""
@@ -148,9 +168,12 @@ class Search:
         count = len(self.problem.requirements)
         return list(range(count)) if self.wanted is None else list(self.wanted)
 
+    def _slacks(self, z: Array) -> Array:
+        return self.problem.slacks(np.clip(z, 0.0, 1.0), self.cases, plain=self.plain)
+
     def _judged(self, z: Array) -> float:
         """Return the worst wanted slack, or what is missing of the kept ones; note the best."""
-        found = self.problem.slacks(np.clip(z, 0.0, 1.0), self.cases)
+        found = self._slacks(z)
         value = float(found[:, self._chosen()].min())
         if self.kept:
             missing = float(found[:, list(self.kept)].min())
@@ -166,7 +189,7 @@ class Search:
 
         def excess(v: Array) -> Array:
             self._judged(v[:n])
-            found = self.problem.slacks(np.clip(v[:n], 0.0, 1.0), self.cases)
+            found = self._slacks(v[:n])
             wanted = found[:, self._chosen()] - v[n]
             return np.concatenate([wanted.ravel(), found[:, list(self.kept)].ravel()])
 
@@ -181,44 +204,16 @@ class Search:
             rate[: len(self.cases) * len(self._chosen())] = -1.0
             return np.column_stack([*columns, rate])
 
-        first = self.problem.slacks(start, self.cases)[:, self._chosen()].min()
+        first = self._slacks(start)[:, self._chosen()].min()
         constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}
         climb: Any = minimize
         climb(
-            lambda v: -float(v[n]), np.append(start, max(first, _UNSTABLE)), method="SLSQP",
+            lambda v: -float(v[n]), np.append(start, max(first, UNSTABLE)), method="SLSQP",
             jac=lambda v: np.append(np.zeros(n), -1.0),
             bounds=[*[(0.0, 1.0)] * n, (None, None)],
             constraints=constraints, options=options,
         )  # fmt: skip
-
-
-def confirmed(search: Search, points: int) -> Array:
-    """Return the best point on a finer grid of frequencies, all models counted.
-
-    A coarse grid may step over a narrow dip of the closed loop to -3 dB: the best points lie
-    where figures jump.
-    """
-    problem = search.problem
-    best, found = -math.inf, np.asarray(search.best)
-    tried: list[Array] = []
-    for slack, z in sorted(search.seen, key=lambda one: -one[0]):
-        if slack <= best + 1e-4 or len(tried) >= _CONFIRMED:
-            break
-        if any(float(np.max(np.abs(z - other))) < _ALIKE for other in tried):
-            continue
-        tried.append(z)
-        fine = min(_fine_slack(problem, z, k, points) for k in range(len(problem.cases)))
-        if fine > best:
-            best, found = fine, z
-    return found
-
-
-def _fine_slack(problem: Problem, z: Array, k: int, points: int) -> float:
-    found = problem.cases[k].figures(problem.gains(z), points)
-    if not found.is_stable:
-        return _UNSTABLE
-    return min(found.slack(one) for one in problem.requirements)
 
 
 def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array]:

@@ -11,6 +11,8 @@ from bywire.analysis.design.requirement import Requirement
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3
 """slack below which a requirement counts as missed: share of the limit"""
+ROOMY = 0.05
+"""slack from which on a requirement does not bind any more"""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,8 @@ class Design:
         The worst normalized slack.
     evaluations
         Loops that were computed.
+    kept
+        What was kept besides the requirements, see `floors`.
     """
 
     gains: Mapping[str, float]
@@ -88,3 +92,9 @@ class Design:
     conflicts: tuple[Conflict, ...]
     slack: float
     evaluations: int
+    kept: tuple[Requirement, ...] = ()
+
+    @property
+    def binds(self) -> bool:
+        """Whether what is worst off leaves no room worth having."""
+        return self.slack < ROOMY

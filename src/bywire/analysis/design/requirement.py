@@ -147,6 +147,8 @@ def _limit(text: str, figure: str, kind: Kind) -> float:
             raise UnitError(f"{name} = {quoted(text)} is no limit in percent: write '<= 15 %'")
         return 100.0 * units.parse(text, "1", name)
     if kind.unit == "degree":
+        if re.fullmatch(r"[-+\d.eE]+", text):
+            raise UnitError(f"{name} = {quoted(text)} has no unit: write '{text} deg'")
         return math.degrees(units.parse(text.replace("°", "deg"), "rad", name))
     return units.parse(text, kind.unit, name)
 

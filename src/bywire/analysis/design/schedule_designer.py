@@ -146,16 +146,40 @@ def _seen_whole(
     middle = points[schedule.main][0]
     cases = cases_of(loop, par, middle, _ranges(loop, every, over))
     nominal = cases[0].figures(gains, _FINE)
-    dense = cases_of(loop, par, middle, {loop.at.name: _between(par, schedule, every)})[1:]
     return ScheduleDesign(
         {name: designs[name] for name in schedule.regions if name in designs},
         {name: tuple(points[name]) for name in schedule.regions},
         gains,
         {name: float(getattr(nominal, name)) for name in FIGURES},
         cases,
-        tuple(_across(one, schedule.region(par, one.at or 0.0), requirements, gains)
-              for one in dense),
-    )  # fmt: skip
+        frozen(loop, par, every, gains, requirements),
+    )
+
+
+def frozen(
+    loop: Loop,
+    par: ParameterSet,
+    points: Sequence[float],
+    gains: Mapping[str, float],
+    requirements: Sequence[Requirement],
+) -> tuple[Across, ...]:
+    """Return the scheduled loop from the lowest to the highest point and across the borders.
+
+    Parameters
+    ----------
+    loop, par, requirements
+        See `design_schedule`.
+    points
+        Operating points [SI], at least one.
+    gains
+        By dotted name [SI].
+    """
+    schedule = scheduled(loop)
+    values = _between(par, schedule, points)
+    dense = cases_of(loop, par, points[0], {loop.at.name: values})[1:]
+    return tuple(
+        _across(one, schedule.region(par, one.at or 0.0), requirements, gains) for one in dense
+    )
 
 
 def _across(
@@ -167,10 +191,10 @@ def _across(
 
 
 def slack_of(found: LoopFigures, requirements: Sequence[Requirement]) -> float:
-    """Return the slack of the requirement that is worst off; negative infinity where unstable."""
+    """Return the room of the requirement that is worst off; negative infinity where unstable."""
     if not found.is_stable:
         return -math.inf
-    return float(min(found.slack(one) for one in requirements))
+    return float(min(found.room(one) for one in requirements))
 
 
 def _ranges(

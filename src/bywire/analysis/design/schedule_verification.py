@@ -48,10 +48,12 @@ def verify_schedule(
     spans = {name: span for own in tunables.values() for name, span in own.items()}
     corners = _corners(found, requirements, trial)
 
-    def whole(gains: Mapping[str, float]) -> Verification:
+    def whole(
+        gains: Mapping[str, float], kept: Sequence[Requirement] | None = None
+    ) -> Verification:
         return verify(
-            gains, requirements, spans, found.cases, trial, corners=corners, generations=0,
-            progress=progress,
+            gains, requirements, spans, found.cases, trial, corners=corners, kept=kept,
+            generations=0, progress=progress,
         )  # fmt: skip
 
     first = whole(found.gains)
@@ -66,13 +68,13 @@ def verify_schedule(
         start = {name: gains[name] for name in tunables[region]}
         made = verify(
             start, requirements, tunables[region], models, own,
-            corners=[c for c in models[1:] if c.at != own.value or c.changes], seed=seed,
-            generations=generations, progress=progress,
+            corners=[c for c in models[1:] if c.at != own.value or c.changes], kept=first.kept,
+            seed=seed, generations=generations, progress=progress,
         )  # fmt: skip
         gains |= made.final.gains
         if made.tuning is not None:
             count, stopped = count + made.tuning.count, made.tuning.interrupted
-    last = whole(gains)
+    last = whole(gains, first.kept)
     return replace(
         first, tuning=Tuning(last.linear, (), stopped, count), kpis=last.kpis, nominal=last.nominal
     )

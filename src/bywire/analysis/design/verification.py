@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from bywire.analysis.design.bench_tuning import GENERATIONS, Tuning, tune
+from bywire.analysis.design.bench_figures import BenchFigures
+from bywire.analysis.design.bench_tuning import GENERATIONS, Tuning, standing, tune
 from bywire.analysis.design.candidate import Candidate, judged, linear_slacks
 from bywire.analysis.design.corners import corners_of, worst_of
+from bywire.analysis.design.designer import largest_error
+from bywire.analysis.design.floors import bench_floors, linear_floors
 from bywire.analysis.design.linear_case import LinearCase
 from bywire.analysis.design.optimizer import Problem, Progress
 from bywire.analysis.design.requirement import FIGURES, Requirement
@@ -33,6 +36,8 @@ class Verification:
         All figures of the nominal linear model with the final gains.
     corners
         Corners that were looked at; the figures shown are those of the worst.
+    kept
+        What was kept of the linear design besides the requirements, see `floors`.
     """
 
     linear: Candidate
@@ -40,6 +45,7 @@ class Verification:
     kpis: tuple[Kpi, ...]
     nominal: Mapping[str, float]
     corners: int = 0
+    kept: tuple[Requirement, ...] = ()
 
     @property
     def final(self) -> Candidate:
@@ -52,13 +58,13 @@ class Verification:
         return self.final.slack >= 0.0
 
     def conflict(self) -> tuple[str, str, list[tuple[float, float]]] | None:
-        """Return the two requirements that are worst off, and the edge between their slacks.
+        """Return the two requirements that are worst off, and the edge between them.
 
         None where everything is met, only one requirement counts, or no candidates are at hand.
         """
         if self.met or self.tuning is None or not self.tuning.tried:
             return None
-        order = sorted(self.final.slacks, key=lambda text: self.final.slacks[text])
+        order = sorted(self.final.slacks, key=self.final.room)
         if len(order) < 2:
             return None
         one, other = order[:2]
@@ -73,6 +79,7 @@ def verify(
     trial: Trial,
     *,
     corners: Sequence[LinearCase] = (),
+    kept: Sequence[Requirement] | None = None,
     seed: int = 0,
     generations: int = GENERATIONS,
     progress: Progress | None = None,
@@ -90,6 +97,9 @@ def verify(
     corners
         Further models at whose parameters and operating points it is tried as well; by default
         that corner of the ranges at which it is worst off on the bench.
+    kept
+        What retuned gains keep of the linear design's figures besides the requirements; by default
+        what `floors.bench_floors` says of ``gains``.
     seed, generations
         Of the search, see `bench_tuning.tune`; no generation: only try.
     progress
@@ -103,21 +113,27 @@ def verify(
     if not trial.amplitudes:
         raise ParameterError(f"loop {trial.loop.name!r}: no amplitude is given to try it with")
     problem = Problem(tunables, tuple(requirements), tuple(cases))
+    floors = tuple(kept or ())
     target = _target(requirements, cases[0], gains)
     trials = [trial, *(trial.at(one) for one in corners)]
     looked = () if corners else corners_of(problem, gains)
 
-    def tried(own: Mapping[str, float]) -> Candidate:
+    def tried(own: Mapping[str, float]) -> dict[str, BenchFigures]:
         linear = linear_slacks(problem, own)
         known = {one.label for one in trials}
         worst = worst_of(trial, looked, problem, own, linear, target)
         trials.extend(one for one in worst if one.label not in known)
         (found,) = measured(trials, {name: [value] for name, value in own.items()}, target)
-        return judged(requirements, own, found, linear)
+        return found
 
     if progress is not None:
         progress("trial on the bench", 0.0)
-    first = tried(gains)
+    found = tried(gains)
+    if kept is None:
+        linear = linear_floors(requirements, largest_error(cases, gains))
+        floors = bench_floors(requirements, linear, found.values())
+    problem = Problem(tunables, (*requirements, *floors), tuple(cases))
+    first = judged(problem.requirements, gains, found, linear_slacks(problem, gains))
     if progress is not None:
         progress("trial on the bench", 1.0)
     tuning = None
@@ -126,14 +142,16 @@ def verify(
             problem, gains, lambda sets: measured(trials, sets, target, rough=True), seed=seed,
             generations=generations, progress=progress,
         )  # fmt: skip
-        tuning = replace(tuning, best=tried(tuning.best.gains))
+        best = tuning.best.gains
+        again = judged(problem.requirements, best, tried(best), linear_slacks(problem, best))
+        tuning = replace(tuning, best=max(first, again, key=standing))
     final = gains if tuning is None else tuning.best.gains
     kpis: tuple[Kpi, ...] = ()
     if trial.bench is not None:
         kpis = run(trial.bench.with_overrides(dict(final))).kpis
     loop = cases[0].figures(final, 4000)
     nominal = {name: float(getattr(loop, name)) for name in FIGURES}
-    return Verification(first, tuning, kpis, nominal, len(corners) or len(looked))
+    return Verification(first, tuning, kpis, nominal, len(corners) or len(looked), floors)
 
 
 def _target(

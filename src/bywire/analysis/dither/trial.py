@@ -107,14 +107,15 @@ def _measured(
         run, {"ecu.dither.gain": gains, "ecu.dither.f_dit": frequencies}, _SIGNALS
     )
     figures = [
-        _figures(par, found.values[k], max(int(trial.window * f), 1) * round(1.0 / (f * T)))
+        _figures(par, found.values[k], max(int(trial.window * f), 1), round(1.0 / (f * T)))
         for k, f in enumerate(frequencies)
     ]
     return {name: np.array([one[name] for one in figures]) for name in figures[0]}
 
 
-def _figures(par: Par, values: Array, count: int) -> dict[str, float]:
-    """Return the figures of the last samples of a run, a whole number of periods."""
+def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, float]:
+    """Return the figures of the last periods of a run, each of so many samples."""
+    count = periods * samples
     late = dict(zip(_SIGNALS, values[-count - 1 :].T, strict=True))
     duration = count * par.ecu.T_s
     whole = {name: value[:-1] for name, value in late.items()}
@@ -124,10 +125,19 @@ def _figures(par: Par, values: Array, count: int) -> dict[str, float]:
     return {
         "mean": mean,
         "stuck": float(late["t_stuck"][-1] - late["t_stuck"][0]) / duration,
-        "ripple_sensor": float(np.ptp(whole["p_mc"])),
-        "ripple_caliper": float(np.ptp(whole["p_pd"])),
+        "ripple_sensor": _ripple(whole["p_mc"], samples),
+        "ripple_caliper": _ripple(whole["p_pd"], samples),
         "current_rms": float(np.sqrt(extra / par.motor.R_m)),
         "copper": extra,
         "current_share": float(np.abs(whole["i_ref"]).max()) / par.ecu.pressure.i_max,
         "duty_share": float(np.abs(whole["duty"]).max()) / par.ecu.current.D_max,
     }
+
+
+def _ripple(pressure: Array, samples: int) -> float:
+    """Return the dither's ripple: what a pressure spans within a period, the median of all.
+
+    Where dither is too weak to free the piston, the controller's integral part does it now and
+    then; that jump is no ripple.
+    """
+    return float(np.median(np.ptp(pressure.reshape(-1, samples), axis=1)))

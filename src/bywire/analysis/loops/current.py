@@ -7,6 +7,7 @@ from typing import cast
 from bywire.analysis import control_laws
 from bywire.analysis.loop import Array, Complex, Loop, Point, Quantity
 from bywire.analysis.loops.motorcycle_causes import CAUSES
+from bywire.analysis.loops.motorcycle_start import require_pressed
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_ecu import Stimulus
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
@@ -19,6 +20,7 @@ _STEP = 10e-6  # substep [s]: at most 1/(100 f) in the loop's band, or midpoint'
 
 def point(par: ParameterSet, value: float) -> Point:
     """Return the brake held at a pressure [Pa] by its current."""
+    require_pressed(value)
     own = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
     state, memory = state_at(value, own), memory_at(value, own)
     stimulus = zeros(Stimulus)._replace(i_set=state.i)

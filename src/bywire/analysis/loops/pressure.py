@@ -9,6 +9,7 @@ from bywire.analysis import control_laws
 from bywire.analysis.loop import Array, Complex, Loop, Point, Quantity
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.loops.motorcycle_causes import CAUSES
+from bywire.analysis.loops.motorcycle_start import require_pressed
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_ecu import Stimulus
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
@@ -19,6 +20,7 @@ from bywire.core.signals import zeros
 
 def point(par: ParameterSet, value: float) -> Point:
     """Return the brake in equilibrium at a pressure [Pa]."""
+    require_pressed(value)
     own = cast(MotorcycleParameters, par.replace({"drive.mode": "pressure"}))
     stimulus = zeros(Stimulus)._replace(p_set=value)
     return Point(MotorcycleBrake(), own, state_at(value, own), memory_at(value, own), stimulus)

@@ -48,7 +48,14 @@ def linear(
             f"{at.quantity.name} = {at.value:g} {at.quantity.unit} is no operating point: it must "
             f"be > 0 {at.quantity.unit}"
         )
-    state = state_at(p, own)._replace(omega=at.speed)
+    try:
+        state = state_at(p, own)._replace(omega=at.speed)
+    except ParameterError as error:
+        if at.quantity is PRESSURE:
+            raise
+        raise ParameterError(
+            f"current = {at.value:g} A is no operating point: {error}"
+        ) from None
     return linearize(
         MotorcycleBrake(), own, state, memory_at(p, own),
         inputs=inputs, outputs=outputs, friction=at.friction,

@@ -30,6 +30,11 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
     """
     own = cast(WedgeParameters, par)
     if at.quantity is CURRENT:
+        if not abs(at.value) < own.drive.i_max:
+            raise ParameterError(
+                f"current = {at.value:g} A is not admissible: its size must be < drive.i_max = "
+                f"{own.drive.i_max:g} A"
+            )
         F_N = force_for_current(at.value, own)
     elif at.quantity is MOMENT:
         if not at.value > 0.0:
@@ -40,4 +45,10 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
         F_N = force_for(at.value, own)
     else:
         F_N = at.value
-    return full(own, F_N, at.friction, at.speed)
+    if at.quantity is FORCE:
+        return full(own, F_N, at.friction, at.speed)
+    try:
+        return full(own, F_N, at.friction, at.speed)
+    except ParameterError as error:
+        given = f"{at.quantity.name} = {at.value:g} {at.quantity.unit}"
+        raise ParameterError(f"{given} is no operating point: {error}") from None

@@ -24,6 +24,7 @@ _NEAR_REST = 1e-6  # frequency that stands for rest [Hz]
 
 TOLERANCE = 0.01
 """relative error over the band that is admissible where nothing else is said"""
+_FAR = 1e3  # of the fastest corner: a response so far beyond it is rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -212,6 +213,12 @@ def _joined(own: LinearModel, first: Matrices, second: Matrices) -> LinearModel:
 def _band(model: LinearModel, band: float | None) -> float:
     """Return the end of the band [Hz]."""
     if band is not None:
+        most = _FAR * float(natural(model).max(initial=0.0))
+        if not model.period and band > most > 0.0:
+            raise ParameterError(
+                f"band = {band:g} Hz is not admissible: it must be <= {most:.3g} Hz, {_FAR:g} "
+                f"times the fastest corner of {model.name}"
+            )
         return band
     if model.period:
         return 0.4 / model.period

@@ -139,7 +139,8 @@ def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
         "uncontrolled": Map(
             "growth_open", "mu_B", "tan_alpha",
             "Largest growth rate of the wedge without control, motors at constant currents; dashed "
-            "the closed form of the neutral point.",
+            "the closed form of the neutral point. The hatched border is computed; colors are "
+            "interpolated between designs, and the rate jumps there.",
             (given,), {"unstable without control": ("beyond_open", 0.0)}, closed,
         ),
         "moment-loop": Map(

@@ -24,7 +24,8 @@ from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import search
 from bywire.identification.output_error import even_interval, trial
-from bywire.identification.stick_slip.shooting import Shooting, Shot, cut_out
+from bywire.identification.stick_slip.shooting import Shooting
+from bywire.identification.stick_slip.shots import Shot, cut_out
 from bywire.identification.stick_slip.slips import find_slips, noise_of
 from bywire.identification.stick_slip.stribeck_band import stribeck_band
 from bywire.identification.stick_slip.whitening import Whitening

@@ -20,6 +20,7 @@ from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.identification.equation import Equation, EquationError
+from bywire.identification.stick_slip.shots import LEAD, Shot
 from bywire.identification.stick_slip.slips import Slip
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
@@ -28,33 +29,9 @@ from bywire.simulation.sensitivity import simulate_with_sensitivities
 Array = NDArray[np.float64]
 
 _ROUNDS = 12  # of Newton for the shift in time
-_LEAD = 0.05  # s of rest before the measured onset
 _SMOOTHED = 0.006  # s: the converter's noise on the current
 _BEGUN = 0.02  # of a slip: before, that noise would decide when the model breaks away
 _BEGUN_AT = 2e3  # Pa: of a long one
-_RESTED = 1.0  # s of rest from which the ramp of the current is read
-
-
-@dataclass(frozen=True)
-class Shot:
-    """A measured slip.
-
-    Parameters
-    ----------
-    slip
-        Where it lies.
-    time, pressure, current
-        Measured around it, from a little before its onset; shape (n,), SI.
-    line
-        Rate [A/s] and level [A], at the first of these times, of the current's ramp while the
-        piston rested.
-    """
-
-    slip: Slip
-    time: Array
-    pressure: Array
-    current: Array
-    line: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -89,26 +66,6 @@ class Fitted:
     breakaway_slopes: Array
     current: float
     onset: float
-
-
-def cut_out(
-    time: Array, pressure: Array, current: Array, slips: Sequence[Slip], longest: float
-) -> list[Shot]:
-    """Return the measured slips with what lies around them, up to the next onset."""
-    interval = float(time[1] - time[0])
-    found = []
-    lead, most, rested = (int(span / interval) for span in (_LEAD, longest, _RESTED))
-    for k, slip in enumerate(slips):
-        first = max(slip.begin - lead, 0)
-        until = slips[k + 1].begin - lead if k + 1 < len(slips) else time.size
-        last = min(slip.end + 2 * lead, slip.begin + most, until)
-        since = max(slip.begin - rested, slips[k - 1].end + lead if k else 0)
-        before = slice(min(since, slip.begin - 2), slip.begin)
-        rate, level = np.polyfit(time[before] - time[first], current[before], 1)
-        rows = slice(first, last)
-        line = (float(rate), float(level))
-        found.append(Shot(slip, time[rows], pressure[rows], current[rows], line))
-    return found
 
 
 class Shooting:
@@ -239,7 +196,7 @@ def _best_shift(shot: Shot, p: Array) -> float:
         if size == 0.0:
             break
         change = float(v @ r) / size
-        shift += float(np.clip(change, -_LEAD, _LEAD))
+        shift += float(np.clip(change, -LEAD, LEAD))
         if abs(change) < 1e-9:
             break
     return shift
