@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.design.confirmation import confirmed
+from bywire.analysis.design.confirmation import confirmed, confirmed_by_figures
 from bywire.analysis.design.floors import linear_floors
 from bywire.analysis.design.linear_case import LinearCase
 from bywire.analysis.design.optimizer import (
-    KEPT_MISSED,
     Problem,
     Progress,
     Search,
@@ -146,12 +145,12 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
             own = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
             seen = own.recall()
             own.run([search.best if seen is None else seen], progress)
-            if own.best is not None and own.slack > KEPT_MISSED:
-                gains = problem.gains(own.best)
-                best = _extreme(problem, gains, problem.requirements[a], search.cases)
-                found.append(
-                    Conflict(problem.requirements[a], problem.requirements[b], best, gains)
-                )
+            wanted, kept = problem.requirements[a], problem.requirements[b]
+            best = confirmed_by_figures(own, wanted, kept, _FINE)
+            if best is not None:
+                gains = problem.gains(best)
+                value = _extreme(problem, gains, wanted, search.cases)
+                found.append(Conflict(wanted, kept, value, gains))
     return tuple(found)
 
 
