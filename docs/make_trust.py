@@ -1,6 +1,6 @@
 """Condense studies of the identification methods into docs/trust and docs/trust.md.
 
-``bywire identify METHOD --study 200 --out FOLDER/METHOD`` for each method, then
+``bywire identify METHOD --study 200 --out FOLDER/METHOD`` for each method (or another label), then
 ``python docs/make_trust.py FOLDER``.
 """
 
@@ -27,7 +27,7 @@ HEADING = (
 )  # fmt: skip
 
 
-def condensed(study: dict[str, Any]) -> dict[str, Any]:
+def condensed(study: dict[str, Any], label: str) -> dict[str, Any]:
     """Return a study with one row of numbers per experiment."""
     names = list(study["recovered"])
     rows = [
@@ -35,7 +35,7 @@ def condensed(study: dict[str, Any]) -> dict[str, Any]:
         for one in study["experiments"]
     ]
     kept = {key: study[key] for key in ("method", "parameter_set", "options", "holds", "recovered")}
-    return {**kept, "columns": ["seed", *names], "experiments": rows}
+    return {"label": label, **kept, "columns": ["seed", *names], "experiments": rows}
 
 
 def lines(study: dict[str, Any]) -> list[str]:
@@ -44,7 +44,7 @@ def lines(study: dict[str, Any]) -> list[str]:
     for name, row in study["recovered"].items():
         bias = f"{100.0 * row['bias'] / row['truth']:+.2g}" if row["truth"] else "-"
         cells = (
-            study["method"], name, row["count"], f"{row['bias_in_errors']:+.1f}", bias,
+            study["label"], name, row["count"], f"{row['bias_in_errors']:+.1f}", bias,
             f"{100 * row['coverage']:.1f} %", f"{row['claimed'] / row['scatter']:.2f}",
             "yes" if row["holds"] else "no",
         )  # fmt: skip
@@ -65,9 +65,9 @@ def main(folder: Path) -> None:
     """Write one file per method and the page."""
     (DOCS / "trust").mkdir(exist_ok=True)
     for file in sorted(folder.glob("*/study.json")):
-        study = condensed(json.loads(file.read_text()))
+        study = condensed(json.loads(file.read_text()), file.parent.name)
         text = json.dumps(study).replace('"], [', '"],\n[')
-        (DOCS / "trust" / f"{study['method']}.json").write_text(text + "\n")
+        (DOCS / "trust" / f"{study['label']}.json").write_text(text + "\n")
     (DOCS / "trust.md").write_text(page())
 
 

@@ -8,12 +8,14 @@ from typing import Any
 import control
 import numpy as np
 import pytest
+from scipy import signal
 
 from bywire.analysis.design.bench_figures import BenchFigures, Small
 from bywire.analysis.design.candidate import Candidate, judged
 from bywire.analysis.design.designer import design
 from bywire.analysis.design.floors import DISK, bench_floors, linear_floors
 from bywire.analysis.design.linear_case import NOMINAL, LinearCase, cases_of
+from bywire.analysis.design.loop_figures import LoopFigures
 from bywire.analysis.design.requirement import read
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop_registry import find_loop
@@ -181,3 +183,20 @@ def test_the_room_of_a_bandwidth_is_that_of_the_frequency() -> None:
 def test_a_phase_margin_without_unit_is_told_how_to_write_it() -> None:
     with pytest.raises(UnitError, match="60 deg"):
         read(["phase margin >= 60"])
+
+
+def test_noise_gain_is_that_of_simulated_noise() -> None:
+    """A first-order loop, L = a / (z - 1): the closed form, and a simulation of white noise."""
+    a = 0.3
+    gain, closed = (
+        LinearModel(
+            "loop", np.array([[pole]]), np.array([[a]]), np.array([[1.0]]), np.array([[0.0]]),
+            ("y",), ("u",), ("y",), ("1",), ("1",), ("1",), np.zeros(1), 1e-3,
+        )
+        for pole in (1.0, 1.0 - a)
+    )  # fmt: skip
+    found = LoopFigures(gain, closed).noise_gain
+    assert found == pytest.approx(math.sqrt(a / (2.0 - a)), rel=1e-4)
+    noise = np.random.default_rng(1).normal(0.0, 1.0, 200_000)
+    y = signal.lfilter([0.0, a], [1.0, a - 1.0], noise)
+    assert found == pytest.approx(float(y.std()), rel=0.01)

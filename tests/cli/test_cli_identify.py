@@ -11,6 +11,7 @@ from command_line import Outcome, no_half_files, refused
 
 from bywire.bench.bench_file import load
 from bywire.catalog.registry import parameters
+from bywire.identification.method_registry import all_methods
 from bywire.identification.parameter_file import parameter_file
 
 Bywire = Callable[..., Outcome]
@@ -34,6 +35,52 @@ def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path)
     page = (out / "report.html").read_text()
     for text in ("All checks hold.", "loop_half_width_at_0", "Residuals", "simulated experiment"):
         assert text in page
+
+
+def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    arguments = ("identify", "motor-winding", "--synthetic", "1", "--option", "duration=0.2 s")
+    good = bywire(*arguments, "--out", tmp_path / "good")
+    assert good.status == 0
+    assert "does not replay it" in good.err
+    said = (tmp_path / "good" / "parameters.toml").read_text()
+    assert "CHECK FAILED" not in said
+    assert "does not replay it" in said
+    data = tmp_path / "good" / "measurement.nc"
+    wrong = bywire("identify", "motor-winding", data, "--set", "anti_alias.f_aa=120 Hz", "--out",
+                   tmp_path / "wrong", "--json")  # fmt: skip
+    assert wrong.status == 1
+    first = (tmp_path / "wrong" / "parameters.toml").read_text().splitlines()[0]
+    assert first.startswith("# CHECK FAILED, do not use it as it is: residual_over_noise = ")
+    assert wrong.object["options"] == {}  # all of them only simulate
+    refused(bywire("identify", "motor-winding", data, "--option", "rotor=turning"),
+            "rotor", "only shapes simulated")  # fmt: skip
+
+
+def test_options_that_only_simulate_are_options() -> None:
+    for method in all_methods().values():
+        assert set(method.simulated) <= set(method.options.model_fields), method.name
+        assert method.simulated
+
+
+def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path: Path) -> None:
+    seal = ("identify", "seal-friction")
+    assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
+    data, other = tmp_path / "measurement.nc", tmp_path / "notes.txt"
+    other.write_text("the user's own")
+    refused(bywire("identify", "friction-model", "--synthetic", "1", "--out", tmp_path),
+            "holds a result of seal-friction", "--out")  # fmt: skip
+    assert (tmp_path / "strokes.png").exists()
+    bad = tmp_path / "still.csv"
+    bad.write_text("t [s],F [N],x [m],p [Pa]\n" + "".join(f"{k},1,0,2\n" for k in range(50)))
+    refused(bywire(*seal, bad, "--out", tmp_path))
+    assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", "still.csv"}
+    assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
+    again = bywire(*seal, data, "--out", tmp_path)
+    assert again.status == 0
+    assert data.exists()
+    assert "no parameters.toml is written" in again.err
 
 
 def test_a_failed_check_is_status_1(bywire: Bywire) -> None:
@@ -60,7 +107,8 @@ def test_a_study_is_stored_with_its_seeds(bywire: Bywire, tmp_path: Path) -> Non
 def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
     refused(bywire("identify", "seal-frictio"), "seal-friction")
     refused(bywire("identify", "seal-friction"), "needs one of", "F [N], x [m], p [Pa]")
-    refused(bywire("identify", "seal-friction", "--synthetic", "1", "--study", "5"), "one of")
+    refused(bywire("identify", "seal-friction", "--synthetic", "1", "--study", "5"),
+            "give only one of")  # fmt: skip
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--set", "a.b=1"), "--set")
     refused(
         bywire("identify", "seal-friction", "--synthetic", "1", "--option", "x_lo=1 mm"), "x_low"

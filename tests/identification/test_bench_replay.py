@@ -11,7 +11,7 @@ import xarray as xr
 import bywire
 from bywire.core.errors import ParameterError, UnitError, UnknownNameError
 from bywire.identification.replaying.bench_replay import replay
-from bywire.identification.replaying.fit import fit_figures, judged
+from bywire.identification.replaying.fit import fit_figures, judged, undefined
 from bywire.identification.replaying.segments import Segment, found_in, read_segments
 
 STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})
@@ -100,8 +100,58 @@ def test_tolerances_by_segment_and_signal() -> None:
         judged({"good": good}, [Segment("a", 0.0, 0.4, {"nmrse": "<= 5 %"})])
     with pytest.raises(UnitError):
         judged({"good": good}, [Segment("a", 0.0, 0.4, {"max_error": "<= 1 A"})])
-    with pytest.raises(ParameterError, match="holds 0 samples"):
-        judged({"good": good}, [Segment("late", 5.0, 6.0)])
+    for late in (Segment("late", 5.0, 6.0), Segment("long", 0.5, 1.2)):
+        with pytest.raises(ParameterError, match=r"beyond the record, which holds 0 to 0\.999"):
+            judged({"good": good}, [late])
+
+
+def test_errors_are_bounded_both_ways() -> None:
+    """The model is 50 ms early, and 10 Pa too low."""
+    t = 1e-3 * np.arange(2000)
+    attrs = {"units": "Pa"}
+    pair = xr.Dataset(
+        {"measured": ("time", 100.0 * np.sin(20.0 * t), attrs),
+         "modeled": ("time", 100.0 * np.sin(20.0 * (t + 0.05)) - 10.0, attrs)},
+        {"time": ("time", t, {"units": "s"})},
+    )  # fmt: skip
+
+    def met(name: str, text: str) -> list[bool]:
+        (fit,) = judged({"p": pair}, [Segment("all", 0.0, 2.0, {name: text})])
+        return [v.met for v in fit.verdicts]
+
+    assert met("lag", "<= 5 ms") == met("p.bias", "<= 1 Pa") == [False]
+    assert met("lag", "<= 60 ms") == met("p.bias", "<= 12 Pa") == [True]
+    assert met("lag", ">= -5 ms and <= 5 ms") == [False, True]
+    assert met("lag", ">= -60 ms and <= -40 ms") == [True, True]
+    with pytest.raises(ParameterError, match="give a lower limit as well"):
+        met("lag", "<= -40 ms")
+    with pytest.raises(UnitError, match=r"'p.bias <= 2' is no limit in Pa.*bar"):
+        met("p.bias", "<= 2")
+
+
+def test_missing_samples_are_named(ramp: xr.Dataset) -> None:
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+    )  # fmt: skip
+    gap = ramp[["i", "p_mc"]].copy(deep=True)
+    gap["p_mc"][40:70] = np.nan
+    found = replay(bench, gap, {"i_set": "i"})
+    share = f"30 of {gap.sizes['time']} samples"
+    assert any("p_mc misses" in note and share in note for note in found.notes)
+    (fit,) = judged(found.outputs, [Segment("all", 0.0, 0.6, {"lag": "<= 5 ms"})])
+    assert not fit.verdicts[0].met
+    assert undefined([fit]) == ("lag of p_mc is not defined in all: the measured signal has gaps",)
+
+
+def test_by_default_what_a_sensor_could_have_measured_is_compared(ramp: xr.Dataset) -> None:
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+    )  # fmt: skip
+    found = replay(bench, ramp, {"i_set": "i"})
+    assert {"p_mc", "omega"} <= set(found.outputs)
+    assert not {"stuck", "E_copper", "t_stuck"} & set(found.outputs)
+    assert any("left out" in note and "E_copper" in note for note in found.notes)
+    assert list(replay(bench, ramp, {"i_set": "i"}, ["stuck"]).outputs) == ["stuck"]
 
 
 def test_steps_and_holds_are_found() -> None:

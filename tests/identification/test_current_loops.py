@@ -89,6 +89,23 @@ def test_a_wrong_model_is_found_out(case: str, wrong: dict[str, float]) -> None:
     assert not all(check.holds for check in found.checks)
 
 
+@pytest.mark.parametrize(("case", "current", "mean"), [("stuck rotor", "i", 1.0), (
+    "motorcycle", "i", 0.0), ("wedge", "i_1", 0.0)])  # fmt: skip
+def test_a_current_that_is_not_of_this_demand_fails(case: str, current: str, mean: float) -> None:
+    method, par, changes, _ = CASES[case]
+    options = method.defaults.replace(changes)
+    data = method.synthetic(par, options, 1)
+    noise = np.random.default_rng(5).normal(mean, 1.0, data.sizes["time"])
+    found = method.identify(data.assign({current: ("time", noise)}), par, options, Effort())
+    failed = {check.name: check.value for check in found.checks if not check.holds}
+    assert failed["variance_explained"] < 0.1
+    (estimate,) = found.estimates.values()
+    vague = estimate.vague()
+    assert failed.get("parameters_without_meaning", 0.0) == len(vague)
+    assert vague.keys() | {k.unknown.label for k in estimate.kept}
+    assert not found.parameters.keys() & vague.keys()
+
+
 @pytest.mark.parametrize("case", ["motorcycle", "wedge"])
 def test_gains_and_winding_together_are_told_but_for_their_scale(case: str) -> None:
     method, par, _, gains = CASES[case]
@@ -112,6 +129,12 @@ def test_a_demand_at_rest_is_refused(method: Method, signal: str) -> None:
     still = data.assign({signal: ("time", np.full(data.sizes["time"], 1.0))})
     with pytest.raises(ParameterError, match=f"{signal} of record 1 does not move"):
         method.identify(still, par, method.defaults, Effort())
+
+
+def test_a_current_of_the_wrong_sign_is_refused(winding: xr.Dataset) -> None:
+    data = winding.assign(i=-winding["i"])
+    with pytest.raises(ParameterError, match=r"i of record 1 goes against v .* sign = -1"):
+        WINDING.identify(data, MOTORCYCLE, WINDING.defaults, Effort())
 
 
 def test_curves_lie_on_the_measurement(winding: xr.Dataset) -> None:

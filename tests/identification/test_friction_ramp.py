@@ -13,7 +13,8 @@ from bywire.core.errors import ParameterError
 from bywire.identification.method import Effort
 from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
 from bywire.identification.stick_slip.shooting import Shooting
-from bywire.identification.stick_slip.slips import find_slips, noise_of
+from bywire.identification.stick_slip.shots import cut_out
+from bywire.identification.stick_slip.slips import Slip, find_slips, noise_of
 from bywire.identification.unknown import parameters_of
 
 PAR = parameters("dardanelli2010")
@@ -34,6 +35,21 @@ def test_slips_are_found_where_they_are(data: xr.Dataset) -> None:
     assert [s.direction for s in slips] == [1, 1, 1, 1, 1, 1, -1]
     assert np.diff([s.rest for s in slips[:-1]]).min() > 0.5e5
     assert find_slips(np.random.default_rng(0).normal(0.0, 2e3, 5000), 1e-3, 0.2e5) == []
+
+
+def test_slips_that_follow_at_once_are_left_out(data: xr.Dataset) -> None:
+    t, p, i = (data[name].values for name in ("time", "p_mc", "i"))
+    crowded = [Slip(begin, begin + 3, 1, 1e5) for begin in (2, 40, 45)]
+    found = cut_out(t[:60], p[:60], i[:60], crowded, OPTIONS.longest)
+    assert [shot.slip.begin for shot in found] == [45]
+    with pytest.raises(ParameterError, match=r"none of the 1 slips.*check the unit"):
+        cut_out(t[:60], p[:60], i[:60], [Slip(1, 4, 1, 1e5)], OPTIONS.longest)
+
+
+def test_a_wrong_unit_is_refused_in_a_sentence(data: xr.Dataset) -> None:
+    """Of bar titled MPa."""
+    with pytest.raises(ParameterError, match="check the unit of p_mc"):
+        METHOD.identify(data.assign(p_mc=10.0 * data["p_mc"]), PAR, OPTIONS, Effort(starts=1))
 
 
 def test_derivatives_of_a_slip(data: xr.Dataset) -> None:

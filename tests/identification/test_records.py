@@ -37,7 +37,8 @@ def test_records_survive_a_file(tmp_path: Path) -> None:
     whole = joined({"a": record(40, 1.0), "b": record(50, 2.0)})
     path = write_measurement(whole, tmp_path / "both.nc")
     found = measured([path], None, {"p": "Pa"})
-    assert [one.sizes["time"] for one in split(found.data).values()] == [40, 50]
+    back = split(found.data)
+    assert {label: one.sizes["time"] for label, one in back.items()} == {"a": 40, "b": 50}
 
 
 def test_records_of_different_signals_are_refused() -> None:

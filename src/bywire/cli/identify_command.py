@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bywire.cli import output
+from bywire.cli import earlier_result, output
+from bywire.cli.identified_bench import bench_notes, bench_text, far_off
 from bywire.cli.identify_text import as_object, text
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
@@ -58,16 +59,19 @@ def execute(name: str, wanted: Wanted, out: Path | None, as_json: bool) -> int:
     chosen = _chosen(method, wanted)
     if out is not None:
         require_folder(out)
+        earlier_result.require_own(out, method.name)
     if wanted.study is not None:
         from bywire.cli.identify_study import study
 
         return study(chosen, wanted, out, as_json)
     with progress_bar() as progress:
         measured, source = _measured(chosen, wanted, progress)
+        if out is not None:
+            earlier_result.remove(out, wanted.measurements)
         found = _identified(chosen, measured, wanted, out, progress)
-    one = _assembled(chosen, found, measured, source)
+    one = _assembled(chosen, found, measured, source, wanted)
     files, trouble = _written(chosen, wanted, one, measured, out)
-    for note in measured.notes:
+    for note in (*one.notes, *([] if out is None else bench_notes(one))):
         output.message(f"note: {note}")
     output.result(json.dumps(as_object(one, files)) if as_json else text(one))
     for check in one.found.checks:
@@ -82,7 +86,11 @@ def execute(name: str, wanted: Wanted, out: Path | None, as_json: bool) -> int:
 
 def _require_one_source(method: Method, wanted: Wanted) -> None:
     sources = [bool(wanted.measurements), wanted.synthetic is not None, wanted.study is not None]
-    if sum(sources) != 1:
+    if sum(sources) > 1:
+        raise ParameterError(
+            f"{method.name}: give only one of measurement files, --synthetic SEED, --study COUNT"
+        )
+    if sum(sources) < 1:
         signals = ", ".join(f"{n} [{unit}]" for n, unit in method.signals.items())
         raise ParameterError(
             f"{method.name} needs one of: measurement files with the signals {signals}, "
@@ -99,6 +107,12 @@ def _chosen(method: Method, wanted: Wanted) -> Chosen:
     from bywire.catalog.registry import entry, main_set
 
     given = parsed(method.options, wanted.options, f"option of {method.name}")
+    idle = [name for name in wanted.options if name.split(".")[0] in method.simulated]
+    if wanted.measurements and idle:
+        raise ParameterError(
+            f"option {idle[0]} of {method.name} only shapes simulated experiments: leave it out "
+            "for measurement files"
+        )
     options = method.defaults.replace(given)
     if not method.assembly:
         if wanted.parameters or wanted.changes:
@@ -157,18 +171,20 @@ def _identified(
         raise
 
 
-def _assembled(chosen: Chosen, found: Any, measured: Measured, source: str) -> Identification:
+def _assembled(
+    chosen: Chosen, found: Any, measured: Measured, source: str, wanted: Wanted
+) -> Identification:
     from bywire.report.identification_report import Identification
     from bywire.report.subject import Subject
 
-    subject = None
+    subject, notes = None, list(measured.notes)
     if chosen.par is not None:
         subject = Subject(
             chosen.method.name, chosen.method.summary, chosen.name, chosen.par
         )
-    return Identification(
-        chosen.method, chosen.options, found, source, measured.notes, subject
-    )
+        notes += far_off(found.parameters, subject.par.leaves())
+    idle = () if wanted.synthetic is not None else chosen.method.simulated
+    return Identification(chosen.method, chosen.options, found, source, notes, subject, idle)
 
 
 def _written(
@@ -177,6 +193,7 @@ def _written(
     """Write everything that was found; a full disk must not cost the numbers too."""
     if out is None:
         return [], None
+    from bywire.bench.values import parsed
     from bywire.report.files import write_bytes
     from bywire.report.identification_report import write_identification
 
@@ -187,21 +204,12 @@ def _written(
 
             files.append(write_measurement(measured.data, out / "measurement.nc", overwrite=True))
         if one.found.parameters and chosen.par is not None:
-            bench = _parameters(chosen, wanted, one)
+            changes = parsed(type(chosen.par), wanted.changes, "parameter")
+            bench = bench_text(one, chosen.par, changes)
             files.append(write_bytes(out / "parameters.toml", bench.encode()))
         files += write_identification(out, one)
-        shown = json.dumps(as_object(one, [*files, out / "estimate.json"]), indent=1) + "\n"
-        files.append(write_bytes(out / "estimate.json", shown.encode()))
+        shown = json.dumps(as_object(one, [*files, out / earlier_result.ESTIMATE]), indent=1) + "\n"
+        files.append(write_bytes(out / earlier_result.ESTIMATE, shown.encode()))
     except InputError as error:
         return files, error
     return files, None
-
-
-def _parameters(chosen: Chosen, wanted: Wanted, one: Identification) -> str:
-    from bywire.bench.values import parsed
-    from bywire.identification.parameter_file import parameter_file
-
-    assert chosen.par is not None
-    changes = {**parsed(type(chosen.par), wanted.changes, "parameter"), **one.found.parameters}
-    comment = f"identified by {chosen.method.name} from {one.source}"
-    return parameter_file(chosen.method.experiment, chosen.name, chosen.par, changes, comment)

@@ -20,7 +20,7 @@ def as_object(one: Identification, files: Sequence[Path]) -> dict[str, Any]:
         "method": one.method.name,
         "parameter_set": None if one.subject is None else one.subject.parameters,
         "measurement": one.source,
-        "options": one.options.model_dump(mode="json"),
+        "options": one.options.model_dump(mode="json", exclude=set(one.idle)),
         "parameters": dict(found.parameters),
         "estimates": {name: estimate_object(e) for name, e in found.estimates.items()},
         "figures": {

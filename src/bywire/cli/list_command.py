@@ -18,7 +18,7 @@ from bywire.identification.method import Method
 from bywire.identification.method_registry import all_methods
 
 _WIDTH = 100  # characters of a line
-_NAME = 24  # columns of a name
+_NAME = 26  # columns of a name
 
 
 def execute(as_text: bool) -> None:

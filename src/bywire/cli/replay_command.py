@@ -69,7 +69,7 @@ def execute(wanted: Wanted, out: Path | None, as_json: bool) -> int:
     shown = _as_object(one, tracks, files)
     if out is not None and trouble is None:
         files += _kept(out, one, shown)
-    for note in (*read.notes, *found.notes):
+    for note in one.said:
         output.message(f"note: {note}")
     output.result(json.dumps(shown) if as_json else _text(one, tracks))
     if trouble is not None:
@@ -93,7 +93,9 @@ def _bench(path: Path, changes: Mapping[str, str]) -> Bench:
 
 
 def _tolerances(texts: Sequence[str]) -> dict[str, str]:
-    found = {}
+    from bywire.identification.replaying.tolerances import joined
+
+    found = []
     for text in texts:
         sign = next((s for s in _SIGNS if s in text), "")
         name, _, limit = text.partition(sign) if sign else (text, "", "")
@@ -102,8 +104,8 @@ def _tolerances(texts: Sequence[str]) -> dict[str, str]:
                 f"--tolerance {text!r} cannot be read: write for instance 'nrmse <= 5 %' or "
                 "'p_mc.max_error <= 2 bar'"
             )
-        found[name.strip()] = f"{sign} {limit.strip()}"
-    return found
+        found.append((name.strip(), f"{sign} {limit.strip()}"))
+    return joined(found)
 
 
 def _segments(
@@ -169,7 +171,7 @@ def _as_object(one: Replay, tracks: Sequence[Track], files: Sequence[Path]) -> d
             "bench": one.bench.name or one.bench.experiment,
             "measurement": one.source,
             "inputs": [str(name) for name in one.found.inputs.data_vars],
-            "notes": [*one.notes, *one.found.notes],
+            "notes": list(one.said),
             "holds": one.holds,
             "segments": [
                 {

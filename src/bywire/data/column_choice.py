@@ -45,6 +45,8 @@ class Chosen:
         SI unit of the signal.
     label
         Description.
+    meanings
+        What its numbers stand for, where they are numbers of something.
     """
 
     mapping: SignalMapping
@@ -53,6 +55,7 @@ class Chosen:
     unit: str
     symbol: str
     label: str
+    meanings: str = ""
 
     def to_si(self, values: NDArray[np.float64]) -> None:
         """Turn numbers of the file into the signal, where they lie."""
@@ -68,6 +71,8 @@ class Chosen:
         found: dict[str, Any] = {
             "units": self.symbol, "long_name": self.label, "column": self.column,
         }  # fmt: skip
+        if self.meanings:
+            found["flag_meanings"] = self.meanings
         if self.mapping.delay:
             found["delay"] = self.mapping.delay
         if self.mapping.limits is not None:
@@ -131,7 +136,7 @@ def _chosen(
     keeps = plain and si_symbol(found) != "1" and unit.isascii() and unit[0].isalpha()
     symbol = _plain(unit) if keeps else si_symbol(found)
     label = one.label or column.label or one.name
-    return Chosen(one, column.name, clock, unit, symbol, label)
+    return Chosen(one, column.name, clock, unit, symbol, label, column.meanings)
 
 
 def _plain(unit: str) -> str:

@@ -38,6 +38,8 @@ class Column:
         Column that holds its instants, where the file says so.
     label
         Description, where the file gives one.
+    meanings
+        What its numbers 0, 1, ... stand for, blank between them, where the file says so.
     """
 
     name: str
@@ -45,6 +47,7 @@ class Column:
     length: int | None = None
     clock: str | None = None
     label: str = ""
+    meanings: str = ""
 
 
 class Source(Protocol):

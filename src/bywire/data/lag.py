@@ -146,9 +146,16 @@ def _refined(
     index = np.arange(first, last)
 
     def loss(s: float) -> float:
-        return -sign * float(np.corrcoef(a[index], spline(index + s))[0, 1])
+        return -sign * _correlation(a[index], spline(index + s))
 
     found = minimize_scalar(
         loss, bounds=(shift - 1.0, shift + 1.0), method="bounded", options={"xatol": 1e-6}
     )
     return float(found.x), -sign * float(found.fun)
+
+
+def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:
+    """Return the correlation coefficient; 0 where one of them does not move."""
+    a, b = a - a.mean(), b - b.mean()
+    size = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / size if size > 0.0 else 0.0

@@ -13,6 +13,8 @@ from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 
+_AT = 1e-6  # of an unknown's scale: nearer to a bound, it lies at it
+
 
 @dataclass(frozen=True)
 class Kept:
@@ -90,6 +92,30 @@ class Estimate:
         t = float(stats.t.ppf(0.5 + 0.5 * level, max(self.freedom, 1.0)))
         reach = t * self.deviations
         return np.column_stack((self.values - reach, self.values + reach))
+
+    def at_bounds(self) -> dict[str, float]:
+        """Return the unknowns that lie at a bound: label -> bound, SI."""
+        return {
+            u.label: end
+            for u, value in zip(self.unknowns, self.values, strict=True)
+            for end in (u.low, u.high)
+            if math.isfinite(end) and abs(value - end) < _AT * u.scale
+        }
+
+    def vague(self) -> dict[str, str]:
+        """Return the unknowns whose values mean nothing: label -> why.
+
+        They lie at a bound, or their 95 % interval reaches further than +-100 % of the value.
+        """
+        bounds = self.at_bounds()
+        reach = 0.5 * np.diff(self.intervals(), axis=1).ravel()
+        found = {}
+        for u, value, half in zip(self.unknowns, self.values, reach, strict=True):
+            if u.label in bounds:
+                found[u.label] = f"lies at its bound, {bounds[u.label]:.4g} {u.unit}"
+            elif half > abs(value):
+                found[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: that may be nothing"
+        return found
 
     def noted(self, notes: tuple[str, ...]) -> Estimate:
         """Return the estimate with more notes."""

@@ -238,10 +238,11 @@ def notes_of(found: Estimate) -> tuple[str, ...]:
         "than either"
         for a, b, c in found.correlated()
     ]
-    for unknown, value in zip(found.unknowns, found.values, strict=True):
-        for end in (unknown.low, unknown.high):
-            if np.isfinite(end) and abs(value - end) < 1e-6 * unknown.scale:
-                notes.append(f"{unknown.label} lies at its bound, {end:.4g} {unknown.unit}")
+    units = {u.label: u.unit for u in found.unknowns}
+    notes += [
+        f"{label} lies at its bound, {end:.4g} {units[label]}"
+        for label, end in found.at_bounds().items()
+    ]
     return tuple(notes)
 
 

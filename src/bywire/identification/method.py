@@ -165,6 +165,10 @@ class Method:
     truth
         ``truth(par, options) -> {label: value}``: what ``synthetic`` puts in, of estimates that
         are no parameters of the assembly.
+    simulated
+        Options that nothing but ``synthetic`` uses.
+    bench_note
+        What a bench with the identified values cannot do.
     """
 
     name: str
@@ -181,6 +185,8 @@ class Method:
     gaps: bool = False
     optional: Mapping[str, str] = field(default_factory=dict)
     truth: Callable[[Any, Any], Mapping[str, float]] | None = None
+    simulated: tuple[str, ...] = ()
+    bench_note: str = ""
 
     def require_signals(self, data: xr.Dataset) -> None:
         """Raise ``UnknownNameError`` when a signal is missing, with the nearest ones."""

@@ -46,6 +46,8 @@ class Identification:
         What was done to the measurement.
     subject
         The brake and its parameters before; None for a method without an assembly.
+    idle
+        Options that had nothing to do: what only shapes simulated experiments.
     """
 
     method: Method
@@ -54,6 +56,7 @@ class Identification:
     source: str
     notes: Sequence[str] = ()
     subject: Subject | None = None
+    idle: Sequence[str] = ()
 
     @property
     def holds(self) -> bool:
@@ -178,8 +181,9 @@ def _keyed(
 
 
 def _made(one: Identification) -> Section:
+    rows = [r for r in parameter_rows(one.options) if r.name.split(".")[0] not in one.idle]
     chosen = Details(
-        "Options of the method", [TableBlock(parameter_table(parameter_rows(one.options)))]
+        "Options of the method", [TableBlock(parameter_table(rows))]
     )
     if one.subject is None:
         return Section("How it was made", [Paragraph(one.method.summary), chosen])

@@ -15,6 +15,7 @@ from bywire.report.channel import FloatArray
 from bywire.report.decimation import kept_samples
 from bywire.report.wording import amount
 
+_FEW = 30  # points: each was measured by itself, and has a marker
 _MOST = 6  # curves of a family that have a color each
 
 
@@ -41,7 +42,8 @@ def _beside(curve: Curve) -> Figure:
             look = style.STROKES[role]
             upper.plot(
                 *_drawn(at, values), color=own if label else look.color, zorder=look.zorder,
-                linestyle=look.linestyle, linewidth=look.linewidth,
+                linestyle=look.linestyle, linewidth=look.linewidth, markersize=3.0,
+                marker="o" if at.size <= _FEW else None,
                 label=style.plain(f"{label} {word}".strip()),
             )  # fmt: skip
         shown = own if label else style.PURPLE
@@ -76,9 +78,17 @@ def _bands(axes: Axes, curve: Curve) -> None:
         if "low" in data and "high" in data:
             low, high = _row(data["low"], x, k), _row(data["high"], x, k)
             axes.fill_between(at, low, high, color=color, alpha=0.25, linewidth=0.0)
-        axes.plot(at, _row(data["value"], x, k), color=color, linewidth=1.3, label=label or "value")
+        name = label or "modeled"
+        word = f"{name}, 95 % band" if "low" in data and not label else name
+        axes.plot(
+            at, _row(data["value"], x, k), color=color, linewidth=1.3,
+            label=style.plain(word),
+        )  # fmt: skip
         if "measured" in data:
-            axes.plot(at, _row(data["measured"], x, k), "o", color=color, markersize=3.0)
+            axes.plot(
+                at, _row(data["measured"], x, k), "o", color=color, markersize=3.0,
+                label=style.plain(f"{label} measured".strip()),
+            )  # fmt: skip
     axes.margins(x=0.01)
     axes.set_xlabel(_x_label(data, x))
     value = data["value"]

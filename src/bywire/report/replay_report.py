@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -9,14 +10,15 @@ from pathlib import Path
 from matplotlib.figure import Figure
 
 from bywire.bench.bench import Bench
+from bywire.bench.kpis.kpi import Kpi
 from bywire.identification.replaying.bench_replay import Replayed
-from bywire.identification.replaying.fit import SegmentFit
+from bywire.identification.replaying.fit import SegmentFit, undefined
 from bywire.report.files import save_figure
 from bywire.report.page import Banner, FigureBlock, Listing, Section, TableBlock, write_page
 from bywire.report.replay_figure import replay_figure
 from bywire.report.subject import Subject, made
 from bywire.report.tables import Cell, Column, Table
-from bywire.report.wording import amount, clean
+from bywire.report.wording import amount, clean, duration
 
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
 
@@ -49,24 +51,43 @@ class Replay:
         """Whether every tolerance is met."""
         return all(v.met for fit in self.fits for v in fit.verdicts)
 
+    @property
+    def undefined(self) -> tuple[str, ...]:
+        """Why figures are not defined."""
+        return undefined(self.fits)
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """All notes."""
+        return (*self.notes, *self.found.notes, *self.undefined)
+
 
 def fit_table(fits: Sequence[SegmentFit]) -> Table:
     """Return the figures of every signal and stretch, with the tolerances that are missed."""
     rows = []
     for fit in fits:
         by_name = {k.name: k for k in fit.kpis}
-        missed = [f"{v.kpi} {v.limit}" for v in fit.verdicts if not v.met]
+        missed = [
+            f"{v.kpi} {v.limit}{' (not defined)' if math.isnan(v.value) else ''}"
+            for v in fit.verdicts if not v.met
+        ]  # fmt: skip
         verdict = Cell("-")
         if fit.verdicts:
             verdict = Cell(f"missed: {', '.join(missed)}", "bad") if missed else Cell("ok", "good")
         rows.append(
             (Cell(clean(fit.segment.name)), Cell(clean(fit.signal)),
-             *(Cell(amount(by_name[n].value, by_name[n].unit, 3)) for n in _SHOWN), verdict)
+             *(Cell(_figure(by_name[n])) for n in _SHOWN), verdict)
         )  # fmt: skip
     numbers = (Column(name.replace("_", " "), numeric=True) for name in _SHOWN)
     return Table(
         (Column("segment"), Column("signal"), *numbers, Column("tolerances")), tuple(rows)
     )
+
+
+def _figure(kpi: Kpi) -> str:
+    if kpi.unit == "s" and math.isfinite(kpi.value):
+        return duration(kpi.value)
+    return amount(kpi.value, kpi.unit, 3)
 
 
 def write_replay(out: Path, one: Replay) -> list[Path]:
@@ -102,7 +123,7 @@ def write_replay(out: Path, one: Replay) -> list[Path]:
         *([Section("Tracked parameters", [FigureBlock(f, c) for f, c in one.tracked.values()])]
           if one.tracked else []),
         made(subject, f"Measurement: {one.source}.",
-             *(f"{note[:1].upper()}{note[1:]}." for note in (*one.notes, *one.found.notes))),
+             *(f"{note[:1].upper()}{note[1:]}." for note in one.said)),
     ]  # fmt: skip
     files = [save_figure(figure, out / f"{name}.png") for name, figure in figures.items()]
     files += [save_figure(f, out / f"{name}.png") for name, (f, _) in one.tracked.items()]

@@ -179,7 +179,7 @@ def _judged(
     slack = bindings[0].slack if stable else -np.inf
     worst = {}
     for name in FIGURES:
-        sign = -1.0 if name.endswith(("peak", "error", "time")) or name == "overshoot" else 1.0
+        sign = -1.0 if name.endswith(("peak", "error", "time", "overshoot", "noise_gain")) else 1.0
         label = min(rows, key=lambda one: sign * rows[one][name])
         worst[name] = (rows[label][name], label)
     return Design(

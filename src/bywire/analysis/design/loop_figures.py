@@ -19,6 +19,7 @@ _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
 _REST = 1e-6  # where a response counts as that at rest, Hz
 _BAND = 0.02  # of the step: half the settling band
 _MOST = 2**15  # samples of a step response: 33 s of a loop of 1 kHz
+_NOISE_POINTS = 1000  # frequencies, evenly spaced
 _LEFT_AFTER = 10.0  # periods of the bandwidth: when an error counts as steady
 _SETTLED = 1e-4  # share of the slowest mode that may be left where a step response ends
 
@@ -138,6 +139,18 @@ class LoopFigures:
     def complementary_peak(self) -> float:
         """Largest magnitude of L/(1 + L)."""
         return float(np.max(np.abs(self._L / (1.0 + self._L))))
+
+    @cached_property
+    def noise_gain(self) -> float:
+        """Rms of the output over that of white noise of each measured sample; NaN if analog.
+
+        The root mean square of L/(1 + L) up to half the sampling frequency.
+        """
+        if not self.gain.period:
+            return math.nan
+        f = (np.arange(_NOISE_POINTS) + 0.5) / _NOISE_POINTS * self.gain.nyquist
+        L = self.gain.response(f)[:, 0, 0]
+        return float(np.sqrt(np.mean(np.abs(L / (1.0 + L)) ** 2)))
 
     @cached_property
     def step(self) -> Array:

@@ -48,6 +48,9 @@ FIGURES: Mapping[str, Kind] = {
     "disk_margin": Kind("1", 0.0, 2.0, "symmetric disk margin"),
     "sensitivity_peak": Kind("1", 1.0, math.inf, "largest magnitude of 1/(1 + L)"),
     "complementary_peak": Kind("1", 0.0, math.inf, "largest magnitude of L/(1 + L)"),
+    "noise_gain": Kind(
+        "1", 0.0, math.inf, "rms of the output over that of white noise of each measured sample"
+    ),
     "overshoot": Kind("%", 0.0, math.inf, "of the unit step at the sampling instants"),
     "settling_time": Kind("s", 0.0, math.inf, "of the unit step, to 2 % of its height"),
     "steady_state_error": Kind(

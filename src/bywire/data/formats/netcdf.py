@@ -60,7 +60,8 @@ def _columns(file: Any) -> Mapping[str, Column]:
         clock = dim if dim in file.variables and dim != name else None
         unit = str(getattr(variable, "units", "")).partition(" since ")[0]
         label = str(getattr(variable, "long_name", ""))
-        found[name] = Column(name, unit, variable.shape[0], clock, label)
+        meanings = str(getattr(variable, "flag_meanings", ""))
+        found[name] = Column(name, unit, variable.shape[0], clock, label, meanings)
     return {n: c for n, c in found.items() if c.clock is None or c.clock in found}
 
 

@@ -20,6 +20,8 @@ from bywire.simulation.run import simulate
 
 Array = NDArray[np.float64]
 
+_AGAINST = -0.5  # correlation of demand and current: beyond chance
+_EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
 _MISFIT = 1.3  # a closed loop's own noise is 1.04 of the sensor's, which is known within 10 %
 
 
@@ -62,24 +64,42 @@ def noise_of_levels(answer: Array, demand: Array) -> float:
     return max(float(np.median(np.abs(chosen))) / (0.6745 * math.sqrt(20.0)), 1e-9)
 
 
-def require_steps(data: xr.Dataset, name: str, label: str) -> None:
-    """Refuse a record whose demand does not move.
+def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
+    """Refuse a record whose demand does not move, or whose current goes against it.
+
+    A winding takes up power at every frequency, and a current loop follows: voltage or demand and
+    current cannot be of opposite sign on the average.
+
+    Parameters
+    ----------
+    data
+        Signals over ``time`` [s].
+    name, answer
+        What the demand and the current are called.
+    label
+        Of the record.
 
     Raises
     ------
     UnknownNameError
         When the demand is missing.
     ParameterError
-        When it does not step.
+        When it does not step, or the current has the wrong sign.
     """
     if name not in data:
         raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
-    if float(np.ptp(data[name].values)) > 0.0:
-        return
-    raise ParameterError(
-        f"{name} of record {label or '1'} does not move: an answer at rest tells neither winding "
-        "nor gains; step it between several levels, the rotor locked"
-    )
+    demand, current = data[name].values, data[answer].values
+    if not float(np.ptp(demand)) > 0.0:
+        raise ParameterError(
+            f"{name} of record {label or '1'} does not move: an answer at rest tells neither "
+            "winding nor gains; step it between several levels, the rotor locked"
+        )
+    together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
+    if together < _AGAINST:
+        raise ParameterError(
+            f"{answer} of record {label or '1'} goes against {name} (correlation {together:.2f}): "
+            "one of the two has the wrong sign; write sign = -1 for it in the map"
+        )
 
 
 def identified_loop(
@@ -103,17 +123,44 @@ def identified_loop(
     """
     found = estimate(output_error(trials, parameters_of(par, names)))
     return Identified(
-        estimates={"current loop": found}, parameters=found.parameters(),
+        estimates={"current loop": found}, parameters=believable(found),
         checks=checks_of(trials, found), curves=tuple(as_curve(t, found) for t in trials),
     )  # fmt: skip
 
 
+def believable(found: Estimate) -> dict[str, float]:
+    """Return the parameters by name, less those whose values mean nothing."""
+    vague = found.vague()
+    return {name: value for name, value in found.parameters().items() if name not in vague}
+
+
 def checks_of(trials: Sequence[Trial], found: Estimate) -> tuple[Check, ...]:
-    """Return whether nothing but noise is left."""
+    """Return whether the model explains the current, and whether the values mean something.
+
+    Noise alone is no proof of a model: where the record is nothing but noise, noise is what any
+    model leaves, one with an answer of zero as well.
+    """
+    vague = found.vague()
+    said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
     return (
+        Check("variance_explained", _explained(trials, found), limit=_EXPLAINED, at_least=True,
+              note="share of the current's variance that the model predicts: do demand and "
+              "current belong together?"),
         Check("residual_over_noise", found.rms, limit=_MISFIT,
               note="1 where nothing but the sensor's noise is left"),
+        Check("parameters_without_meaning", float(len(vague)), limit=0.0,
+              note=said or "none at its bound, none with a 95 % interval wider than +-100 %"),
     )  # fmt: skip
+
+
+def _explained(trials: Sequence[Trial], found: Estimate) -> float:
+    """Return the variance accounted for, each record about its own mean."""
+    total = 0.0
+    for one in trials:
+        for name, values in one.measured.items():
+            counted = values[one.rows(name)]
+            total += float(np.sum(((counted - counted.mean()) / one.noise[name]) ** 2))
+    return 1.0 - float(found.residuals @ found.residuals) / max(total, 1e-300)
 
 
 def as_curve(one: Trial, found: Estimate) -> Curve:

@@ -228,5 +228,9 @@ METHOD = Method(
     identify=identify,
     synthetic=synthetic,
     several=True,
+    simulated=(
+        "plant", "p_low", "p_medium", "p_high", "i_step", "amplitude", "f_zero", "f_pole",
+        "sigma_p", "sigma_i",
+    ),
     truth=truth,
 )  # fmt: skip

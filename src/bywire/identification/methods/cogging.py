@@ -224,6 +224,7 @@ METHOD = Method(
     defaults=Options(cutoff=60.0, slowest=0.1, margin=0.3, highest=400, sigma_i=0.02),
     identify=identify,
     synthetic=synthetic,
+    simulated=("sigma_i",),
     unknowns=("motor_1.T_cog",),
     truth=truth,
 )

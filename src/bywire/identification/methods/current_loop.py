@@ -90,7 +90,7 @@ def identify(
 def _trial(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, label: str
 ) -> Trial:
-    require_steps(data, "i_set", label)
+    require_steps(data, "i_set", "i", label)
     own = par.replace(
         {"drive.mode": "current-direct", "adc.law": "ideal", "seal.T_pr": options.T_hold}
     )
@@ -140,4 +140,5 @@ METHOD = Method(
     synthetic=synthetic,
     unknowns=_GAINS,
     several=True,
+    simulated=("p_start", "i_low", "i_high", "dwell", "duration", "sigma_i"),
 )  # fmt: skip

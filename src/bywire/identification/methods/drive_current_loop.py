@@ -80,7 +80,7 @@ def identify(
 
 
 def _trial(data: xr.Dataset, par: WedgeParameters, options: Options, label: str) -> Trial:
-    require_steps(data, "i_1_set", label)
+    require_steps(data, "i_1_set", "i_1", label)
     own = par.replace({**_CLAMPED, "encoder.law": "ideal"})
     sigma = noise_of_levels(data["i_1"].values, data["i_1_set"].values)
     t = data["time"].values
@@ -121,4 +121,5 @@ METHOD = Method(
     synthetic=synthetic,
     unknowns=_GAINS,
     several=True,
+    simulated=("i_step", "dwell", "duration", "interval", "sigma_i"),
 )  # fmt: skip

@@ -181,5 +181,6 @@ METHOD = Method(
     ),
     identify=identify,
     synthetic=synthetic,
+    simulated=("sigma_i", "sigma_F"),
     truth=truth,
 )

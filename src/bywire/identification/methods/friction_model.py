@@ -221,6 +221,7 @@ METHOD = Method(
     identify=identify,
     synthetic=synthetic,
     several=True,
+    simulated=("pressures", "v_max", "f_motion", "duration", "interval", "truth"),
     gaps=True,
     optional={"pressure": "Pa"},
     truth=known_values,

@@ -25,7 +25,7 @@ from bywire.identification.method import Check, Curve, Effort, Identified, Metho
 from bywire.identification.multistart import search
 from bywire.identification.output_error import even_interval, trial
 from bywire.identification.stick_slip.shooting import Shooting
-from bywire.identification.stick_slip.shots import Shot, cut_out
+from bywire.identification.stick_slip.shots import Shot, cut_out, require_reachable
 from bywire.identification.stick_slip.slips import find_slips, noise_of
 from bywire.identification.stick_slip.stribeck_band import stribeck_band
 from bywire.identification.stick_slip.whitening import Whitening
@@ -79,13 +79,14 @@ def identify(
     Raises
     ------
     ParameterError
-        When the record has no slip to learn from.
+        When the record has no slip to learn from, or a pressure that the brake cannot have.
 
     References
     ----------
     Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see ``slip_shooting``.
     """
     shots = shots_of(data, options)
+    require_reachable(shots, par)
     known = {_ZERO: options.zero, _RIPPLE: options.ripple}
     unknowns = (
         *parameters_of(par, [f"seal.{name}" for name in _NAMES]),
@@ -241,5 +242,6 @@ METHOD = Method(
     ),
     identify=identify,
     synthetic=synthetic,
+    simulated=("sigma_p", "sigma_i"),
     unknowns=tuple(f"seal.{name}" for name in _NAMES),
 )

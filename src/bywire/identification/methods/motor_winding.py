@@ -17,6 +17,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Unit, Voltage
 from bywire.identification.electrics.loop_records import (
     as_curve,
+    believable,
     checks_of,
     levels,
     noise_of_levels,
@@ -86,7 +87,7 @@ def identify(
     records = split(data)
     trials = []
     for label, one in records.items():
-        require_steps(one, "v", label)
+        require_steps(one, "v", "i", label)
         sigma = noise_of_levels(one["i"].values, one["v"].values)
         names = {"v": "v", "omega": "omega", "i": "i"}
         trials.append(winding_trial(par.motor, one, names, par.anti_alias.f_aa, sigma, label))
@@ -97,7 +98,7 @@ def identify(
         "the shaft does not turn: nothing tells K_e; let it turn, and measure its speed",
     )  # fmt: skip
     return Identified(
-        estimates={"winding": found}, parameters=found.parameters(),
+        estimates={"winding": found}, parameters=believable(found),
         checks=checks_of(trials, found), curves=tuple(as_curve(t, found) for t in trials),
         notes=notes,
     )  # fmt: skip
@@ -145,4 +146,7 @@ METHOD = Method(
     synthetic=synthetic,
     unknowns=_NAMES,
     several=True,
+    simulated=tuple(Options.model_fields),
+    bench_note="the record was made with a voltage source, its rotor locked or at a speed of its "
+    "own; the bench's shaft is free, and does not replay it: take over the values alone",
 )  # fmt: skip

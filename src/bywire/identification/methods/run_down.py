@@ -202,6 +202,7 @@ METHOD = Method(
     ),
     identify=identify,
     synthetic=synthetic,
+    simulated=("sigma_i", "sigma_q"),
     unknowns=NAMES,
     several=True,
 )

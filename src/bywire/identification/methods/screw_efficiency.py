@@ -212,5 +212,6 @@ METHOD = Method(
     ),
     identify=identify,
     synthetic=synthetic,
+    simulated=("sigma_i", "sigma_F"),
     unknowns=_NAMES,
 )

@@ -187,6 +187,7 @@ METHOD = Method(
     synthetic=synthetic,
     unknowns=("A", "F_0", "f"),
     several=True,
+    simulated=("pressures", "interval", "truth"),
     gaps=True,
     truth=known,
 )  # fmt: skip

@@ -184,6 +184,7 @@ METHOD = Method(
     ),
     identify=identify,
     synthetic=synthetic,
+    simulated=("sigma_i", "sigma_F"),
     unknowns=("heart.K_S", "heart.K_W", "heart.K_C"),
     several=True,
     truth=truth,

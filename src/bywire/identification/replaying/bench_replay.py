@@ -16,12 +16,16 @@ from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
-from bywire.core.errors import ParameterError, StepError, UnitError, unknown_name
-from bywire.core.signals import Signal, signals_of
-from bywire.data.column_units import measures, unit_of_symbol
+from bywire.core.errors import ParameterError, StepError, unknown_name
+from bywire.core.signals import signals_of
 from bywire.identification.measured import as_even
 from bywire.identification.output_error import even_interval
 from bywire.identification.records import RECORD
+from bywire.identification.replaying.compared import (
+    compared_outputs,
+    missed_samples,
+    require_measured,
+)
 from bywire.simulation.run import Run, simulate
 
 Array = NDArray[np.float64]
@@ -70,7 +74,8 @@ def replay(
     inputs
         Stimulus of the model -> measured signal; by default all of the same name.
     outputs
-        Outputs of the model, measured under the same names; by default all that are.
+        Outputs of the model, measured under the same names; by default all that are but flags,
+        what accumulates (energies, times) and what does not move.
     case
         Label of the experiment's run; the first one by default.
 
@@ -85,7 +90,7 @@ def replay(
         raise ParameterError("replay takes one record, and this measurement has several")
     chosen = _case(bench, case)
     driven = _inputs(chosen, data, inputs)
-    compared = _outputs(chosen, data, outputs, driven)
+    compared, passed = compared_outputs(chosen, data, outputs, driven)
     bench, notes = _started(bench, data, compared)
     chosen = _case(bench, case)
     data, chosen, said = _on_grid(bench, data, chosen)
@@ -103,7 +108,7 @@ def replay(
     return Replayed(
         _driving(chosen, data, driven),
         {name: _beside(data, name, modeled[name][rows:]) for name in compared},
-        run, (*notes, *said),
+        run, (*notes, *said, *missed_samples(data, compared), *passed),
     )  # fmt: skip
 
 
@@ -129,34 +134,8 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     for stimulus, signal in wanted.items():
         if stimulus not in stimuli:
             raise unknown_name("stimulus", stimulus, stimuli)
-        _require(data, signal, stimuli[stimulus])
+        require_measured(data, signal, stimuli[stimulus])
     return dict(wanted)
-
-
-def _outputs(
-    case: Case, data: xr.Dataset, wanted: Sequence[str] | None, driven: Mapping[str, str]
-) -> list[str]:
-    signals, there = signals_of(case.model.Output), [str(name) for name in data.data_vars]
-    if wanted is None:
-        wanted = [n for n in there if n in signals and n not in driven.values()]
-    if not wanted:
-        raise ParameterError(
-            "nothing measured is an output of the model: name signals as the model does (--map), "
-            f"for instance {', '.join(list(signals)[:6])}; measured are {', '.join(there)}"
-        )
-    for name in wanted:
-        if name not in signals:
-            raise unknown_name("output", name, signals)
-        _require(data, name, signals[name])
-    return list(wanted)
-
-
-def _require(data: xr.Dataset, name: str, signal: Signal) -> None:
-    if name not in data:
-        raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
-    unit = str(data[name].attrs.get("units", "1"))
-    if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
-        raise UnitError(f"{name} is measured in {unit}, but {signal.unit} is wanted: check the map")
 
 
 def _started(

@@ -11,15 +11,17 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.requirements import Verdict, check, judge
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.bench.requirements import Verdict
+from bywire.core.errors import ParameterError
 from bywire.data.lag import estimate_lag
 from bywire.identification.replaying.segments import Segment
+from bywire.identification.replaying.tolerances import judge_fit, require_known
 
 Array = NDArray[np.float64]
 
 _LARGEST_LAG = 0.25  # of a stretch
 _FIRST_LAG = 8.0  # samples
+_NO_LAG = 1e-3  # samples: what rounding makes of none
 
 
 @dataclass(frozen=True)
@@ -61,8 +63,9 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     Raises
     ------
     ParameterError
-        When the stretch holds fewer than two samples.
+        When the stretch goes beyond the record, or holds fewer than two samples.
     """
+    _require_within(pair["time"].values, segment)
     part = pair.sel(time=slice(segment.start - 1e-9, segment.stop + 1e-9))
     y, m = part["measured"].values, part["modeled"].values
     there = np.isfinite(y) & np.isfinite(m)
@@ -92,6 +95,17 @@ def fit_figures(pair: xr.Dataset, segment: Segment) -> tuple[Kpi, ...]:
     )  # fmt: skip
 
 
+def _require_within(time: Array, segment: Segment) -> None:
+    """Refuse a stretch of which a part was not measured; by a sample's interval it may."""
+    first, last = float(time[0]), float(time[-1])
+    spare = 1.001 * float(np.median(np.diff(time)))
+    if segment.start < first - spare or segment.stop > last + spare:
+        raise ParameterError(
+            f"segment {segment.name!r}, {segment.start:g} to {segment.stop:g} s, goes beyond the "
+            f"record, which holds {first:.6g} to {last:.6g} s: correct its start or stop"
+        )
+
+
 def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
     """Return the lag nearest to zero at which both go together best, and a note.
 
@@ -108,7 +122,8 @@ def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
         except ParameterError as error:
             return math.nan, str(error)
         if not found.at_limit and found.correlation > 0.0:
-            return found.value, f"correlation {found.correlation:.4f}"
+            value = found.value if abs(found.value) > _NO_LAG * step else 0.0
+            return value, f"correlation {found.correlation:.4f}"
         reach *= 2.0
     return math.nan, "no lag stands out"
 
@@ -118,33 +133,34 @@ def judged(
 ) -> tuple[SegmentFit, ...]:
     """Return the figures of all signals over all stretches, with the verdicts.
 
-    A tolerance named ``nrmse`` holds for every signal, ``p_mc.nrmse`` for one.
+    A tolerance named ``nrmse`` holds for every signal, ``p_mc.nrmse`` for one; its limits are
+    read by `bywire.identification.replaying.tolerances.judge_fit`.
 
     Raises
     ------
+    ParameterError, UnitError
+        When a limit cannot be read, or a stretch goes beyond the record.
     UnknownNameError
         When a tolerance names no figure or signal.
     """
     found = []
     for segment in segments:
         figures = {name: fit_figures(pair, segment) for name, pair in outputs.items()}
-        _require_known(segment, figures)
+        require_known(segment.tolerances, figures)
         for name, kpis in figures.items():
-            shared = {k: v for k, v in segment.tolerances.items() if "." not in k}
-            own = {
-                key.removeprefix(f"{name}."): text
-                for key, text in segment.tolerances.items()
-                if key.startswith(f"{name}.")
-            }
-            wanted = {**shared, **own}
-            check(wanted, {k.name: k.unit for k in kpis})
-            found.append(SegmentFit(segment, name, kpis, judge(wanted, kpis)))
+            verdicts = judge_fit(segment.tolerances, name, kpis)
+            found.append(SegmentFit(segment, name, kpis, verdicts))
     return tuple(found)
 
 
-def _require_known(segment: Segment, figures: Mapping[str, Sequence[Kpi]]) -> None:
-    names = [f"{name}.{k.name}" for name, kpis in figures.items() for k in kpis]
-    known = dict.fromkeys([*(name.partition(".")[2] for name in names), *names])
-    for name in segment.tolerances:
-        if name not in known:
-            raise unknown_name("figure", name, known)
+def undefined(fits: Sequence[SegmentFit]) -> tuple[str, ...]:
+    """Return why figures are not defined, a sentence for each reason."""
+    where: dict[tuple[str, str, str], list[str]] = {}
+    for fit in fits:
+        for kpi in fit.kpis:
+            if math.isnan(kpi.value):
+                where.setdefault((kpi.name, fit.signal, kpi.note), []).append(fit.segment.name)
+    return tuple(
+        f"{figure} of {signal} is not defined in {', '.join(segments)}: {reason}"
+        for (figure, signal, reason), segments in where.items()
+    )

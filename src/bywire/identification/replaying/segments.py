@@ -37,7 +37,8 @@ class Segment:
     start, stop
         On the measurement's clock [s].
     tolerances
-        Figure, or ``SIGNAL.FIGURE`` -> limit, such as ``{"nrmse": "<= 5 %"}``.
+        Figure, or ``SIGNAL.FIGURE`` -> limits, such as ``{"nrmse": "<= 5 %"}`` or
+        ``{"lag": ">= -1 ms and <= 5 ms"}``.
     """
 
     name: str
@@ -128,7 +129,10 @@ def _parsed(file: Path) -> dict[str, Any]:
         return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
     except RecursionError:
         raise FileError(f"{file} is nested far too deeply") from None
-    except (OSError, ValueError) as error:  # UnicodeDecodeError and TOMLDecodeError among them
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        raise FileError(f"cannot read segments {file}: {why}: give a TOML file") from None
+    except ValueError as error:  # UnicodeDecodeError and TOMLDecodeError among them
         raise FileError(f"cannot read segments {file}: {error}: give a TOML file") from None
 
 

@@ -1,0 +1,81 @@
+"""What an earlier identification left in the folder of ``--out``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from bywire.core.errors import FileError
+
+ESTIMATE = "estimate.json"
+"""file of the output folder that says which method wrote it, and what else it wrote"""
+
+_OURS = (".html", ".nc", ".png", ".toml")
+
+
+def require_own(out: Path, method: str) -> None:
+    """Refuse a folder that holds another method's result.
+
+    Raises
+    ------
+    FileError
+        When it does, or its result cannot be read.
+    """
+    earlier = _read(out)
+    if earlier is None or earlier.get("method") == method:
+        return
+    raise FileError(
+        f"{out} holds a result of {earlier.get('method') or 'something else'}: name another folder "
+        f"with --out for {method}, or remove {out / ESTIMATE} with the files that it lists"
+    )
+
+
+def remove(out: Path, keep: Sequence[Path]) -> None:
+    """Remove the files of an earlier result, so that none stands beside the new one.
+
+    Parameters
+    ----------
+    out
+        Folder.
+    keep
+        Files that stay: what is just being identified.
+
+    Raises
+    ------
+    FileError
+        When one cannot be removed.
+    """
+    earlier = _read(out)
+    if earlier is None:
+        return
+    kept = {path.resolve() for path in keep}
+    # Names alone, within the folder: it may have moved since. The list itself goes last.
+    names = [Path(str(text)).name for text in earlier.get("files", [])]
+    own = [out / name for name in names if Path(name).suffix in _OURS]
+    for path in (*own, out / ESTIMATE):
+        try:
+            if path.resolve() not in kept and path.is_file():
+                path.unlink()
+        except OSError as error:
+            raise FileError(
+                f"cannot remove {path} of an earlier result: {error.strerror}; name another folder "
+                "with --out"
+            ) from None
+
+
+def _read(out: Path) -> dict[str, Any] | None:
+    """Return an earlier result, None where there is none."""
+    path = out / ESTIMATE
+    if not path.exists():
+        return None
+    try:
+        found = json.loads(path.read_text(encoding="utf-8"))
+        if not (isinstance(found, dict) and isinstance(found.get("files", []), list)):
+            raise ValueError("it is no result of bywire identify")
+    except (OSError, ValueError) as error:
+        raise FileError(
+            f"{path} cannot be read ({error}): name another folder with --out, or remove it"
+        ) from None
+    return found
