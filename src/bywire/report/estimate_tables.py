@@ -27,7 +27,7 @@ def estimate_table(estimate: Estimate, before: Mapping[str, float] | None = None
         estimate.unknowns, estimate.values, estimate.intervals(), strict=True
     ):
         shown, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
-        share = f"{50.0 * float(high - low) / abs(value):.2g} %" if value else "-"
+        share = _percent(50.0 * float(high - low) / abs(value)) if value else "-"
         rows.append(
             (Cell(clean(unknown.label)), Cell(shown), Cell(half), Cell(share), Cell(unit),
              Cell(_old(before, unknown.label, unknown.unit)))
@@ -55,6 +55,13 @@ def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str
     if reach > 0.0 and number != 0.0:
         digits = min(max(math.floor(math.log10(abs(number)) - math.log10(reach)) + 2, 2), 9)
     return f"{number:.{digits}g}", f"{reach:.2g}", unit_text(unit) or "-"
+
+
+def _percent(share: float) -> str:
+    """Return an uncertainty in percent; a thousand of them say no more than many."""
+    if share >= 1000.0:
+        return "> 1000 %"
+    return f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"
 
 
 def _old(before: Mapping[str, float] | None, label: str, symbol: str) -> str:
