@@ -13,7 +13,7 @@ from bywire.bench.running import as_run
 from bywire.core import ops
 from bywire.core.errors import ParameterError, SolverError, UnknownNameError
 from bywire.core.model import Task
-from bywire.simulation import run as run_module
+from bywire.simulation import advance
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.native import SingleKernel
@@ -38,7 +38,7 @@ def test_chunks_do_not_show(system: str, engine: str, monkeypatch: pytest.Monkey
     reached: list[list[float]] = []
     results = []
     for seconds in (1e9, 1e-9):
-        monkeypatch.setattr(run_module, "_CHUNK_SECONDS", seconds)
+        monkeypatch.setattr(advance, "_CHUNK_SECONDS", seconds)
         shares: list[float] = []
         results.append(simulate(run, engine=engine, progress=shares.append))
         reached.append(shares)

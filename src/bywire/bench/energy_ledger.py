@@ -7,9 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
 
 BRAKE_SOURCES = {"E_source": "source"}
 BRAKE_SINKS = {

@@ -79,8 +79,3 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     damped = 2.0 * par.zeta * w * (par.c * u.omega_ref - speed)
     i = par.J_hat / par.K_hat * (stiff + damped)
     return State(last=u.theta, speed=speed), Output(i=ops.clip(i, -par.i_max, par.i_max))
-
-
-def at_rest(theta: Annotated[float, Signal("rad", "measured angle", 3.0)]) -> State:
-    """Return the state of a shaft that stands at an angle."""
-    return State(last=theta, speed=0.0)

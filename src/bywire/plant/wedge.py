@@ -99,16 +99,6 @@ def pad_power(x: State, u: Input, par: Parameters) -> Power:
     return par.mu_B * u.turning * u.F_N * x.v
 
 
-def brake_factor(par: Parameters) -> Annotated[float, Signal("1", "brake factor C*")]:
-    r"""Return the frictionless brake factor, :math:`C^* = 2 \mu_B / (\tan\alpha - \mu_B)`.
-
-    References
-    ----------
-    Roberts et al. (2003), section "Principle": positive means push, negative means pull.
-    """
-    return 2.0 * par.mu_B / (slope(par) - par.mu_B)
-
-
 def energy(x: State, par: Parameters) -> Energy:
     """Return the energy of motion and of the return spring."""
     return 0.5 * par.M_W * x.v * x.v + 0.5 * par.k_return * x.x * x.x

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_lanes import emit_lanes
@@ -22,7 +23,6 @@ from bywire.simulation.program import Program
 from bywire.simulation.run import (
     Run,
     initial_vector,
-    require_finite,
     sampled_stimulus,
     selected,
     simulate,

@@ -10,8 +10,9 @@ import casadi as ca
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal, signals_of
+from bywire.simulation.contact_set import contact_forces
 from bywire.simulation.model_check import check_model
-from bywire.simulation.scheme import Pass, Symbols, build_pass, contact_forces
+from bywire.simulation.scheme import Pass, Symbols, build_pass
 from bywire.simulation.stiff_contacts import contact_jacobians
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 

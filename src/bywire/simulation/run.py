@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
@@ -10,20 +9,18 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, SolverError, unknown_name
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.simulation.advance import Progress, advance_all
 from bywire.simulation.emission import Layout
-from bywire.simulation.engine import Engine, prepare
+from bywire.simulation.engine import prepare
 from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule, plan
 from bywire.simulation.stiff_contacts import unresolved
 
 Array = NDArray[np.float64]
-Progress = Callable[[float], None]
 Status = Literal["done", "interrupted", "unsettled"]
-
-_CHUNK_SECONDS = 0.1
 
 
 @dataclass(frozen=True)
@@ -149,7 +146,7 @@ def simulate(
     schedule = request.schedule
     vector = initial_vector(chosen.layout, run.state, run.memory)
     values = np.empty((schedule.rows, len(wanted)))
-    finished = _advance_all(chosen, request, vector, values, progress)
+    finished = advance_all(chosen, request, vector, values, progress)
     rows = schedule.rows if finished == schedule.frames else -(-finished // schedule.record_frames)
     counters = vector[chosen.layout.start["counters"] :]
     status: Status = "done" if finished == schedule.frames else "interrupted"
@@ -176,46 +173,6 @@ def _doubt(run: Run) -> str:
     p = np.array(list(run.par.leaves().values()))
     opened, *closed = map(np.array, jacobians(np.array(run.state), np.array(run.memory), p))
     return unresolved(opened, closed, run.step)
-
-
-def _advance_all(
-    engine: Engine, request: Request, vector: Array, values: Array, progress: Progress | None
-) -> int:
-    """Advance in chunks that leave room for progress and interrupts; return frames done."""
-    schedule = request.schedule
-    begin, size = 0, 16 * schedule.record_frames
-    while begin < schedule.frames:
-        end = min(begin + size, schedule.frames)
-        started, saved = time.perf_counter(), vector.copy()
-        row = -(-begin // schedule.record_frames)
-        try:
-            engine.advance(request, vector, begin, end, values[row:])
-        except KeyboardInterrupt:
-            vector[:] = saved
-            return begin
-        require_finite(engine.layout, vector, f"the run left the numbers before t = "
-                       f"{end * schedule.frame:g} s")  # fmt: skip
-        begin = end
-        try:
-            if progress is not None:
-                progress(end / schedule.frames)
-        except KeyboardInterrupt:
-            return begin
-        elapsed = max(time.perf_counter() - started, 1e-9)
-        factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
-        size = max(int(size * factor) // schedule.record_frames, 1) * schedule.record_frames
-    return begin
-
-
-def require_finite(layout: Layout, vector: Array, what: str) -> None:
-    """Raise ``SolverError`` unless all that a run, or several, carry on are numbers.
-
-    Not the states alone: a friction whose force is no number would pass for one that sticks.
-    """
-    if not np.all(np.isfinite(vector[: layout.start["counters"]])):
-        raise SolverError(
-            f"{what}: look for a parameter far from its usual magnitude, or take a smaller step"
-        )
 
 
 def sampled_stimulus(run: Run, schedule: Schedule) -> Array:

@@ -12,10 +12,9 @@ from typing import Any
 
 import casadi as ca
 
-from bywire.core.errors import SolverError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.contacts import active_stiffness
+from bywire.simulation.contact_set import gaps, stiffness, violations
 from bywire.simulation.elimination import Reduced, eliminate
 from bywire.simulation.linear_form import Form, forms
 from bywire.simulation.set_valued import Projection, project_exact, project_fast
@@ -92,8 +91,8 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
-    K = _stiffness(model, par, _gaps(model, par, y, y), exact)
-    at_y = K @ _gaps(model, par, y, y)
+    K = stiffness(model, par, gaps(model, par, y, y), exact)
+    at_y = K @ gaps(model, par, y, y)
     linear = _linearize(model, par, s, y, K)
     bounds = _bounds(model, par, s, y, at_y)
     mass = column(model.mass(symbol_tuple(model.State, y), par))
@@ -107,7 +106,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     x = column(
         [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
     )
-    overlap = _gaps(model, par, middle, y)
+    overlap = gaps(model, par, middle, y)
     contact = K @ overlap
     flow = model.powers(
         symbol_tuple(model.State, middle),
@@ -118,7 +117,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         scalars(contact),
         scalars(reaction),
     )
-    doubts = _violations(model, par, overlap, contact, exact)
+    doubts = violations(model, par, overlap, contact, exact)
     doubts.append(ca.if_else(projection.failed, 1, 0))
     if not exact:
         doubts += [-x[model.State._fields.index(name)] for name in model.limits]
@@ -127,49 +126,6 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     for doubt in doubts:
         flag = ca.fmax(flag, doubt)
     return Pass(x, d, reaction, column(flow), flag)
-
-
-def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
-    """Return the forces of all contacts at an instant: what is recorded, not what acts in a step.
-
-    Those of a substep belong to its middle; recorded as they are, they would be half a substep old.
-    """
-    overlap = _gaps(model, par, x, x)
-    return _stiffness(model, par, overlap, exact=True) @ overlap
-
-
-def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
-    """Return compliances, place among all contacts, and whether the pass takes them as open."""
-    matrices, found, at = model.compliance(par), [], 0
-    rarely = model.usually_open or (False,) * len(matrices)
-    for C, rare in zip(matrices, rarely, strict=True):
-        rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
-        found.append((rows, slice(at, at + len(C)), rare and not exact))
-        at += len(C)
-    return found
-
-
-def _stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
-    """Return the block-diagonal stiffness of the active subsets of all groups."""
-    blocks = [
-        SX(*rows.shape) if is_open else active_stiffness(rows, d[place])
-        for rows, place, is_open in _groups(model, par, exact)
-    ]
-    return ca.diagcat(*blocks) if blocks else SX(0, 0)
-
-
-def _gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
-    """Return all overlaps as affine functions of x whose coefficients can be hoisted."""
-    n = x.shape[0]
-    state, fixed = SX.sym("x_", n), SX.sym("xe_", n)
-    groups = model.gap(symbol_tuple(model.State, state), symbol_tuple(model.State, fixed), par)
-    gap = column([d for group in groups for d in group])
-    if any(nonlinear(gap, state)):
-        raise SolverError(f"{model.name}: the overlaps of contacts must be affine in the state")
-    slope = ca.jacobian(gap, state)
-    rest = ca.substitute(gap, state, SX.zeros(n))
-    rest, slope = ca.substitute([rest, slope], [fixed], [xe])
-    return slope @ x + rest
 
 
 def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
@@ -182,7 +138,7 @@ def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _
     variables = ca.vertcat(x, force)
     curved = nonlinear(f, variables)[:n]
     bent = [any(nonlinear(f[i], variables)) for i in range(n)]
-    pressed = K @ _gaps(model, par, x, y)
+    pressed = K @ gaps(model, par, x, y)
     at = column([y[k] if curved[k] else s.x[k] for k in range(n)])
     pressed = ca.densify(pressed)
     with_contact = ca.substitute(f, force, pressed)
@@ -240,21 +196,3 @@ def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> Any:
     known = {k: 0.5 * (projection.w[a] - s.x[k]) for a, k in enumerate(reduced.kept)}
     every = reduced.back_substitute(known)
     return column([every[k] for k in range(s.x.shape[0])])
-
-
-def _violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:
-    """Return what is positive where a contact set does not fit the midpoint that came out.
-
-    Forces of the assumed set that push, and overlaps outside it that they close, are the solution:
-    there is only one. Cheaper than to choose the set once more.
-    """
-    found: list[Any] = []
-    for rows, place, is_open in _groups(model, par, exact):
-        overlap, force = d[place], ca.densify(F[place])
-        closed = rows @ force
-        for k in range(overlap.shape[0]):
-            lack = overlap[k] - closed[k]
-            # Where a force pushes, the lack is zero but for rounding.
-            wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
-            found.append(overlap[k] if is_open else wrong)
-    return found

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
+from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_tangents import emit_tangents
@@ -23,7 +24,6 @@ from bywire.simulation.run import (
     Run,
     Trajectory,
     initial_vector,
-    require_finite,
     sampled_stimulus,
     selected,
 )
@@ -91,11 +91,13 @@ def simulate_with_sensitivities(
     parameters: Sequence[str],
     signals: Sequence[str],
     initial: Array | None = None,
+    memory: Array | None = None,
 ) -> Sensitivity:
     """Compute a run and the derivatives of its signals.
 
     Beside parameters, directions may be an initial state, ``initial.omega``, and a constant that
-    is added to a stimulus, ``stimulus.i_set``.
+    is added to a stimulus, ``stimulus.i_set``; or anything, ``start.p``, that acts through the
+    given derivatives of the start alone.
 
     Forward differentiation through every substep, friction and contact decisions included:
     exact derivatives of what is computed. Across stick-slip the instants of breakaway move with
@@ -113,6 +115,8 @@ def simulate_with_sensitivities(
     initial
         Derivatives of the initial state with respect to the parameters, shape
         (states, parameters); zero by default.
+    memory
+        The same of the initial memory, shape (memories, parameters).
 
     Raises
     ------
@@ -127,11 +131,8 @@ def simulate_with_sensitivities(
         raise ParameterError("sensitivities need at least one parameter: name it")
     prepared = prepare(run.model, run.par)
     directions = _directions(run, parameters, prepared.program.parameter_names)
-    wanted = (len(run.state), len(parameters))
-    if initial is not None and np.shape(initial) != wanted:
-        raise ParameterError(
-            f"initial has the shape {np.shape(initial)}, wanted is {wanted}: states, parameters"
-        )
+    _require_shape("initial", initial, (len(run.state), len(parameters)))
+    _require_shape("memory", memory, (len(run.memory), len(parameters)))
     from_start = directions.initial + (0.0 if initial is None else initial)
     compiler = find_compiler()
     if compiler is None:
@@ -160,6 +161,9 @@ def simulate_with_sensitivities(
         tangents = np.zeros((vector.size, DIRECTIONS))
         seeds[:, :here] = directions.seeds[:, lanes]
         tangents[: len(from_start), :here] = from_start[:, lanes]
+        if memory is not None:
+            at = kernel.layout.start["m"]
+            tangents[at : at + len(memory), :here] = memory[:, lanes]
         rec_t = np.empty((schedule.rows, selection.size, DIRECTIONS))
         kernel.run(
             (p, stimulus, vector, plan, selection, values, seeds, tangents, rec_t), schedule.step
@@ -178,6 +182,13 @@ def simulate_with_sensitivities(
         vector=vector,
     )
     return Sensitivity(trajectory, derivatives, tuple(parameters))
+
+
+def _require_shape(name: str, given: Array | None, wanted: tuple[int, int]) -> None:
+    if given is not None and np.shape(given) != wanted:
+        raise ParameterError(
+            f"{name} has the shape {np.shape(given)}, wanted is {wanted}: rows, parameters"
+        )
 
 
 @dataclass(frozen=True)
@@ -203,7 +214,7 @@ def _directions(run: Run, wanted: Sequence[str], known: Sequence[str]) -> _Direc
     states = [f"initial.{name}" for name in run.model.State._fields]
     stimuli = [f"stimulus.{name}" for name in run.model.Stimulus._fields]
     for name in wanted:
-        if name not in (*known, *states, *stimuli):
+        if name not in (*known, *states, *stimuli) and not name.startswith("start."):
             raise unknown_name("parameter", name, (*known, *states, *stimuli))
     own = [name for name in wanted if name in known] or [known[0]]  # a kernel has one at least
     seeded = [*own, *stimuli]

@@ -16,13 +16,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, ParameterError
+from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.engine import prepare
 from bywire.simulation.native import plan_array
 from bywire.simulation.program import Program
 from bywire.simulation.repetition import window_schedule
 from bywire.simulation.reversals import reversals
-from bywire.simulation.run import Run, initial_vector, require_finite, selected
+from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.sensitivity import DIRECTIONS, TangentKernel
 

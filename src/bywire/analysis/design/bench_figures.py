@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
 from bywire.analysis.loop import Loop
@@ -26,8 +25,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 _POINTS = 12
 _BELOW, _ABOVE = 4.0, 3.0  # of the target: the range of frequencies

@@ -232,16 +232,6 @@ def require_moving(model: PeriodicModel) -> None:
         )
 
 
-def averaged_model(
-    loop: Loop, par: ParameterSet, value: float, step: float | None = None
-) -> LinearModel:
-    """Return the model from a set point held over a dither period to the output's mean over it.
-
-    As `dithered_loop`, which says more.
-    """
-    return dithered_loop(loop, par, value, step).averaged
-
-
 def unrounded(loop: Loop, par: ParameterSet) -> ParameterSet:
     """Return parameters whose converters and encoders have no resolution."""
     changes = {

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -114,11 +112,6 @@ def needed_gain(par: Par, f: float, p: float) -> float:
     """
     amplitude = 0.5 * dead_band(par, p) / reach(par, f, p)
     return amplitude / float(dither.breakaway_current(p, par.ecu.est_par))
-
-
-def reaches(par: Par, frequencies: Sequence[float], p: float) -> Array:
-    """Return `reach` at every frequency, shape (n,)."""
-    return np.array([reach(par, f, p) for f in frequencies])
 
 
 def _efficiency(par: Par) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from bywire.analysis.loop import Loop, Quantity
-from bywire.analysis.loops.screw_rig_point import CAUSES, point
-from bywire.analysis.loops.wedge_causes import DRIVE_LIMITS
+from bywire.analysis.loops.position_control import BAND, TUNABLES
+from bywire.analysis.loops.screw_rig_point import point
+from bywire.analysis.loops.wedge_causes import DRIVE_LIMITS, DRIVE_TRAIN
 
 LOOP = Loop(
     name="force-against",
@@ -15,13 +16,10 @@ LOOP = Loop(
     output="F",
     cut="i_1_ref",
     point=point,
-    causes=CAUSES,
-    band=(1.0, 150.0),
+    causes=DRIVE_TRAIN,
+    band=BAND,
     amplitudes=(1e-3, 0.05, 0.1, 0.2),
-    tunables={
-        "control.position.f_n": (2.0, 200.0), "control.position.zeta": (0.2, 4.0),
-        "control.position.c": (0.0, 1.0),
-    },
+    tunables=TUNABLES,
     saturations=DRIVE_LIMITS,
     single=False,  # the force answers, the angle is controlled
 )

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.analysis.loops.wedge_causes import CAUSES, DRIVE_LIMITS
+from bywire.analysis.loop import Point, Quantity
+from bywire.analysis.loops.position_control import two_motor_loop
+from bywire.analysis.loops.wedge_causes import CAUSES
 from bywire.assemblies.wedge_brake import WedgeBrake
 from bywire.assemblies.wedge_control import Stimulus
 from bywire.assemblies.wedge_parameters import WedgeParameters
@@ -37,22 +38,10 @@ def point(par: ParameterSet, value: float) -> Point:
     return Point(WedgeBrake(), own, state_at(value, own), memory, stimulus)
 
 
-LOOP = Loop(
+LOOP = two_motor_loop(
     name="position",
-    assembly="wedge-brake",
     summary="position control of the assembled wedge in its clearance, 5 kHz",
     at=Quantity("wedge travel", "m", 0.0),
-    inputs=("theta_1_set", "theta_2_set"),
-    output="theta_2",
-    cut="i_2_ref",
     point=point,
     causes=CAUSES,
-    band=(1.0, 150.0),
-    amplitudes=(1e-3, 0.25, 0.5, 1.0),
-    tunables={
-        "control.position.f_n": (2.0, 200.0), "control.position.zeta": (0.2, 4.0),
-        "control.position.c": (0.0, 1.0),
-    },
-    saturations=DRIVE_LIMITS,
-    single=False,  # two motors share the load
 )

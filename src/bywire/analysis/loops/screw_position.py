@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, cast
+from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis.loops.position_control import BAND, TUNABLES
+from bywire.analysis.loops.wedge_causes import DRIVE_TRAIN
 from bywire.assemblies.shaft_rig import ShaftRig
 from bywire.assemblies.shaft_rig_plant import Memory, State, Stimulus
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
-CAUSES: Mapping[str, Mapping[str, Any]] = {
-    "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,
-                         "bearing.T_nu": 0.0},
-    "screw efficiency": {"screw.eta_f": 1.0, "screw.eta_b": 1.0},
-    "cogging": {"motor_1.T_cog": 0.0},
-    "encoder": {"encoder.law": "ideal"},
-}  # fmt: skip
+CAUSES = {**DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}  # the one motor that there is
 
 
 def point(par: ParameterSet, value: float) -> Point:
@@ -42,11 +37,8 @@ LOOP = Loop(
     cut="i_1_ref",
     point=point,
     causes=CAUSES,
-    band=(1.0, 150.0),
+    band=BAND,
     amplitudes=(1e-3, 0.25, 0.5, 1.0, 2.0),
-    tunables={
-        "control.position.f_n": (2.0, 200.0), "control.position.zeta": (0.2, 4.0),
-        "control.position.c": (0.0, 1.0),
-    },
+    tunables=TUNABLES,
     proof="screw-position",
 )

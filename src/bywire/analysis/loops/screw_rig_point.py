@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Any, cast
+from typing import cast
 
 from bywire.analysis.loop import Point
 from bywire.assemblies import screw_rig_plant as plant
@@ -14,15 +13,6 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 from bywire.plant import force_sensor, roller_screw, servo_motor
-
-CAUSES: Mapping[str, Mapping[str, Any]] = {
-    "bearing friction": {"bearing.C_0": 0.0, "bearing.C_1": 0.0, "bearing.C_2": 0.0,
-                         "bearing.T_nu": 0.0},
-    "screw efficiency": {"screw.eta_f": 1.0, "screw.eta_b": 1.0},
-    "cogging": {"motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0},
-    "encoder": {"encoder.law": "ideal"},
-}  # fmt: skip
-"""cause -> parameters without it"""
 
 
 def point(par: ParameterSet, value: float) -> Point:

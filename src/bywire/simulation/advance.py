@@ -1,0 +1,77 @@
+"""Carry a run forward, chunk by chunk, and refuse what leaves the numbers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import SolverError
+from bywire.simulation.emission import Layout
+from bywire.simulation.engine import Engine
+from bywire.simulation.native import Request
+
+Array = NDArray[np.float64]
+Progress = Callable[[float], None]
+
+_CHUNK_SECONDS = 0.1
+
+
+def advance_all(
+    engine: Engine, request: Request, vector: Array, values: Array, progress: Progress | None
+) -> int:
+    """Advance in chunks that leave room for progress and interrupts; return frames done.
+
+    Parameters
+    ----------
+    engine, request
+        What computes, and what of.
+    vector
+        State vector of the engine, renewed in place; where an interrupt ends the run it holds
+        the state after the frames that are done.
+    values
+        Recorded rows, filled in place, shape (rows, signals).
+    progress
+        Called with the finished share, 0 to 1, after every chunk.
+
+    Raises
+    ------
+    SolverError
+        When the trajectory leaves the numbers.
+    """
+    schedule = request.schedule
+    begin, size = 0, 16 * schedule.record_frames
+    while begin < schedule.frames:
+        end = min(begin + size, schedule.frames)
+        started, saved = time.perf_counter(), vector.copy()
+        row = -(-begin // schedule.record_frames)
+        try:
+            engine.advance(request, vector, begin, end, values[row:])
+        except KeyboardInterrupt:
+            vector[:] = saved
+            return begin
+        require_finite(engine.layout, vector, f"the run left the numbers before t = "
+                       f"{end * schedule.frame:g} s")  # fmt: skip
+        begin = end
+        try:
+            if progress is not None:
+                progress(end / schedule.frames)
+        except KeyboardInterrupt:
+            return begin
+        elapsed = max(time.perf_counter() - started, 1e-9)
+        factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)
+        size = max(int(size * factor) // schedule.record_frames, 1) * schedule.record_frames
+    return begin
+
+
+def require_finite(layout: Layout, vector: Array, what: str) -> None:
+    """Raise ``SolverError`` unless all that a run, or several, carry on are numbers.
+
+    Not the states alone: a friction whose force is no number would pass for one that sticks.
+    """
+    if not np.all(np.isfinite(vector[: layout.start["counters"]])):
+        raise SolverError(
+            f"{what}: look for a parameter far from its usual magnitude, or take a smaller step"
+        )
