@@ -5,9 +5,11 @@ import pytest
 import xarray as xr
 
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.data import resampling
 from bywire.data.alignment import resample
 from bywire.data.channel_quality import quality
 from bywire.data.lag import estimate_lag
+from bywire.data.resampling import METHODS
 
 
 def measurement(**channels):
@@ -109,6 +111,16 @@ def test_clipped_stretches_are_found_and_left_out_where_asked():
         assert not np.isnan(left_out[last + 1 : last + 100]).any()
 
 
+@pytest.mark.parametrize("method", METHODS)
+def test_the_axis_is_filled_piece_by_piece(method, monkeypatch):
+    time = np.arange(300) * 0.01
+    data = measurement(a=(time, np.sin(3 * time)))
+    whole = resample(data, "4 ms", method=method).dataset["a"].values
+    monkeypatch.setattr(resampling, "_BLOCK", 64)
+    pieces = resample(data, "4 ms", method=method).dataset["a"].values
+    np.testing.assert_allclose(pieces, whole, rtol=0, atol=1e-13)
+
+
 def test_jitter_is_the_largest_distance_from_the_median_step():
     time = np.arange(100) * 0.01
     time[50] += 0.003
@@ -121,7 +133,10 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
     ("options", "kind", "text"),
     [
         ({"interval": "0 s"}, ParameterError, "interval = '0 s' is not admissible"),
-        ({"interval": 1e-12}, ParameterError, "would make 2e[+]12 samples: choose a larger"),
+        ({"interval": 1e-12}, ParameterError, "would make 2e[+]12 samples of each signal"),
+        ({"interval": 2e-9}, ParameterError, r"14.9 GiB, and .* GiB are made at most"),
+        ({"interval": 0.1, "signals": ["high"], "exclude": ["clipped"]}, ParameterError,
+         "high has no value that is not excluded .clipped.: check its limits"),
         ({"interval": 1, "max_gap": -1}, ParameterError, "max_gap = -1"),
         ({"interval": 1, "method": "linaer"}, UnknownNameError, "did you mean 'linear'"),
         ({"interval": 1, "exclude": ["gap"]}, UnknownNameError, "did you mean 'gaps'"),
@@ -133,7 +148,10 @@ def test_jitter_is_the_largest_distance_from_the_median_step():
 )
 def test_refused_alignments(options, kind, text):
     t = [0, 1, 2]
-    data = measurement(a=(t, t), late=([5, 6], [1, 2]), none=(t, [np.nan, 1, np.nan]))
+    data = measurement(
+        a=(t, t), late=([5, 6], [1, 2]), none=(t, [np.nan, 1, np.nan]),
+        high=(t, [7, 8, 9], {"valid_min": 0.0, "valid_max": 5.0}),
+    )  # fmt: skip
     with pytest.raises(kind, match=text):
         resample(data, **{"signals": ["a"], **options})
 

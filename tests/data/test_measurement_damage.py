@@ -44,6 +44,30 @@ def test_cut_files(tmp_path, name):
     assert "is empty (0 bytes)" in errors[0]
 
 
+@pytest.mark.parametrize(
+    ("number", "mark", "lost", "text"),
+    [
+        ("{:.4f}", ".", 1, "'4.812' and without a line end, .* have more decimals"),
+        ("{:.4f}", ",", 2, "'4,81' and without a line end, .* have more decimals"),
+        ("{!r}", ".", 9, "without a line end, and all numbers before in that column are longer"),
+        ("{:.5e}", ".", 4, "'4.81260' and without a line end"),
+    ],
+)
+def test_a_table_that_ends_within_a_number(tmp_path, number, mark, lost, text):
+    """A missing line end alone is no damage, nor is a short number that has one."""
+    path = tmp_path / "a.csv"
+    rows = [f"{0.01 * k:.2f};{number.format(0.1234 * k * (1 + 1e-12))}"
+            for k in range(40)]  # fmt: skip
+    whole = "\n".join(["time [s];y [m]", *rows]).replace(".", mark)
+    path.write_text(whole)
+    assert read_measurement(path)["y"].size == 40
+    path.write_text(whole[:-lost])
+    with pytest.raises(FileError, match=rf"line 41: .*{text}"):
+        read_measurement(path)
+    path.write_text(whole[:-lost] + "\n")
+    assert read_measurement(path)["y"].size == 40
+
+
 def test_flipped_bytes(tmp_path, name):
     path = file_of(tmp_path, name, measurement(60))
     whole = path.read_bytes()
@@ -132,6 +156,20 @@ def test_hdf5_arrays_in_other_files_are_not_opened(tmp_path):
         read_measurement(tmp_path / "a.h5", {"rate": "1 Hz"})
 
 
+@pytest.mark.parametrize("ending", [".h5", ".mat"])
+def test_netcdf_files_are_not_read_as_bare_hdf5(tmp_path, ending):
+    """Their numbers may be packed, and HDF5 would give them as they are stored."""
+    pytest.importorskip("h5py")
+    path = tmp_path / f"a{ending}"
+    measurement().to_netcdf(path, engine="netcdf4", encoding={"x_mc": {"dtype": "i2",
+                            "scale_factor": 1e-3, "_FillValue": -32768}})  # fmt: skip
+    with pytest.raises(FileError, match="is a NetCDF file: rename it"):
+        read_measurement(path)
+    np.testing.assert_allclose(
+        read_measurement(path, {"format": "netcdf"})["x_mc"], measurement()["x_mc"], atol=6e-4
+    )
+
+
 def test_netcdf_counts_that_lie(tmp_path):
     path = tmp_path / "a.nc"
     measurement().to_netcdf(path, format="NETCDF3_CLASSIC", engine="netcdf4")
@@ -168,6 +206,22 @@ def test_mdf_blocks_that_lie(tmp_path, block, offset, layout, value, text):
     pytest.importorskip("asammdf")
     with pytest.raises(FileError, match=text):
         read_measurement(mdf_with(tmp_path, block, offset, layout, value))
+
+
+def test_mdf_blocks_that_inflate_too_far(tmp_path):
+    """Three records of 100 MB in 300 kB, of which 24 bytes are asked for."""
+    pytest.importorskip("asammdf")
+    path = mdf_with(tmp_path, b"##CG", 24 + 48 + 8, "<Q", 3)
+    data, size = bytearray(path.read_bytes()), 10**8
+    machine = zlib.compressobj(9)
+    packed = b"".join(machine.compress(bytes(size)) for _ in range(3)) + machine.flush()
+    struct.pack_into("<I", data, data.index(b"##CG") + 24 + 48 + 24, size)
+    struct.pack_into("<Q", data, data.index(b"##DG") + 24 + 16, len(data))
+    head = struct.pack("<2sBBIQQ", b"DT", 0, 0, 0, 3 * size, len(packed))
+    data += struct.pack("<4sIQQ", b"##DZ", 0, 24 + len(head) + len(packed), 0) + head + packed
+    path.write_bytes(data)
+    with pytest.raises(FileError, match="it is inflated as a whole"):
+        read_measurement(path)
 
 
 @pytest.mark.parametrize(

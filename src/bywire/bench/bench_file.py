@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import re
-import tomllib
 from collections.abc import Mapping
 from difflib import get_close_matches
 from pathlib import Path
@@ -15,19 +14,14 @@ from bywire.bench.registry import all_experiments, find_experiment
 from bywire.bench.stimuli import registry as stimuli
 from bywire.bench.values import parsed, require_unit, require_units
 from bywire.catalog.registry import entry, main_set
-from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.data.toml_file import read_toml
 
 _SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 _KEYS = ("experiment", "parameters", "assembly", "name")
 _SIMULATION = ("step", "record", "seed")
-LARGEST = 1_000_000
-"""size of a bench file in bytes; a larger one is refused before it is parsed"""
-
-# The time to read a dotted key grows with the square of its parts, so long ones are not read.
-_KEY_PARTS = 16
 _NAME = re.compile(r"[a-z][a-z0-9-]*")
-_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
-_LONG_KEY = re.compile(rf"(?<![\w-]){_PART}(?:[ \t]*\.[ \t]*{_PART}){{{_KEY_PARTS}}}")
+_TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
 
 
 def load(path: str | Path) -> Bench:
@@ -62,7 +56,9 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         ``experiment``, ``parameters``, or the dotted name of a parameter.
     """
     file = Path(path)
-    content = _of_experiment(file) or _parsed(file)
+    content = _of_experiment(file) or read_toml(
+        file, "bench file", missing=_nearest, too_large=_TOO_LARGE
+    )
     try:
         _require_shape(content)
         return from_mapping(_changed(content, changes), file.parent, _printable(file.stem))
@@ -123,41 +119,6 @@ def _of_experiment(file: Path) -> dict[str, Any]:
         return {}
     assembly = find_experiment(name).assembly
     return {"experiment": name, "parameters": main_set(assembly)}
-
-
-def _parsed(file: Path) -> dict[str, Any]:
-    text = _text(file)
-    try:
-        return tomllib.loads(text)
-    except RecursionError:
-        raise FileError(f"{file} is not a bench file: it is nested far too deeply") from None
-    except ValueError as error:  # TOMLDecodeError, or a number of thousands of digits
-        raise FileError(f"{file} is not valid TOML: {error}") from None
-
-
-def _text(file: Path) -> str:
-    """Return the text of a bench file; a mark of the byte order is let pass."""
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        hint = _nearest(file) if isinstance(error, FileNotFoundError) else "check the path"
-        raise FileError(f"cannot read bench file {file}: {reason}: {hint}") from None
-    if len(data) > LARGEST:
-        raise FileError(
-            f"{file} has more than {LARGEST // 1000} kB: that is no bench file; "
-            "measured traces go into a file of their own (options.trace)"
-        )
-    try:
-        text = data.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError:
-        raise FileError(
-            f"cannot read bench file {file}: it is not UTF-8 text: give a TOML file"
-        ) from None
-    if _LONG_KEY.search(text):
-        raise FileError(f"{file} holds a dotted key of more than {_KEY_PARTS} parts: shorten it")
-    return text
 
 
 def _nearest(file: Path) -> str:

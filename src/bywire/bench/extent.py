@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import os
 from typing import Any
 
 from bywire.bench.experiment import Case
 from bywire.core import units
 from bywire.core.errors import ParameterError, StepError, quoted
+from bywire.core.machine_memory import machine_memory as _memory
 from bywire.simulation.run import Run
 
 SHORTEST_STEP = 1e-9
@@ -17,7 +17,6 @@ LARGEST_SEED = 2**63 - 1
 
 _COPIES = 3  # of the recorded rows, while they become a dataset and a file
 _GIGA = 1e9
-_FALLBACK = 8.0 * _GIGA  # where the system does not tell its memory
 
 
 def checked_step(value: Any) -> float:
@@ -99,11 +98,3 @@ def check_memory(run: Run, signals: int) -> None:
             f"{needed / _GIGA:.3g} GB of memory, but this machine has {memory / _GIGA:.3g} GB: "
             "run shorter, or record less often (simulation.record)"
         )
-
-
-def _memory() -> float:
-    """Return the machine's memory in bytes."""
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES")) * float(os.sysconf("SC_PAGE_SIZE"))
-    except (AttributeError, ValueError, OSError):  # not every system has it
-        return _FALLBACK

@@ -13,74 +13,15 @@ from numpy.typing import NDArray
 
 from bywire.core import units
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.data.alignment_report import AlignedChannel, AlignmentReport
 from bywire.data.channel_quality import ChannelQuality, Stretch, quality
 from bywire.data.resampling import METHODS, resampled
+from bywire.data.room import room
 
 FLAWS = ("gaps", "missing", "clipped")
 """what may be excluded"""
 
 _SLACK = 1e-9  # intervals: rounding of instants that are meant to be the same
-_LARGEST = 2**31  # samples
-_FASTER = 0.01  # clocks of the same nominal rate differ by less
-
-
-@dataclass(frozen=True)
-class AlignedChannel:
-    """What was found in a channel, and what was done with it.
-
-    Parameters
-    ----------
-    name
-        Name of the signal.
-    quality
-        What it is like.
-    delay
-        By how much its instants had been moved back [s].
-    excluded
-        Number of samples of the common axis that are NaN because of its flaws.
-    """
-
-    name: str
-    quality: ChannelQuality
-    delay: float
-    excluded: int
-
-
-@dataclass(frozen=True)
-class AlignmentReport:
-    """What was done to bring signals to one time axis.
-
-    Parameters
-    ----------
-    interval
-        Step of the common axis [s].
-    start, stop
-        Its first and last instant [s].
-    samples
-        How many there are.
-    method
-        How values between samples were found.
-    exclude
-        Which flaws were excluded; the others were used.
-    channels
-        What was found and done, for each signal.
-    """
-
-    interval: float
-    start: float
-    stop: float
-    samples: int
-    method: str
-    exclude: tuple[str, ...]
-    channels: tuple[AlignedChannel, ...]
-
-    @property
-    def folded(self) -> tuple[str, ...]:
-        """Signals that are faster than the axis, so that their fast content folds into slow."""
-        if self.method == "average":
-            return ()
-        limit = (1.0 + _FASTER) / self.interval
-        return tuple(one.name for one in self.channels if one.quality.rate > limit)
 
 
 @dataclass(frozen=True)
@@ -130,8 +71,8 @@ def resample(
     Raises
     ------
     ParameterError
-        When interval or pause is not positive, a signal has too few values, or signals do not
-        overlap.
+        When interval or pause is not positive, the result would be too large, a signal has too
+        few values or none that is not excluded, or signals do not overlap.
     UnknownNameError
         For an unknown signal, method or flaw.
     """
@@ -212,11 +153,16 @@ def _axis(found: dict[str, ChannelQuality], step: float, method: str) -> NDArray
             f"{found[last_start].start:g} s and the end of {first_stop} at "
             f"{found[first_stop].stop:g} s: choose a smaller interval, or signals that overlap"
         )
-    if last - first >= _LARGEST:
+    size = 8 * (last - first + 1) * (len(found) + 1)
+    if size > room():
         raise ParameterError(
-            f"interval = {step:g} s would make {last - first + 1:.3g} samples: choose a larger one"
+            f"interval = {step:g} s would make {last - first + 1:.3g} samples of each signal, "
+            f"{size / 2**30:.3g} GiB, and {room() / 2**30:.3g} GiB are made at most: choose a "
+            "larger one, or fewer signals"
         )
-    return np.round(np.arange(first, last + 1) * step, 12)
+    axis = np.arange(first, last + 1, dtype=np.float64)
+    axis *= step
+    return np.round(axis, 12, out=axis)
 
 
 def _on_axis(
@@ -239,6 +185,11 @@ def _on_axis(
     for flaw in left_out:
         for stretch in getattr(found, flaw):
             flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
+    if flawed.all():
+        raise ParameterError(
+            f"{name} has no value that is not excluded ({', '.join(left_out)}): check its limits, "
+            "or exclude less"
+        )
     result[flawed] = np.nan
     return result, int(flawed.sum())
 

@@ -10,6 +10,7 @@ from bywire.data.mdf4_blocks import Block, Blocks
 
 _HEADER = 64  # bytes of the identification, before the first block
 _LONGEST_TEXT = 10 * 2**20  # bytes
+_LARGEST_BLOCK = 2**28  # bytes
 _DEEPEST = 6  # channels in channels, conversions in conversions
 _MOST_CONVERSIONS = 200_000
 _ZSTD = 2**15  # how many bytes one byte of the newer compressions can become
@@ -124,6 +125,12 @@ class _Checks:
         _, kind, _, _, size, stored = self._blocks.unpack(block, "2sBBIQQ")
         if stored > block.size - 24:
             raise self._blocks.damaged(block.address, "a compressed block is cut")
+        if size > _LARGEST_BLOCK:
+            raise FileError(
+                f"{self._path}: the compressed block at {block.address} has {size} bytes, and "
+                f"{_LARGEST_BLOCK} are read at most, for it is inflated as a whole: write the file "
+                "again in smaller blocks"
+            )
         ratio = 1 if kind in (0, 1) else _ZSTD // DEFLATE
         require_possible(self._path, f"the block at {block.address}", size, stored * ratio)
         return size

@@ -24,10 +24,8 @@ from bywire.data.format_registry import format_to_read
 from bywire.data.mapping import MeasurementMapping
 from bywire.data.mapping_file import read_mapping
 from bywire.data.mapping_tables import mapping_from
+from bywire.data.room import room
 from bywire.data.time_axis import AxisKey, instants
-
-LARGEST = 8 * 2**30
-"""bytes of numbers that are read at most, unless more is asked for"""
 
 
 def read_measurement(
@@ -36,7 +34,7 @@ def read_measurement(
     *,
     signals: Sequence[str] | None = None,
     progress: Progress = no_progress,
-    largest: int = LARGEST,
+    largest: int | None = None,
 ) -> xr.Dataset:
     """Read a measurement file.
 
@@ -52,8 +50,8 @@ def read_measurement(
     progress
         Called with a label and the finished share.
     largest
-        Most bytes of numbers to read; more is refused before anything is read. Of a text table
-        only reading tells how many there are.
+        Most bytes of numbers to read; more is refused before anything is read. 8 GiB by default,
+        or half the machine's memory. Of a text table only reading tells how many there are.
 
     Returns
     -------
@@ -79,7 +77,7 @@ def read_measurement(
     try:
         with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as source:
             chosen = choose(file, source, meaning, signals)
-            _require_room(file, source, chosen, largest)
+            _require_room(file, source, chosen, room() if largest is None else largest)
             dataset = _dataset(file, source, chosen, progress)
     except InputError:
         raise

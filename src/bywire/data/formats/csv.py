@@ -16,6 +16,7 @@ from bywire.core.errors import FileError
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
 from bywire.data.growing_columns import GrowingColumns
 from bywire.data.text_dialect import HEAD, Dialect, dialect_of
+from bywire.data.text_end import LOOKED_AT, require_whole_end
 from bywire.data.text_rows import strict_columns
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ class TextSource:
         indices = [self._index[name] for name in names]
         size = self._path.stat().st_size
         found = GrowingColumns(len(names), 0)
-        line, done = self._dialect.first_line, self._dialect.start
+        line, done, tail = self._dialect.first_line, self._dialect.start, b""
         for block in _blocks(self._path, self._dialect.start):
             columns = _fast(block, self._dialect, indices)
             if columns is None:
@@ -56,6 +57,8 @@ class TextSource:
                 found = GrowingColumns(len(names), int(expected) + 1)
             found.append(columns)
             line += block.count(b"\n")
+            tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
+            require_whole_end(self._path, tail, line, self._dialect)
             progress(f"reading {self._path.name}", done / max(size, 1))
         return dict(zip(names, found.finished(), strict=True))
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
 from bywire.data.declared_size import require_possible
+from bywire.data.failing_stream import kept
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
 from bywire.data.matlab_layout import Part, columns_of, described, parts_of
 
@@ -24,6 +25,7 @@ _DEEPEST, _MOST = 8, 10_000  # groups in groups; objects in a file
 _LONGEST = 1000  # characters of a text
 _USER_BLOCK = 512
 _HEADER = b"MATLAB 7.3 MAT-file, written by bywire".ljust(116) + bytes(8) + b"\x00\x02IM"
+_NETCDF = "_NCProperties"  # attribute of NetCDF files, whose numbers may be packed
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _WHAT = "MAT files of version 7.3"
 
@@ -126,6 +128,11 @@ def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
     h5py = library("h5py", _WHAT)
     try:
         with h5py.File(path, "r") as file:
+            if _NETCDF in file.attrs:
+                raise FileError(
+                    f"{path} is a NetCDF file: rename it with the ending .nc, or say "
+                    "format = 'netcdf'"
+                )
             yield Mat73Source(path, file)
     # The library tells a damaged file by any of these, depending on what is damaged.
     except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError) as error:
@@ -138,7 +145,7 @@ def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     h5py = library("h5py", _WHAT)
     texts = described(dataset, path)
-    with h5py.File(path, "w", userblock_size=_USER_BLOCK) as file:
+    with kept(path) as whole, h5py.File(whole, "w", userblock_size=_USER_BLOCK) as file:
         for k, (name, variable) in enumerate(dataset.variables.items()):
             numbers = np.asarray(variable.values, dtype=np.float64).reshape(1, -1)
             made = file.create_dataset(str(name), data=numbers, compression="gzip", shuffle=True,
