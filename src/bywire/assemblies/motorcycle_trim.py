@@ -79,10 +79,15 @@ def holding_current(p: float, par: Par) -> float:
     return torque / (efficiency * par.motor.K_e)
 
 
-def state_at(p: float, par: Par) -> State:
+def state_at(p: float, par: Par, current: float | None = None) -> State:
     """Return the state at rest at a pressure [Pa]; the friction holds what is left over.
 
     Without pressure the piston rests at its retracted end.
+
+    Parameters
+    ----------
+    current
+        Through the motor [A]; what balances the pressure without friction by default.
 
     Raises
     ------
@@ -97,21 +102,21 @@ def state_at(p: float, par: Par) -> State:
             f"<= {limit:g} bar, where the piston meets its end stop: start lower, or move the "
             "stop (master_cylinder.x_end)"
         )
-    i = 0.0 if par.drive.mode == "current-source" else holding_current(p, par)
+    held = holding_current(p, par) if current is None else current
     return State(
-        i=i,
+        i=0.0 if par.drive.mode == "current-source" else held,
         theta=x / par.gear.k_g,
         omega=0.0,
         p_mc=p,
         p_pd=p,
         y_p=pressure_sensor.reading(p + par.fluid.p_atm, par.pressure_sensor),
-        y_i=current_sensor.reading(holding_current(p, par), par.current_sensor),
+        y_i=current_sensor.reading(held, par.current_sensor),
     )
 
 
-def memory_at(p: float, par: Par) -> Memory:
-    """Return the memory in which every controller, or the ideal source, holds that equilibrium."""
-    i = holding_current(p, par)
+def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
+    """Return the memory in which every controller, or the ideal source, holds that state."""
+    i = holding_current(p, par) if current is None else current
     measured = zeros(Memory)._replace(p_meas=p, i_meas=i)
     if par.drive.mode == "voltage-source":
         return measured._replace(v_source=par.motor.R_m * i)

@@ -16,7 +16,8 @@ from bywire.benchmark.engine import timed
 from bywire.benchmark.result import Result, at_least
 from bywire.identification.method import Effort
 from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
-from bywire.identification.stick_slip.shooting import Shooting, overlaid
+from bywire.identification.stick_slip.overlay import overlaid
+from bywire.identification.stick_slip.shooting import BEFORE, Shooting, onset_of
 from bywire.identification.stick_slip.shots import Shot
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
@@ -39,7 +40,8 @@ def measured(par: MotorcycleParameters) -> list[Result]:
     shots = shots_of(data, options)
     unknowns = parameters_of(par, METHOD.unknowns)
     starts = scattered(unknowns, STARTS, 0.3, _SEED)[1 : 1 + _PEER_STARTS]
-    peer = timed(partial(_by_scipy, Shooting(par, unknowns, options.step), shots, unknowns, starts))
+    shooting = Shooting(par, unknowns, options.step)
+    peer = timed(partial(_by_scipy, shooting, shots, unknowns, starts, options))
     plain()
     seconds = [(plain(), ours(), plain()) for _ in range(_ROUNDS)]
     in_runs = median(2.0 * b / (a + c) for a, b, c in seconds)
@@ -58,7 +60,11 @@ def measured(par: MotorcycleParameters) -> list[Result]:
 
 
 def _by_scipy(
-    shooting: Shooting, shots: list[Shot], unknowns: tuple[Unknown, ...], starts: tuple[Array, ...]
+    shooting: Shooting,
+    shots: list[Shot],
+    unknowns: tuple[Unknown, ...],
+    starts: tuple[Array, ...],
+    options: Options,
 ) -> None:
     scale = np.array([u.scale for u in unknowns])
 
@@ -67,8 +73,8 @@ def _by_scipy(
         for shot in shots:
             run, current, _ = shooting.run(shot, z * scale)
             r, _, shift = overlaid(shot, simulate(run, ("p_mc",))["p_mc"])
-            rate, level = shot.line
-            parts.append(np.append(r / 2e3, (level + rate * shift - current) / 1e-3))
+            level, _ = onset_of(shot, shift + BEFORE)
+            parts.append(np.append(r / options.sigma_p, (level - current) / options.scatter))
         return np.concatenate(parts)
 
     bounds = (np.array([u.low for u in unknowns]) / scale, [u.high / u.scale for u in unknowns])

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,11 +16,13 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, SolverError
 from bywire.identification.least_squares import Loss, Problem, Solution, solve
+from bywire.identification.unknown import moved
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 _SAME = 0.01  # of the lowest cost: minima that count as one
+_ROUGH = 1e-4  # of the cost: enough to come nearer
 _ENDED = 1e-5  # of the cost: enough to tell minima apart; the best one is polished later
 
 
@@ -62,6 +64,7 @@ def search(
     progress: Progress | None = None,
     store: Path | None = None,
     threads: int | None = None,
+    before: Callable[[Array], Array] | None = None,
 ) -> Search:
     """Solve from every start.
 
@@ -78,6 +81,8 @@ def search(
         from there.
     threads
         All cores by default.
+    before
+        Brings each start nearer first.
 
     Raises
     ------
@@ -97,12 +102,14 @@ def search(
         return problem.evaluate(values)
 
     guarded = replace(problem, evaluate=evaluate)
+
+    def one(start: Array) -> Solution:
+        return solve(guarded, start if before is None else before(start), loss, share=_ENDED)
+
     failed = 0
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         jobs = {
-            pool.submit(solve, guarded, start, loss, share=_ENDED): k
-            for k, start in enumerate(starts)
-            if k not in found
+            pool.submit(one, start): k for k, start in enumerate(starts) if k not in found
         }
         try:
             for job in as_completed(jobs):
@@ -123,6 +130,18 @@ def search(
             "no start could be computed: begin nearer to the truth, or measure at other points"
         )
     return Search(tuple(found[k] for k in sorted(found)), failed)
+
+
+def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
+    """Return where a start leads with some unknowns, by name, held at it."""
+    fixed = [k for k, u in enumerate(problem.unknowns) if u.name in held]
+    rest = replace(problem, unknowns=moved(problem.unknowns, start))
+    for k in reversed(fixed):
+        rest = rest.held(k)
+    found = start.copy()
+    free = np.delete(np.arange(start.size), fixed)
+    found[free] = solve(rest, start[free], share=_ROUGH).values
+    return found
 
 
 def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:

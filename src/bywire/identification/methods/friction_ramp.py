@@ -22,13 +22,13 @@ from bywire.core.quantities import Current, Duration, Pressure, Unit
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.multistart import search
+from bywire.identification.multistart import nearer, search
 from bywire.identification.output_error import even_interval, trial
+from bywire.identification.stick_slip.loss import Noise, SlipLoss
 from bywire.identification.stick_slip.shooting import Shooting
 from bywire.identification.stick_slip.shots import Shot, cut_out, require_reachable
 from bywire.identification.stick_slip.slips import find_slips, noise_of
 from bywire.identification.stick_slip.stribeck_band import stribeck_band
-from bywire.identification.stick_slip.whitening import Whitening
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
 
@@ -36,9 +36,10 @@ Array = NDArray[np.float64]
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"
-# The search of several starts: coarse in time, and the beginnings of slips, whose cost has fewer
-# minima; weights that do not move. The best one is then fitted in full.
-_QUICK_STEP, _QUICK_LENGTH = 1e-4, 1.5  # s
+# The search of several starts, coarse in time: first the beginnings of slips, which have few minima
+# once that is held which they hardly tell. The best minimum is then fitted in full.
+_QUICK_STEP, _BEGINNING, _QUICK_LENGTH = 1e-4, 0.3, 4.0  # s
+_HARDLY_TOLD = ("seal.c", "seal.mu_T")
 _LIMIT_REPLAY, _LIMIT_RESIDUAL = 0.1, 1.1
 
 
@@ -50,8 +51,8 @@ class Options(ParameterSet):
     longest: Duration
     """how much of a slip is compared"""
     scatter: Current
-    """standard deviation of the current from slip to slip: of its measurement, and of what
-    breaks the piston away"""
+    """standard deviation of the current that breaks the piston away, from slip to slip, beside the
+    noise of its measurement and its ripple"""
     zero: Current
     """standard deviation of the zero of the current's sensor, which all slips share"""
     ripple: Current
@@ -60,7 +61,8 @@ class Options(ParameterSet):
     sigma_p: Annotated[float, Unit("Pa", 2e3), Field(ge=0)]
     """noise of the pressure in synthetic measurements"""
     sigma_i: Annotated[float, Unit("A", 1e-2), Field(ge=0)]
-    """noise of the measured current in synthetic measurements, beside the control's own"""
+    """noise of the current's sensors in synthetic measurements: of the one that is recorded, and
+    of the one that the control acts on"""
     step: Duration
     """substep of the slips' runs"""
 
@@ -75,6 +77,9 @@ def identify(
     data
         ``i``: measured motor current [A]; ``p_mc``: pressure [Pa]. The demand in place of the
         current biases the estimates: while the shaft turns quickly the current lags behind it.
+    par
+        What is known. Motor and current controller count: with them the current dips, as a slip
+        begins, that breaks away from the ramp; dither is off.
 
     Raises
     ------
@@ -83,7 +88,8 @@ def identify(
 
     References
     ----------
-    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see ``slip_shooting``.
+    Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see
+    ``stick_slip.loss``.
     """
     shots = shots_of(data, options)
     require_reachable(shots, par)
@@ -93,15 +99,16 @@ def identify(
         *(Unknown(k, 0.0, scale=v, unit="A", prior=(0.0, v)) for k, v in known.items()),
     )
     starts = scattered(unknowns, effort.starts, effort.spread, effort.seed)
-    quick = options.replace(
-        {"step": max(_QUICK_STEP, options.step), "longest": min(_QUICK_LENGTH, options.longest)}
+    beginning, longer = (
+        _problem(data, par, _quick(options, length), unknowns)
+        for length in (_BEGINNING, _QUICK_LENGTH)
     )
     found = search(
-        _problem(data, par, quick, unknowns, 0.0), starts, "linear", effort.progress, effort.store,
-        effort.threads,
+        longer, starts, "linear", effort.progress, effort.store, effort.threads,
+        partial(nearer, beginning, _HARDLY_TOLD),
     )  # fmt: skip
-    sigma_i = noise_of(data["i"].values)
-    best = estimate(_problem(data, par, options, unknowns, sigma_i), start=found.best.values)
+    at = found.best.values
+    best = estimate(_problem(data, par, options, unknowns, at), start=at)
     values = best.parameters()
     own = par.replace(values)
     shift = best[_ZERO] if _ZERO in best.names else 0.0
@@ -128,19 +135,25 @@ def identify(
     )  # fmt: skip
 
 
+def _quick(options: Options, length: float) -> Options:
+    return options.replace(
+        {"step": max(_QUICK_STEP, options.step), "longest": min(length, options.longest)}
+    )
+
+
 def _problem(
     data: xr.Dataset,
     par: MotorcycleParameters,
     options: Options,
     unknowns: tuple[Unknown, ...],
-    sigma_i: float,
+    weighted_at: Array | None = None,
 ) -> Problem:
     shots = shots_of(data, options)
-    sigma = max(noise_of(data["p_mc"].values), 1.0)
+    noise = Noise(
+        max(noise_of(data["p_mc"].values), 1.0), noise_of(data["i"].values), options.scatter
+    )
     shooting = Shooting(par, unknowns[: len(_NAMES)], options.step)
-    noise = (sigma, sigma_i, options.scatter)
-    evaluate = partial(_residuals, shooting, shots, noise)
-    return Problem(unknowns, evaluate, apart=len(shots))
+    return Problem(unknowns, SlipLoss(shooting, shots, noise, weighted_at), apart=len(shots))
 
 
 def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
@@ -161,30 +174,6 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     return cut_out(t, p, i, slips, options.longest)
 
 
-def _residuals(
-    shooting: Shooting, shots: list[Shot], noise: tuple[float, float, float], values: Array
-) -> tuple[Array, Array]:
-    """Return what the slips' shapes and their breakaway currents say, weighted.
-
-    Parameters
-    ----------
-    noise
-        Of a sample of pressure [Pa] and current [A], and the current's scatter [A].
-    """
-    seal, zero, ripple = values[: shooting.count], values[-2], values[-1]
-    residuals, slopes, breakaway, breakaway_slopes = [], [], [], []
-    for shot in shots:
-        one, way = shooting.fit(shot, seal), shot.slip.direction
-        whiten = Whitening(one, *noise)
-        r = one.residuals - way * ripple * one.by_current
-        none = np.zeros(r.size)
-        residuals.append(whiten(r))
-        slopes.append(whiten(np.column_stack((one.slopes, none, -way * one.by_current))))
-        breakaway.append((one.breakaway - zero + way * ripple) / noise[2])
-        breakaway_slopes.append(np.array([*one.breakaway_slopes, -1.0, way]) / noise[2])
-    return np.concatenate((*residuals, breakaway)), np.vstack((*slopes, *breakaway_slopes))
-
-
 def _counted(shots: Sequence[Shot]) -> str:
     up = sum(shot.slip.direction > 0 for shot in shots)
     return f"{up} slips up, {len(shots) - up} down"
@@ -199,7 +188,7 @@ def _replay(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Data
         memory=memory_at(start, own), step=step,
     )  # fmt: skip
     modeled = simulate(whole.run, ("p_mc",))["p_mc"]
-    attrs = {"units": "Pa", "long_name": "p_mc"}
+    attrs = {"units": "Pa", "long_name": "master-cylinder pressure"}
     return xr.Dataset(
         {"measured": ("time", data["p_mc"].values, attrs), "modeled": ("time", modeled, attrs)},
         {"time": data["time"]},
@@ -216,9 +205,12 @@ def _stribeck(par: MotorcycleParameters, found: Estimate) -> Curve:
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
-    """Return the ramp of eq. (17) without dither, simulated, with the sensor's noise."""
-    case = friction_ramp.EXPERIMENT.cases(par, friction_ramp.EXPERIMENT.defaults, None)[0]
-    made = simulate(as_run(case, 20e-6), ("i", "p_mc"))
+    """Return the ramp of eq. (17) without dither, simulated, with the sensors' noise."""
+    sensor = par.current_sensor
+    share = options.sigma_i / (sensor.i_high - sensor.i_low)
+    own = par.replace({"adc.noise": float(np.hypot(par.adc.noise, share))})
+    case = friction_ramp.EXPERIMENT.cases(own, friction_ramp.EXPERIMENT.defaults, None)[0]
+    made = simulate(as_run(case, 20e-6, seed=(seed,)), ("i", "p_mc"))
     random = np.random.default_rng(seed)
     noise = random.normal(0.0, options.sigma_p, made.time.size)
     noise_i = random.normal(random.normal(0.0, options.zero), options.sigma_i, made.time.size)
@@ -237,11 +229,15 @@ METHOD = Method(
     signals={"i": "A", "p_mc": "Pa"},
     options=Options,
     defaults=Options(
-        least=0.2e5, longest=6.0, scatter=1e-3, zero=2e-3, ripple=3e-3, sigma_p=2e3,
+        least=0.2e5, longest=6.0, scatter=5e-4, zero=2e-3, ripple=1e-2, sigma_p=2e3,
         sigma_i=3e-3, step=20e-6,
     ),
     identify=identify,
     synthetic=synthetic,
     simulated=("sigma_p", "sigma_i"),
     unknowns=tuple(f"seal.{name}" for name in _NAMES),
+    further={
+        _ZERO: ("A", "reading of the current's sensor without current"),
+        _RIPPLE: ("A", "by how much the current at its peaks exceeds its mean"),
+    },
 )

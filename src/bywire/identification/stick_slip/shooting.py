@@ -5,13 +5,18 @@ early or too late costs as much as one that is not there. So each slip is run by
 rest that was measured, beginning where the model breaks away, and moved in time to where it lies
 best on the measured one. What breaking away tells, the current at which it happened, is a residual
 of its own.
+
+The run's demand ramps through the model's own breakaway current, and the modeled control answers to
+the motor's induced voltage: the current dips as it did on the bench, at the right time. From where
+the slip has begun, the demand is corrected by how far the measured current lies beside that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,18 +25,22 @@ from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.identification.equation import Equation, EquationError
-from bywire.identification.stick_slip.shots import LEAD, Shot
-from bywire.identification.stick_slip.slips import Slip
+from bywire.identification.stick_slip.overlay import best_shift, overlaid
+from bywire.identification.stick_slip.shots import Shot
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 
 Array = NDArray[np.float64]
 
-_ROUNDS = 12  # of Newton for the shift in time
-_SMOOTHED = 0.006  # s: the converter's noise on the current
-_BEGUN = 0.02  # of a slip: before, that noise would decide when the model breaks away
+BEFORE = 0.01
+"""rest before the model breaks away [s]"""
+_SMOOTHED = 0.01  # s: over which the measured current is
+_BEGUN = 0.02  # of a slip: before, the current's noise would decide when the model breaks away
 _BEGUN_AT = 2e3  # Pa: of a long one
+_ALIGNED = 2  # times that the measured current is laid over the slip which it drives
+_MORE = 1e-3  # A: with which the answer to an offset is computed
+_I_SET = MotorcycleBrake().Stimulus._fields.index("i_set")
 
 
 @dataclass(frozen=True)
@@ -45,7 +54,7 @@ class Fitted:
     slopes
         Their derivatives by the unknowns with the shift at its best, shape (n, p).
     by_current
-        Derivative of the residuals by an offset of the current [Pa/A], shape (n,).
+        Derivative of the residuals by an offset of the current along the slip [Pa/A], shape (n,).
     answer, speed
         The same with the shift kept [Pa/A], and how fast the pressure moves [Pa/s], shape (n,).
     breakaway, breakaway_slopes
@@ -82,13 +91,20 @@ class Shooting:
     """
 
     def __init__(
-        self, par: MotorcycleParameters, unknowns: Sequence[Unknown], step: float = 20e-6
+        self,
+        par: MotorcycleParameters,
+        unknowns: Sequence[Unknown],
+        step: float = 20e-6,
     ) -> None:
-        self.par = par.replace({"drive.mode": "current-source"})
+        self.par = par.replace(
+            {"drive.mode": "current", "ecu.dither.waveform": "off",
+             "adc.law": "ideal", "adc.noise": 0.0}
+        )  # fmt: skip
+        self._source = par.replace({"drive.mode": "current-source"})
         self.names = tuple(u.name for u in unknowns)
         self.count = len(self.names)
         self.model, self.step = MotorcycleBrake(), step
-        self._error = EquationError(Equation(self.model, "omega", "alpha"), self.par, unknowns)
+        self._error = EquationError(Equation(self.model, "omega", "alpha"), self._source, unknowns)
 
     def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
         """Return the current [A] that breaks away from a rest [Pa], and its derivatives.
@@ -97,8 +113,8 @@ class Shooting:
         motion, which is affine in the current.
         """
         columns = self._error.at(
-            state_at(max(rest, 0.0), self.par)._replace(omega=direction * 1e-12),
-            memory_at(max(rest, 0.0), self.par), "i_source", (0.0, 1.0),
+            state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
+            memory_at(max(rest, 0.0), self._source), "i_source", (0.0, 1.0),
         )  # fmt: skip
         e, slopes = self._error(columns, values)
         per_ampere = e[1] - e[0]
@@ -107,112 +123,115 @@ class Shooting:
     def run(self, shot: Shot, values: Array) -> tuple[Run, float, Array]:
         """Return the run of one slip, the current [A] it breaks away at, and its derivatives.
 
-        The current grows as it did before the slip; once the slip has begun it follows the
-        measured one, which dips where the shaft turns quickly.
+        The demand ramps past that current as the measured one did; the control answers to what
+        the motor induces, as it did on the bench.
         """
-        slip, interval, t = shot.slip, _interval(shot), _clock(shot)
+        slip, interval = shot.slip, shot.interval
         current, current_slopes = self.breakaway(slip.rest, slip.direction, values)
-        rate, level = shot.line
-        middle = t + 0.5 * interval  # what is held over an interval, without lag
-        ramp = current + rate * middle
         par = self.par.replace(dict(zip(self.names, values.tolist(), strict=True)))
-        rest = max(slip.rest, 0.0)
+        after = shot.clock + 0.5 * interval - BEFORE  # what is held over an interval, without lag
+        demand = current + shot.rate * after
+        rest, start = max(slip.rest, 0.0), float(demand[0])
         run = Run(
-            self.model, par, state_at(rest, par), memory_at(rest, par),
-            partial(_held, ramp, interval), (t.size - 1) * interval, self.step, interval,
+            self.model, par, state_at(rest, par, start), memory_at(rest, par, start),
+            partial(_held, demand, interval), (demand.size - 1) * interval, self.step, interval,
         )  # fmt: skip
-        alone = simulate(run, ("p_mc",))["p_mc"]
-        shift = _best_shift(shot, alone)
-        dip = _dip(np.interp(middle + shift, t, shot.current - level - rate * t), interval)
-        travel = np.abs(alone - alone[0])
-        dip[travel < min(_BEGUN * travel.max(), _BEGUN_AT)] = 0.0
-        return replace(run, stimulus=partial(_held, ramp + dip, interval)), current, current_slopes
+        return run, current, current_slopes
 
-    def fit(self, shot: Shot, values: Array) -> Fitted:
-        """Run one slip and lay it over the measured one."""
+    def fit(self, shot: Shot, values: Array, zero: float | None = None) -> Fitted:
+        """Run one slip and lay it over the measured one.
+
+        Parameters
+        ----------
+        values
+            Of the unknowns.
+        zero
+            Reading of the current's sensor without current [A]. The slip is then driven by the
+            measured current once it has begun; without, by its ramp alone.
+        """
         run, current, current_slopes = self.run(shot, values)
-        found = simulate_with_sensitivities(run, [*self.names, "stimulus.i_set"], ("p_mc",))
-        slopes, by_current = found.derivatives[:, 0, :-1], found.derivatives[:, 0, -1:]
-        slopes = np.hstack((slopes + by_current * current_slopes, by_current))
+        answer = np.zeros(shot.time.size)
+        if zero is not None:
+            run, driven = self._driven(run, shot, zero)
+            more = simulate(replace(run, stimulus=_with(run, _MORE * driven)), ("p_mc",))
+            answer = (more["p_mc"] - simulate(run, ("p_mc",))["p_mc"]) / _MORE
+        state, memory = self._start_slopes(run, shot)
+        found = simulate_with_sensitivities(
+            run, [*self.names, "stimulus.i_set"], ("p_mc",), state, memory
+        )
+        columns = found.derivatives[:, 0]
+        # the demand begins at the breakaway current, and goes on as measured
+        slopes = columns[:, :-1] + np.outer(columns[:, -1] - answer, current_slopes)
         r, v, shift = overlaid(shot, found.trajectory["p_mc"])
-        t, (rate, level) = _clock(shot), shot.line
-        at = t - shift
-        J = np.column_stack([np.interp(at, t, column) for column in slopes.T])
+        at = shot.clock - shift
+        J = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
         J[at < 0.0] = 0.0
         shift_slopes = (v @ J) / max(float(v @ v), 1e-300)
         answer, J = J[:, -1], J - np.outer(v, shift_slopes)
+        level, rate = onset_of(shot, shift + BEFORE)
         return Fitted(
             residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=answer, speed=v,
-            breakaway=level + rate * shift - current,
+            breakaway=level - current,
             breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
-            current=current, onset=float(shot.time[0] + shift),
+            current=current, onset=float(shot.time[0] + shift + BEFORE),
         )  # fmt: skip
 
+    def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
+        """Return derivatives of the start by the unknowns, and by an offset of the demand."""
+        rest, start = max(shot.slip.rest, 0.0), float(run.state.i)
 
-def overlaid(shot: Shot, p: Array) -> tuple[Array, Array, float]:
-    """Return computed less measured pressure, the computed speed, and the shift between them.
+        def at(current: float) -> Array:
+            both = (*state_at(rest, self.par, current), *memory_at(rest, self.par, current))
+            return np.array(both)
 
-    Parameters
-    ----------
-    p
-        Computed pressure [Pa], shape (n,); moved in time to where it lies best.
+        slopes = np.zeros((len(run.state) + len(run.memory), self.count + 1))
+        slopes[:, -1] = (at(start + _MORE) - at(start - _MORE)) / (2.0 * _MORE)
+        return slopes[: len(run.state)], slopes[len(run.state) :]
+
+    def _driven(self, ramp: Run, shot: Shot, zero: float) -> tuple[Run, Array]:
+        """Return the run driven by the measured current, and where it is (1, before 0)."""
+        middle = shot.clock + 0.5 * shot.interval
+        measured = _smooth(shot.current - zero, shot.interval)
+        run, more = ramp, np.zeros(middle.size)
+        for _ in range(_ALIGNED):
+            found = simulate(run, ("p_mc", "i"))
+            p, i = found["p_mc"], _smooth(found["i"], shot.interval)
+            shift = best_shift(shot, p, shot.steep)
+            travel = np.abs(p - p[0])
+            begun = np.where(travel > min(_BEGUN * travel.max(), _BEGUN_AT), 1.0, 0.0)
+            wanted = np.interp(np.asarray(middle + shift), shot.clock, measured)
+            more = begun * (more + wanted - np.interp(middle, shot.clock, i))
+            run = replace(ramp, stimulus=_with(ramp, more))
+        return run, begun
+
+
+def _with(run: Run, more: Array) -> Callable[[Array], Array]:
+    """Return the run's stimulus with more demand at each of its intervals."""
+    interval = run.record
+    demand = run.stimulus(np.arange(more.size, dtype=np.float64) * interval)[:, _I_SET]
+    return partial(_held, demand + more, interval)
+
+
+def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
+    """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
+
+    The rate is no slower than the ramp's: what brings the piston to breaking away drives it on.
     """
-    shift = _best_shift(shot, p)
-    r, v = _laid_over(shot, p, shift)
-    return r, v, shift
-
-
-def _interval(shot: Shot) -> float:
-    return float(f"{shot.time[1] - shot.time[0]:.9g}")
-
-
-def _clock(shot: Shot) -> Array:
-    """Return the time since the first row [s], shape (n,)."""
-    return np.arange(shot.time.size, dtype=float) * _interval(shot)
+    level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
+    way = float(np.sign(shot.rate)) or float(shot.slip.direction)
+    return level, way * max(way * slope, way * shot.rate)
 
 
 def _held(ramp: Array, interval: float, at: Array) -> Array:
     fields = MotorcycleBrake().Stimulus._fields
     rows = np.zeros((at.size, len(fields)))
     index = np.clip(np.floor(at / interval + 1e-6).astype(int), 0, ramp.size - 1)
-    rows[:, fields.index("i_set")] = ramp[index]
+    rows[:, _I_SET] = ramp[index]
     return rows
 
 
-def _dip(beside: Array, interval: float) -> Array:
-    """Return how far the current leaves its ramp, smoothed over a few samples."""
+def _smooth(values: NDArray[np.floating[Any]], interval: float) -> Array:
+    """Return the mean over a few samples around each."""
     width = 2 * int(0.5 * _SMOOTHED / interval) + 1
-    padded = np.pad(beside, width // 2, mode="edge")
-    return np.convolve(padded, np.ones(width) / width, mode="valid")
-
-
-def _best_shift(shot: Shot, p: Array) -> float:
-    """Return by how much later the computed slip lies on the measured one [s] (Gauss, Newton)."""
-    t = _clock(shot)
-    shift = _half_way(t, shot.pressure, shot.slip) - _half_way(t, p, shot.slip)
-    for _ in range(_ROUNDS):
-        r, v = _laid_over(shot, p, shift)
-        size = float(v @ v)
-        if size == 0.0:
-            break
-        change = float(v @ r) / size
-        shift += float(np.clip(change, -LEAD, LEAD))
-        if abs(change) < 1e-9:
-            break
-    return shift
-
-
-def _laid_over(shot: Shot, p: Array, shift: float) -> tuple[Array, Array]:
-    """Return computed less measured pressure with the computed one later, and its speed."""
-    t = _clock(shot)
-    at = t - shift
-    v = np.interp(at, t, np.gradient(p, _interval(shot)))
-    v[(at <= 0.0) | (at >= t[-1])] = 0.0
-    return np.interp(at, t, p) - shot.pressure, v
-
-
-def _half_way(t: Array, p: Array, slip: Slip) -> float:
-    """Return when a slip has gone half of its way [s]."""
-    middle = 0.5 * (p[0] + p[-1])
-    beyond = np.flatnonzero(slip.direction * (p - middle) > 0.0)
-    return float(t[beyond[0]]) if beyond.size else float(t[-1])
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(np.convolve(padded, np.ones(width) / width, mode="valid"), dtype=float)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,9 @@ Array = NDArray[np.float64]
 LEAD = 0.05
 """rest before the measured onset [s]"""
 _LEAST = 8  # samples
-_RESTED = 1.0  # s of rest from which the ramp of the current is read
+_RESTED = 1.0  # s of rest from which its pressure and the ramp of the current are read
+_COMPARED = 0.9  # of a slip's way: its end, like its beginning, is up to the current's ripple
+_SEEN = 0.016  # s: over which the current is read, short as its ripple moves it
 
 
 @dataclass(frozen=True)
@@ -31,16 +33,39 @@ class Shot:
         Where it lies.
     time, pressure, current
         Measured around it, from a little before its onset; shape (n,), SI.
-    line
-        Rate [A/s] and level [A], at the first of these times, of the current's ramp while the
-        piston rested.
+    rate
+        Of the current's ramp while the piston rested [A/s].
+    unrest
+        Standard deviation of the current from that ramp [A].
+    before, slope
+        Level [A] and rate [A/s] of the current at each time, from a line through what was
+        measured shortly before it; shape (n,).
+    seen
+        How many samples that line goes through.
+    steep
+        Rows in which the first half of the way is made.
     """
 
     slip: Slip
     time: Array
     pressure: Array
     current: Array
-    line: tuple[float, float]
+    rate: float
+    unrest: float
+    before: Array
+    slope: Array
+    seen: int
+    steep: int
+
+    @property
+    def interval(self) -> float:
+        """Sample time [s]."""
+        return float(f"{self.time[1] - self.time[0]:.9g}")
+
+    @property
+    def clock(self) -> Array:
+        """Time since the first row [s], shape (n,)."""
+        return np.arange(self.time.size, dtype=float) * self.interval
 
 
 def cut_out(
@@ -58,18 +83,27 @@ def cut_out(
     interval = float(time[1] - time[0])
     found = []
     lead, most, rested = (int(span / interval) for span in (LEAD, longest, _RESTED))
+    seen = max(round(_SEEN / interval), 4)
     for k, slip in enumerate(slips):
         first = max(slip.begin - lead, 0)
         until = slips[k + 1].begin - lead if k + 1 < len(slips) else time.size
-        last = min(slip.end + 2 * lead, slip.begin + most, until)
+        compared, half = (_passed(pressure, slip, 2 * lead, share) for share in (_COMPARED, 0.5))
+        last = min(compared, slip.begin + most, until)
         if last - first < _LEAST or slip.begin < 2:
             continue
         since = max(slip.begin - rested, slips[k - 1].end + lead if k else 0)
-        before = slice(min(since, slip.begin - 2), slip.begin)
-        rate, level = np.polyfit(time[before] - time[first], current[before], 1)
+        rest = slice(min(since, slip.begin - 2), slip.begin)
         rows = slice(first, last)
-        line = (float(rate), float(level))
-        found.append(Shot(slip, time[rows], pressure[rows], current[rows], line))
+        level, slope = _lines_before(current, first, last, seen)
+        line = np.polynomial.Polynomial.fit(time[rest], current[rest], 1)
+        unrest = float(np.std(current[rest] - line(time[rest])))
+        rate = float(line.deriv()(time[first]))
+        own = replace(slip, rest=float(pressure[rest].mean()))
+        shot = Shot(
+            own, time[rows], pressure[rows], current[rows], rate, unrest, level, slope / interval,
+            seen, min(half, last) - first,
+        )  # fmt: skip
+        found.append(shot)
     if not found:
         raise ParameterError(
             f"none of the {len(slips)} slips has {_LEAST} samples before the next one begins: they "
@@ -77,6 +111,24 @@ def cut_out(
             "slip (--option least=...)"
         )
     return found
+
+
+def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:
+    """Return the sample at which a slip has gone a share of its way."""
+    end = float(values[slip.end : slip.end + rest].mean())
+    beyond = slip.direction * (values[slip.begin :] - slip.rest) > share * abs(end - slip.rest)
+    return slip.begin + int(np.argmax(beyond))
+
+
+def _lines_before(values: Array, first: int, last: int, seen: int) -> tuple[Array, Array]:
+    """Return level, and change per sample, at each sample of a line through those before it."""
+    at = np.arange(1 - seen, 1, dtype=float)
+    centered = at - at.mean()
+    slope = centered / (centered @ centered)
+    level = 1.0 / seen - at.mean() * slope
+    padded = np.concatenate((np.full(max(seen - 1 - first, 0), values[0]), values[:last]))
+    windows = np.lib.stride_tricks.sliding_window_view(padded[-(last - first + seen - 1) :], seen)
+    return np.asarray(windows @ level), np.asarray(windows @ slope)
 
 
 def require_reachable(shots: Sequence[Shot], par: MotorcycleParameters) -> None:

@@ -11,6 +11,7 @@ Array = NDArray[np.float64]
 
 _WINDOW = 0.02  # s: over which a change counts as motion
 _SURE = 6.0  # standard deviations of that change
+_OVER_NOISE = 6.0  # standard deviations of the rest before: smaller changes are its noise
 _PAUSE = 0.05  # s: shorter rests belong to the slip around them
 
 
@@ -60,7 +61,7 @@ def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
     interval
         Sample time [s].
     least
-        Changes smaller than this are no slips.
+        Changes smaller than this are no slips, nor such as the noise of the rest before makes.
     """
     width = max(round(_WINDOW / interval), 1)
     smooth = _mean(values, width)
@@ -70,10 +71,12 @@ def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
     moving = np.abs(change) > threshold
     slips = []
     for begin, end in _stretches(moving, int(_PAUSE / interval)):
-        for first, last in _one_way(values, begin, end, least):
+        for first, last in _one_way(smooth, begin, end, least):
             before = values[max(first - 5 * width, 0) : max(first - width, 1)]
-            travel = values[min(last, values.size - 1)] - before.mean()
-            if abs(travel) >= least:
+            if before.size < width:
+                continue  # what it rested at was not measured
+            travel = smooth[min(last, values.size - 1)] - before.mean()
+            if abs(travel) >= max(least, _OVER_NOISE * float(before.std())):
                 direction = 1 if travel > 0 else -1
                 slips.append(Slip(first, last, direction, float(before.mean())))
     return slips

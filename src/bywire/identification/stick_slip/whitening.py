@@ -1,4 +1,4 @@
-"""Residuals of one slip freed from what errors of the measured current do to all of them."""
+"""Residuals of one slip freed from what the noise of the measured current does to all of them."""
 
 from __future__ import annotations
 
@@ -15,44 +15,36 @@ _BLOCKS = 250  # at most
 class Whitening:
     r"""Makes means of neighboring residuals independent, of size one.
 
-    .. math:: \Sigma = \sigma^2 I + P H H^T P \sigma_i^2 + d d^T
+    .. math:: \Sigma = \sigma^2 I + P H H^T P \sigma_i^2
 
     with the answer H of the pressure to every sample of the current, taken from that to a lasting
-    offset as if the slip answered alike at all times; P takes off what a shift in time takes up;
-    d is an offset of one standard deviation.
+    offset as if the slip answered alike at all times; P takes off what a shift in time takes up.
 
     Parameters
     ----------
     one
         A slip of the model.
     sigma, sigma_i
-        Noise of a sample of the pressure [Pa], and of the current [A]; 0 leaves H out, which is
-        quick.
-    scatter
-        Standard deviation of an offset of the current along the slip [A].
+        Noise of a sample of the pressure [Pa], and of the current [A] that drives the slip; 0
+        where none does.
     """
 
-    def __init__(self, one: Fitted, sigma: float, sigma_i: float, scatter: float) -> None:
+    def __init__(self, one: Fitted, sigma: float, sigma_i: float) -> None:
         self._block = max(-(-one.residuals.size // _BLOCKS), 1)
         self._sigma = sigma / np.sqrt(self._block)
-        d = self._means(one.by_current) * (scatter / self._sigma)
-        size = float(d @ d)
-        self._u = d / np.sqrt(size) if size > 0.0 else d
-        self._share = 1.0 - 1.0 / np.sqrt(1.0 + size)
-        self._root = self._full_root(one, sigma_i, d) if sigma_i > 0.0 else None
+        self._root = self._root_of(one, sigma_i) if sigma_i > 0.0 else None
 
     def __call__(self, values: Array) -> Array:
         """Return residuals or their Jacobian, shape (n,) or (n, p), as fewer independent rows."""
         from scipy import linalg
 
-        means = self._means(values) / self._sigma
-        if self._root is not None:
-            return np.asarray(linalg.solve_triangular(self._root, means, lower=True))
-        along = self._u @ means
-        return np.asarray(means - self._share * np.outer(self._u, along).reshape(means.shape))
+        means: Array = self._means(values) / self._sigma
+        if self._root is None:
+            return means
+        return np.asarray(linalg.solve_triangular(self._root, means, lower=True))
 
-    def _full_root(self, one: Fitted, sigma_i: float, d: Array) -> Array:
-        """Return the root of the whole covariance, in units of the pressure's noise."""
+    def _root_of(self, one: Fitted, sigma_i: float) -> Array:
+        """Return the root of the covariance, in units of the pressure's noise."""
         answer = np.diff(self._means(one.answer), prepend=0.0)
         count = answer.size
         back = np.arange(count)[:, None] - np.arange(count)[None, :]
@@ -60,7 +52,7 @@ class Whitening:
         v = self._means(one.speed)
         H -= np.outer(v, v @ H) / max(float(v @ v), 1e-300)
         H *= sigma_i / (np.sqrt(self._block) * self._sigma)
-        covariance = H @ H.T + np.outer(d, d)
+        covariance = H @ H.T
         covariance[np.diag_indices(count)] += 1.0
         return np.asarray(np.linalg.cholesky(covariance), dtype=float)
 
