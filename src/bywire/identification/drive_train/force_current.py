@@ -5,7 +5,7 @@ Two motors squeeze a force between their screws; one of them at rest is the same
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 import xarray as xr
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.identification.differentiation import low_passed
+from bywire.identification.drive_train.cogging_waves import waves
 from bywire.identification.drive_train.steady_motion import windows
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
@@ -39,8 +40,12 @@ class Squeeze:
     way
         1 closing, -1 opening.
     waves
-        Cosine and sine of the cogging's angle, shape (n, 2). The motors turn against each other,
-        so that one angle stands for both.
+        Of the cogging, shape (n, 4).
+    reach
+        The travel one margin before a window begins, and at its end [m], shape (n, 2): what
+        happens in between shows in the window.
+    each
+        Speed of one motor in each window [rad/s].
     speed
         Of one motor, that the current is stated at [rad/s].
     """
@@ -50,7 +55,20 @@ class Squeeze:
     d: Array
     way: Array
     waves: Array
+    reach: Array
+    each: Array
     speed: float
+
+    def only(self, rows: NDArray[np.bool_]) -> Squeeze:
+        """Return some of the windows."""
+        own = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "speed"}
+        return replace(self, **own)
+
+    def under(self, F: Array, par: WedgeParameters) -> Squeeze:
+        """Return the same with forces that no sensor told, and the current stated anew for them."""
+        before = _speed_effect(self.F, self.each, self.speed, par)
+        after = _speed_effect(F, self.each, self.speed, par)
+        return replace(self, i=self.i + self.way * (before - after), F=F)
 
 
 @dataclass(frozen=True)
@@ -113,8 +131,6 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     def means(values: Array) -> Array:
         return np.array([values[w.rows].mean(axis=0) for w in found])
 
-    angle = 0.5 * par.motor_1.N_cog * (q_1 - q_2)
-    waves = np.column_stack((np.cos(angle), np.sin(angle)))
     # The sensor's amplifier lags, one way while the force rises, the other while it falls.
     lag = 1.0 / (2.0 * np.pi * par.rig.sensor.f_F)
     rate = np.gradient(low_passed(data["y_F"].values, interval, reading.cutoff), interval)
@@ -122,12 +138,16 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     each = 0.5 * np.abs(means(speed))
     stated = float(each.mean()) if reading.speed is None else reading.speed
     beyond = _speed_effect(F, each, stated, par)
+    d = roller_screw.slope(par.screw) * (q_1 - q_2)
+    skip = round(reading.margin / interval)
     return Squeeze(
         i=means(0.5 * (data["i_1"].values - data["i_2"].values)) - ways * beyond,
         F=F,
-        d=means(roller_screw.slope(par.screw) * (q_1 - q_2)),
+        d=means(d),
         way=ways,
-        waves=means(waves),
+        waves=means(waves(q_1, q_2, par.motor_1.N_cog)),
+        reach=np.array([(d[w.rows.start - skip], d[w.rows.stop - 1]) for w in found]),
+        each=each,
         speed=stated,
     )
 
@@ -138,12 +158,13 @@ def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -
     A position loop gives way under load, so that the screws close slower than they open; the
     bearings' friction falls with the speed, and the line would turn by it.
     """
-    K = servo_motor.torque_constant(par.motor_1)
-    return np.array([
+    motor = par.motor_1
+    bearing = np.array([
         axial_bearing.friction(axial_bearing.Input(float(f), float(w)), par.bearing)
         - axial_bearing.friction(axial_bearing.Input(float(f), stated), par.bearing)
         for f, w in zip(F, speed, strict=True)
-    ]) / K  # fmt: skip
+    ])  # fmt: skip
+    return (bearing + motor.D_M * (speed - stated)) / servo_motor.torque_constant(motor)
 
 
 def unknowns(par: WedgeParameters) -> tuple[Unknown, ...]:
@@ -177,16 +198,6 @@ def law(F: Array, way: Array, values: Array) -> tuple[Array, Array, Array]:
     w_0, w_1, w_2 = values[2:5]
     i = values[0] + F / c + way * (w_0 + w_1 * size + w_2 * size**2)
     return i, columns, 1.0 / c + way * np.sign(F) * (w_1 + 2.0 * w_2 * size)
-
-
-def waves_unknowns(par: WedgeParameters, stage: str) -> tuple[Unknown, ...]:
-    """Return the cogging's amplitudes in a stage, in terms of the current."""
-    K = servo_motor.torque_constant(par.motor_1)
-    size = max(par.motor_1.T_cog, par.motor_2.T_cog, 1e-4) / K
-    return tuple(
-        Unknown(f"cogging.{stage}.{name}", 0.0, scale=10.0 * size, unit="A")
-        for name in ("cos", "sin")
-    )
 
 
 def branches(one: Squeeze, power: int, x: Array) -> Array:

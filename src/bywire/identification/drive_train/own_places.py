@@ -1,4 +1,4 @@
-"""Several curves, each read at places of its own, on one axis."""
+"""Several curves, each read at places of its own, in one table."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 
-def on_common_axis(
-    places: Sequence[Array], rows: Sequence[Array], count: int = 200
-) -> tuple[Array, Array]:
-    """Return curves interpolated to one axis; nothing (NaN) beyond a curve's own ends.
+def at_own_places(places: Sequence[Array], rows: Sequence[Array]) -> tuple[Array, Array]:
+    """Return curves at the places where each was read, in ascending order.
+
+    Nothing is interpolated: what is shown as measured was measured there.
 
     Parameters
     ----------
@@ -21,20 +21,20 @@ def on_common_axis(
         Where each curve was read, shape (n_k,), in any order.
     rows
         What was read there, shape (..., n_k).
-    count
-        Points of the axis.
 
     Returns
     -------
     tuple
-        The axis, shape (count,), and the curves, shape (..., curves, count).
+        Places, shape (curves, n), and curves, shape (..., curves, n), with n the most places that
+        a curve has; NaN beyond those of a shorter one.
     """
-    low, high = min(p.min() for p in places), max(p.max() for p in places)
-    x = np.linspace(low, high, count)
-    found = []
-    for place, row in zip(places, rows, strict=True):
-        order = np.argsort(place)
-        flat = row.reshape(-1, place.size)[:, order]
-        own = [np.interp(x, place[order], one, left=np.nan, right=np.nan) for one in flat]
-        found.append(np.reshape(own, (*row.shape[:-1], count)))
-    return x, np.stack(found, axis=-2)
+    count = max(place.size for place in places)
+
+    def filled(values: Array, order: NDArray[np.intp]) -> Array:
+        beyond = np.full((*values.shape[:-1], count - order.size), np.nan)
+        return np.concatenate((values[..., order], beyond), axis=-1)
+
+    orders = [np.argsort(place, kind="stable") for place in places]
+    x = [filled(place, order) for place, order in zip(places, orders, strict=True)]
+    table = [filled(row, order) for row, order in zip(rows, orders, strict=True)]
+    return np.stack(x), np.stack(table, axis=-2)

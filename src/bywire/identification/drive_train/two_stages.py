@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.core.errors import ParameterError
-from bywire.identification.drive_train import force_current
+from bywire.identification.drive_train import cogging_waves, force_current
 from bywire.identification.drive_train.force_current import Squeeze, branches, law
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 _STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")
 _S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)
 _LAW = slice(6, 11)
-_SENSOR, _HEART = slice(11, 13), slice(13, 15)
+_SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
 _SHARE = 0.3  # of the largest current, beyond which a contact is surely closed
 
 
@@ -62,6 +62,18 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
     return Contacts(*found)
 
 
+def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
+    """Return the windows in which no contact opens or closes, nor has done so just before.
+
+    There force over travel has a kink, which a mean over a window rounds off, and the motors
+    change their speed.
+    """
+    low, high = heart.reach.min(axis=1), heart.reach.max(axis=1)
+    kinks = np.array([contacts.closed, contacts.apart])
+    inside = (low[:, None] <= kinks) & (kinks <= high[:, None])
+    return np.asarray(~inside.any(axis=1))
+
+
 @dataclass(frozen=True)
 class TwoStages:
     """What was measured in both stages, and the unknowns of the fit.
@@ -91,8 +103,9 @@ class TwoStages:
             Unknown("tips_touch", self.contacts.closed, scale=play, unit="m"),
             Unknown("free_play", play, low=0.0, scale=play, unit="m"),
             *force_current.unknowns(self.par),
-            *force_current.waves_unknowns(self.par, "sensor"),
-            *force_current.waves_unknowns(self.par, "heart"),
+            *cogging_waves.unknowns(self.par, "sensor"),
+            *cogging_waves.unknowns(self.par, "heart"),
+            Unknown("travel_loop", 0.0, scale=1e-3 * play, unit="m"),
         )
 
     def parts(self) -> tuple[Problem, Problem, Problem]:
@@ -101,6 +114,10 @@ class TwoStages:
             Problem(self.unknowns, evaluate)
             for evaluate in (self.sensor_force, self.sensor_current, self.heart_current)
         )  # type: ignore[return-value]
+
+    def touching(self, values: Array) -> Contacts:
+        """Return where the contacts are."""
+        return Contacts(float(values[_CLOSED]), float(values[_CLOSED] - values[_PLAY]))
 
     def slopes(self, values: Array) -> tuple[float, float]:
         """Return stiffnesses tip to tip and through the wedge [N/m]."""
@@ -111,9 +128,10 @@ class TwoStages:
         """Return the straight line less the sensor's force, and its derivatives."""
         one, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
         K = 1.0 / (2.0 / values[_S] + 1.0 / self.par.rig.sensor.K_F)
-        away = one.d - values[_ZERO]
+        away = one.d + one.way * values[_LOOP] - values[_ZERO]
         J[:, _S] = away * K**2 * 2.0 / values[_S] ** 2
         J[:, _ZERO] = -K
+        J[:, _LOOP] = K * one.way
         return K * away - one.F, J
 
     def sensor_current(self, values: Array) -> tuple[Array, Array]:
@@ -123,9 +141,9 @@ class TwoStages:
         J[:, _SENSOR] = one.waves
         return i + one.waves @ values[_SENSOR] - one.i, J
 
-    def heart_force(self, values: Array) -> tuple[Array, Array]:
+    def heart_force(self, values: Array, one: Squeeze) -> tuple[Array, Array]:
         """Return the force in the heart by the travel, and its derivatives."""
-        d, J = self.heart.d, np.zeros((self.heart.d.size, len(values)))
+        d, J = one.d + one.way * values[_LOOP], np.zeros((one.d.size, len(values)))
         K_c, K_t = self.slopes(values)
         close = np.maximum(d - values[_CLOSED], 0.0)
         apart = np.maximum(values[_CLOSED] - values[_PLAY] - d, 0.0)
@@ -134,12 +152,13 @@ class TwoStages:
         J[:, _C] = close * K_c**2 / values[_C] ** 2
         J[:, _CLOSED] = -K_c * (close > 0.0) - K_t * (apart > 0.0)
         J[:, _PLAY] = K_t * (apart > 0.0)
+        J[:, _LOOP] = one.way * (K_c * (close > 0.0) + K_t * (apart > 0.0))
         return K_c * close - K_t * apart, J
 
     def heart_current(self, values: Array) -> tuple[Array, Array]:
         """Return the law's current at that force less the measured one."""
         one = self.heart
-        F, J_F = self.heart_force(values)
+        F, J_F = self.heart_force(values, one)
         i, columns, slope = law(F, one.way, values[_LAW])
         J = slope[:, None] * J_F
         J[:, _LAW] = columns
@@ -148,7 +167,7 @@ class TwoStages:
 
     def force_by_current(self, values: Array) -> Array:
         """Return the force that the heart's current says, to first order around the fit."""
-        F, _ = self.heart_force(values)
+        F, _ = self.heart_force(values, self.heart)
         slope = law(F, self.heart.way, values[_LAW])[2]
         return np.asarray(F - self.heart_current(values)[0] / slope)
 
@@ -161,9 +180,9 @@ class TwoStages:
             Number of unknowns that were told.
         """
         left = [part.evaluate(values)[0] for part in self.parts()]
-        F, d = self.heart_force(values)[0], self.sensor.d
+        F, d = self.heart_force(values, self.heart)[0], self.sensor.d
         richer = (
-            np.vander(d / np.ptp(d), 4),
+            np.column_stack((np.vander(d / np.ptp(d), 4), self.sensor.way)),
             np.hstack((branches(self.sensor, 3, self.sensor.F), self.sensor.waves)),
             np.hstack((branches(self.heart, 3, F), self.heart.waves)),
         )

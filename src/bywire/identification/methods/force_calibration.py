@@ -5,51 +5,35 @@ For a brake without a force sensor: what force a current means, and how far fric
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from pydantic import Field
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import force_cycle
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.drive_train import force_current
-from bywire.identification.drive_train.common_axis import on_common_axis
+from bywire.identification.drive_train import cogging_waves, force_current
 from bywire.identification.drive_train.force_current import Reading, Squeeze, branches, law, squeeze
+from bywire.identification.drive_train.own_places import at_own_places
+from bywire.identification.drive_train.rig_measurement import (
+    SIGNALS,
+    SIMULATED,
+    RigOptions,
+    drive_sensors,
+)
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.simulated_record import Sensor, sensed, turned
+from bywire.identification.simulated_record import sensed, turned
 from bywire.plant import roller_screw, servo_motor
-from bywire.plant.axial_bearing import AngularSpeed
 
 Array = NDArray[np.float64]
 
+_GAP = np.full((2, 1), np.nan)
 _LAW = len(force_current.NAMES)
 
 
-class Options(ParameterSet):
-    """Which part of the motion counts, and the synthetic noise."""
-
-    cutoff: Frequency
-    """low-pass of the speed"""
-    slowest: AngularSpeed
-    """speed of one motor toward the other that counts as motion"""
-    margin: Duration
-    """time left out at either end of a motion"""
-    window: Duration
-    """time over which signals are averaged"""
-    sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
-    """noise of the measured currents in synthetic measurements"""
-    sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]
-    """noise of the force sensor in synthetic measurements"""
-
-
 def identify(
-    data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
+    data: xr.Dataset, par: WedgeParameters, options: RigOptions, effort: Effort
 ) -> Identified:
     r"""Return the line of force over current and the friction around it.
 
@@ -74,7 +58,7 @@ def identify(
     """
     reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
     one = squeeze(data, par, reading, "the record")
-    unknowns = force_current.unknowns(par) + force_current.waves_unknowns(par, "sensor")
+    unknowns = force_current.unknowns(par) + cogging_waves.unknowns(par, "sensor")
     scatter = _scatter(one)
 
     def evaluate(values: Array) -> tuple[Array, Array]:
@@ -128,42 +112,42 @@ def _figures(
 
 def _curve(one: Squeeze, values: Array) -> Curve:
     measured = one.i - one.waves @ values[_LAW:]
-    # Compression and tension apart: nothing was read right at the kink between them.
-    groups = [(k, (one.way == sign) & ((one.F > 0.0) == closed))
-              for k, sign in enumerate((1.0, -1.0)) for closed in (True, False)]  # fmt: skip
-    groups = [(k, rows) for k, rows in groups if rows.any()]
-    F, seen = on_common_axis([one.F[g] for _, g in groups], [measured[g] for _, g in groups])
-    table = np.full((2, 3, F.size), np.nan)
-    for (k, _), row in zip(groups, seen, strict=True):
-        table[0, k] = np.where(np.isfinite(row), row, table[0, k])
-    for k, sign in enumerate((1.0, -1.0, 0.0)):
-        table[1, k] = law(F, np.full(F.size, sign), values)[0]
+    places, rows = [], []
+    for sign in (1.0, -1.0):
+        F, i = one.F[one.way == sign], measured[one.way == sign]
+        # A gap at zero force: nothing was read right at the kink there.
+        places.append(np.append(F, 0.0))
+        own = np.array((i, law(F, np.full(F.size, sign), values)[0]))
+        rows.append(np.append(own, _GAP, axis=1))
+    line = np.array((one.F.min(), 0.0, one.F.max()))
+    places.append(line)
+    rows.append(np.array((np.full(3, np.nan), law(line, np.zeros(3), values)[0])))
+    F, table = at_own_places(places, rows)
+    dims = ("direction", "window")
     attrs = {"units": "A", "long_name": "current, cogging taken off"}
     return Curve(
         "current-over-force",
         "Current over force, closing and opening, with the calibration line between.",
         xr.Dataset(
-            {name: (("direction", "F"), rows, attrs)
-             for name, rows in zip(("measured", "modeled"), table, strict=True)},
+            {name: (dims, values_of, attrs)
+             for name, values_of in zip(("measured", "modeled"), table, strict=True)},
             {"direction": ["closing", "opening", "mean line"],
-             "F": ("F", F, {"units": "N", "long_name": "force"})},
+             "F": (dims, F, {"units": "N", "long_name": "force"})},
         ),
         "F",
     )  # fmt: skip
 
 
-def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
+def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
     """Return the force cycle on the sensor, simulated, with the sensors' noise."""
     experiment = force_cycle.EXPERIMENT
     case = experiment.cases(par, experiment.defaults, None)[0]
     random = np.random.default_rng(seed)
-    sensors = {name: Sensor(name, options.sigma_i) for name in ("i_1", "i_2")}
-    sensors |= {name: Sensor(name) for name in ("q_1", "q_2")}
-    sensors["y_F"] = Sensor("y_F", options.sigma_F)
-    return sensed(turned(case, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
+    begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
+    return sensed(begun, drive_sensors(options), random)
 
 
-def truth(par: WedgeParameters, options: Options) -> dict[str, float]:
+def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
     """Return the line and the growth of the friction that the laws of screw and bearing mean."""
     known = {u.label: u.start for u in force_current.unknowns(par)}
     return {name: known[name] for name in ("offset", "force_per_current", "half_width_slope")}
@@ -174,13 +158,22 @@ METHOD = Method(
     assembly="wedge-brake",
     summary="force over current of the screw drive: line, friction to either side, offset",
     experiment="force-cycle",
-    signals={"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"},
-    options=Options,
-    defaults=Options(
+    signals=SIGNALS,
+    options=RigOptions,
+    defaults=RigOptions(
         cutoff=20.0, slowest=0.2, margin=0.05, window=0.02, sigma_i=0.02, sigma_F=5.0
     ),
     identify=identify,
     synthetic=synthetic,
-    simulated=("sigma_i", "sigma_F"),
+    simulated=SIMULATED,
     truth=truth,
+    further={
+        "offset": ("A", "current at zero force, i_0"),
+        "force_per_current": ("N/A", "slope of the line, c"),
+        "half_width": ("A", "friction to either side without force, w_0"),
+        "half_width_slope": ("A/N", "its growth with force, w_1"),
+        "half_width_curvature": ("A/N**2", "and with the square of force, w_2"),
+        "cogging.sensor.cos": ("A", "cogging of known order, with the motor's angle"),
+        "cogging.sensor.sin": ("A", "the same, a quarter of a period off"),
+    },
 )

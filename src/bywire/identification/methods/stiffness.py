@@ -7,6 +7,7 @@ close, through the wedge while they open, and nothing in between.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any
 
 import numpy as np
@@ -21,9 +22,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.identification.drive_train import force_current, two_stages
-from bywire.identification.drive_train.force_current import Reading, squeeze
+from bywire.identification.drive_train.force_current import Reading, Squeeze, squeeze
 from bywire.identification.drive_train.steady_motion import steady_dynamics
 from bywire.identification.drive_train.two_stages import TwoStages
+from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
 from bywire.identification.simulated_record import Sensor, sensed, turned
@@ -32,6 +34,7 @@ from bywire.plant.axial_bearing import AngularSpeed
 
 Array = NDArray[np.float64]
 
+_PASSES = 3  # a first fit finds the contacts, a second without their kinks the forces
 _WITHIN = 0.5  # of the clearance, in which the wedge stands when the test begins
 _ADVICE = "squeeze and pull with and without the brake heart, as 'bywire run force-cycle' does"
 
@@ -60,11 +63,14 @@ def identify(
 
     .. math::
         F = \frac{d - d_0}{2/K_S + 1/K_F}, \qquad
-        F = \frac{\max(0, d - d_c)}{2/K_S + 1/K_C} - \frac{\max(0, d_t - d)}{2/K_S + 2/K_W}
+        F = \frac{\max(0, d - d_c)}{2/K_S + 1/K_C} - \frac{\max(0, d_t - d)}{2/K_S + 2/K_W}, \qquad
+        d = d_q \pm h
 
     on the sensor and in the heart, with the travel d of one nut toward the other; the free-play is
-    :math:`d_c - d_t`. In the heart F is what the current says, by the law of
-    ``bywire.identification.drive_train.force_current``, which is fitted to both stages at once.
+    :math:`d_c - d_t`. What the encoders show, :math:`d_q`, stays behind the motion by h, and the
+    damping of screws and sensor counts as more of it. In the heart F is what the current says, by
+    the law of ``bywire.identification.drive_train.force_current``, which is fitted to both stages
+    at once; windows in which a contact opens or closes, or has just done so, are left out.
 
     Parameters
     ----------
@@ -90,12 +96,8 @@ def identify(
             )
     sensor = squeeze(records["sensor"], par, _reading(options, None), "record sensor")
     heart = squeeze(records["heart"], par, _reading(options, sensor.speed), "record heart")
-    stages = TwoStages(par, sensor, heart, two_stages.started(par, sensor, heart, _ADVICE))
-    best = steady_dynamics(stages.parts(), stages.unknowns, _ADVICE)
-    told = {u.label: u.start for u in stages.unknowns}
-    told |= dict(zip(best.names, best.values.tolist(), strict=True))
-    values = np.array([told[u.label] for u in stages.unknowns])
-    F = stages.heart_force(values)[0]
+    stages, best, values, heart = _fitted(par, sensor, heart)
+    F = stages.heart_force(values, stages.heart)[0]
     return Identified(
         estimates={"stiffness and free-play": best},
         parameters={k: v for k, v in best.parameters().items() if k.startswith("heart.")},
@@ -106,12 +108,32 @@ def identify(
             "largest_tension": (float(-F.min()), "N"),
         },
         checks=(stages.fits(values, len(best.values)),),
-        curves=(_curve(stages, values),),
+        curves=(_curve(replace(stages, heart=heart), values),),
         notes=(
             "free-play is told as a whole: g_1 + g_2 + g_12; how it is shared is not",
             f"the sensor's stiffness is taken as {par.rig.sensor.K_F / 1e6:g} N/um",
         ),
     )  # fmt: skip
+
+
+def _fitted(
+    par: WedgeParameters, sensor: Squeeze, heart: Squeeze
+) -> tuple[TwoStages, Estimate, Array, Squeeze]:
+    """Return stages, fit, its values, and all windows in the heart.
+
+    Where contacts change, and what force slows the motors, the fit before tells.
+    """
+    contacts = two_stages.started(par, sensor, heart, _ADVICE)
+    for _ in range(_PASSES):
+        clear = heart.only(two_stages.clear_of(contacts, heart))
+        stages = TwoStages(par, sensor, clear, contacts)
+        best = steady_dynamics(stages.parts(), stages.unknowns, _ADVICE)
+        told = {u.label: u.start for u in stages.unknowns}
+        told |= dict(zip(best.names, best.values.tolist(), strict=True))
+        values = np.array([told[u.label] for u in stages.unknowns])
+        contacts = stages.touching(values)
+        heart = heart.under(stages.heart_force(values, heart)[0], par)
+    return stages, best, values, heart
 
 
 def _named(records: dict[str, xr.Dataset]) -> str:
@@ -128,7 +150,7 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
     order = np.argsort(d)
     rows = {
         "measured": stages.force_by_current(values)[order],
-        "modeled": stages.heart_force(values)[0][order],
+        "modeled": stages.heart_force(values, stages.heart)[0][order],
     }
     attrs = {"units": "N", "long_name": "force between the screws"}
     x = ("d", 1e3 * d[order], {"units": "mm", "long_name": "travel toward each other"})
