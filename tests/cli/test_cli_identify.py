@@ -29,6 +29,8 @@ def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path)
     no_half_files(out)
     again = bywire("identify", "seal-friction", out / "measurement.nc", "--json")
     assert again.status == 0
+    assert first.object["put_in"]["A"] == 4.9e-4
+    assert again.object["put_in"] == {}  # measured, as far as anyone can tell
     for name in ("estimates", "figures", "checks"):
         assert again.object[name] == first.object[name]
     assert json.loads((out / "estimate.json").read_text())["estimates"] == again.object["estimates"]
@@ -83,6 +85,37 @@ def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path
     assert "no parameters.toml is written" in again.err
 
 
+def test_a_study_keeps_out_of_other_folders(bywire: Bywire, tmp_path: Path) -> None:
+    law = ("--option", "duration=4 s", "--option", "law=stribeck-pressure", "--out", tmp_path)
+    file = tmp_path / "study.json"
+    file.write_text('{"method": "seal-friction"}')
+    for wanted in (("--study", "2"), ("--synthetic", "1")):
+        refused(bywire("identify", "friction-model", *wanted, *law),
+                "holds a study of seal-friction", "study.json")  # fmt: skip
+    file.unlink()
+    found = bywire("identify", "friction-model", "--synthetic", "1", *law, "--json")
+    assert found.status == 0
+    assert found.object["put_in"]["F_c"] == 20.0
+    assert found.object["start"] == {}  # it needs none
+    refused(bywire("identify", "seal-friction", "--study", "2", "--out", tmp_path),
+            "holds a result of friction-model")  # fmt: skip
+    page = (tmp_path / "report.html").read_text()
+    assert "put in" in page
+    assert ">start<" not in page
+
+
+def test_what_was_put_in_stands_beside_the_start(bywire: Bywire) -> None:
+    arguments = ("identify", "motor-winding", "--option", "duration=0.2 s", "--synthetic", "3")
+    found = bywire(*arguments, "--json").object
+    truth = parameters("dardanelli2010").leaves()
+    for name, estimate in found["estimates"]["winding"]["parameters"].items():
+        assert found["put_in"][name] == truth[name]
+        assert 0.0 < abs(found["start"][name] / truth[name] - 1.0) < 0.31
+        low, high = estimate["interval_95"]
+        assert abs(estimate["value"] - truth[name]) < high - low
+    assert " put in " in bywire(*arguments).out
+
+
 def test_a_failed_check_is_status_1(bywire: Bywire) -> None:
     outcome = bywire("identify", "friction-model", "--synthetic", "1", "--option", "law=viscous",
                      "--option", "duration=4 s")  # fmt: skip
@@ -111,8 +144,13 @@ def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
             "give only one of")  # fmt: skip
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--set", "a.b=1"), "--set")
     refused(
-        bywire("identify", "seal-friction", "--synthetic", "1", "--option", "x_lo=1 mm"), "x_low"
+        bywire("identify", "seal-friction", "--synthetic", "1", "--option", "x_lo=1 mm"), "x_low",
+        "'bywire list seal-friction'",
     )
+    for text, said in (("3", "'20 bar'"), ("1 bar, 3", "pressures.1 = '3'"), ("x", "commas"),
+                       ("1 bar", "at least 2 wanted, got '1 bar'"), ("-1 bar, 1 bar", ">= 0 Pa")):
+        refused(bywire("identify", "seal-friction", "--synthetic", "1", "--option",
+                       f"pressures={text}"), "pressures", said)  # fmt: skip
     refused(
         bywire("identify", "friction-ramp", "--synthetic", "1", "--parameters", "roberts2003"),
         "wedge-brake",

@@ -21,7 +21,7 @@ import bywire as package
         ("options=3", ["options is a section", "options.NAME=VALUE"]),
         ("options.p_to.x=3", ["unknown option of hard-braking 'p_to.x'", "'p_to'"]),
         ("motor.R_n=0.4ohm", ["unknown parameter 'motor.R_n'", "'motor.R_m'"]),
-        ("motor.R_m=0.4", ["a pure number cannot be ohm", "'1.5 ohm'"]),
+        ("motor.R_m=0.4", ["a pure number cannot be ohm", "'0.5 ohm'"]),
         ("motor.R_m=9bar", ["bar cannot be ohm"]),
         ("motor.R_m=-1ohm", ["motor.R_m = -1.0 ohm", "> 0 ohm"]),
         ("motor.R_m=nan", ["is not a quantity"]),
@@ -54,7 +54,7 @@ def test_number_without_a_unit_gets_the_same_answer_in_file_and_change(bywire, b
     changed = bywire("run", bench(), "--set", f"motor.R_m={float(value)!r}")
     written = bywire("run", bench(f"{BRAKING}[set]\nmotor.R_m = {value}\n"))
     for outcome in (changed, written):
-        refused(outcome, expected.replace("= ", "= '", 1).replace(" has", "' has", 1), "'1.5 ohm'")
+        refused(outcome, expected.replace("= ", "= '", 1).replace(" has", "' has", 1), "'0.5 ohm'")
     assert changed.err == written.err
 
 

@@ -104,6 +104,7 @@ def test_nothing_can_be_assigned_or_added():
         ({"table": (0.0, -1.0)}, "table.1 = -1.0 Pa is not admissible: it must be >= 0 Pa"),
         ({"table": (math.nan,)}, "table.0 = nan Pa is not admissible: it must be >= 0 Pa"),
         ({"table": ()}, "table: at least 1 wanted, got ()"),
+        ({"table": 3.0}, "table = 3.0 Pa is not admissible: it must be >= 0 Pa"),
         ({"inner.law": "papr"}, "inner.law: it must be 'paper' or 'directional', got 'papr': "
                                 "did you mean 'paper'?"),
         ({"inner.law": 3}, "inner.law: it must be 'paper' or 'directional', got 3"),

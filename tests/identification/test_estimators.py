@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import runpy
 from pathlib import Path
 from types import ModuleType
 
@@ -115,6 +116,29 @@ def test_instruments_take_away_the_bias_of_noise(axis: ModuleType) -> None:
     bias = [abs(np.mean(v) / truth.J - 1.0) for v in (plain, helped)]
     assert bias[0] > 0.02
     assert bias[1] < 0.2 * bias[0]
+
+
+def test_the_example_says_what_noise_does_to_its_first_step(
+    axis: ModuleType, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    """On a record of its own; parameters other than the example's are no failure."""
+    data, file = axis.measured(seed=3, noise=3e-3), tmp_path / "axis.csv"
+    table = data.assign(v=1.5 * data["v"]).to_dataframe()[["theta", "v"]]
+    table.to_csv(file, header=["theta [rad]", "v [V]"], index_label="time [s]")
+    monkeypatch.setattr("sys.argv", [str(FILE), str(file)])
+    runpy.run_path(str(FILE), run_name="__main__")
+    said = capsys.readouterr().out
+    assert "J: noise biases inverse dynamics" in said
+    assert "does not explain" not in said
+    assert "angle left over: 0.003 rad" in said
+
+
+def test_with_instruments_both_criteria_agree(axis: ModuleType) -> None:
+    first, second, third = axis.identified(axis.measured(seed=1, noise=3e-3))
+    assert axis.apart(first, second) == ["J"]
+    assert axis.apart(third, second) == []
+    assert abs(third["J"] - axis.TRUTH.J) < 3.5 * third.deviations[third.names.index("J")]
 
 
 def test_weights_count_samples_by_their_noise(axis: ModuleType) -> None:

@@ -75,8 +75,19 @@ def test_a_wrong_law_is_found_out() -> None:
 def test_too_little_is_refused() -> None:
     data = METHOD.synthetic(None, METHOD.defaults, 1)
     one_way = data.assign(speed=np.abs(data["speed"]), friction=np.abs(data["friction"]))
-    with pytest.raises(ParameterError, match="move to and fro"):
+    with pytest.raises(ParameterError, match="slide backward"):
         METHOD.identify(one_way, None, METHOD.defaults, Effort())
     with_pressure = METHOD.defaults.replace({"law": "pressure"})
     with pytest.raises(ParameterError, match="needs a measured pressure"):
         METHOD.identify(data.drop_vars("pressure"), None, with_pressure, Effort())
+
+
+def test_motion_one_way_is_refused_with_its_count() -> None:
+    data = METHOD.synthetic(None, SHORT, 1)
+    back = np.flatnonzero(data["speed"].values < 0.0)
+    one_way = data.isel(time=np.setdiff1d(np.arange(data.sizes["time"]), back[7:]))
+    with pytest.raises(ParameterError, match=r"backward \(\d{3} forward, 7 back.* to and fro"):
+        METHOD.identify(one_way, None, SHORT, Effort())
+    lost = data.assign(friction=data["friction"] * np.nan)
+    with pytest.raises(ParameterError, match="slide forward and backward"):
+        METHOD.identify(lost, None, SHORT, Effort())

@@ -40,7 +40,8 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
     for name, value in values.items():
         if name in leaves:
             read = nodes if _is_table(cls, name) else number
-            found[name] = read(value, leaves[name].unit.symbol, name)
+            unit = leaves[name].unit
+            found[name] = read(value, unit.symbol, name, unit.nominal)
         elif name in choices:
             found[name] = value
         else:
@@ -48,14 +49,14 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
     return found
 
 
-def number(value: Any, symbol: str, name: str) -> float:
+def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     """Return one value in an SI unit; see `bywire.core.units.parse`. Zero needs no unit."""
     if isinstance(value, (Mapping, Sequence)) and not isinstance(value, str):
         raise ParameterError(f"{name} = {quoted(value)}: one value is wanted, not several")
-    return _quantity(value, symbol, name)
+    return _quantity(value, symbol, name, nominal)
 
 
-def nodes(value: Any, symbol: str, name: str) -> tuple[float, ...]:
+def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[float, ...]:
     """Return the nodes of a table: of a sequence, or of one text with commas, each with its unit.
 
     Examples
@@ -64,12 +65,25 @@ def nodes(value: Any, symbol: str, name: str) -> tuple[float, ...]:
     (0.0, 0.2)
     """
     if isinstance(value, str):
-        value = [text.strip() for text in value.split(",")]
+        return _listed(value, symbol, name, nominal)
     several = isinstance(value, Sequence)
     found = value if several else (value,)
     return tuple(
-        _quantity(node, symbol, f"{name}.{k}" if several else name) for k, node in enumerate(found)
+        _quantity(node, symbol, f"{name}.{k}" if several else name, nominal)
+        for k, node in enumerate(found)
     )
+
+
+def _listed(text: str, symbol: str, name: str, nominal: float) -> tuple[float, ...]:
+    """Return the nodes of a table that one text holds."""
+    parts = [part.strip() for part in text.split(",")]
+    try:
+        return tuple(
+            _quantity(part, symbol, f"{name}.{k}" if len(parts) > 1 else name, nominal)
+            for k, part in enumerate(parts)
+        )
+    except UnitError as error:
+        raise UnitError(f"{error}; commas separate several values") from None
 
 
 def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit: str = "") -> None:
@@ -91,15 +105,16 @@ def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit
     """
     leaves = leaf_fields(cls)
     for name in values.keys() & leaves.keys():
-        value, symbol = values[name], leaves[name].unit.symbol.replace("level", level_unit)
+        value, unit = values[name], leaves[name].unit
+        symbol = unit.symbol.replace("level", level_unit)
         if isinstance(value, list) and _is_table(cls, name):
             for k, node in enumerate(value):
-                require_unit(node, symbol, f"{name}.{k}")
+                require_unit(node, symbol, f"{name}.{k}", unit.nominal)
         else:
-            require_unit(value, symbol, name)
+            require_unit(value, symbol, name, unit.nominal)
 
 
-def require_unit(value: Any, symbol: str, name: str) -> None:
+def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> None:
     """Refuse a plain number where a unit is wanted; see `require_units`."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return
@@ -108,13 +123,13 @@ def require_unit(value: Any, symbol: str, name: str) -> None:
     except OverflowError:  # a whole number of 309 digits or more
         return
     if is_plain:
-        units.parse(repr(value), symbol, name)
+        units.parse(repr(value), symbol, name, nominal)
 
 
-def _quantity(value: Any, symbol: str, name: str) -> float:
+def _quantity(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     if isinstance(value, str) and _ZERO.fullmatch(value):
         return 0.0
-    number = units.parse(value, symbol, name)
+    number = units.parse(value, symbol, name, nominal)
     if not isinstance(value, str):
         return number
     unit = units.split(value)[1]

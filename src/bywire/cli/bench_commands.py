@@ -7,17 +7,18 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import (
-    JsonFlag,
-    OutFolder,
-    changes,
-    execute,
-)
+from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes, execute
 
 
-def list_command(json: JsonFlag = False) -> None:
-    """Show assemblies, parameter sets, experiments, stimuli and KPIs."""
-    execute("list_command", json)
+def list_command(
+    name: Annotated[
+        str | None,
+        typer.Argument(help="Something of the list: its options, signals and units."),
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
+    """Show assemblies, parameter sets, experiments, methods, KPIs; or all about one of them."""
+    execute("list_command", name, json)
 
 
 def run(
@@ -25,10 +26,7 @@ def run(
         Path,
         typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False),
     ],
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
-    ] = None,
+    set_: BenchChanges = None,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

@@ -15,7 +15,7 @@ from bywire.core.errors import ParameterError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from bywire.data.alignment import AlignedChannel, AlignmentReport
+    from bywire.data.alignment_report import AlignedChannel, AlignmentReport
     from bywire.data.channel_quality import Stretch
 
 _SHOWN = 20

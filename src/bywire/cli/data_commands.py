@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import JsonFlag, execute
+from bywire.cli.options import JsonFlag, Map, execute
 
 
 def convert(
@@ -17,10 +17,7 @@ def convert(
     target: Annotated[
         Path, typer.Argument(metavar="OUT", help="File to write.", show_default=False)
     ],
-    map_: Annotated[
-        Path | None,
-        typer.Option("--map", metavar="PATH", help="What the columns mean (TOML)."),
-    ] = None,
+    map_: Map = None,
     signals: Annotated[str, typer.Option(help="Signals to keep, e.g. 'p_mc, x_mc'.")] = "",
     rate: Annotated[
         str, typer.Option(help="Bring all signals to one time axis, e.g. '1 kHz'.")

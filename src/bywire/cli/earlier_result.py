@@ -1,4 +1,4 @@
-"""What an earlier identification left in the folder of ``--out``."""
+"""What an earlier identification or study left in the folder of ``--out``."""
 
 from __future__ import annotations
 
@@ -12,24 +12,39 @@ from bywire.core.errors import FileError
 ESTIMATE = "estimate.json"
 """file of the output folder that says which method wrote it, and what else it wrote"""
 
+STUDY = "study.json"
+"""file of the output folder that says which method a study tried, and what came of it"""
+
 _OURS = (".html", ".nc", ".png", ".toml")
 
 
 def require_own(out: Path, method: str) -> None:
-    """Refuse a folder that holds another method's result.
+    """Refuse a folder that holds a result or a study of another method.
 
     Raises
     ------
     FileError
-        When it does, or its result cannot be read.
+        When it does, or what it holds cannot be read.
     """
-    earlier = _read(out)
-    if earlier is None or earlier.get("method") == method:
-        return
-    raise FileError(
-        f"{out} holds a result of {earlier.get('method') or 'something else'}: name another folder "
-        f"with --out for {method}, or remove {out / ESTIMATE} with the files that it lists"
-    )
+    for path, what in ((out / ESTIMATE, "result"), (out / STUDY, "study")):
+        earlier = _read(path)
+        if earlier is None or earlier.get("method") == method:
+            continue
+        raise FileError(
+            f"{out} holds a {what} of {earlier.get('method') or 'something else'}: name another "
+            f"folder with --out for {method}, or remove {path} with what belongs to it"
+        )
+
+
+def remove_study(out: Path) -> None:
+    """Remove the result of an earlier study; the experiments that it finished stay.
+
+    Raises
+    ------
+    FileError
+        When it cannot be removed.
+    """
+    _unlink(out / STUDY)
 
 
 def remove(out: Path, keep: Sequence[Path]) -> None:
@@ -47,7 +62,7 @@ def remove(out: Path, keep: Sequence[Path]) -> None:
     FileError
         When one cannot be removed.
     """
-    earlier = _read(out)
+    earlier = _read(out / ESTIMATE)
     if earlier is None:
         return
     kept = {path.resolve() for path in keep}
@@ -55,19 +70,23 @@ def remove(out: Path, keep: Sequence[Path]) -> None:
     names = [Path(str(text)).name for text in earlier.get("files", [])]
     own = [out / name for name in names if Path(name).suffix in _OURS]
     for path in (*own, out / ESTIMATE):
-        try:
-            if path.resolve() not in kept and path.is_file():
-                path.unlink()
-        except OSError as error:
-            raise FileError(
-                f"cannot remove {path} of an earlier result: {error.strerror}; name another folder "
-                "with --out"
-            ) from None
+        if path.resolve() not in kept:
+            _unlink(path)
 
 
-def _read(out: Path) -> dict[str, Any] | None:
+def _unlink(path: Path) -> None:
+    try:
+        if path.is_file():
+            path.unlink()
+    except OSError as error:
+        raise FileError(
+            f"cannot remove {path} of an earlier result: {error.strerror}; name another folder "
+            "with --out"
+        ) from None
+
+
+def _read(path: Path) -> dict[str, Any] | None:
     """Return an earlier result, None where there is none."""
-    path = out / ESTIMATE
     if not path.exists():
         return None
     try:

@@ -7,10 +7,55 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import Changes, JsonFlag, OutFolder, Parameters, changes, execute
+from bywire.cli.options import (
+    BenchChanges,
+    CaseName,
+    Changes,
+    Inputs,
+    JsonFlag,
+    Map,
+    OutFolder,
+    Parameters,
+    changes,
+    execute,
+    named,
+)
 
-Map = Annotated[
-    Path | None, typer.Option("--map", metavar="PATH", help="What the columns mean (TOML).")
+# What methods of any bench take.
+_ANY_BENCH = "Methods of any bench"
+TestBench = Annotated[
+    Path | None,
+    typer.Option(
+        "--bench", help="Bench file (TOML), or an experiment's name.", rich_help_panel=_ANY_BENCH
+    ),
+]
+NoisyOutputs = Annotated[
+    list[str] | None,
+    typer.Option("--output", metavar="SIGNAL[=NOISE]", rich_help_panel=_ANY_BENCH,
+                 help="Output of the model that is measured, e.g. 'p_mc=0.02 bar'."),
+]  # fmt: skip
+Unknowns = Annotated[
+    list[str] | None,
+    typer.Option("--unknown", metavar="NAME[=LOW..HIGH]", rich_help_panel=_ANY_BENCH,
+                 help="What is searched, e.g. 'motor.R_m=0.1..1 ohm', offset.i_meas."),
+]  # fmt: skip
+Priors = Annotated[
+    list[str] | None,
+    typer.Option("--prior", metavar="NAME=VALUE+-DEV", rich_help_panel=_ANY_BENCH,
+                 help="What is known of it, e.g. 'motor.R_m=0.35 +- 0.02 ohm'."),
+]  # fmt: skip
+States = Annotated[
+    list[str] | None,
+    typer.Option("--estimate-start", metavar="STATE", rich_help_panel=_ANY_BENCH,
+                 help="State whose initial value is unknown, e.g. omega."),
+]  # fmt: skip
+Loss = Annotated[
+    str,
+    typer.Option(rich_help_panel=_ANY_BENCH, help="linear, soft_l1, huber or cauchy."),
+]
+Holdout = Annotated[
+    Path | None,
+    typer.Option(rich_help_panel=_ANY_BENCH, help="Measurement that is not fitted: validation."),
 ]
 
 
@@ -25,7 +70,7 @@ def identify(
     set_: Changes = None,
     option: Annotated[
         list[str] | None,
-        typer.Option("--option", metavar="KEY=VALUE", help="Change an option of the method."),
+        typer.Option("--option", metavar="KEY=VALUE", help="Its options: 'bywire list METHOD'."),
     ] = None,
     starts: Annotated[
         int | None, typer.Option(help="Starts of the search: 16; with --study 1.", min=1)
@@ -39,15 +84,30 @@ def identify(
         int | None,
         typer.Option(metavar="COUNT", help="Try the method on many simulated ones.", min=2),
     ] = None,
+    bench: TestBench = None,
+    input_: Inputs = None,
+    output: NoisyOutputs = None,
+    unknown: Unknowns = None,
+    prior: Priors = None,
+    start: States = None,
+    case: CaseName = "",
+    loss: Loss = "",
+    holdout: Holdout = None,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Identify parameters with their confidence from measurements; status 1 if a check fails."""
-    from bywire.cli.identify_command import Wanted
+    from bywire.cli.measured_bench import OnBench
+    from bywire.cli.method_choice import Wanted
 
+    on_bench = OnBench(
+        bench, changes(input_, "--input"), named(output, "--output"), named(unknown, "--unknown"),
+        changes(prior, "--prior"), start or [], case, holdout,
+    )  # fmt: skip
+    options = changes([*(option or []), *([f"loss={loss}"] if loss else [])], "--option")
     wanted = Wanted(
-        measurements or [], map_, parameters, changes(set_), changes(option, "--option"),
-        starts or (16 if study is None else 1), seed, synthetic, study,
+        measurements or [], map_, parameters, changes(set_), options,
+        starts or (16 if study is None else 1), seed, synthetic, study, on_bench,
     )  # fmt: skip
     raise typer.Exit(execute("identify_command", method, wanted, out, json))
 
@@ -56,19 +116,13 @@ def replay(
     measurement: Annotated[Path, typer.Argument(help="Measurement file.", show_default=False)],
     bench: Annotated[Path, typer.Option(help="Bench file (TOML), or an experiment's name.")],
     map_: Map = None,
-    set_: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
-    ] = None,
-    input_: Annotated[
-        list[str] | None,
-        typer.Option("--input", metavar="STIMULUS=SIGNAL", help="What drives the model."),
-    ] = None,
+    set_: BenchChanges = None,
+    input_: Inputs = None,
     output: Annotated[
         list[str] | None,
         typer.Option("--output", metavar="SIGNAL", help="What is compared; by default all."),
     ] = None,
-    case: Annotated[str, typer.Option(help="Run of the experiment; the first by default.")] = "",
+    case: CaseName = "",
     tolerance: Annotated[
         list[str] | None,
         typer.Option(help="Tolerance, e.g. 'nrmse <= 5 %', 'p_mc.max_error <= 2 bar'."),

@@ -35,6 +35,12 @@ def bench_text(one: Identification, par: ParameterSet, changes: Mapping[str, Any
         lines += [f"not told by the data: {k.unknown.label}" for k in estimate.kept]
         lines += [f"lies at its bound: {label}" for label in estimate.at_bounds()]
     lines += [one.method.bench_note] if one.method.bench_note else []
+    if one.method.bench is not None:
+        from bywire.bench import bench_text as written
+
+        return written.bench_text(
+            one.method.bench.with_overrides(one.found.parameters), "\n".join(lines)
+        )
     return parameter_file(
         one.method.experiment, one.subject.parameters, par,
         {**changes, **one.found.parameters}, "\n".join(lines),

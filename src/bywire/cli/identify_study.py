@@ -7,12 +7,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bywire.cli import output
+from bywire.cli import earlier_result, output
 from bywire.cli.identify_text import finite
 from bywire.cli.progress import progress_bar
 
 if TYPE_CHECKING:
-    from bywire.cli.identify_command import Chosen, Wanted
+    from bywire.cli.method_choice import Chosen, Wanted
     from bywire.identification.trust import Trust
 
 STORE = "experiments.jsonl"
@@ -29,6 +29,8 @@ def study(chosen: Chosen, wanted: Wanted, out: Path | None, as_json: bool) -> in
     store = None if out is None else out / STORE
     seeds = range(wanted.seed, wanted.seed + wanted.study)
     effort = Effort(starts=wanted.starts)
+    if out is not None:
+        earlier_result.remove_study(out)
     try:
         with progress_bar() as progress:
             found = trust(
@@ -43,7 +45,7 @@ def study(chosen: Chosen, wanted: Wanted, out: Path | None, as_json: bool) -> in
     files: list[Path] = []
     if out is not None:
         content = json.dumps(shown, indent=1) + "\n"
-        files.append(write_bytes(out / "study.json", content.encode()))
+        files.append(write_bytes(out / earlier_result.STUDY, content.encode()))
     shown["files"] = [str(path) for path in files]
     output.result(json.dumps(shown) if as_json else _text(chosen, found))
     for path in files:

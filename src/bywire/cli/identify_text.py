@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -23,6 +23,8 @@ def as_object(one: Identification, files: Sequence[Path]) -> dict[str, Any]:
         "options": one.options.model_dump(mode="json", exclude=set(one.idle)),
         "parameters": dict(found.parameters),
         "estimates": {name: estimate_object(e) for name, e in found.estimates.items()},
+        "start": _of_estimates(one.start, one),
+        "put_in": _of_estimates(one.put_in, one),
         "figures": {
             name: {"value": value, "unit": unit} for name, (value, unit) in found.figures.items()
         },
@@ -44,7 +46,7 @@ def text(one: Identification) -> str:
 
     parts = [f"{one.method.name}, {one.source}: {one.method.summary}"]
     for name, estimate in one.found.estimates.items():
-        parts.append(f"{name}\n{table_text(estimate_table(estimate, one.before))}")
+        parts.append(f"{name}\n{table_text(estimate_table(estimate, one.start, one.put_in))}")
         said = [f"- {k.unknown.label} is not told by the data: {k.reason}" for k in estimate.kept]
         said += [f"- {note}" for note in estimate.notes]
         parts += ["\n".join(said)] if said else []
@@ -55,6 +57,13 @@ def text(one: Identification) -> str:
     if one.found.notes:
         parts.append("\n".join(f"- {note}" for note in one.found.notes))
     return "\n\n".join(parts)
+
+
+def _of_estimates(values: Mapping[str, float], one: Identification) -> dict[str, float]:
+    """Return those values that an estimate, or an unknown that is not told, stands beside."""
+    labels = [u.label for e in one.found.estimates.values()
+              for u in (*e.unknowns, *(k.unknown for k in e.kept))]  # fmt: skip
+    return {label: values[label] for label in labels if label in values}
 
 
 def finite(value: Any) -> Any:

@@ -15,14 +15,17 @@ from bywire.bench.stimuli.registry import entries as stimuli
 from bywire.catalog.registry import entries
 from bywire.cli.output import result
 from bywire.identification.method import Method
-from bywire.identification.method_registry import all_methods
+from bywire.identification.method_registry import all_methods, bench_methods
 
 _WIDTH = 100  # characters of a line
 _NAME = 26  # columns of a name
 
 
-def execute(as_text: bool) -> None:
-    """Print what there is."""
+def execute(name: str | None, as_json: bool) -> None:
+    """Print what there is, or all about one name."""
+    if name is not None:
+        _print_one(name, as_json)
+        return
     experiments = all_experiments()
     found = {
         "assemblies": sorted({e.assembly for e in entries().values()}),
@@ -31,12 +34,13 @@ def execute(as_text: bool) -> None:
         "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in all_loops().values()},
         "plants": {one.name: f"{one.summary} ({one.assembly})" for one in all_plants().values()},
         "studies": {one.name: f"{one.summary} ({one.assembly})" for one in all_studies().values()},
-        "methods": {one.name: _method(one) for one in all_methods().values()},
+        "methods": {one.name: _method(one) for one in all_methods().values()}
+        | {one.name: f"{one.summary} (any, with --bench)" for one in bench_methods().values()},
         "stimuli": {e.kind: e.summary for e in stimuli().values()},
         "kpis": {m.name: m.definition for m in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments.values()},
     }
-    if as_text:
+    if as_json:
         result(json.dumps(found))
         return
     lines: list[str] = []
@@ -46,7 +50,18 @@ def execute(as_text: bool) -> None:
         for name, about in pairs:
             lines += _entry(name, about)
         lines.append("")
+    lines.append("'bywire list NAME' shows the options, signals and units of one of them")
     result("\n".join(lines))
+
+
+def _print_one(name: str, as_json: bool) -> None:
+    from bywire.cli.described import described, described_text
+
+    found = described(name)
+    if as_json:
+        result(json.dumps({"name": name, "found": found}))
+    else:
+        result("\n\n".join(map(described_text, found)))
 
 
 def _method(one: Method) -> str:

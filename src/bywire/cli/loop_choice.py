@@ -10,8 +10,8 @@ import numpy as np
 
 from bywire.analysis.loop import Loop, Quantity
 from bywire.analysis.loop_registry import find_loop
-from bywire.bench.values import number, parsed
-from bywire.catalog.registry import entry, main_set
+from bywire.bench.values import number
+from bywire.cli.parameter_choice import parameters_for
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -51,16 +51,9 @@ def choose(name: str, parameters: str, at: str, changes: Mapping[str, str]) -> C
         For names that are unknown, values out of range, and sets of another brake.
     """
     loop = find_loop(name)
-    found = entry(parameters or main_set(loop.assembly))
-    if found.assembly != loop.assembly:
-        raise ParameterError(
-            f"loop {loop.name!r} is one of a {loop.assembly}, but parameter set {found.name!r} is "
-            f"for a {found.assembly}"
-        )
-    base = found.parameters()
-    par = base.replace(parsed(type(base), changes, "parameter"))
+    own, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
-    return Chosen(loop, found.name, par, value)
+    return Chosen(loop, own, par, value)
 
 
 def subject(chosen: Chosen) -> Subject:

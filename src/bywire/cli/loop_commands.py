@@ -9,6 +9,7 @@ import typer
 from bywire.cli.options import (
     At,
     Changes,
+    Frequencies,
     JsonFlag,
     LoopName,
     OutFolder,
@@ -55,9 +56,7 @@ def frequency_response_command(
     parameters: Parameters = "",
     at: At = "",
     set_: Changes = None,
-    frequencies: Annotated[
-        str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:40', or a list.")
-    ] = "",
+    frequencies: Frequencies = "",
     amplitudes: Annotated[str, typer.Option(help="Amplitudes, e.g. '0.5 rad, 1 rad'.")] = "",
     excitation: Annotated[
         str, typer.Option(help="sine (one frequency at a time), multisine, or chirp.")
@@ -80,9 +79,7 @@ def agreement_command(
     parameters: Parameters = "",
     at: At = "",
     set_: Changes = None,
-    frequencies: Annotated[
-        str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:6', or a list.")
-    ] = "",
+    frequencies: Frequencies = "",
     amplitudes: Annotated[
         str, typer.Option(help="A small and a large amplitude, e.g. '0.001 rad, 1 rad'.")
     ] = "",

@@ -31,6 +31,23 @@ Changes = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. wedge.mu_B=0.4."),
 ]
+BenchChanges = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
+]
+Frequencies = Annotated[
+    str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:20', or a list.")
+]
+Map = Annotated[
+    Path | None, typer.Option("--map", metavar="PATH", help="What the columns mean (TOML).")
+]
+Inputs = Annotated[
+    list[str] | None,
+    typer.Option("--input", metavar="STIMULUS=SIGNAL", help="What drives the model."),
+]
+CaseName = Annotated[
+    str, typer.Option("--case", help="Run of the experiment; the first by default.")
+]
 
 
 # Each command loads what it needs when it runs, so that `bywire --help` stays quick.
@@ -41,6 +58,25 @@ def execute(name: str, *arguments: Any) -> Any:
     except KeyboardInterrupt:  # typer would exit without a word
         message("interrupted")
         raise typer.Exit(INTERRUPTED) from None
+
+
+def named(texts: list[str] | None, flag: str) -> dict[str, str]:
+    """Return what an option ``NAME`` or ``NAME=TEXT`` names, with an empty text by default.
+
+    Raises
+    ------
+    ParameterError
+        For what names nothing, and names that are given twice.
+    """
+    found: dict[str, str] = {}
+    for text in texts or ():
+        name, equals, value = (part.strip() for part in text.partition("="))
+        if not name or (equals and not value):
+            raise ParameterError(f"{flag} {text}: write NAME, or NAME=TEXT")
+        if name in found:
+            raise ParameterError(f"{flag} {text}: {name} is given twice: leave one of them out")
+        found[name] = value
+    return found
 
 
 def changes(texts: list[str] | None, flag: str = "--set") -> dict[str, str]:

@@ -10,8 +10,8 @@ from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.plant import Plant, PlantPoint
 from bywire.analysis.linear.plant_registry import find_plant
 from bywire.analysis.loop import Quantity
-from bywire.bench.values import number, parsed
-from bywire.catalog.registry import entry, main_set
+from bywire.bench.values import number
+from bywire.cli.parameter_choice import parameters_for
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.parameters import ParameterSet
 
@@ -53,17 +53,10 @@ def choose(
         For names that are unknown, values out of range, and sets of another brake.
     """
     plant = find_plant(name)
-    found = entry(parameters or main_set(plant.assembly))
-    if found.assembly != plant.assembly:
-        raise ParameterError(
-            f"plant {plant.name!r} is one of a {plant.assembly}, but parameter set "
-            f"{found.name!r} is for a {found.assembly}"
-        )
-    base = found.parameters()
-    par = base.replace(parsed(type(base), changes, "parameter"))
+    own, par = parameters_for(f"plant {plant.name!r}", plant.assembly, parameters, changes)
     quantity, value = _operating_point(plant, at)
     kind, omega = _friction(friction, speed)
-    return ChosenPlant(plant, found.name, par, PlantPoint(quantity, value, kind, omega))
+    return ChosenPlant(plant, own, par, PlantPoint(quantity, value, kind, omega))
 
 
 def point_text(point: PlantPoint) -> str:

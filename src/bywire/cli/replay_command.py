@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from bywire.cli import output
 from bywire.cli.identify_text import finite
+from bywire.cli.measured_bench import read_bench
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import InputError, ParameterError
@@ -17,7 +18,6 @@ from bywire.core.errors import InputError, ParameterError
 if TYPE_CHECKING:
     import xarray as xr
 
-    from bywire.bench.bench import Bench
     from bywire.identification.replaying.segments import Segment
     from bywire.identification.replaying.tracking import Track
     from bywire.report.replay_report import Replay
@@ -49,7 +49,7 @@ def execute(wanted: Wanted, out: Path | None, as_json: bool) -> int:
     from bywire.identification.replaying.tracking import track
     from bywire.report.replay_report import Replay
 
-    bench = _bench(wanted.bench, wanted.changes)
+    bench = read_bench(wanted.bench, wanted.changes)
     tolerances = _tolerances(wanted.tolerances)
     if out is not None:
         require_folder(out)
@@ -77,19 +77,6 @@ def execute(wanted: Wanted, out: Path | None, as_json: bool) -> int:
     if out is not None:
         output.message(f"report: {out / 'report.html'}")
     return 0 if one.holds else 1
-
-
-def _bench(path: Path, changes: Mapping[str, str]) -> Bench:
-    """Return the bench; one that wants a stimulus gets none of its own, for it is measured."""
-    from bywire.bench.bench_file import read
-
-    try:
-        return read(path, changes)
-    except ParameterError as error:
-        if "[stimulus]" not in str(error):
-            raise
-    silent = {"kind": "step", "start": "0", "end": "0", "t_step": "0"}
-    return read(path, {**{f"stimulus.{k}": v for k, v in silent.items()}, **changes})
 
 
 def _tolerances(texts: Sequence[str]) -> dict[str, str]:

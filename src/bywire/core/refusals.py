@@ -55,8 +55,8 @@ def _explain(
     if leaf is not None and kind != "value_error" and not _is_length(detail):
         wanted = "a whole number, " if kind.startswith("int") else ""
         return _out_of_range(name, value, leaf, wanted, texts.get(name, ""))
-    if kind == "too_short":
-        return f"{name}: at least {detail['ctx']['min_length']} wanted, got {quoted(value)}"
+    if _is_length(detail):
+        return _wrong_count(name, detail, texts)
     message = _PLAIN_WORDS.get(kind, str(detail["msg"]).removeprefix("Value error, "))
     given = "" if isinstance(value, dict) else f", got {quoted(value)}"
     return f"{name or owner}: {message}{given}"
@@ -71,6 +71,16 @@ def _out_of_range(name: str, value: Any, leaf: Leaf, wanted: str, text: str) -> 
     unit = "" if symbol == "1" else f" {symbol}"
     got = "" if written in ("", symbol) else f", got {quoted(text)}"
     return f"{name} = {value}{unit} is not admissible: it must be {wanted}{leaf.range_text}{got}"
+
+
+def _wrong_count(name: str, detail: Mapping[str, Any], texts: Mapping[str, str]) -> str:
+    """Return what is said of a table with too few or too many nodes."""
+    context, value = detail["ctx"], detail["input"]
+    short = detail["type"] == "too_short"
+    wanted = f"at least {context['min_length']}" if short else f"at most {context['max_length']}"
+    written = [texts.get(f"{name}.{k}", "") for k in range(len(value))]
+    got = quoted(", ".join(written)) if written and all(written) else quoted(value)
+    return f"{name}: {wanted} wanted, got {got}"
 
 
 def _is_length(detail: Mapping[str, Any]) -> bool:

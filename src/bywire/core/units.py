@@ -87,7 +87,7 @@ def registry() -> pint.UnitRegistry[Any]:
     return known
 
 
-def parse(value: str | float, symbol: str, name: str) -> float:
+def parse(value: str | float, symbol: str, name: str, nominal: float = 1.0) -> float:
     """Return a value in an SI unit.
 
     Parameters
@@ -98,6 +98,8 @@ def parse(value: str | float, symbol: str, name: str) -> float:
         SI unit wanted, ``"1"`` for a pure number.
     name
         What to call the value in an error.
+    nominal
+        Its usual magnitude in that unit, for the example that an error gives.
 
     Raises
     ------
@@ -114,10 +116,11 @@ def parse(value: str | float, symbol: str, name: str) -> float:
     """
     if isinstance(value, bool) or not isinstance(value, (str, int, float)):
         raise UnitError(
-            f"{name} = {quoted(value)}: one number is wanted, for instance {example(symbol)!r}"
+            f"{name} = {quoted(value)}: one number is wanted, for instance "
+            f"{example(symbol, nominal)!r}"
         )
     try:
-        number = _number(value, symbol, name) if isinstance(value, str) else float(value)
+        number = _number(value, symbol, name, nominal) if isinstance(value, str) else float(value)
     except OverflowError:  # a whole number of 309 digits or more
         number = math.inf
     if not math.isfinite(number):
@@ -128,11 +131,12 @@ def parse(value: str | float, symbol: str, name: str) -> float:
     return number
 
 
-def _number(text: str, symbol: str, name: str) -> float:
+def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     match = _NUMBER.fullmatch(text) if len(text) <= _LONGEST else None
     if match is None or (match[2] and not _UNIT.fullmatch(match[2])):
         raise UnitError(
-            f"{name} = {quoted(text)} is not a quantity: write for instance {example(symbol)!r}"
+            f"{name} = {quoted(text)} is not a quantity: write for instance "
+            f"{example(symbol, nominal)!r}"
         )
     size, unit = float(match[1]), match[2]
     common = _COMMON.get(unit)
@@ -149,12 +153,12 @@ def _number(text: str, symbol: str, name: str) -> float:
     except pint.DimensionalityError:
         raise UnitError(
             f"{name} = {text!r} has the wrong unit: {unit or 'a pure number'} cannot be "
-            f"{_wanted(symbol)}; write for instance {example(symbol)!r}"
+            f"{_wanted(symbol)}; write for instance {example(symbol, nominal)!r}"
         ) from None
     except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
         raise UnitError(
             f"{name} = {text!r}: the unit {unit!r} is not known; "
-            f"write for instance {example(symbol)!r}"
+            f"write for instance {example(symbol, nominal)!r}"
         ) from None
 
 
@@ -214,9 +218,17 @@ def convert(value: float, symbol: str, unit: str) -> float:
     return value * factor
 
 
-def example(symbol: str) -> str:
-    """Return a quantity that would be accepted."""
+def example(symbol: str, nominal: float = 1.0) -> str:
+    """Return a quantity that would be accepted: of its usual magnitude, where one is known.
+
+    Examples
+    --------
+    >>> example("Pa"), example("Pa", 2e6)
+    ('1.5 bar', '20 bar')
+    """
     unit = display_unit(symbol)
+    if nominal != 1.0:
+        return shown(nominal, symbol)
     return "1.5" if unit == "1" else f"1.5 {unit}"
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, SolverError
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
-from bywire.identification.unknown import Unknown, moved
+from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
@@ -244,8 +244,3 @@ def notes_of(found: Estimate) -> tuple[str, ...]:
         for label, end in found.at_bounds().items()
     ]
     return tuple(notes)
-
-
-def restarted(problem: Problem, values: Array) -> Problem:
-    """Return the problem with other starts."""
-    return replace(problem, unknowns=moved(problem.unknowns, values))

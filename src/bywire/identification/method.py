@@ -9,6 +9,7 @@ from typing import Any
 
 import xarray as xr
 
+from bywire.bench.bench import Bench
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.identification.estimate import Estimate
@@ -165,10 +166,17 @@ class Method:
     truth
         ``truth(par, options) -> {label: value}``: what ``synthetic`` puts in, of estimates that
         are no parameters of the assembly.
+    further
+        Estimates that are no parameters of the assembly: name -> SI unit (empty where it is the
+        data's) and meaning, for listings.
     simulated
         Options that nothing but ``synthetic`` uses.
     bench_note
         What a bench with the identified values cannot do.
+    bench
+        The bench whose parameters it finds, where it was made for one.
+    key
+        What else tells its simulated experiments from those of other methods.
     """
 
     name: str
@@ -185,8 +193,11 @@ class Method:
     gaps: bool = False
     optional: Mapping[str, str] = field(default_factory=dict)
     truth: Callable[[Any, Any], Mapping[str, float]] | None = None
+    further: Mapping[str, tuple[str, str]] = field(default_factory=dict)
     simulated: tuple[str, ...] = ()
     bench_note: str = ""
+    bench: Bench | None = None
+    key: str = ""
 
     def require_signals(self, data: xr.Dataset) -> None:
         """Raise ``UnknownNameError`` when a signal is missing, with the nearest ones."""

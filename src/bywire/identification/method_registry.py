@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from functools import cache
 
-from bywire.core.discovery import declared, pick
+from bywire.core.discovery import declared
+from bywire.core.errors import unknown_name
 from bywire.identification import methods
+from bywire.identification.fitting.asked import BenchMethod
 from bywire.identification.method import Method
 
 
@@ -17,11 +19,19 @@ def all_methods() -> Mapping[str, Method]:
 
 
 def find_method(name: str) -> Method:
-    """Return one method.
+    """Return one method that needs no bench.
 
     Raises
     ------
     UnknownNameError
         With the nearest known names.
     """
-    return pick(all_methods(), name, "method")
+    if name not in all_methods():
+        raise unknown_name("method", name, (*all_methods(), *bench_methods()))
+    return all_methods()[name]
+
+
+@cache
+def bench_methods() -> Mapping[str, BenchMethod]:
+    """Return the methods that are made for a bench: also a ``METHOD`` of ``methods`` each."""
+    return declared(methods, "METHOD", BenchMethod)

@@ -8,7 +8,7 @@ are the exact ones of the run, friction and contacts included.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -16,11 +16,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, SolverError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of, zeros
 from bywire.identification.least_squares import Problem
+from bywire.identification.moved_run import Start, moved_run, start_slopes
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
@@ -44,6 +45,9 @@ class Trial:
         What names it among several.
     used
         Rows that count, shape (rows,); all by default.
+    start
+        ``start(values) -> (state, memory)``: where the run begins with unknowns changed, by
+        name; by default always where ``run`` does. It takes ``start.NAME`` as well.
     """
 
     run: Run
@@ -51,6 +55,7 @@ class Trial:
     noise: Mapping[str, float]
     label: str = ""
     used: NDArray[np.bool_] | None = field(default=None)
+    start: Start | None = None
 
     def rows(self, signal: str) -> NDArray[np.bool_]:
         """Return which rows of a signal count."""
@@ -172,7 +177,7 @@ def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Proble
         Of models with the same kind of parameters.
     unknowns
         Parameters, which all trials share unless they name a trial; ``initial.STATE``,
-        ``stimulus.NAME`` and ``offset.SIGNAL`` of a trial.
+        ``stimulus.NAME``, ``offset.SIGNAL`` and, with a start of its own, ``start.NAME``.
 
     Raises
     ------
@@ -195,15 +200,8 @@ def _residuals(one: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[
     """Return computed less measured, over the noise, and its derivatives."""
     own = [k for k, u in enumerate(unknowns) if u.trial in ("", one.label)]
     moving = [k for k in own if not unknowns[k].name.startswith("offset.")]
-    run = moved_run(one.run, {unknowns[k].name: float(values[k]) for k in moving})
     signals = tuple(one.measured)
-    names = [unknowns[k].name for k in moving]
-    if names:
-        found = simulate_with_sensitivities(run, names, signals)
-        computed, slopes = found.trajectory.values, found.derivatives
-    else:
-        computed = simulate(run, signals).values
-        slopes = np.empty((*computed.shape, 0))
+    computed, slopes = _computed(one, [unknowns[k] for k in moving], values[moving], signals)
     residuals, jacobians = [], []
     for s, signal in enumerate(signals):
         rows, weight = one.rows(signal), 1.0 / one.noise[signal]
@@ -218,19 +216,21 @@ def _residuals(one: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[
     return np.concatenate(residuals), np.vstack(jacobians)
 
 
-def moved_run(run: Run, values: Mapping[str, float]) -> Run:
-    """Return a run with parameters, initial states and offsets of its stimulus changed.
-
-    Parameters
-    ----------
-    values
-        By name; ``initial.STATE`` replaces, ``stimulus.NAME`` adds.
-    """
-    par = {n: v for n, v in values.items() if not n.startswith(("initial.", "stimulus."))}
-    start = {n[8:]: v for n, v in values.items() if n.startswith("initial.")}
-    shift = {n[9:]: v for n, v in values.items() if n.startswith("stimulus.")}
-    if shift:
-        fields, inner = run.model.Stimulus._fields, run.stimulus
-        add = np.array([shift.get(name, 0.0) for name in fields])
-        run = replace(run, stimulus=lambda t: inner(t) + add)
-    return replace(run, par=run.par.replace(par), state=run.state._replace(**start))
+def _computed(
+    one: Trial, unknowns: Sequence[Unknown], values: Array, signals: tuple[str, ...]
+) -> tuple[Array, Array]:
+    """Return the outputs and their derivatives, shapes (rows, signals), (rows, signals, p)."""
+    named = {u.name: float(v) for u, v in zip(unknowns, values, strict=True)}
+    try:
+        run = moved_run(one.run, named, one.start)
+    except ParameterError as error:  # bounds of several parameters together: a step too far
+        raise SolverError(str(error)) from None
+    if not unknowns:
+        computed = simulate(run, signals).values
+        return computed, np.empty((*computed.shape, 0))
+    if one.start is None:
+        found = simulate_with_sensitivities(run, list(named), signals)
+    else:
+        slopes = start_slopes(one.start, run, unknowns, named)
+        found = simulate_with_sensitivities(run, list(named), signals, *slopes)
+    return found.trajectory.values, found.derivatives

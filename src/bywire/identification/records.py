@@ -1,8 +1,8 @@
 """Several records of one experiment in one measurement, one after the other.
 
 The signal ``record`` numbers them, 0, 1, ...; its attribute ``flag_meanings`` names them, as the
-Climate and Forecast conventions write it. Time goes on from one record to the next, so that any
-file can hold them.
+Climate and Forecast conventions write it; ``begins`` says when each began on its own clock, while
+they are in memory. Time goes on from one record to the next, so that any file can hold them.
 """
 
 from __future__ import annotations
@@ -54,24 +54,36 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
     axis = pd.Index(np.concatenate(times), name="time")
     whole = whole.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
     names = " ".join(label.replace(" ", "_") for label in records)
-    whole[RECORD].attrs = {"units": "1", "long_name": "record", "flag_meanings": names}
+    begins = [float(one["time"].values[0]) for one in records.values()]
+    whole[RECORD].attrs = {
+        "units": "1", "long_name": "record", "flag_meanings": names, "begins": begins
+    }  # fmt: skip
     return whole
 
 
-def split(data: xr.Dataset) -> dict[str, xr.Dataset]:
+def split(data: xr.Dataset, own_clock: bool = False) -> dict[str, xr.Dataset]:
     """Return the records of a measurement by label, each with a time that begins at zero.
 
     Without the signal ``record`` it is one record without a name, as it is.
+
+    Parameters
+    ----------
+    data
+        The measurement.
+    own_clock
+        Whether each record's time begins where it did before they were joined.
     """
     if RECORD not in data:
         return {"": data}
     numbers = data[RECORD].values
     names = str(data[RECORD].attrs.get("flag_meanings", "")).split()
+    begins = np.atleast_1d(data[RECORD].attrs.get("begins", [])) if own_clock else np.empty(0)
     found = {}
     for number in np.unique(numbers[np.isfinite(numbers)]):
         k = int(number)
         one = data.isel(time=np.flatnonzero(numbers == number)).drop_vars(RECORD)
-        axis = pd.Index(np.round(one["time"].values - one["time"].values[0], 12), name="time")
+        t = one["time"].values - one["time"].values[0] + (begins[k] if k < begins.size else 0.0)
+        axis = pd.Index(np.round(t, 12), name="time")
         label = names[k] if 0 <= k < len(names) else f"record_{k}"
         found[label] = one.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
     return found

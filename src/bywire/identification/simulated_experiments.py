@@ -141,7 +141,8 @@ def _ignore_interrupts() -> None:
 
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
     own = "" if par is None else par.model_dump_json()
-    text = f"{method.name} {own} {options.model_dump_json()} {effort.starts} {effort.spread}"
+    name = f"{method.name}{method.key}"
+    text = f"{name} {own} {options.model_dump_json()} {effort.starts} {effort.spread}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from bywire.identification.method import Effort, Method
+from bywire.identification.put_in import put_in
 from bywire.identification.simulated_experiments import Outcome, experiments
 
 Progress = Callable[[str, float], None]
@@ -134,9 +135,7 @@ def _recovered(
 ) -> Iterator[Recovered]:
     from scipy import stats
 
-    truth: dict[str, float] = {} if par is None else par.leaves()
-    if method.truth is not None:
-        truth.update(method.truth(par, options))
+    truth = put_in(method, par, options)
     for label in dict.fromkeys(label for o in outcomes for label in o.values if label in truth):
         told = [o for o in outcomes if label in o.values]
         values = np.array([o.values[label] for o in told])

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, MultipleLocator, NullFormatter
+from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
@@ -111,10 +111,7 @@ def bode(
             )
     upper.set_xscale("log")
     upper.margins(x=0.01)
-    spread = np.log10(upper.get_xlim()[1] / upper.get_xlim()[0])
-    upper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if spread < 3 else (1.0,)))
-    upper.xaxis.set_major_formatter(lambda hertz, _: f"{hertz:g}")
-    upper.xaxis.set_minor_formatter(NullFormatter())
+    style.log_ticks(upper.xaxis)
     upper.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     for axes in (upper, lower):
         axes.grid(True, which="minor", axis="x", color=style.PALE, linewidth=0.3)

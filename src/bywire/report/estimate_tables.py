@@ -8,43 +8,49 @@ from collections.abc import Mapping, Sequence
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check, Identified
 from bywire.identification.trust import Trust
+from bywire.identification.unknown import Unknown
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean, in_display_unit, unit_text
 
 
-def estimate_table(estimate: Estimate, before: Mapping[str, float] | None = None) -> Table:
+def estimate_table(
+    estimate: Estimate,
+    start: Mapping[str, float] | None = None,
+    put_in: Mapping[str, float] | None = None,
+) -> Table:
     """Return the estimates with the half widths of their 95 % intervals, in display units.
 
     Parameters
     ----------
     estimate
         What was found; what the data does not tell stands below it.
-    before
-        Values that the parameter set had, by label.
+    start
+        Values from which the search began, by label.
+    put_in
+        What a simulated measurement is made of, by label.
     """
+    beside: dict[str, Mapping[str, float]] = {"put in": put_in or {}, "start": start or {}}
+    shown = [*estimate.unknowns, *(kept.unknown for kept in estimate.kept)]
+    beside = {t: known for t, known in beside.items() if any(u.label in known for u in shown)}
     rows = []
     for unknown, value, (low, high) in zip(
         estimate.unknowns, estimate.values, estimate.intervals(), strict=True
     ):
-        shown, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
+        number, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
         share = _percent(50.0 * float(high - low) / abs(value)) if value else "-"
-        rows.append(
-            (Cell(clean(unknown.label)), Cell(shown), Cell(half), Cell(share), Cell(unit),
-             Cell(_old(before, unknown.label, unknown.unit)))
-        )  # fmt: skip
-    for kept in estimate.kept:
-        u = kept.unknown
-        shown, _, unit = with_interval(u.start, 0.0, u.unit)
-        rows.append(
-            (Cell(clean(u.label)), Cell(shown), Cell("not told", "bad"), Cell("-"), Cell(unit),
-             Cell(_old(before, u.label, u.unit)))
-        )  # fmt: skip
-    columns = (
-        Column("parameter"), Column("estimate", numeric=True), Column("± (95 %)", numeric=True),
-        Column("share", numeric=True), Column("unit"), Column("before", numeric=True),
+        rows.append((unknown, (Cell(number), Cell(half), Cell(share), Cell(unit))))
+    for u in (kept.unknown for kept in estimate.kept):
+        number, _, unit = with_interval(u.start, 0.0, u.unit)
+        rows.append((u, (Cell(number), Cell("not told", "bad"), Cell("-"), Cell(unit))))
+    return Table(
+        (Column("parameter"), Column("estimate", numeric=True), Column("± (95 %)", numeric=True),
+         Column("share", numeric=True), Column("unit"),
+         *(Column(title, numeric=True) for title in beside)),
+        tuple(
+            (Cell(clean(u.label)), *cells, *(_known(known, u) for known in beside.values()))
+            for u, cells in rows
+        ),
     )  # fmt: skip
-    keep = 6 if any(row[5].text != "-" for row in rows) else 5
-    return Table(columns[:keep], tuple(row[:keep] for row in rows))
 
 
 def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str]:
@@ -64,10 +70,10 @@ def _percent(share: float) -> str:
     return f"{share:.0f} %" if share >= 10.0 else f"{share:.2g} %"
 
 
-def _old(before: Mapping[str, float] | None, label: str, symbol: str) -> str:
-    if before is None or label not in before:
-        return "-"
-    return f"{in_display_unit(before[label], symbol)[0]:.5g}"
+def _known(values: Mapping[str, float], unknown: Unknown) -> Cell:
+    if unknown.label not in values:
+        return Cell("-")
+    return Cell(f"{in_display_unit(values[unknown.label], unknown.unit)[0]:.5g}")
 
 
 def check_table(checks: Sequence[Check]) -> Table:

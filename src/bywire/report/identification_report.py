@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from matplotlib.figure import Figure
@@ -45,9 +45,13 @@ class Identification:
     notes
         What was done to the measurement.
     subject
-        The brake and its parameters before; None for a method without an assembly.
+        The brake and its parameters; None for a method without an assembly.
     idle
         Options that had nothing to do: what only shapes simulated experiments.
+    start
+        Values from which the search began, by the estimates' labels, SI.
+    put_in
+        What a simulated measurement is made of, likewise; empty for a measured one.
     """
 
     method: Method
@@ -57,16 +61,13 @@ class Identification:
     notes: Sequence[str] = ()
     subject: Subject | None = None
     idle: Sequence[str] = ()
+    start: Mapping[str, float] = field(default_factory=dict)
+    put_in: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def holds(self) -> bool:
         """Whether every check holds."""
         return all(check.holds for check in self.found.checks)
-
-    @property
-    def before(self) -> Mapping[str, float]:
-        """Values of the parameters before."""
-        return {} if self.subject is None else self.subject.par.leaves()
 
 
 def write_identification(out: Path, one: Identification) -> list[Path]:
@@ -119,7 +120,8 @@ def _banner(one: Identification) -> Banner:
 def _parameters(one: Identification) -> list[Block]:
     blocks: list[Block] = []
     for name, estimate in one.found.estimates.items():
-        blocks.append(TableBlock(estimate_table(estimate, one.before), f"{_capital(name)}."))
+        table = estimate_table(estimate, one.start, one.put_in)
+        blocks.append(TableBlock(table, f"{_capital(name)}."))
         said = [f"{k.unknown.label} is not told by the data: {k.reason}." for k in estimate.kept]
         said += [f"{_capital(text)}." for text in estimate.notes]
         blocks += [Listing(said)] if said else []

@@ -6,6 +6,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
@@ -13,14 +14,18 @@ from bywire.identification.method import Curve
 from bywire.report import style
 from bywire.report.channel import FloatArray
 from bywire.report.decimation import kept_samples
+from bywire.report.record_marks import mark_records
 from bywire.report.wording import amount
 
-_FEW = 30  # points: each was measured by itself, and has a marker
 _MOST = 6  # curves of a family that have a color each
 
 
 def method_curve(curve: Curve) -> Figure:
-    """Draw measured and modeled with their difference below, or values with 95 % bands."""
+    """Draw measured and modeled with their difference below, or values with 95 % bands.
+
+    Few measured points stand alone, without a line between them. Records that follow one another
+    are told apart by thin lines and named.
+    """
     if "measured" in curve.data and "modeled" in curve.data:
         return _beside(curve)
     figure, (axes,) = style.new_figure(3.8)
@@ -31,62 +36,91 @@ def method_curve(curve: Curve) -> Figure:
 def _beside(curve: Curve) -> Figure:
     figure, (upper, lower) = style.new_figure(4.4, (2.4, 1.0))
     data, x = curve.data, curve.x
-    at = _abscissa(data, x)
-    for k, label in _family(data["measured"], x):
-        measured, modeled = (_row(data[name], x, k) for name in ("measured", "modeled"))
-        own = style.SEQUENCE[k % _MOST]
-        for values, role, word in (
-            (measured, style.Role.MEASURED, "measured"),
-            (modeled, style.Role.SIMULATED, "modeled"),
-        ):
-            look = style.STROKES[role]
-            upper.plot(
-                *_drawn(at, values), color=own if label else look.color, zorder=look.zorder,
-                linestyle=look.linestyle, linewidth=look.linewidth, markersize=3.0,
-                marker="o" if at.size <= _FEW else None,
-                label=style.plain(f"{label} {word}".strip()),
-            )  # fmt: skip
-        shown = own if label else style.PURPLE
-        lower.plot(*_drawn(at, modeled - measured), linewidth=0.9, color=shown)
+    sparse = False
+    for k, label in _family(data["measured"], data[x]):
+        at = _abscissa(data, x, k)
+        measured, modeled = (_row(data[name], data[x], k) for name in ("measured", "modeled"))
+        few = int(np.isfinite(measured).sum()) <= style.FEW
+        own = style.SEQUENCE[k % _MOST] if label else ""
+        _draw_pair(upper, at, (measured, modeled), label, own, few)
+        _draw(lower, at, modeled - measured, few, color=own or style.PURPLE, linewidth=0.9)
+        sparse = sparse or few
     for name in (str(k) for k in data.data_vars if k not in ("measured", "modeled")):
         look = style.STROKES[style.Role.SECOND]
         upper.plot(
-            *_drawn(at, _row(data[name], x, 0)), color=look.color, zorder=look.zorder,
-            linestyle=look.linestyle, linewidth=look.linewidth, label=style.plain(name),
+            *_drawn(_abscissa(data, x, 0), _row(data[name], data[x], 0)), color=look.color,
+            zorder=look.zorder, linestyle=look.linestyle, linewidth=look.linewidth,
+            label=style.plain(name),
         )  # fmt: skip
     lower.axhline(0.0, color=style.GRAY, linewidth=0.6)
     for axes in (upper, lower):
-        axes.margins(x=0.0)
-        if x == "frequency":
-            axes.set_xscale("log")
+        axes.margins(x=0.02 if sparse else 0.0)
     symbol = str(data["measured"].attrs.get("units", "1"))
     name = str(data["measured"].attrs.get("long_name", "value"))
     upper.set_ylabel(style.axis_label(name, symbol))
     lower.set_ylabel(style.axis_label("difference", symbol, "\n"))
     lower.set_xlabel(_x_label(data, x))
+    if x == "frequency":
+        _over_frequency(upper, lower, symbol)
+    mark_records((upper, lower), data[x])
     style.few_ticks(lower, 4)
     style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
 
 
+def _over_frequency(upper: Axes, lower: Axes, symbol: str) -> None:
+    """Make the frequency logarithmic, and a gain too; a phase is none."""
+    lower.set_xscale("log")
+    style.log_ticks(lower.xaxis)
+    if symbol not in ("degree", "rad"):
+        upper.set_yscale("log")
+        style.log_ticks(upper.yaxis)
+
+
+def _draw_pair(
+    axes: Axes, at: FloatArray, pair: tuple[FloatArray, FloatArray], label: str, own: str, few: bool
+) -> None:
+    """Draw measured and modeled; of a family both in its own color, measured pale and wide."""
+    for values, role, word in zip(
+        pair, (style.Role.MEASURED, style.Role.SIMULATED), ("measured", "modeled"), strict=True
+    ):
+        if not np.isfinite(values).any():
+            continue
+        look = style.STROKES[role]
+        wide = bool(own) and role is style.Role.MEASURED and not few
+        _draw(
+            axes, at, values, few and role is style.Role.MEASURED, color=own or look.color,
+            zorder=look.zorder, linestyle=look.linestyle, alpha=0.4 if wide else 1.0,
+            linewidth=3.0 if wide else look.linewidth,
+            label=style.plain(f"{label} {word}".strip()),
+        )  # fmt: skip
+
+
+def _draw(axes: Axes, at: FloatArray, values: FloatArray, alone: bool, **look: object) -> None:
+    """Draw a line, or points that stand alone."""
+    if alone:
+        look |= {"linestyle": "none", "marker": "o", "markersize": 3.5}
+    axes.plot(*_drawn(at, values), **look)  # type: ignore[arg-type]
+
+
 def _bands(axes: Axes, curve: Curve) -> None:
     data, x = curve.data, curve.x
-    at = _abscissa(data, x)
-    for k, label in _family(data["value"], x):
+    banded = "low" in data and "high" in data
+    family = _family(data["value"], data[x])
+    for k, label in family:
+        at = _abscissa(data, x, k)
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
-        if "low" in data and "high" in data:
-            low, high = _row(data["low"], x, k), _row(data["high"], x, k)
+        if banded:
+            low, high = _row(data["low"], data[x], k), _row(data["high"], data[x], k)
             axes.fill_between(at, low, high, color=color, alpha=0.25, linewidth=0.0)
-        name = label or "modeled"
-        word = f"{name}, 95 % band" if "low" in data and not label else name
         axes.plot(
-            at, _row(data["value"], x, k), color=color, linewidth=1.3,
-            label=style.plain(word),
+            at, _row(data["value"], data[x], k), color=color, linewidth=1.3,
+            label=style.plain(label or "modeled"),
         )  # fmt: skip
         if "measured" in data:
             axes.plot(
-                at, _row(data["measured"], x, k), "o", color=color, markersize=3.0,
+                at, _row(data["measured"], data[x], k), "o", color=color, markersize=3.0,
                 label=style.plain(f"{label} measured".strip()),
             )  # fmt: skip
     axes.margins(x=0.01)
@@ -95,7 +129,11 @@ def _bands(axes: Axes, curve: Curve) -> None:
     axes.set_ylabel(
         style.axis_label(str(value.attrs.get("long_name", "value")), value.attrs.get("units", "1"))
     )
-    style.legend_above(axes)
+    entries = list(axes.get_legend_handles_labels()[0])
+    if banded:
+        shade = style.GRAY if len(family) > 1 else style.SEQUENCE[0]
+        entries.append(Patch(color=shade, alpha=0.25, linewidth=0.0, label="95 % band"))
+    style.legend_above(axes, entries)
 
 
 def _drawn(at: FloatArray, values: FloatArray) -> tuple[FloatArray, ...]:
@@ -106,9 +144,9 @@ def _drawn(at: FloatArray, values: FloatArray) -> tuple[FloatArray, ...]:
     return at, values
 
 
-def _family(array: xr.DataArray, x: str) -> list[tuple[int, str]]:
+def _family(array: xr.DataArray, x: xr.DataArray) -> list[tuple[int, str]]:
     """Return number and label of each curve; one without a label where there is no family."""
-    others = [dim for dim in array.dims if dim != x]
+    others = [dim for dim in array.dims if dim != x.dims[-1]]
     if not others:
         return [(0, "")]
     (other,) = others
@@ -120,18 +158,21 @@ def _family(array: xr.DataArray, x: str) -> list[tuple[int, str]]:
     ]
 
 
-def _row(array: xr.DataArray, x: str, k: int) -> FloatArray:
-    others = [dim for dim in array.dims if dim != x]
+def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> FloatArray:
+    """Return a curve of a family in its display unit."""
+    others = [dim for dim in array.dims if dim != x.dims[-1]]
     one = array.isel({others[0]: k}) if others else array
     values = np.asarray(one.values, dtype=float)
     symbol = str(array.attrs.get("units", "1"))
     return np.asarray(values * convert(1.0, symbol, display_unit(symbol)))
 
 
-def _abscissa(data: xr.Dataset, x: str) -> FloatArray:
+def _abscissa(data: xr.Dataset, x: str, k: int) -> FloatArray:
+    """Return where a curve was read, in the display unit: all at the same places, or each alone."""
     symbol = str(data[x].attrs.get("units", "s" if x == "time" else "1"))
     factor = convert(1.0, symbol, display_unit(symbol))
-    return np.asarray(data[x].values, dtype=float) * factor
+    values = np.asarray(data[x].values, dtype=float)
+    return (values[k] if values.ndim > 1 else values) * factor
 
 
 def _x_label(data: xr.Dataset, x: str) -> str:

@@ -80,6 +80,7 @@ def replay_figure(
 def _segments(panels: Sequence[Axes], fits: Sequence[SegmentFit], scale: float) -> None:
     if len(fits) < 2 and all(v.met for fit in fits for v in fit.verdicts):
         return
+    label: str | None = "tolerance missed"
     for fit in fits:
         missed = any(not v.met for v in fit.verdicts)
         for axes in panels:
@@ -87,8 +88,9 @@ def _segments(panels: Sequence[Axes], fits: Sequence[SegmentFit], scale: float) 
             if missed:
                 axes.axvspan(
                     scale * fit.segment.start, scale * fit.segment.stop, color=style.ORANGE,
-                    alpha=0.15, linewidth=0.0, zorder=0.5,
+                    alpha=0.15, linewidth=0.0, zorder=0.5, label=label,
                 )  # fmt: skip
+                label = None
         if len(fits) <= _NAMED:
             middle = scale * float(np.mean([fit.segment.start, fit.segment.stop]))
             panels[0].annotate(

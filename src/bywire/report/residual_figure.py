@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from bywire.identification.confidence import autocorrelation
 from bywire.identification.estimate import Estimate
@@ -29,10 +30,12 @@ def residual_figure(estimate: Estimate) -> Figure:
     spread, together = figure.add_subplot(grid[1, 0]), figure.add_subplot(grid[1, 1])
     for axes in (whole, spread, together):
         style.dress(axes)
-    order = np.arange(r.size, dtype=float)
-    whole.plot(*decimate(order, r), color=style.BLUE, linewidth=0.8)
+    order = np.arange(1, r.size + 1, dtype=float)
+    few = r.size <= style.FEW
+    look = {"linestyle": "none", "marker": "o", "markersize": 3.5} if few else {"linewidth": 0.8}
+    whole.plot(*decimate(order, r), color=style.BLUE, **look)
     whole.axhline(0.0, color=style.GRAY, linewidth=0.6)
-    whole.margins(x=0.0)
+    whole.margins(x=0.02 if few else 0.0)
     whole.set_xlabel("number of the measured value")
     whole.set_ylabel("weighted residual [-]")
     _histogram(spread, r)
@@ -43,7 +46,10 @@ def residual_figure(estimate: Estimate) -> Figure:
         limit = end / np.sqrt(r.size)
         label = "95 % band of white residuals" if end > 0 else None
         together.axhline(limit, color=style.VERMILLION, linestyle=":", linewidth=1.2, label=label)
-    together.set_ylim(min(-0.25, float(rho.min()) - 0.05), 1.0)
+    lowest = min(-0.2, float(rho.min()), -_SURE / np.sqrt(r.size))
+    together.set_ylim(lowest - 0.05, 1.0)
+    for axes in (whole, together):
+        axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     together.set_xlabel("lag [samples]")
     together.set_ylabel("autocorrelation [-]")
     style.legend_above(together)

@@ -12,8 +12,9 @@ from enum import Enum
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from matplotlib.ticker import MaxNLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from bywire.core.quantities import display_unit
 from bywire.report.channel import Channel, FloatArray
@@ -40,6 +41,9 @@ WIDTH = 7.2
 """width of a figure [inch]"""
 TEXT_SIZE = 8.5
 """size of all text in a figure [points]"""
+
+FEW = 40
+"""points up to which each stands for itself, and no line joins them"""
 
 _EM_PER_CHARACTER = 0.58  # of the default font, a little more than its mean
 _EMS_BESIDE_TEXT = 4.4  # handle, its gap and the gap between columns in a legend
@@ -121,6 +125,15 @@ def dress(axes: Axes) -> None:
 def few_ticks(axes: Axes, count: int) -> None:
     """Leave at most ``count`` intervals on the ordinate of a low panel."""
     axes.yaxis.set_major_locator(MaxNLocator(nbins=count, steps=[1, 2, 2.5, 5, 10]))
+
+
+def log_ticks(axis: Axis) -> None:
+    """Label a logarithmic axis with plain numbers: 1, 2, 5, 10, or decades where it is long."""
+    low, high = axis.get_view_interval()
+    subs = (1.0, 2.0, 5.0) if high < 1e3 * low else (1.0,)
+    axis.set_major_locator(LogLocator(subs=subs))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_formatter(NullFormatter())
 
 
 def plain(text: object, longest: int = 90) -> str:

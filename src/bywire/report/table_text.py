@@ -56,9 +56,10 @@ def _longest_word(rows: list[list[str]], column: int) -> int:
 def _lines(table: Table, row: list[str], widths: list[int]) -> list[str]:
     """Return the lines of one row."""
     wrapped = [
-        [part for line in text.splitlines() or [""] for part in textwrap.wrap(line, w) or [""]]
+        [part for line in text.splitlines() or [""]
+         for part in textwrap.wrap(line, w, break_on_hyphens=False) or [""]]
         for text, w in zip(row, widths, strict=True)
-    ]
+    ]  # fmt: skip
     height = max(len(parts) for parts in wrapped)
     lines = []
     for k in range(height):

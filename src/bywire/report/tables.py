@@ -194,7 +194,7 @@ def parameter_table(rows: Iterable[ParameterRow]) -> Table:
         tuple(
             (
                 Cell(clean(row.name)),
-                Cell(_value_text(row.value, row.unit)),
+                Cell(value_text(row.value, row.unit)),
                 Cell(clean(row.range)),
                 Cell(clean(row.kind)),
                 Cell(clean(row.where)),
@@ -231,13 +231,13 @@ def _tolerance(row: ReproductionRow) -> str:
     return amount(row.tolerance, row.unit)
 
 
-def _value_text(value: object, unit: str) -> str:
+def value_text(value: object, unit: str) -> str:
     """Return a parameter's value; a choice as it is, a table number by number."""
     if value is None or isinstance(value, (bool, str)):
         return "-" if value is None else clean(value)
     if isinstance(value, (int, float)):
         return amount(float(value), unit, 6)
     if isinstance(value, Sequence):
-        return ", ".join(_value_text(item, unit) for item in value) or "empty"
+        return ", ".join(value_text(item, unit) for item in value) or "empty"
     written = unit_text(unit)
     return clean(value) + (f" {written}" if written else "")

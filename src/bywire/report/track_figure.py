@@ -48,6 +48,7 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
         center = np.concatenate((value[used], [] if known is None else [factor * known]))
         reach = float(np.median((high - low)[used]))
         axes.set_ylim(float(center.min()) - 2.0 * reach, float(center.max()) + 2.0 * reach)
+    axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(x=0.0)
     axes.set_ylabel(style.axis_label(name, symbol))
     axes.set_xlabel(f"time [{unit}]")

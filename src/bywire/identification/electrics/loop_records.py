@@ -12,9 +12,11 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.identification.estimate import Estimate
+from bywire.identification.explained import explained
 from bywire.identification.least_squares import estimate
 from bywire.identification.method import Check, Curve, Identified
-from bywire.identification.output_error import Trial, moved_run, output_error
+from bywire.identification.moved_run import moved_run
+from bywire.identification.output_error import Trial, output_error
 from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
 
@@ -143,7 +145,7 @@ def checks_of(trials: Sequence[Trial], found: Estimate) -> tuple[Check, ...]:
     vague = found.vague()
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
     return (
-        Check("variance_explained", _explained(trials, found), limit=_EXPLAINED, at_least=True,
+        Check("variance_explained", explained(trials, found), limit=_EXPLAINED, at_least=True,
               note="share of the current's variance that the model predicts: do demand and "
               "current belong together?"),
         Check("residual_over_noise", found.rms, limit=_MISFIT,
@@ -151,16 +153,6 @@ def checks_of(trials: Sequence[Trial], found: Estimate) -> tuple[Check, ...]:
         Check("parameters_without_meaning", float(len(vague)), limit=0.0,
               note=said or "none at its bound, none with a 95 % interval wider than +-100 %"),
     )  # fmt: skip
-
-
-def _explained(trials: Sequence[Trial], found: Estimate) -> float:
-    """Return the variance accounted for, each record about its own mean."""
-    total = 0.0
-    for one in trials:
-        for name, values in one.measured.items():
-            counted = values[one.rows(name)]
-            total += float(np.sum(((counted - counted.mean()) / one.noise[name]) ** 2))
-    return 1.0 - float(found.residuals @ found.residuals) / max(total, 1e-300)
 
 
 def as_curve(one: Trial, found: Estimate) -> Curve:
@@ -175,8 +167,8 @@ def as_curve(one: Trial, found: Estimate) -> Curve:
     attrs = {"units": "A", "long_name": "current"}
     data = xr.Dataset(
         {"measured": ("time", one.measured[signal], attrs),
-         "modeled": ("time", made[signal], attrs)},
+         "modeled": ("time", np.where(one.rows(signal), made[signal], np.nan), attrs)},
         {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
     )  # fmt: skip
     name = f"current-{one.label}" if one.label else "current"
-    return Curve(name, "Current: measured, and modeled with the estimates.", data, "time")
+    return Curve(name, "Current: measured, and modeled where it counts.", data, "time")

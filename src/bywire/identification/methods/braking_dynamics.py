@@ -233,4 +233,10 @@ METHOD = Method(
         "sigma_p", "sigma_i",
     ),
     truth=truth,
+    further={
+        "K": ("Pa/A", "gain from current to pressure, in each region"),
+        "tau_L": ("s", "zero of the slow pair"), "T_L": ("s", "pole of the slow pair"),
+        "T1": ("s", "slower pole of the drive"), "T2": ("s", "faster pole of the drive"),
+        "p_rest": ("Pa", "pressure before a step, for each step"),
+    },
 )  # fmt: skip

@@ -183,7 +183,7 @@ def _folded(found: CoggingFit) -> Curve:
             table[k, b] = own.mean() if own.size else np.nan
     amplitude, phase = found.estimate["motor_1.T_cog"], found.estimate["phase"]
     model = np.tile(amplitude * np.sin(middle + phase), (2, 1))
-    attrs = {"units": "N*m", "long_name": "torque of the motor against cogging"}
+    attrs = {"units": "N*m", "long_name": "torque against cogging"}
     dims = ("direction", "x")
     return Curve(
         "cogging-period",
@@ -227,4 +227,11 @@ METHOD = Method(
     simulated=("sigma_i",),
     unknowns=("motor_1.T_cog",),
     truth=truth,
+    further={
+        "phase": ("rad", "of the main order at the encoder's zero"),
+        "amplitude.N": ("N*m", "of a weaker order N, with its phase.N"),
+        "T_forward": ("N*m", "dry friction forward"),
+        "T_backward": ("N*m", "dry friction backward"),
+        "friction_slope": ("N*m*s/rad", "friction over speed, at the test's"),
+    },
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -13,8 +13,8 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at
 from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Current, Duration, Pressure, Torque, Unit
+from bywire.core.quantities import Current, Pressure, Torque, Unit
+from bywire.identification.electrics.loop_experiment import LoopOptions, without_lead
 from bywire.identification.electrics.loop_records import (
     identified_loop,
     levels,
@@ -30,13 +30,9 @@ _GAINS = ("ecu.current.k_p", "ecu.current.k_i")
 _WINDING = ("motor.R_m", "motor.L_m")
 
 
-class Options(ParameterSet):
-    """What is unknown, and the synthetic experiment."""
+class Options(LoopOptions):
+    """What is unknown, how the rotor is held, and the synthetic experiment."""
 
-    unknowns: Literal["gains", "all"]
-    """gains alone, the winding being known; or the winding with them"""
-    lead: Duration
-    """beginning of a record that does not count: where the loop was before is not known"""
     T_hold: Torque
     """torque by which the model's rotor is held: more than the motor has"""
     p_start: Pressure
@@ -45,10 +41,6 @@ class Options(ParameterSet):
     """synthetic: how far steps go below the holding current, within breakaway"""
     i_high: Current
     """synthetic: how far they go above it"""
-    dwell: Duration
-    """synthetic: time from one step to the next"""
-    duration: Duration
-    """synthetic: length of the record"""
     sigma_i: Annotated[float, Unit("A", 5e-3), Field(ge=0)]
     """synthetic: noise of the measured current, ahead of the converter"""
 
@@ -83,8 +75,7 @@ def identify(
     Dardanelli, Alli, Savaresi (2010), section 3.1, Fig. 3.
     """
     trials = [_trial(one, par, options, label) for label, one in split(data).items()]
-    names = _GAINS if options.unknowns == "gains" else (*_GAINS, *_WINDING)
-    return identified_loop(trials, par, names)
+    return identified_loop(trials, par, options.names(_GAINS, _WINDING))
 
 
 def _trial(
@@ -100,8 +91,7 @@ def _trial(
         MotorcycleBrake(), own, data.assign(i_meas=("time", i)), {"i_set": "i_set"},
         {"i_meas": sigma}, state=state_at(0.0, own), memory=memory_at(0.0, own), label=label,
     )  # fmt: skip
-    t = data["time"].values
-    return Trial(found.run, found.measured, found.noise, label, t - t[0] >= options.lead)
+    return without_lead(found, data, options.lead)
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:

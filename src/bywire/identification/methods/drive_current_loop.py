@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated
 
 import numpy as np
 import xarray as xr
@@ -12,8 +12,8 @@ from bywire.assemblies.shaft_rig import ShaftRig
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.rig_case import check_current, shaft_case
 from bywire.bench.running import as_run
-from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
+from bywire.identification.electrics.loop_experiment import LoopOptions, without_lead
 from bywire.identification.electrics.loop_records import (
     identified_loop,
     levels,
@@ -30,19 +30,11 @@ _WINDING = ("motor_1.R_ref", "motor_1.L_M")
 _CLAMPED = {"rig.load": "dummy", "rig.clamp": "closed", "rig.mode_1": "current"}
 
 
-class Options(ParameterSet):
+class Options(LoopOptions):
     """What is unknown, and the synthetic experiment."""
 
-    unknowns: Literal["gains", "all"]
-    """gains alone, the winding being known; or the winding with them"""
-    lead: Duration
-    """beginning of a record that does not count: where the loop was before is not known"""
     i_step: Current
     """synthetic: largest demand"""
-    dwell: Duration
-    """synthetic: time from one step to the next"""
-    duration: Duration
-    """synthetic: length of the record"""
     interval: Duration
     """synthetic: sample time"""
     sigma_i: Annotated[float, Unit("A", 2e-2), Field(ge=0)]
@@ -75,17 +67,15 @@ def identify(
     Roberts et al. (2003), sections "Current controller" and "Motor current loop".
     """
     trials = [_trial(one, par, options, label) for label, one in split(data).items()]
-    names = _GAINS if options.unknowns == "gains" else (*_GAINS, *_WINDING)
-    return identified_loop(trials, par, names)
+    return identified_loop(trials, par, options.names(_GAINS, _WINDING))
 
 
 def _trial(data: xr.Dataset, par: WedgeParameters, options: Options, label: str) -> Trial:
     require_steps(data, "i_1_set", "i_1", label)
     own = par.replace({**_CLAMPED, "encoder.law": "ideal"})
     sigma = noise_of_levels(data["i_1"].values, data["i_1_set"].values)
-    t = data["time"].values
     found = trial(ShaftRig(), own, data, {"i_1_set": "i_1_set"}, {"i_1": sigma}, label=label)
-    return Trial(found.run, found.measured, found.noise, label, t - t[0] >= options.lead)
+    return without_lead(found, data, options.lead)
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:

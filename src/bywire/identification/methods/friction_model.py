@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Annotated, Literal
 
 import numpy as np
-import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
@@ -17,13 +16,16 @@ from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.identification.friction_models import LAWS, find_law, laws_for
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.model_choice import Choice, choose
+from bywire.identification.record_axis import after_one_another
 from bywire.identification.records import split
 
 Array = NDArray[np.float64]
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, lt=1)]
+Pressures = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 Size = Annotated[float, Unit("N", 10.0), Field(ge=0)]
 
 _BINS, _MISFIT = 12, 0.05
+_LEAST = 20  # samples each way
 
 
 class Truth(ParameterSet):
@@ -55,8 +57,8 @@ class Options(ParameterSet):
     """one of the laws, or all compared on data held out"""
     slowest: Share
     """of the fastest speed: slower samples stick or turn round, and are left out"""
-    pressures: tuple[Annotated[float, Unit("Pa")], ...]
-    """pressures of simulated records"""
+    pressures: Annotated[Pressures, Unit("Pa", 2e6), Field(min_length=1)]
+    """pressures of simulated records, one record each"""
     v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]
     """fastest speed of simulated records"""
     f_motion: Frequency
@@ -111,7 +113,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             Check("validation_over_training", best.validation_error / best.training_error,
                   limit=1.5, note="error on data held out over that on data fitted"),
         ),
-        curves=(_curve(whole, predicted),),
+        curves=(_curve(records, whole, predicted),),
         notes=(f"held out: {choice.held_out}; chosen is the simplest law within a standard error "
                "of the best",),
     )  # fmt: skip
@@ -124,15 +126,24 @@ def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.
         kept = one[[n for n in names if n in one]]
         v = np.abs(kept["speed"].values)
         good = np.all([np.isfinite(kept[n].values) for n in kept.data_vars], axis=0)
-        rows = np.flatnonzero(good & (v > slowest * np.nanmax(v)))
+        rows = np.flatnonzero(good & (v > slowest * np.max(v[good], initial=0.0)))
         found[label] = kept.isel(time=rows)
-    signs = np.concatenate([np.sign(one["speed"].values) for one in found.values()])
-    if min(np.sum(signs > 0), np.sum(signs < 0)) < 20:
-        raise ParameterError(
-            "fewer than 20 samples slide one of both ways: move to and fro, or lower "
-            "--option slowest"
-        )
+    _require_both_ways(found, slowest)
     return found
+
+
+def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> None:
+    """Refuse records in which too few samples slide forward, or backward."""
+    v = np.concatenate([one["speed"].values for one in sliding.values()])
+    counts = {"forward": int(np.sum(v > 0)), "backward": int(np.sum(v < 0))}
+    short = [way for way, count in counts.items() if count < _LEAST]
+    if short:
+        said = ", ".join(f"{count} {way}" for way, count in counts.items())
+        raise ParameterError(
+            f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
+            "record motion to and fro (speed changes its sign), or lower --option slowest, which "
+            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
+        )
 
 
 def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
@@ -164,18 +175,17 @@ def _misfit(whole: xr.Dataset, predicted: Array) -> float:
     return max(found) / float(np.sqrt(np.mean(F**2)))
 
 
-def _curve(whole: xr.Dataset, predicted: Array) -> Curve:
+def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Array) -> Curve:
     attrs = {"units": whole["friction"].attrs.get("units", "1"), "long_name": "friction"}
-    number = pd.Index(np.arange(predicted.size, dtype=float), name="sample")
     return Curve(
         "friction",
-        "Friction while it slides: measured, and of the chosen law.",
+        "Friction while it slides, record after record: measured, and of the chosen law.",
         xr.Dataset(
-            {"measured": ("sample", whole["friction"].values, attrs),
-             "modeled": ("sample", predicted, attrs)},
-            {"sample": ("sample", number, {"units": "1", "long_name": "sample"})},
+            {"measured": ("time", whole["friction"].values, attrs),
+             "modeled": ("time", predicted, attrs)},
+            after_one_another({name: one["time"].values for name, one in records.items()}),
         ),
-        "sample",
+        "time",
     )  # fmt: skip
 
 
@@ -225,4 +235,9 @@ METHOD = Method(
     gaps=True,
     optional={"pressure": "Pa"},
     truth=known_values,
+    further={
+        "F_c": ("", "Coulomb friction, or F_p forward and F_n backward"),
+        "f": ("", "friction over pressure"), "d": ("", "viscous friction"),
+        "k": ("1", "breakaway over Coulomb friction"), "v_s": ("", "Stribeck velocity"),
+    },
 )  # fmt: skip

@@ -19,7 +19,7 @@ from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import run_down
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.drive_train.common_axis import on_common_axis
+from bywire.identification.drive_train.own_places import at_own_places
 from bywire.identification.drive_train.run_downs import (
     INERTIA,
     NAMES,
@@ -161,16 +161,16 @@ def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
         torque = run.motion.means(J * moved["alpha"].values)
         speeds.append(run.motion.means(moved["omega"].values))
         table.append(np.array((-torque, -torque + e)))
-    x, filled = on_common_axis(speeds, table)
+    x, filled = at_own_places(speeds, table)
     attrs = {"units": "N*m", "long_name": "decelerating torque"}
-    dims = ("record", "omega")
+    dims = ("record", "window")
     return Curve(
         "torque-over-speed",
         "Inertia times deceleration over speed while coasting, with the estimated inertia.",
         xr.Dataset(
             {"measured": (dims, filled[0], attrs), "modeled": (dims, filled[1], attrs)},
             {"record": [run.label for run in runs],
-             "omega": ("omega", x, {"units": "rad/s", "long_name": "motor speed"})},
+             "omega": (dims, x, {"units": "rad/s", "long_name": "motor speed"})},
         ),
         "omega",
     )  # fmt: skip

@@ -7,21 +7,21 @@ square the bearings'.
 
 from __future__ import annotations
 
-from typing import Annotated
-
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
-from pydantic import Field
 
 from bywire.assemblies.driven_shaft import DrivenShaft
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import load_sweep
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.identification.differentiation import differentiated
-from bywire.identification.drive_train.common_axis import on_common_axis
+from bywire.identification.drive_train.own_places import at_own_places
+from bywire.identification.drive_train.rig_measurement import (
+    SIGNALS,
+    SIMULATED,
+    RigOptions,
+    drive_sensors,
+)
 from bywire.identification.drive_train.screw_strokes import Stroke, fits, strokes
 from bywire.identification.drive_train.steady_motion import (
     Motions,
@@ -31,33 +31,21 @@ from bywire.identification.drive_train.steady_motion import (
 )
 from bywire.identification.equation import Equation
 from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.simulated_record import Sensor, sensed, turned
+from bywire.identification.simulated_record import sensed, turned
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
-
-Array = NDArray[np.float64]
 
 _NAMES = ("screw.eta_f", "screw.eta_b", "bearing.C_0", "bearing.C_2")
 _SPREAD = 1.5  # by which forces have to differ for friction with and without load to part
 _ADVICE = "turn the screw both ways, slowly, under several forces, as 'bywire run load-sweep' does"
 
 
-class Options(ParameterSet):
-    """How the signals are filtered, and how sure measurements are."""
+class Options(RigOptions):
+    """Which strokes count, and the synthetic noise."""
 
-    cutoff: Frequency
-    """low-pass before the angle is differentiated"""
     slowest: AngularSpeed
     """speed that a stroke keeps"""
-    margin: Duration
-    """time left out at either end of a stroke"""
-    window: Duration
-    """time over which the torque balance is averaged"""
-    sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
-    """noise of the measured currents in synthetic measurements"""
-    sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]
-    """noise of the force sensor in synthetic measurements"""
 
 
 def identify(
@@ -171,11 +159,11 @@ def _figures(par: WedgeParameters, made: list[Stroke]) -> dict[str, tuple[float,
 def _curve(made: list[Stroke]) -> Curve:
     """Return motor torque over force, both ways."""
     ways = [[s for s in made if s.drives is drives] for drives in (True, False)]
-    F, table = on_common_axis(
+    F, table = at_own_places(
         [np.array([s.F for s in way]) for way in ways],
         [np.array([(s.torque, s.torque + s.error) for s in way]).T for way in ways],
     )
-    dims = ("direction", "F")
+    dims = ("direction", "stroke")
     attrs = {"units": "N*m", "long_name": "motor torque along the motion"}
     return Curve(
         "torque-over-force",
@@ -183,7 +171,7 @@ def _curve(made: list[Stroke]) -> Curve:
         xr.Dataset(
             {"measured": (dims, table[0], attrs), "modeled": (dims, table[1], attrs)},
             {"direction": ["driving", "driven back"],
-             "F": ("F", F, {"units": "N", "long_name": "force"})},
+             "F": (dims, F, {"units": "N", "long_name": "force"})},
         ),
         "F",
     )  # fmt: skip
@@ -193,11 +181,9 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
     """Return the load sweep, simulated, with the sensors' noise."""
     experiment = load_sweep.EXPERIMENT
     case = experiment.cases(par, experiment.defaults, None)[0]
-    sensors = {name: Sensor(name, options.sigma_i) for name in ("i_1", "i_2")}
-    sensors |= {name: Sensor(name) for name in ("q_1", "q_2")}
-    sensors["y_F"] = Sensor("y_F", options.sigma_F)
     random = np.random.default_rng(seed)
-    return sensed(turned(case, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
+    begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
+    return sensed(begun, drive_sensors(options), random)
 
 
 METHOD = Method(
@@ -205,13 +191,13 @@ METHOD = Method(
     assembly="wedge-brake",
     summary="roller screw's efficiency driving and driven back, bearing friction apart",
     experiment="load-sweep",
-    signals={"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"},
+    signals=SIGNALS,
     options=Options,
     defaults=Options(
         cutoff=120.0, slowest=5.0, margin=0.05, window=0.05, sigma_i=0.02, sigma_F=5.0
     ),
     identify=identify,
     synthetic=synthetic,
-    simulated=("sigma_i", "sigma_F"),
+    simulated=SIMULATED,
     unknowns=_NAMES,
 )

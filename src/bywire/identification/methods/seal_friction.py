@@ -26,6 +26,8 @@ from bywire.identification.unknown import Unknown
 Array = NDArray[np.float64]
 ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
 
+Pressures = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
+
 _MISFIT = 0.1
 
 
@@ -59,8 +61,8 @@ class Options(ParameterSet):
     """corner of the low-pass before the travel is differentiated"""
     zero: Literal["known", "free"]
     """zero of the force sensor: taken as right, or estimated"""
-    pressures: tuple[Annotated[float, Unit("Pa")], ...]
-    """chamber pressures of simulated records"""
+    pressures: Annotated[Pressures, Unit("Pa", 2e6), Field(min_length=2)]
+    """chamber pressures of simulated records, one record each"""
     interval: Duration
     """sample time of simulated records"""
     truth: Truth
@@ -190,4 +192,9 @@ METHOD = Method(
     simulated=("pressures", "interval", "truth"),
     gaps=True,
     truth=known,
+    further={
+        "A": ("m**2", "area"), "F_0": ("N", "friction without pressure"),
+        "f": ("N/Pa", "friction over pressure"),
+        "F_off": ("N", "zero of the force sensor, with zero=free"),
+    },
 )  # fmt: skip

@@ -10,6 +10,7 @@ import xarray as xr
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 from bywire.identification.output_error import even_interval
+from bywire.identification.record_axis import after_one_another
 from bywire.identification.sealing.stroke_groups import Group
 from bywire.identification.sealing.strokes import find_strokes, velocity
 
@@ -48,9 +49,10 @@ def sliding_force(
 ) -> Curve:
     """Return the force while it slides, measured and modeled, record after record."""
     offset = found["F_off"] if "F_off" in found.names else 0.0
-    measured, modeled = [], []
-    for one in records.values():
-        x, p, F = (one[name].values for name in ("x", "p", "F"))
+    measured, modeled, times = [], [], {}
+    for name, one in records.items():
+        x, p, F = (one[n].values for n in ("x", "p", "F"))
+        times[name] = one["time"].values - one["time"].values[0]
         v = velocity(x, even_interval(one["time"].values), cutoff)
         model = np.full(F.size, np.nan)
         for stroke in find_strokes(x, v, *stretch, slowest):
@@ -60,14 +62,13 @@ def sliding_force(
         measured.append(np.where(np.isfinite(model), F, np.nan))
         modeled.append(model)
     attrs = {"units": "N", "long_name": "force"}
-    number = np.arange(sum(m.size for m in measured), dtype=float)
     return Curve(
         "strokes",
-        "Force while the piston slides: measured, and of the model.",
+        "Force while the piston slides, record after record: measured, and of the model.",
         xr.Dataset(
-            {"measured": ("sample", np.concatenate(measured), attrs),
-             "modeled": ("sample", np.concatenate(modeled), attrs)},
-            {"sample": ("sample", number, {"units": "1", "long_name": "sample"})},
+            {"measured": ("time", np.concatenate(measured), attrs),
+             "modeled": ("time", np.concatenate(modeled), attrs)},
+            after_one_another(times),
         ),
-        "sample",
+        "time",
     )  # fmt: skip

@@ -1,0 +1,78 @@
+"""A bench as the text of a bench file: what `bywire.bench.bench_file` reads, written."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from bywire.bench.bench import Bench
+from bywire.bench.stimuli.registry import entry as stimulus_entry
+from bywire.core.parameters import ParameterSet, leaf_fields
+
+_PATHS = ("trace", "file")  # keys that name files: they must hold from any folder
+
+
+def bench_text(bench: Bench, comment: str = "") -> str:
+    """Return a bench as TOML.
+
+    Parameters
+    ----------
+    bench
+        What is written; numbers get their SI units, texts stay as they were typed.
+    comment
+        First lines.
+
+    Examples
+    --------
+    >>> print(bench_text(Bench("hard-braking", "dardanelli2010", overrides={"motor.R_m": 0.4})))
+    experiment = "hard-braking"
+    parameters = "dardanelli2010"
+    <BLANKLINE>
+    [set]
+    "motor.R_m" = "0.4 ohm"
+    <BLANKLINE>
+    """
+    definition = bench.definition
+    stimulus: dict[str, str] = {}
+    if "kind" in bench.stimulus and definition.driven_unit is not None:
+        level = definition.driven_unit(bench.chosen_options)
+        stimulus = _units(stimulus_entry(str(bench.stimulus["kind"])).parameter_class, level)
+    simulation: dict[str, Any] = {"step": bench.step} if bench.step != Bench.step else {}
+    simulation |= {} if bench.record is None else {"record": bench.record}
+    simulation |= {"seed": bench.seed} if bench.seed else {}
+    sections: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {
+        "options": (bench.options, _units(definition.options)),
+        "stimulus": (bench.stimulus, stimulus),
+        "set": (bench.overrides, _units(type(bench.par))),
+        "simulation": (simulation, {"step": "s", "record": "s"}),
+        "requirements": (bench.requirements, {}),
+    }
+    lines = [f"# {line}" for line in comment.splitlines()]
+    lines += [f'experiment = "{bench.experiment}"', f'parameters = "{bench.parameters}"']
+    for name, (values, units) in sections.items():
+        if values:
+            lines += ["", f"[{name}]"]
+            lines += [f"{_key(k)} = {_text(k, v, units.get(k, '1'))}" for k, v in values.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _units(cls: type[ParameterSet], level: str = "") -> dict[str, str]:
+    return {n: leaf.unit.symbol.replace("level", level) for n, leaf in leaf_fields(cls).items()}
+
+
+def _key(name: str) -> str:
+    return f'"{name}"' if "." in name else name
+
+
+def _text(name: str, value: Any, symbol: str) -> str:
+    if isinstance(value, (str, Path)):
+        path = name in _PATHS and str(value)
+        return json.dumps(str(Path(path).resolve()) if path else str(value), ensure_ascii=False)
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, Sequence):
+        return f"[{', '.join(_text(name, node, symbol) for node in value)}]"
+    number = value if isinstance(value, int) else float(f"{float(value):.12g}")
+    return json.dumps(f"{number} {symbol}") if symbol != "1" else f"{number}"

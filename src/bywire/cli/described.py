@@ -1,0 +1,149 @@
+"""What ``bywire list NAME`` shows: everything of that name, with options, signals and units."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from bywire.analysis.linear.plant_registry import all_plants
+from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.study import Study
+from bywire.analysis.study_registry import all_studies
+from bywire.bench.experiment import Experiment
+from bywire.bench.kpis.registry import definitions
+from bywire.bench.registry import all_experiments
+from bywire.bench.stimuli.registry import Entry as Stimulus
+from bywire.bench.stimuli.registry import entries as stimuli
+from bywire.catalog.registry import Entry as Set
+from bywire.catalog.registry import entries as sets
+from bywire.catalog.registry import entry, main_set
+from bywire.cli.option_rows import option_rows, option_table
+from bywire.core.errors import unknown_name
+from bywire.core.field_notes import field_notes
+from bywire.core.parameters import leaf_fields
+from bywire.core.quantities import display_unit
+from bywire.identification.fitting.asked import BenchMethod
+from bywire.identification.method import Method
+from bywire.identification.method_registry import all_methods, bench_methods
+
+Object = dict[str, Any]
+
+
+def described(name: str) -> list[Object]:
+    """Return an object for everything that has a name: a method, an experiment, both.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    kinds: Mapping[str, tuple[Mapping[str, Any], Callable[[Any], Object]]] = {
+        "method": (all_methods(), _method),
+        "method of any bench": (bench_methods(), _bench_method),
+        "experiment": (all_experiments(), _experiment),
+        "study": (all_studies(), _study),
+        "parameter set": (sets(), _set),
+        "loop": (all_loops(), _in_short),
+        "plant": (all_plants(), _in_short),
+        "stimulus": (stimuli(), _stimulus),
+        "KPI": (definitions(), lambda one: {"summary": one.definition}),
+    }
+    found: list[Object] = [
+        {"kind": kind, "name": name, **describe(known[name])}
+        for kind, (known, describe) in kinds.items() if name in known
+    ]  # fmt: skip
+    if not found:
+        raise unknown_name("name", name, {n for known, _ in kinds.values() for n in known})
+    return found
+
+
+def described_text(one: Object) -> str:
+    """Return such an object as the terminal shows it."""
+    from bywire.report.table_text import table_text
+    from bywire.report.tables import text_table
+    from bywire.report.wording import unit_text
+
+    lines = [f"{one['kind']} {one['name']}: {one['summary']}"]
+    lines += [f"  {key}: {one[key]}" for key in ("assembly", "experiment", "records", "source")
+              if one.get(key)]  # fmt: skip
+    parts = ["\n".join(lines)]
+    for key in ("signals", "estimates", "kpis"):
+        rows = one.get(key)
+        if rows:
+            columns = list(rows[0])
+            cells = [
+                [(unit_text(row[n]) if n == "unit" else row[n]) or "-" for n in columns]
+                for row in rows
+            ]
+            parts.append(f"{key}\n{table_text(text_table(columns, cells))}")
+    for key, heading in (("options", "default"), ("parameters", "value")):
+        if one.get(key):
+            said = f"{key}, changed with {one['changed_with']}" if "changed_with" in one else key
+            parts.append(f"{said}\n{table_text(option_table(one[key], heading))}")
+    return "\n\n".join(parts)
+
+
+def _method(one: Method) -> Object:
+    needed = [{"signal": n, "unit": u or "any", "needed": "yes"} for n, u in one.signals.items()]
+    more = [{"signal": n, "unit": u or "any", "needed": "no"} for n, u in one.optional.items()]
+    return {
+        "summary": one.summary,
+        "assembly": one.assembly or "any",
+        "experiment": one.experiment,
+        "records": "one or several" if one.several else "one",
+        "signals": [*needed, *more],
+        "estimates": _estimates(one),
+        "options": option_rows(one.options, one.defaults, one.simulated),
+        "changed_with": "--option NAME=VALUE",
+    }
+
+
+def _bench_method(one: BenchMethod) -> Object:
+    return {
+        "summary": one.summary,
+        "assembly": "any, that of --bench",
+        "records": "one or several",
+        "options": option_rows(one.options, one.defaults, one.simulated),
+        "changed_with": "--option NAME=VALUE",
+    }
+
+
+def _estimates(one: Method) -> list[Object]:
+    """Return the names that a method finds, parameters of the assembly first."""
+    rows = []
+    if one.assembly and one.unknowns:
+        cls = entry(main_set(one.assembly)).parameter_class
+        leaves, notes = leaf_fields(cls), field_notes(cls)
+        rows += [{"name": n, "unit": display_unit(leaves[n].unit.symbol), "meaning": notes[n]}
+                 for n in one.unknowns if n in leaves]  # fmt: skip
+    return rows + [{"name": n, "unit": display_unit(unit) or "any", "meaning": text}
+                   for n, (unit, text) in one.further.items()]  # fmt: skip
+
+
+def _experiment(one: Experiment) -> Object:
+    return {
+        "summary": one.summary,
+        "assembly": one.assembly,
+        "kpis": [{"name": n, "unit": display_unit(u)} for n, u in one.kpis.items()],
+        "options": option_rows(one.options, one.defaults),
+        "changed_with": "--set options.NAME=VALUE",
+    }  # fmt: skip
+
+
+def _study(one: Study) -> Object:
+    return {**_in_short(one), "options": option_rows(one.options, one.defaults),
+            "changed_with": "--set NAME=VALUE"}  # fmt: skip
+
+
+def _set(one: Set) -> Object:
+    return {**_in_short(one), "source": one.source,
+            "parameters": option_rows(one.parameter_class, one.parameters()),
+            "changed_with": "--set NAME=VALUE"}  # fmt: skip
+
+
+def _stimulus(one: Stimulus) -> Object:
+    return {"summary": one.summary, "parameters": option_rows(one.parameter_class, None)}
+
+
+def _in_short(one: Any) -> Object:
+    return {"summary": one.summary, "assembly": one.assembly}

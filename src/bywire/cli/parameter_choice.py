@@ -1,0 +1,41 @@
+"""The parameters that a user asked for, of the brake that is looked at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bywire.bench.values import parsed
+from bywire.catalog.registry import entry, main_set
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+
+
+def parameters_for(
+    subject: str, assembly: str, name: str, changes: Mapping[str, str]
+) -> tuple[str, ParameterSet]:
+    """Return name and values of a parameter set, changed.
+
+    Parameters
+    ----------
+    subject
+        What is looked at, for instance ``"loop 'moment'"``.
+    assembly
+        The brake that it belongs to.
+    name
+        Parameter set; empty for the main one of that brake.
+    changes
+        Parameters by dotted name, with units.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, and sets of another brake.
+    """
+    found = entry(name or main_set(assembly))
+    if found.assembly != assembly:
+        raise ParameterError(
+            f"{subject} is one of a {assembly}, but parameter set {found.name!r} is for a "
+            f"{found.assembly}"
+        )
+    base = found.parameters()
+    return found.name, base.replace(parsed(type(base), changes, "parameter"))

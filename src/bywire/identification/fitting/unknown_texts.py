@@ -1,0 +1,177 @@
+"""Unknowns as users write them: names, ranges ``LOW..HIGH``, priors ``MEAN +- DEVIATION``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.experiment import Case
+from bywire.bench.values import number
+from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
+from bywire.core.signals import signals_of
+from bywire.core.units import shown, split
+from bywire.identification.fitting.asked import Asked
+from bywire.identification.unknown import Unknown, parameters_of, scattered
+
+Array = NDArray[np.float64]
+
+_BETWEEN = re.compile(r"\s*(?:\+-|\+/-|±)\s*")
+_OPEN = 1e-6  # of a range: how near an end comes to zero that is not admissible
+_EXAMPLES = {"range": (0.5, 2.0), "prior": (1.0, 0.1)}  # of the usual magnitude
+_STIMULUS, _OFFSET = "stimulus.", "offset."
+
+
+def is_parameter(name: str) -> bool:
+    """Return whether an unknown is a parameter of the bench, and no offset."""
+    return not name.startswith((_STIMULUS, _OFFSET))
+
+
+def unknowns_of(case: Case, known: ParameterSet, asked: Asked) -> tuple[Unknown, ...]:
+    """Return what all records share; see `Asked` for how it is written.
+
+    Parameters
+    ----------
+    case
+        Run of the bench: its parameters are the starts.
+    known
+        Parameters of the bench; what the experiment sets itself differs from them.
+    asked
+        What is asked for.
+
+    Raises
+    ------
+    UnknownNameError
+        For a name that is no number of the bench, with the nearest.
+    ParameterError, UnitError
+        When nothing is asked for; for ranges and priors that cannot be read or are empty.
+    """
+    if not asked.unknowns:
+        raise ParameterError(
+            "nothing is unknown: give --unknown PARAMETER, once for each, for instance --unknown "
+            f"{next(iter(leaf_fields(type(case.par))))}"
+        )
+    for name in asked.priors:
+        if name not in asked.unknowns:
+            raise unknown_name("unknown in --prior", name, asked.unknowns)
+    leaves = leaf_fields(type(known))
+    return tuple(
+        _with_texts(
+            _bare(name, case, known, asked.outputs), text, asked.priors.get(name, ""),
+            leaves.get(name),
+        )
+        for name, text in asked.unknowns.items()
+    )  # fmt: skip
+
+
+def _bare(
+    name: str, case: Case, known: ParameterSet, outputs: Iterable[str]
+) -> Unknown:
+    """Return an unknown without range and prior."""
+    if name.startswith(_STIMULUS):
+        stimuli = signals_of(case.model.Stimulus)
+        driven = [k for k in stimuli if not k.startswith("noise_")]
+        if name.removeprefix(_STIMULUS) not in driven:
+            raise unknown_name("input", name, [f"{_STIMULUS}{k}" for k in driven])
+        signal = stimuli[name.removeprefix(_STIMULUS)]
+        return Unknown(name, 0.0, scale=signal.nominal, unit=signal.unit)
+    if name.startswith(_OFFSET):
+        if name.removeprefix(_OFFSET) not in outputs:
+            raise unknown_name("output", name, [f"{_OFFSET}{k}" for k in outputs])
+        signal = signals_of(case.model.Output)[name.removeprefix(_OFFSET)]
+        return Unknown(name, 0.0, scale=signal.nominal, unit=signal.unit)
+    if name.startswith("initial."):
+        raise ParameterError(
+            f"unknown {name}: initial values are each record's own; write --estimate-start "
+            f"{name.removeprefix('initial.')}"
+        )
+    given, leaves = known.flat().get(name), leaf_fields(type(known))
+    if name not in leaves and given is not None:
+        raise ParameterError(
+            f"unknown {name}: it is a choice, here {quoted(given)}, and no number; try each with "
+            f"--set {name}=..."
+        )
+    if isinstance(given, tuple):
+        raise ParameterError(
+            f"unknown {name}: it is a table, of which no node can be estimated; name a number"
+        )
+    if name not in leaves:
+        raise unknown_name("parameter", name, [k for k in leaves if k in known.leaves()])
+    if case.par.leaves()[name] != known.leaves()[name]:
+        raise ParameterError(
+            f"unknown {name}: the experiment itself sets it, to "
+            f"{shown(case.par.leaves()[name], leaves[name].unit.symbol)}; name another one"
+        )
+    return parameters_of(case.par, [name])[0]
+
+
+def _with_texts(one: Unknown, within: str, prior: str, leaf: Leaf | None) -> Unknown:
+    if prior:
+        one = replace(one, prior=_prior(one, prior))
+    if not within:
+        return one
+    low, high = _pair(one, within, within.split(".."), "range", "..")
+    if not low < high:
+        raise ParameterError(
+            f"range of {one.name}: {quoted(within)} is empty; the lower end comes first"
+        )
+    if leaf is not None and (low < leaf.low or high > leaf.high):
+        raise ParameterError(
+            f"range of {one.name}: {quoted(within)} is not admissible: {one.name} must be "
+            f"{leaf.range_text}"
+        )
+    low = low if low > one.low or leaf is None or not leaf.low_open else max(low, _OPEN * high)
+    # Where the bench's own value lies outside, the search begins in the middle.
+    start = one.start if low <= one.start <= high else 0.5 * (low + high)
+    return replace(one, low=low, high=high, start=start)
+
+
+def _prior(one: Unknown, text: str) -> tuple[float, float]:
+    mean, deviation = _pair(one, text, _BETWEEN.split(text), "prior", " +- ")
+    if not deviation > 0.0:
+        raise ParameterError(f"prior of {one.name}: {quoted(text)} wants a deviation > 0")
+    return mean, deviation
+
+
+def _pair(
+    one: Unknown, text: str, parts: Sequence[str], kind: str, sign: str
+) -> tuple[float, float]:
+    """Return two quantities; a unit that only the second one has counts for both."""
+    if len(parts) != 2 or not all(part.strip() for part in parts):
+        raise ParameterError(
+            f"{kind} of {one.name}: {quoted(text)} cannot be read; write for instance "
+            f"'{sign.join(shown(k * one.scale, one.unit) for k in _EXAMPLES[kind])}'"
+        )
+    first, second = (part.strip() for part in parts)
+    unit = split(second)[1]
+    if unit and not split(first)[1]:
+        first = f"{first} {unit}"
+    what = f"{kind} of {one.name}"
+    return (
+        number(first, one.unit, what, one.scale), number(second, one.unit, what, one.scale)
+    )  # fmt: skip
+
+
+def starts_of(
+    unknowns: Sequence[Unknown], ranges: Mapping[str, str], count: int, spread: float, seed: int
+) -> tuple[Array, ...]:
+    """Return starts: the unknowns' own, then others, all over a range that was given.
+
+    Parameters
+    ----------
+    ranges
+        Texts by name; without one, starts scatter around the own one.
+    count, spread, seed
+        As of `scattered`.
+    """
+    first, *others = scattered(unknowns, count, spread, seed)
+    given = [k for k, u in enumerate(unknowns) if ranges.get(u.name)]
+    low, high = (np.array([getattr(unknowns[k], e) for k in given]) for e in ("low", "high"))
+    random = np.random.default_rng([seed, 1])
+    for start in others:
+        start[given] = random.uniform(low, high)
+    return (first, *others)

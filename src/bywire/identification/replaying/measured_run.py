@@ -1,0 +1,231 @@
+"""A bench's run over measured demands, before it is computed.
+
+Any assembly and any experiment: one of the experiment's runs gives model, parameters, start and
+what is not measured; measured signals take the place of the stimulus signals that they are given
+for. Sensor noise stays off.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.bench import Bench
+from bywire.bench.experiment import Case
+from bywire.core.errors import ParameterError, StepError, unknown_name
+from bywire.core.signals import signals_of
+from bywire.identification.measured import as_even
+from bywire.identification.output_error import even_interval
+from bywire.identification.replaying.compared import compared_outputs, require_measured
+from bywire.simulation.run import Run
+
+Array = NDArray[np.float64]
+Between = Literal["held", "linear"]
+
+_AT_START = {"p_start": "p_mc"}  # option of an experiment: output that shows it
+
+
+@dataclass(frozen=True)
+class MeasuredRun:
+    """A run with its measured inputs, and what its outputs are compared with.
+
+    Parameters
+    ----------
+    bench
+        With the start that was measured.
+    case
+        Its run, aligned to the record.
+    data
+        Measured signals over ``time`` [s], on the instants at which the model is recorded.
+    driven
+        Stimulus -> measured signal.
+    compared
+        Outputs, measured under the same names.
+    run
+        What is to be computed; its first ``settled`` rows lie before the record.
+    settled
+        Rows of the settling time.
+    begun_at
+        Option of the experiment -> signal whose first sample it was taken from.
+    notes
+        What the user should know.
+    """
+
+    bench: Bench
+    case: Case
+    data: xr.Dataset
+    driven: Mapping[str, str]
+    compared: tuple[str, ...]
+    run: Run
+    settled: int
+    begun_at: Mapping[str, str]
+    notes: tuple[str, ...]
+
+
+def measured_run(
+    bench: Bench,
+    data: xr.Dataset,
+    inputs: Mapping[str, str] | None = None,
+    outputs: Sequence[str] | None = None,
+    case: str = "",
+    *,
+    settle: bool = True,
+    between: Between = "held",
+) -> MeasuredRun:
+    """Return a bench's run over measured demands.
+
+    Parameters
+    ----------
+    bench
+        Its experiment gives model, start, and what is not measured.
+    data
+        Measured signals over ``time`` [s], SI; resampled where the model's steps want it. The
+        run begins with the record; a time that begins before zero is taken as the experiment's.
+    inputs
+        Stimulus of the model -> measured signal; by default all of the same name.
+    outputs
+        Outputs of the model, measured under the same names; by default all that are but flags,
+        what accumulates (energies, times) and what does not move.
+    case
+        Label of the experiment's run; the first one by default.
+    settle
+        Whether the run settles before the record as the experiment does.
+    between
+        What inputs do between samples: demands of a controller are held, what is smooth and
+        read faster than it was measured is better joined by straight lines.
+
+    Raises
+    ------
+    UnknownNameError
+        When a signal is not measured, or the model has none of that name.
+    ParameterError
+        When nothing drives the model, nothing is compared, or an input has gaps.
+    """
+    chosen = case_of(bench, case)
+    driven = _inputs(chosen, data, inputs)
+    compared, passed = compared_outputs(chosen, data, outputs, driven)
+    bench, begun_at, notes = _started(bench, data, compared)
+    chosen = case_of(bench, case)
+    if not settle and chosen.settle > 0.0:
+        chosen = replace(chosen, settle=0.0)
+        notes = (*notes, "begins with the record: the experiment's settling is left out")
+    data, chosen, said = _on_grid(bench, data, chosen)
+    for signal in driven.values():
+        missing = np.flatnonzero(np.isnan(data[signal].values))
+        if missing.size:
+            at = float(data["time"].values[missing[0]])
+            raise ParameterError(
+                f"{signal} drives the model and misses {missing.size} samples, the first at "
+                f"{at:.4g} s: cut the record there"
+            )
+    run = _run(bench, chosen, data, driven, between)
+    return MeasuredRun(
+        bench, chosen, data, driven, tuple(compared), run, round(chosen.settle / run.record),
+        begun_at, (*notes, *said, *passed),
+    )  # fmt: skip
+
+
+def case_of(bench: Bench, label: str) -> Case:
+    """Return a run of a bench's experiment; the first one where the label is empty.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is none of that label.
+    ParameterError
+        When the experiment makes no run.
+    """
+    found = {one.label: one for one in bench.cases()}
+    if not found:
+        raise ParameterError(f"experiment {bench.experiment!r} makes no run: take another one")
+    if label and label not in found:
+        raise unknown_name(f"run of {bench.experiment}", label, found)
+    return found[label] if label else next(iter(found.values()))
+
+
+def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> dict[str, str]:
+    stimuli, there = signals_of(case.model.Stimulus), [str(name) for name in data.data_vars]
+    if wanted is None:
+        wanted = {name: name for name in there if name in stimuli}
+    if not wanted:
+        raise ParameterError(
+            f"nothing measured drives the model: give --input STIMULUS=SIGNAL with one of "
+            f"{', '.join(n for n in stimuli if not n.startswith('noise_'))} "
+            f"and one of {', '.join(there)}"
+        )
+    for stimulus, signal in wanted.items():
+        if stimulus not in stimuli:
+            raise unknown_name("stimulus", stimulus, stimuli)
+        require_measured(data, signal, stimuli[stimulus])
+    return dict(wanted)
+
+
+def _started(
+    bench: Bench, data: xr.Dataset, compared: Sequence[str]
+) -> tuple[Bench, dict[str, str], tuple[str, ...]]:
+    """Return the bench with its start at what was measured, where the experiment has one."""
+    for option, signal in _AT_START.items():
+        known = option in bench.chosen_options.flat() and option not in bench.options
+        if known and signal in compared:
+            first = data[signal].values[np.isfinite(data[signal].values)][:1]
+            start = max(float(first[0]), 0.0) if first.size else 0.0
+            own = replace(bench, options={**bench.options, option: start})
+            said = f"starts at the measured {signal}, {start:.5g} Pa"
+            return own, {option: signal}, (said,)
+    return bench, {}, ()
+
+
+def _on_grid(
+    bench: Bench, data: xr.Dataset, case: Case
+) -> tuple[xr.Dataset, Case, tuple[str, ...]]:
+    """Return data on instants at which the model can be recorded, and the case aligned to them."""
+    interval = even_interval(data["time"].values)
+    # A clock that begins before zero is the experiment's own: part of its settling was recorded.
+    case = replace(case, settle=max(case.settle + min(float(data["time"].values[0]), 0.0), 0.0))
+    try:
+        return data, case.aligned(bench.step, interval), ()
+    except StepError:
+        near = max(round(interval / bench.step), 1) * bench.step
+    for candidate in (near, case.record):
+        try:
+            aligned = case.aligned(bench.step, float(f"{candidate:.9g}"))
+        except StepError:
+            continue
+        even, said = as_even(data, aligned.record)
+        return even, aligned, tuple(said)
+    raise StepError(
+        f"neither samples every {interval:g} s nor every {case.record:g} s go with steps of "
+        f"{bench.step:g} s: resample the measurement (bywire convert --rate)"
+    )
+
+
+def _run(
+    bench: Bench, case: Case, data: xr.Dataset, driven: Mapping[str, str], between: Between
+) -> Run:
+    interval = case.record
+    columns = {name: data[signal].values for name, signal in driven.items()}
+    fields = case.model.Stimulus._fields
+    begin = min(float(data["time"].values[0]), 0.0)
+
+    def stimulus(t: Array) -> Array:
+        """Measured values, from one sample to the next; the first one while it settles."""
+        rows = np.zeros((t.size, len(fields)))
+        given = case.stimulus(t - case.settle + begin)
+        at = (t - case.settle) / interval
+        at = np.floor(at + 1e-6) if between == "held" else at
+        for k, name in enumerate(fields):
+            if name in columns:
+                rows[:, k] = np.interp(at, np.arange(columns[name].size), columns[name])
+            elif name in given and not name.startswith("noise_"):
+                rows[:, k] = given[name]
+        return rows
+
+    duration = case.settle + (data.sizes["time"] - 1) * interval
+    return Run(
+        case.model, case.par, case.state, case.memory, stimulus, duration, bench.step, interval
+    )

@@ -1,0 +1,76 @@
+"""``bywire list NAME``: options, signals and units of everything that has a name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+from command_line import Outcome, refused
+
+from bywire.analysis.study_registry import all_studies
+from bywire.bench.registry import all_experiments
+from bywire.catalog.registry import entries
+from bywire.identification.method_registry import all_methods
+
+Bywire = Callable[..., Outcome]
+
+
+def only(found: Outcome, kind: str) -> dict[str, object]:
+    (one,) = (one for one in found.object["found"] if one["kind"] == kind)
+    return one
+
+
+@pytest.mark.parametrize("name", all_methods())
+def test_a_method_says_all_that_its_use_takes(bywire: Bywire, name: str) -> None:
+    method = all_methods()[name]
+    one = only(bywire("list", name, "--json"), "method")
+    assert [row["name"] for row in one["options"]] == list(method.defaults.flat())
+    for row in one["options"]:
+        assert row["meaning"], row
+        assert row["value"] not in (None, ""), row
+        assert row["range"] not in ("", "-"), row
+    needed = {row["signal"]: row["unit"] for row in one["signals"] if row["needed"] == "yes"}
+    assert needed == {n: unit or "any" for n, unit in method.signals.items()}
+    assert set(method.unknowns) <= {row["name"] for row in one["estimates"]}
+    text = bywire("list", name).out
+    assert f"method {name}: {method.summary}" in text
+    for row in (*one["options"], *one["estimates"]):
+        assert row["name"] in text
+
+
+def test_what_is_found_under_a_name_of_several_kinds(bywire: Bywire) -> None:
+    found = bywire("list", "friction-ramp", "--json")
+    assert [one["kind"] for one in found.object["found"]] == ["method", "experiment"]
+    options = {row["name"]: row for row in only(found, "method")["options"]}
+    assert options["least"]["value"] == "0.2 bar"
+    assert options["least"]["range"] == "> 0 bar"
+    text = bywire("list", "friction-ramp").out
+    assert "changed with --option NAME=VALUE" in text
+    assert "changed with --set options.NAME=VALUE" in text
+
+
+def test_experiments_studies_and_sets_list_their_values(bywire: Bywire) -> None:
+    cases = (
+        ("experiment", "options", {n: e.defaults for n, e in all_experiments().items()}),
+        ("study", "options", {n: s.defaults for n, s in all_studies().items()}),
+        ("parameter set", "parameters", {n: e.parameters() for n, e in entries().items()}),
+    )
+    for kind, key, known in cases:
+        for name, values in known.items():
+            one = only(bywire("list", name, "--json"), kind)
+            assert [row["name"] for row in one[key]] == list(values.flat()), name
+
+
+def test_choices_and_plain_numbers_say_what_they_may_be(bywire: Bywire) -> None:
+    rows = only(bywire("list", "seal-friction", "--json"), "method")["options"]
+    by_name = {row["name"]: row for row in rows}
+    assert by_name["zero"]["range"] == "known or free"
+    assert by_name["x_low"]["range"] == "any finite number in mm"
+    assert by_name["pressures"]["value"] == "1 bar, 3 bar, 5 bar, 7 bar"
+    (stimulus,) = bywire("list", "sine", "--json").object["found"]
+    assert [row["name"] for row in stimulus["parameters"]][:2] == ["mean", "amplitude"]
+    assert bywire("list", "moment").out.startswith("loop moment: ")
+
+
+def test_an_unknown_name_gets_the_nearest(bywire: Bywire) -> None:
+    refused(bywire("list", "frction-ramp"), "unknown name 'frction-ramp'", "'friction-ramp'")
