@@ -7,7 +7,6 @@ import pytest
 from bywire.analysis.linear.motorcycle_linear import (
     linear_model,
     theoretical,
-    theoretical_transfer_function,
 )
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.catalog.registry import entry
@@ -58,7 +57,7 @@ def test_printed_set_does_not() -> None:
 
 def test_transfer_function_is_one_of_control() -> None:
     par = brake("dardanelli2010")
-    system = theoretical_transfer_function(par)
+    system = theoretical(par).transfer_function()
     assert isinstance(system, control.TransferFunction)
     assert float(np.real(system.dcgain())) == pytest.approx(theoretical(par).gain, rel=1e-12)
     slow = np.sort(np.abs(system.poles()))

@@ -28,7 +28,7 @@ t_step = "0 s"
 [requirements]
 p_max = "<= 100 bar"
 """
-UNKNOWNS = ("--unknown", "motor.R_m=0.1..1 ohm", "--unknown", "motor.K_e")
+UNKNOWNS = ("--unknown", "motor.R_m=0.4..1 ohm", "--unknown", "motor.K_e")
 OUTPUTS = ("--output", "p_mc=0.02 bar", "--output", "i=10 mA")
 
 
@@ -75,6 +75,8 @@ def test_files_become_a_bench_file(bywire: Bywire, bench: Path, tmp_path: Path) 
         assert low - 0.5 * (high - low) < value < high + 0.5 * (high - low)
         assert high - low < 0.03 * value
     assert found.object["options"]["loss"] == "huber"
+    assert found.object["start"]["motor.R_m"] == pytest.approx(0.7)  # the bench's lies outside
+    assert found.object["start"]["run1:start.p_start"] == pytest.approx(12e5, rel=0.05)
     assert json.loads((out / "estimate.json").read_text())["parameters"] == (
         found.object["parameters"]
     )

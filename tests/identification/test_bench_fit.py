@@ -150,6 +150,15 @@ def test_a_record_that_is_held_out_says_whether_the_result_carries_over() -> Non
         assert found["validation.i.vaf"].value > 0.99
 
 
+def test_a_held_out_record_begins_where_it_did() -> None:
+    """Not at the start of the one record that was fitted."""
+    held = record(bench(14e5, "7 Hz"), 6)
+    asked = Asked(outputs=TWO.outputs, unknowns=TWO.unknowns, holdout=held)
+    found = {c.name: c for c in identified(bench(None), record(bench(), 5), asked).checks}
+    assert found["validation.p_mc.vaf"].value > 0.99
+    assert found["validation.p_mc.nrmse"].value < 0.05
+
+
 def test_a_wrong_model_does_not_hold() -> None:
     data = record(bench(), 7)
     found = identified(bench(caliper__K_pd=8e5), data)

@@ -180,7 +180,7 @@ def test_files_of_segments(tmp_path: Path) -> None:
         ('[segments.a]\nbegin = "1 s"\n', "'begin'"),
         ('[segment.a]\nstart = "1 s"\n', "'segment'"),
         ("[segments]\n", "no segment"),
-        ("a = ", "give a TOML file"),
+        ("a = ", "is not valid TOML"),
     ):
         path.write_text(text)
         with pytest.raises((ParameterError, UnknownNameError, bywire.core.errors.FileError),

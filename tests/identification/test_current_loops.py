@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 MOTORCYCLE, WEDGE = parameters("dardanelli2010"), parameters("roberts2003")
 WINDING, LOOP, DRIVE = motor_winding.METHOD, current_loop.METHOD, drive_current_loop.METHOD
-SEEDS = range(1, 9)
+SEEDS = range(1, 11)
 CASES = {
     "stuck rotor": (WINDING, MOTORCYCLE, {}, ("motor.R_m", "motor.L_m")),
     "turning rotor": (WINDING, MOTORCYCLE, {"rotor": "turning"},

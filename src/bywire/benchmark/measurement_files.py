@@ -13,6 +13,7 @@ import numpy as np
 
 from bywire.benchmark.engine import interleaved, ratio, timed
 from bywire.benchmark.result import Result, at_most
+from bywire.core.extras import how_to_install
 from bywire.data.measurement import read_measurement
 
 RATE, CHANNELS = 10_000, 20
@@ -29,7 +30,7 @@ def measured() -> list[Result]:
     try:
         asammdf = importlib.import_module("asammdf")
     except ImportError:
-        note = "not installed: pip install bywire[measurements]"
+        note = f"not installed: {how_to_install('measurements')}"
         return [Result("read.mdf4", None, "times as long", f"<= {_GOAL:g}", None, note)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "run.mf4"

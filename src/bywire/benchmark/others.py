@@ -12,6 +12,7 @@ from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.benchmark.engine import timed
 from bywire.benchmark.peers.problem import Solution, braking_run, error, hard_braking, reference
 from bywire.benchmark.result import Result, at_least
+from bywire.core.extras import how_to_install
 from bywire.simulation.run import simulate
 
 
@@ -41,7 +42,7 @@ def others(par: MotorcycleParameters) -> list[Result]:
 def _compare(par: MotorcycleParameters, peer: Peer, exact: Solution) -> Result:
     module: ModuleType = importlib.import_module(f"bywire.benchmark.peers.{peer.name}")
     if not module.available():
-        note = "not installed: pip install bywire[benchmark]"
+        note = f"not installed: {how_to_install('benchmark')}"
         return Result(f"peer.{peer.name}", None, "times faster", f">= {peer.goal:g}", None, note)
     run = braking_run(par, hard_braking, peer.duration)
     own = simulate(run, ("p_mc",))

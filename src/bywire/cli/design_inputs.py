@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,10 +10,10 @@ from bywire.analysis.design.requirement import Requirement, read
 from bywire.analysis.design.trial import Trial
 from bywire.bench.bench import Bench
 from bywire.cli.loop_choice import Chosen, spread
-from bywire.core.errors import FileError, ParameterError
+from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
+from bywire.data.toml_file import read_toml
 
-_LARGEST = 100_000  # bytes of a file of requirements
 Spans = Mapping[str, tuple[float, float]]
 
 
@@ -79,13 +78,7 @@ def _from_file(path: Path | None) -> list[str]:
     """Return the requirements of a TOML file: ``figure = "<= limit"``, or a list of limits."""
     if path is None:
         return []
-    try:
-        with path.open("rb") as stream:
-            content = tomllib.loads(stream.read(_LARGEST).decode("utf-8-sig"))
-    except (OSError, ValueError, RecursionError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(f"cannot read requirements {path}: {reason}") from None
-    section = content.get("requirements")
+    section = read_toml(path, "file of requirements").get("requirements")
     if not isinstance(section, dict) or not section:
         raise ParameterError(
             f'{path}: a section [requirements] is wanted, with lines such as bandwidth = ">= 10 Hz"'

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from bywire.cli import earlier_result, output
 from bywire.cli.identified_bench import bench_notes, bench_text, far_off
@@ -18,7 +18,7 @@ from bywire.core.errors import InputError, ParameterError
 if TYPE_CHECKING:
     from bywire.core.parameters import ParameterSet
     from bywire.identification.measured import Measured
-    from bywire.identification.method import Progress
+    from bywire.identification.method import Identified, Progress
     from bywire.report.identification_report import Identification
 
 STARTS = "starts.jsonl"
@@ -86,7 +86,7 @@ def _start(chosen: Chosen, wanted: Wanted) -> ParameterSet | None:
 def _identified(
     chosen: Chosen, start: ParameterSet | None, measured: Measured, wanted: Wanted,
     out: Path | None, progress: Progress,
-) -> Any:  # fmt: skip
+) -> Identified:  # fmt: skip
     from bywire.identification.method import Effort
 
     method = chosen.method
@@ -102,7 +102,7 @@ def _identified(
 
 
 def _assembled(
-    chosen: Chosen, start: ParameterSet | None, found: Any, measured: Measured, source: str,
+    chosen: Chosen, start: ParameterSet | None, found: Identified, measured: Measured, source: str,
     wanted: Wanted,
 ) -> Identification:  # fmt: skip
     from bywire.identification.put_in import put_in
@@ -125,8 +125,20 @@ def _assembled(
             notes.append(str(error))
     return Identification(
         chosen.method, chosen.options, found, source, notes, subject, idle,
-        start={} if start is None else start.leaves(), put_in=truth,
+        start=_begun_at(chosen, start, found), put_in=truth,
     )  # fmt: skip
+
+
+def _begun_at(chosen: Chosen, start: ParameterSet | None, found: Identified) -> dict[str, float]:
+    """Return the values from which the search began, by label."""
+    if start is None:
+        return {}
+    if chosen.method.bench is None:
+        return start.leaves()
+    # A range that leaves out the bench's own value begins elsewhere.
+    own = {u.label: u.start for e in found.estimates.values()
+           for u in (*e.unknowns, *(k.unknown for k in e.kept))}  # fmt: skip
+    return start.leaves() | own
 
 
 def _written(

@@ -109,7 +109,7 @@ def _require_one_source(method: Method, wanted: Wanted) -> None:
 
 def _chosen(method: Method, wanted: Wanted) -> Chosen:
     from bywire.bench.values import parsed
-    from bywire.catalog.registry import entry, main_set
+    from bywire.cli.parameter_choice import set_for
 
     idle = [name for name in wanted.options if name.split(".")[0] in method.simulated]
     if wanted.measurements and idle:
@@ -128,12 +128,7 @@ def _chosen(method: Method, wanted: Wanted) -> Chosen:
         bench = method.bench
         changes = parsed(type(bench.par), bench.overrides, "parameter")
         return Chosen(method, bench.parameters, bench.par, options, changes)
-    found = entry(wanted.parameters or main_set(method.assembly))
-    if found.assembly != method.assembly:
-        raise ParameterError(
-            f"method {method.name!r} is for a {method.assembly}, but parameter set "
-            f"{found.name!r} is for a {found.assembly}"
-        )
+    found = set_for(f"method {method.name!r}", method.assembly, wanted.parameters)
     base = found.parameters()
     for name in wanted.changes:
         if name in options.flat() and name not in base.flat():

@@ -5,9 +5,31 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bywire.bench.values import parsed
-from bywire.catalog.registry import entry, main_set
+from bywire.catalog.registry import Entry, entry, main_set
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+
+
+def set_for(subject: str, assembly: str, name: str) -> Entry:
+    """Return a parameter set of a brake.
+
+    Parameters
+    ----------
+    subject, assembly, name
+        As of `parameters_for`.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, and sets of another brake.
+    """
+    found = entry(name or main_set(assembly))
+    if found.assembly != assembly:
+        raise ParameterError(
+            f"{subject} is for a {assembly}, but parameter set {found.name!r} is for a "
+            f"{found.assembly}"
+        )
+    return found
 
 
 def parameters_for(
@@ -31,11 +53,6 @@ def parameters_for(
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    found = entry(name or main_set(assembly))
-    if found.assembly != assembly:
-        raise ParameterError(
-            f"{subject} is one of a {assembly}, but parameter set {found.name!r} is for a "
-            f"{found.assembly}"
-        )
+    found = set_for(subject, assembly, name)
     base = found.parameters()
     return found.name, base.replace(parsed(type(base), changes, "parameter"))

@@ -11,7 +11,7 @@ from bywire.bench.running import Progress
 
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Yield a function that shows the finished share of a labelled piece of work."""
+    """Yield a function that shows the finished share of a labeled piece of work."""
     if not sys.stderr.isatty():
         yield lambda label, share: None
         return

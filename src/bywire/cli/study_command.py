@@ -14,11 +14,11 @@ import xarray as xr
 from bywire.analysis.study import Found, Study
 from bywire.analysis.study_registry import find_study
 from bywire.bench.values import parsed
-from bywire.catalog.registry import entry, main_set
 from bywire.cli import output
 from bywire.cli.output_folder import require_folder
+from bywire.cli.parameter_choice import set_for
 from bywire.cli.progress import progress_bar
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 
 
@@ -27,12 +27,7 @@ def execute(
 ) -> None:
     """Compare designs of a brake, and show the best of them."""
     study = find_study(name)
-    found_set = entry(parameters or main_set(study.assembly))
-    if found_set.assembly != study.assembly:
-        raise ParameterError(
-            f"study {study.name!r} sizes a {study.assembly}, but parameter set "
-            f"{found_set.name!r} is for a {found_set.assembly}"
-        )
+    found_set = set_for(f"study {study.name!r}", study.assembly, parameters)
     par, options = _changed(study, found_set.parameters(), changes)
     if out is not None:
         require_folder(out)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Unit
+from bywire.core.quantities import Nodes, Unit
 from bywire.core.signals import Signal
-
-Nodes = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 
 
 class Parameters(ParameterSet):

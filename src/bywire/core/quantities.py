@@ -84,6 +84,10 @@ Density = Annotated[float, Unit("kg/m**3", 1e3), _POSITIVE]
 KinematicViscosity = Annotated[float, Unit("m**2/s", 5e-4), _POSITIVE]
 Conductance = Annotated[float, Unit("m**3/(s*Pa)", 1e-11), _NOT_NEGATIVE]
 
+# Tables
+Nodes = tuple[Annotated[float, _NOT_NEGATIVE], ...]
+"""numbers of a table; their unit is the field's"""
+
 # Signals and control
 Duration = Annotated[float, Unit("s", 1e-3), _POSITIVE]
 TimeConstant = Annotated[float, Unit("s", 1e-3), _NOT_NEGATIVE]

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
+from bywire.core.extras import how_to_install
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -133,7 +134,7 @@ def library(name: str, what: str) -> ModuleType:
     except ImportError:
         raise FileError(
             f"{what} need the library {name.partition('.')[0]}, which is not installed: "
-            "pip install 'bywire[measurements]'"
+            f"{how_to_install('measurements')}"
         ) from None
 
 

@@ -19,7 +19,7 @@ from bywire.identification.confidence import uncertainty
 from bywire.identification.differentiation import low_passed
 from bywire.identification.equation import Equation, EquationError
 from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import notes_of
+from bywire.identification.identifiability import notes_of
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, SolverError
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
+from bywire.identification.identifiability import notes_of, untold
 from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
-_TOLD = 1.0  # standard deviation per scale above which nothing is known
-_FLAT = 1e-7  # singular value per the largest one: below it rounding decides
+_NEWTON = 8  # steps from the least sum to where instruments see no residual
+_WORSE = 0.02  # of the least sum of squares: more is another place
 
 
 @dataclass(frozen=True)
@@ -34,11 +35,16 @@ class Problem:
         residuals are of size one where the noise is as assumed.
     apart
         Last rows that are independent of all others and taken to be weighted rightly.
+    instrument
+        Whether the Jacobian is that of a model which the measured inputs' noise does not drive,
+        while it drives that of the residuals. Where their product vanishes, the estimate is then
+        free of the bias that the least sum of squares has.
     """
 
     unknowns: tuple[Unknown, ...]
     evaluate: Callable[[Array], tuple[Array, Array]]
     apart: int = 0
+    instrument: bool = False
 
     def held(self, index: int) -> Problem:
         """Return the problem with one unknown held at its start."""
@@ -49,7 +55,7 @@ class Problem:
             r, J = self.evaluate(np.insert(values, index, value))
             return r, np.delete(J, index, axis=1)
 
-        return Problem(rest, evaluate, self.apart)
+        return replace(self, unknowns=rest, evaluate=evaluate)
 
 
 @dataclass(frozen=True)
@@ -124,6 +130,26 @@ def solve(
     return Solution(np.asarray(found.x) * scale, float(found.cost))
 
 
+def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
+    """Return the nearest minimum, or what is no least sum where the Jacobian is an instrument."""
+    found = solve(problem, begin, loss)
+    if not problem.instrument:
+        return found
+    scale = np.array([u.scale for u in problem.unknowns])
+    low, high = (np.array([getattr(u, end) for u in problem.unknowns]) for end in ("low", "high"))
+    values, most = found.values, (1.0 + _WORSE) * found.cost
+    for _ in range(_NEWTON):
+        r, J = with_priors(problem, values)
+        cost = 0.5 * float(r @ r)
+        if cost > most:
+            return found
+        step = np.linalg.lstsq(J * scale, r)[0]
+        values = np.clip(values - step * scale, low, high)
+        if np.abs(step).max() < 1e-7:
+            break
+    return Solution(values, cost)
+
+
 def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:
     """Return residuals and Jacobian with one more row for every prior."""
     r, J = problem.evaluate(values)
@@ -158,8 +184,8 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
     origin = problem
     begin = np.array([u.start for u in problem.unknowns]) if start is None else start
     while True:
-        found, J = _at_minimum(problem, solve(problem, begin, loss), loss)
-        worst = _untold(found, J)
+        found, J = _at_minimum(problem, _solved(problem, begin, loss), loss)
+        worst = untold(found, J)
         if worst is None:
             return replace(found, kept=kept, notes=notes_of(found))
         index, reason = worst
@@ -208,39 +234,3 @@ def _slope(r: Array, loss: Loss) -> Array:
     if loss == "huber":
         return np.where(z <= 1.0, 1.0, np.maximum(z, 1.0) ** -0.5)
     return np.asarray(1.0 / (1.0 + z))
-
-
-def _untold(found: Estimate, J: Array) -> tuple[int, str] | None:
-    """Return the unknown that the data tells least, and why, if there is one."""
-    share = found.singular_values[-1] / max(found.singular_values[0], 1e-300)
-    told = f"smallest singular value {share:.1e} of the largest"
-    silent = np.flatnonzero(~J.any(axis=0))
-    if silent.size:
-        return int(silent[0]), "nothing measured depends on it"
-    if share < _FLAT:
-        direction = np.linalg.svd(J, full_matrices=False)[2][-1]
-        return int(np.argmax(np.abs(direction))), f"only a combination with others shows ({told})"
-    relative = found.deviations / np.array([u.scale for u in found.unknowns])
-    index = int(np.argmax(relative))
-    if relative[index] <= _TOLD:
-        return None
-    unknown = found.unknowns[index]
-    return index, (
-        f"its standard deviation would be {relative[index]:.2g} times its usual magnitude "
-        f"{unknown.scale:.3g} {unknown.unit} ({told})"
-    )
-
-
-def notes_of(found: Estimate) -> tuple[str, ...]:
-    """Return what the user should know: unknowns that go together, or lie at a bound."""
-    notes = [
-        f"{a} and {b} go together (correlation {c:.3f}): the data tells their combination better "
-        "than either"
-        for a, b, c in found.correlated()
-    ]
-    units = {u.label: u.unit for u in found.unknowns}
-    notes += [
-        f"{label} lies at its bound, {end:.4g} {units[label]}"
-        for label, end in found.at_bounds().items()
-    ]
-    return tuple(notes)

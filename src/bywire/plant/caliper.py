@@ -6,15 +6,14 @@ from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Ge
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Area, Stiffness, Unit
+from bywire.core.quantities import Area, Nodes, Stiffness, Unit
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.plant import brake_fluid
 
-Table = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 Flow = Annotated[float, Signal("m**3/s", "flow in", 1e-6)]
 
 
@@ -32,9 +31,9 @@ class Parameters(ParameterSet):
     """piston area"""
     K_pd: Stiffness
     """stiffness of pads and caliper"""
-    p_table: Annotated[Table, Unit("Pa", 1e6)]
+    p_table: Annotated[Nodes, Unit("Pa", 1e6)]
     """pressures of the table, from 0, increasing; used by law "table" only"""
-    V_table: Annotated[Table, Unit("m**3", 1e-7)]
+    V_table: Annotated[Nodes, Unit("m**3", 1e-7)]
     """volumes of the table, from 0, increasing; used by law "table" only"""
 
     @model_validator(mode="after")

@@ -10,11 +10,10 @@ from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Length, Stiffness, TimeConstant, Unit
+from bywire.core.quantities import Length, Nodes, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Power, Signal
 
 Clearance = Annotated[float, Unit("m", 2e-4), Field(ge=0, allow_inf_nan=False)]
-Table = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
 
 
@@ -29,9 +28,9 @@ class Parameters(ParameterSet):
     """which relation of travel and force holds"""
     K_cal: Stiffness
     """stiffness of caliper and pads; used by law "linear" only"""
-    n_table: Annotated[Table, Unit("m", 1e-4)]
+    n_table: Annotated[Nodes, Unit("m", 1e-4)]
     """travels of the pads after contact, from 0, increasing; used by law "table" only"""
-    F_table: Annotated[Table, Unit("N", 3e3)]
+    F_table: Annotated[Nodes, Unit("N", 3e3)]
     """normal forces of the table, from 0, increasing; used by law "table" only"""
     tau_cal: TimeConstant
     """damping over stiffness"""
@@ -57,7 +56,7 @@ class Parameters(ParameterSet):
         return self
 
 
-def _require_rising(name: str, unit: str, nodes: Table) -> None:
+def _require_rising(name: str, unit: str, nodes: Nodes) -> None:
     if not nodes:
         return
     wanted = f"{name} must hold 2 nodes or more, from 0 {unit} and increasing"

@@ -61,7 +61,7 @@ def find_compiler() -> Compiler | None:
     if wanted == "none":
         return None
     if wanted and shutil.which(wanted):
-        return _labelled((str(shutil.which(wanted)),))
+        return _labeled((str(shutil.which(wanted)),))
     if wanted:
         raise CompilerError(
             f"BYWIRE_CC = {wanted!r} names no program: "
@@ -74,11 +74,11 @@ def find_compiler() -> Compiler | None:
         commands.append((sys.executable, "-m", "ziglang", "cc"))
     for command in commands:
         with contextlib.suppress(CompilerError):  # a broken one must not hide the next
-            return _labelled(command)
+            return _labeled(command)
     return None
 
 
-def _labelled(command: tuple[str, ...]) -> Compiler:
+def _labeled(command: tuple[str, ...]) -> Compiler:
     try:
         done = subprocess.run(
             [*command, "--version"], capture_output=True, text=True, timeout=60, check=False

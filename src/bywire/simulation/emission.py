@@ -1,4 +1,4 @@
-"""Common parts of kernel emission: names of values, blocks of statements, the exact pass."""
+"""Common parts of kernel emission: the plan, names of values, statements, the exact pass."""
 
 from __future__ import annotations
 
@@ -12,6 +12,12 @@ from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
 CAP = 8  # passes through one substep before it is counted as unsettled
+
+# plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
+# row, frames a recorded row, first recorded row, recorded signals, frames a tick of each task.
+PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
+  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
+"""C text that reads a run's plan"""
 
 
 @dataclass(frozen=True)

@@ -26,7 +26,7 @@ SIGNATURE = """int bw_lanes(void) { return W; }
 void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, double *restrict rec)"""
 
-# As for a single run; then whether each lane has a stimulus of its own, and the distance between
+# As `emission.PLAN`; then whether each lane has a stimulus of its own, and the distance between
 # the recordings of two lanes.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5], row0 = plan[6];

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
+    PLAN,
     Layout,
     branching_statements,
     exact_pass,
@@ -23,11 +24,6 @@ from bywire.simulation.stages import STATE, Stages
 SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
     double *restrict rec)"""
-
-# plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
-# row, frames a recorded row, first recorded row, recorded signals, frames a tick of each task.
-PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
-  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
 
 
 def emit_single(stages: Stages) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
+    PLAN,
     Layout,
     exact_pass,
     indented,
@@ -24,9 +25,6 @@ SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const do
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
     double *restrict rec, const double *restrict seeds, double *restrict tangents,
     double *restrict rec_t)"""
-
-PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
-  const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
 
 
 class _Tangents:

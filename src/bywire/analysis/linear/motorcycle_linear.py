@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
@@ -160,11 +159,6 @@ def theoretical(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
             1.0,
         ),
     )
-
-
-def theoretical_transfer_function(par: Par, p: float = 20e5, x: float | None = None) -> Any:
-    """Return eq. (15) as ``control.TransferFunction`` [Pa/A]."""
-    return theoretical(par, p, x).transfer_function()
 
 
 def two_pole(par: Par, p: float = 20e5, x: float | None = None) -> Rational:

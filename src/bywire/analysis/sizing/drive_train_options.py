@@ -22,7 +22,7 @@ ASSUMPTIONS = (
     "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
     "the sensor shows 90 % of the demand in time at every friction coefficient.",
     "Bandwidths stay: those of the position loops on the shaft, the crossover of the moment loop.",
-    "The end stops of the wedge stand where the pads have travelled as far as before.",
+    "The end stops of the wedge stand where the pads have traveled as far as before.",
     "Infeasible are designs that at any coefficient are more than 2 % late (where the response is "
     "enforced), do not hold 95 % of the demand, do not release, or press on an end stop.",
     "Power counts at the drives' input, standby included, in build-up and hold, and in the release "

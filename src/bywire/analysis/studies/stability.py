@@ -32,7 +32,7 @@ ASSUMPTIONS = (
     "one screw loses the wedge, and the other moves or holds it alone.",
     "With control: moment loop around position and current loops, as they are sampled, at the "
     "moment given; its controllers know the wedge's slope.",
-    "The end stops of the wedge stand where the pads have travelled as far as before.",
+    "The end stops of the wedge stand where the pads have traveled as far as before.",
 )
 HIGHEST = 5.0
 """friction coefficient up to which the moment loop's border is sought"""

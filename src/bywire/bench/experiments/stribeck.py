@@ -13,16 +13,14 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Unit
+from bywire.core.quantities import Nodes, Unit
 from bywire.plant import seal_friction
-
-Pressures = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 
 
 class Options(ParameterSet):
     """Where the curves are drawn."""
 
-    pressures: Annotated[Pressures, Unit("Pa", 2e6), Field(min_length=1)]
+    pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """master-cylinder pressures, one curve each"""
     omega_max: Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]
     """largest motor speed, both directions"""

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
-from bywire.identification.least_squares import Problem, estimate, notes_of
+from bywire.identification.identifiability import notes_of
+from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown, moved
 
 Array = NDArray[np.float64]

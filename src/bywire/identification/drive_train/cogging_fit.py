@@ -45,7 +45,7 @@ class Turning:
     waves: Callable[[int], tuple[Array, Array]]
 
     @cached_property
-    def levelled(self) -> Array:
+    def leveled(self) -> Array:
         """Torque less its mean of each way."""
         rest = self.torque.copy()
         for way in (1.0, -1.0):

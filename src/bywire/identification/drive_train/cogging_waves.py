@@ -11,7 +11,12 @@ from bywire.plant import servo_motor
 
 Array = NDArray[np.float64]
 
-_NAMES = ("cos", "sin", "cos_drift", "sin_drift")
+_WAVES = {
+    "cos": "cogging of known order over the motors' angle against each other, cosine",
+    "sin": "the same, sine",
+    "cos_drift": "what a drift of both motors the same way adds, cosine",
+    "sin_drift": "the same, sine",
+}
 
 
 def waves(q_1: Array, q_2: Array, order: float) -> Array:
@@ -50,5 +55,11 @@ def unknowns(par: WedgeParameters, stage: str) -> tuple[Unknown, ...]:
     K = servo_motor.torque_constant(par.motor_1)
     size = max(par.motor_1.T_cog, par.motor_2.T_cog, 1e-4) / K
     return tuple(
-        Unknown(f"cogging.{stage}.{name}", 0.0, scale=10.0 * size, unit="A") for name in _NAMES
+        Unknown(name, 0.0, scale=10.0 * size, unit=unit)
+        for name, (unit, _) in meanings(stage).items()
     )
+
+
+def meanings(stage: str) -> dict[str, tuple[str, str]]:
+    """Return SI unit and meaning of the unknowns of a stage, by name."""
+    return {f"cogging.{stage}.{name}": ("A", text) for name, text in _WAVES.items()}

@@ -5,6 +5,7 @@ Two motors squeeze a force between their screws; one of them at rest is the same
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
@@ -22,7 +23,16 @@ from bywire.plant import axial_bearing, roller_screw, servo_motor
 
 Array = NDArray[np.float64]
 
-NAMES = ("offset", "force_per_current", "half_width", "half_width_slope", "half_width_curvature")
+MEANINGS: Mapping[str, tuple[str, str]] = {
+    "offset": ("A", "current at zero force, i_0"),
+    "force_per_current": ("N/A", "slope of the line, c"),
+    "half_width": ("A", "friction to either side without force, w_0"),
+    "half_width_slope": ("A/N", "its growth with force, w_1"),
+    "half_width_curvature": ("A/N**2", "and with the square of force, w_2"),
+}
+"""unknowns of the law -> SI unit and meaning"""
+
+NAMES = tuple(MEANINGS)
 
 
 @dataclass(frozen=True)
@@ -101,8 +111,8 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     data
         ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N].
     par
-        Lead of the screw, order of the cogging, corner of the force sensor, and how the bearings'
-        friction changes with speed.
+        Lead of the screw, order of the cogging, corner of the force sensor, and how the friction
+        of bearings and motors changes with speed.
     reading
         How it is read.
     where
@@ -156,7 +166,7 @@ def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -
     """Return the current by which friction at each speed exceeds that at the stated one [A].
 
     A position loop gives way under load, so that the screws close slower than they open; the
-    bearings' friction falls with the speed, and the line would turn by it.
+    friction of bearings and motors changes with the speed, and the line would turn by it.
     """
     motor = par.motor_1
     bearing = np.array([
@@ -173,7 +183,9 @@ def unknowns(par: WedgeParameters) -> tuple[Unknown, ...]:
     .. math::
         i = i_0 + F/c \pm (w_0 + w_1 |F| + w_2 F^2), \quad
         \frac{1}{c} = \frac{L}{2\pi} \frac{1/\eta_f + \eta_b}{2 K_T}, \quad
-        w_1 = \frac{L}{2\pi} \frac{1/\eta_f - \eta_b}{2 K_T}
+        w_1 = \frac{L}{2\pi} \frac{1/\eta_f - \eta_b}{2 K_T} + \frac{C_1}{K_T}
+
+    with :math:`w_0 = C_0 (1 + G_S) / K_T` and :math:`w_2 = C_2 / K_T` of the bearings' friction.
     """
     K = 0.5 * sum(servo_motor.torque_constant(m) for m in (par.motor_1, par.motor_2))
     k, screw, bearing = roller_screw.slope(par.screw), par.screw, par.bearing

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +24,17 @@ _STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")
 _S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)
 _LAW = slice(6, 11)
 _SENSOR, _HEART, _LOOP = slice(11, 15), slice(15, 19), 19
+MEANINGS: Mapping[str, tuple[str, str]] = {
+    "zero_of_travel": ("m", "travel without force on the sensor, d_0"),
+    "tips_touch": ("m", "travel at which the tips touch, d_c"),
+    "free_play": ("m", "from there to where the wedge is pulled, d_c - d_t"),
+    **force_current.MEANINGS,
+    **cogging_waves.meanings("sensor"),
+    **cogging_waves.meanings("heart"),
+    "travel_loop": ("m", "by how much the encoders stay behind the motion, h"),
+}
+"""unknowns beside the stiffnesses -> SI unit and meaning"""
+
 _SHARE = 0.3  # of the largest current, beyond which a contact is surely closed
 
 
@@ -95,7 +107,7 @@ class TwoStages:
 
     @cached_property
     def unknowns(self) -> tuple[Unknown, ...]:
-        """Stiffnesses, zeros of travel, free-play, law of the current, cogging."""
+        """Stiffnesses, zeros of travel, free-play, law of the current, cogging, encoders' lag."""
         play = self.contacts.closed - self.contacts.apart
         return (
             *parameters_of(self.par, _STIFFNESS),

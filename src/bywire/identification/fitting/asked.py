@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import xarray as xr
 
@@ -45,8 +45,8 @@ class Asked:
 
     @property
     def key(self) -> str:
-        """What tells this from anything else that is asked for."""
-        return f"{[*vars(self).values()][:-1]}"
+        """What tells experiments made for this from those made for anything else."""
+        return str(replace(self, holdout=None))  # what is held out shapes no experiment
 
 
 @dataclass(frozen=True)

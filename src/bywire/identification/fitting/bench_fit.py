@@ -36,10 +36,10 @@ from bywire.identification.fitting.worth import (
 from bywire.identification.least_squares import estimate
 from bywire.identification.method import Effort, Identified
 from bywire.identification.multistart import search
+from bywire.identification.noise import noise_of
 from bywire.identification.output_error import Trial, initial_states, output_error
 from bywire.identification.records import split
 from bywire.identification.replaying.measured_run import MeasuredRun, case_of, measured_run
-from bywire.identification.stick_slip.slips import noise_of
 from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]

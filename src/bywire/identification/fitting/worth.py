@@ -22,6 +22,7 @@ from bywire.identification.replaying.measured_run import MeasuredRun
 from bywire.identification.replaying.segments import Segment
 from bywire.simulation.run import simulate
 
+_OWN = ("initial.", "start.")  # what each record has for itself
 _EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
 
 
@@ -68,7 +69,7 @@ def compared(one: MeasuredRun, trial: Trial, found: Estimate) -> Compared:
     Parameters
     ----------
     one, trial
-        The record; unknowns of its own carry its label.
+        The record; unknowns of its own carry its label, which is empty where it was fitted alone.
     found
         The estimates; what the data does not tell stays where it was.
     """
@@ -78,7 +79,7 @@ def compared(one: MeasuredRun, trial: Trial, found: Estimate) -> Compared:
             *zip(found.unknowns, found.values, strict=True),
             *((k.unknown, k.unknown.start) for k in found.kept),
         )
-        if u.trial in ("", trial.label)
+        if u.trial == trial.label or not (u.trial or u.name.startswith(_OWN))
     }
     moving = {name: v for name, v in values.items() if not name.startswith("offset.")}
     made = simulate(moved_run(trial.run, moving, trial.start), one.compared)
@@ -117,7 +118,7 @@ def checks_of(trials: Sequence[Trial], found: Estimate, options: Options) -> tup
 def _of_bench(found: Estimate, label: str) -> bool:
     """Return whether a label is that of a parameter; offsets and starts may be near zero."""
     one = found.unknowns[found.names.index(label)]
-    return is_parameter(one.name) and not one.name.startswith(("initial.", "start."))
+    return is_parameter(one.name) and not one.name.startswith(_OWN)
 
 
 def believable(found: Estimate) -> dict[str, float]:

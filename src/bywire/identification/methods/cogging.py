@@ -84,7 +84,7 @@ def identify(
     Roberts et al. (2003), section "Motor": T_COG(theta).
     """
     turning = _turning(data, par, options)
-    orders = standing_out(turning.angle, turning.levelled, options.highest)
+    orders = standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
             f"no order up to {options.highest} stands out of the noise: turn slower or by more "

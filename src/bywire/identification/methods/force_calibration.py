@@ -167,13 +167,5 @@ METHOD = Method(
     synthetic=synthetic,
     simulated=SIMULATED,
     truth=truth,
-    further={
-        "offset": ("A", "current at zero force, i_0"),
-        "force_per_current": ("N/A", "slope of the line, c"),
-        "half_width": ("A", "friction to either side without force, w_0"),
-        "half_width_slope": ("A/N", "its growth with force, w_1"),
-        "half_width_curvature": ("A/N**2", "and with the square of force, w_2"),
-        "cogging.sensor.cos": ("A", "cogging of known order, with the motor's angle"),
-        "cogging.sensor.sin": ("A", "the same, a quarter of a period off"),
-    },
+    further={**force_current.MEANINGS, **cogging_waves.meanings("sensor")},
 )

@@ -12,16 +12,15 @@ from pydantic import Field
 
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.core.quantities import Duration, Frequency, Nodes, Unit
 from bywire.identification.friction_models import LAWS, find_law, laws_for
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.model_choice import Choice, choose
 from bywire.identification.record_axis import after_one_another
-from bywire.identification.records import split
+from bywire.identification.records import joined, split
 
 Array = NDArray[np.float64]
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, lt=1)]
-Pressures = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 Size = Annotated[float, Unit("N", 10.0), Field(ge=0)]
 
 _BINS, _MISFIT = 12, 0.05
@@ -57,7 +56,7 @@ class Options(ParameterSet):
     """one of the laws, or all compared on data held out"""
     slowest: Share
     """of the fastest speed: slower samples stick or turn round, and are left out"""
-    pressures: Annotated[Pressures, Unit("Pa", 2e6), Field(min_length=1)]
+    pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
     """pressures of simulated records, one record each"""
     v_max: Annotated[float, Unit("m/s", 0.1), Field(gt=0)]
     """fastest speed of simulated records"""
@@ -191,8 +190,6 @@ def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Arra
 
 def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
     """Return a sine of the speed at each pressure, with the friction of the truth and noise."""
-    from bywire.identification.records import joined
-
     random, truth = np.random.default_rng(seed), options.truth
     t = np.arange(0.0, options.duration, options.interval)
     v = options.v_max * np.sin(2.0 * np.pi * options.f_motion * t + 0.1)

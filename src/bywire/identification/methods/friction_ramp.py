@@ -23,11 +23,12 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import nearer, search
+from bywire.identification.noise import noise_of
 from bywire.identification.output_error import even_interval, trial
 from bywire.identification.stick_slip.loss import Noise, SlipLoss
 from bywire.identification.stick_slip.shooting import Shooting
 from bywire.identification.stick_slip.shots import Shot, cut_out, require_reachable
-from bywire.identification.stick_slip.slips import find_slips, noise_of
+from bywire.identification.stick_slip.slips import find_slips
 from bywire.identification.stick_slip.stribeck_band import stribeck_band
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
@@ -153,7 +154,8 @@ def _problem(
         max(noise_of(data["p_mc"].values), 1.0), noise_of(data["i"].values), options.scatter
     )
     shooting = Shooting(par, unknowns[: len(_NAMES)], options.step)
-    return Problem(unknowns, SlipLoss(shooting, shots, noise, weighted_at), apart=len(shots))
+    loss = SlipLoss(shooting, shots, noise, weighted_at)
+    return Problem(unknowns, loss, apart=len(shots), instrument=weighted_at is not None)
 
 
 def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:

@@ -6,7 +6,6 @@ from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
@@ -30,8 +29,6 @@ from bywire.identification.output_error import output_error
 from bywire.identification.records import split
 from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 _NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
 _TURNS = 1.0  # rad/s: below, a shaft counts as locked

@@ -12,7 +12,6 @@ from typing import Annotated
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
@@ -37,8 +36,6 @@ from bywire.identification.method import Check, Curve, Effort, Identified, Metho
 from bywire.identification.records import joined, split
 from bywire.identification.simulated_record import Sensor, sensed, turned
 from bywire.plant.axial_bearing import AngularSpeed
-
-Array = NDArray[np.float64]
 
 _RATIOS = {"bearing.C_0": "rad/s**2", "bearing.T_nu": "rad/s**2", "motor_1.D_M": "1/s"}
 _AGREE = 3.0  # standard deviations

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Force, Frequency, Position, Unit
+from bywire.core.quantities import Duration, Force, Frequency, Nodes, Position, Unit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Effort, Identified, Method
 from bywire.identification.records import joined, split
@@ -25,8 +25,6 @@ from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
-
-Pressures = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 
 _MISFIT = 0.1
 
@@ -61,7 +59,7 @@ class Options(ParameterSet):
     """corner of the low-pass before the travel is differentiated"""
     zero: Literal["known", "free"]
     """zero of the force sensor: taken as right, or estimated"""
-    pressures: Annotated[Pressures, Unit("Pa", 2e6), Field(min_length=2)]
+    pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=2)]
     """chamber pressures of simulated records, one record each"""
     interval: Duration
     """sample time of simulated records"""

@@ -8,21 +8,24 @@ close, through the wedge while they open, and nothing in between.
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from pydantic import Field
 
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import force_cycle
 from bywire.bench.rig_case import slope_of
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.identification.drive_train import force_current, two_stages
 from bywire.identification.drive_train.force_current import Reading, Squeeze, squeeze
+from bywire.identification.drive_train.rig_measurement import (
+    SIGNALS,
+    SIMULATED,
+    RigOptions,
+    drive_sensors,
+)
 from bywire.identification.drive_train.steady_motion import steady_dynamics
 from bywire.identification.drive_train.two_stages import TwoStages
 from bywire.identification.estimate import Estimate
@@ -30,34 +33,16 @@ from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
 from bywire.identification.simulated_record import Sensor, sensed, turned
 from bywire.plant import shaft_encoder
-from bywire.plant.axial_bearing import AngularSpeed
 
 Array = NDArray[np.float64]
 
-_PASSES = 3  # a first fit finds the contacts, a second without their kinks the forces
+_PASSES = 3  # a fit finds the contacts, one without their kinks the forces, one uses both
 _WITHIN = 0.5  # of the clearance, in which the wedge stands when the test begins
 _ADVICE = "squeeze and pull with and without the brake heart, as 'bywire run force-cycle' does"
 
 
-class Options(ParameterSet):
-    """Which part of the motion counts, and the synthetic noise."""
-
-    cutoff: Frequency
-    """low-pass of the speed"""
-    slowest: AngularSpeed
-    """speed of one motor toward the other that counts as motion"""
-    margin: Duration
-    """time left out at either end of a motion"""
-    window: Duration
-    """time over which signals are averaged"""
-    sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
-    """noise of the measured currents in synthetic measurements"""
-    sigma_F: Annotated[float, Unit("N", 5.0), Field(ge=0)]
-    """noise of the force sensor in synthetic measurements"""
-
-
 def identify(
-    data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
+    data: xr.Dataset, par: WedgeParameters, options: RigOptions, effort: Effort
 ) -> Identified:
     r"""Return stiffnesses of screws, interfaces and tips, and the free-play.
 
@@ -140,7 +125,7 @@ def _named(records: dict[str, xr.Dataset]) -> str:
     return ", ".join(name for name in records if name) or "one without a name"
 
 
-def _reading(options: Options, speed: float | None) -> Reading:
+def _reading(options: RigOptions, speed: float | None) -> Reading:
     return Reading(options.cutoff, options.slowest, options.margin, options.window, speed)
 
 
@@ -162,20 +147,17 @@ def _curve(stages: TwoStages, values: Array) -> Curve:
     )
 
 
-def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
+def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Dataset:
     """Return both stages, simulated, with the sensors' noise; there is no force in the heart."""
     experiment = force_cycle.EXPERIMENT
     on_sensor, in_heart = experiment.cases(par, experiment.defaults, None)
     random = np.random.default_rng(seed)
-    currents = {name: Sensor(name, options.sigma_i) for name in ("i_1", "i_2")}
-    angles = {f"q_{k}": Sensor(f"q_{k}") for k in (1, 2)}
-    first = sensed(
-        turned(on_sensor, random.uniform(0.0, 2.0 * np.pi)),
-        currents | angles | {"y_F": Sensor("y_F", options.sigma_F)}, random,
-    )  # fmt: skip
+    sensors = drive_sensors(options)
+    first = sensed(turned(on_sensor, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
     angles = {f"q_{k}": Sensor(f"theta_{k}") for k in (1, 2)}
     away = random.uniform(-_WITHIN, _WITHIN) * par.caliper.clearance / slope_of(par)
-    second = sensed(turned(in_heart, away), currents | angles, random)
+    rest = {name: one for name, one in sensors.items() if name != "y_F"}
+    second = sensed(turned(in_heart, away), rest | angles, random)
     for name in angles:
         angle: Any = second[name].values
         shown = shaft_encoder.reading(angle, par.encoder)
@@ -184,7 +166,7 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
     return joined({"sensor": first, "heart": second})
 
 
-def truth(par: WedgeParameters, options: Options) -> dict[str, float]:
+def truth(par: WedgeParameters, options: RigOptions) -> dict[str, float]:
     """Return free-play and calibration that ``synthetic`` puts in."""
     known = {u.label: u.start for u in force_current.unknowns(par)}
     heart = par.heart
@@ -199,15 +181,16 @@ METHOD = Method(
     assembly="wedge-brake",
     summary="stiffness of screws, interfaces, tips, and free-play, on a sensor and in the heart",
     experiment="force-cycle",
-    signals={"i_1": "A", "i_2": "A", "q_1": "rad", "q_2": "rad", "y_F": "N"},
-    options=Options,
-    defaults=Options(
+    signals=SIGNALS,
+    options=RigOptions,
+    defaults=RigOptions(
         cutoff=20.0, slowest=0.2, margin=0.05, window=0.02, sigma_i=0.02, sigma_F=5.0
     ),
     identify=identify,
     synthetic=synthetic,
-    simulated=("sigma_i", "sigma_F"),
+    simulated=SIMULATED,
     unknowns=("heart.K_S", "heart.K_W", "heart.K_C"),
     several=True,
     truth=truth,
+    further=two_stages.MEANINGS,
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from itertools import pairwise
@@ -13,13 +12,12 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.core.errors import FileError, InputError, ParameterError, quoted, unknown_name
+from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.units import parse
+from bywire.data.toml_file import read_toml
 
 Array = NDArray[np.float64]
 
-LARGEST = 20_000
-"""size of a file of segments in bytes; a larger one is refused before it is parsed"""
 _STEADY = 0.02  # of the demand's range: it holds while it moves less than this over a window
 _WINDOW = 0.1  # s
 _MOST = 60
@@ -113,27 +111,11 @@ def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segme
         For anything in it that does not fit.
     """
     file = Path(path)
-    content = _parsed(file)
+    content = read_toml(file, "file of segments")
     try:
         return _from(content, tolerances)
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
-
-
-def _parsed(file: Path) -> dict[str, Any]:
-    try:
-        with file.open("rb") as stream:
-            data = stream.read(LARGEST + 1)
-        if len(data) > LARGEST:
-            raise FileError(f"{file} has more than {LARGEST // 1000} kB: it holds no segments")
-        return tomllib.loads(data.decode("utf-8-sig").replace("\r\n", "\n"))
-    except RecursionError:
-        raise FileError(f"{file} is nested far too deeply") from None
-    except OSError as error:
-        why = (error.strerror or str(error)).lower()
-        raise FileError(f"cannot read segments {file}: {why}: give a TOML file") from None
-    except ValueError as error:  # UnicodeDecodeError and TOMLDecodeError among them
-        raise FileError(f"cannot read segments {file}: {error}: give a TOML file") from None
 
 
 def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Segment]:

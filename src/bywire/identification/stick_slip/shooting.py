@@ -1,6 +1,6 @@
 """Every slip of a ramp shot from its own rest and laid over the measured one.
 
-A fit to the whole pressure curve fails from starts a few per cent off: a slip that begins too
+A fit to the whole pressure curve fails from starts a few percent off: a slip that begins too
 early or too late costs as much as one that is not there. So each slip is run by itself, from the
 rest that was measured, beginning where the model breaks away, and moved in time to where it lies
 best on the measured one. What breaking away tells, the current at which it happened, is a residual
@@ -13,10 +13,9 @@ the slip has begun, the demand is corrected by how far the measured current lies
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +24,8 @@ from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.identification.equation import Equation, EquationError
-from bywire.identification.stick_slip.overlay import best_shift, overlaid
+from bywire.identification.stick_slip.driving import driven_by, held, with_more
+from bywire.identification.stick_slip.overlay import overlaid
 from bywire.identification.stick_slip.shots import Shot
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
@@ -35,12 +35,7 @@ Array = NDArray[np.float64]
 
 BEFORE = 0.01
 """rest before the model breaks away [s]"""
-_SMOOTHED = 0.01  # s: over which the measured current is
-_BEGUN = 0.02  # of a slip: before, the current's noise would decide when the model breaks away
-_BEGUN_AT = 2e3  # Pa: of a long one
-_ALIGNED = 2  # times that the measured current is laid over the slip which it drives
 _MORE = 1e-3  # A: with which the answer to an offset is computed
-_I_SET = MotorcycleBrake().Stimulus._fields.index("i_set")
 
 
 @dataclass(frozen=True)
@@ -134,7 +129,7 @@ class Shooting:
         rest, start = max(slip.rest, 0.0), float(demand[0])
         run = Run(
             self.model, par, state_at(rest, par, start), memory_at(rest, par, start),
-            partial(_held, demand, interval), (demand.size - 1) * interval, self.step, interval,
+            partial(held, demand, interval), (demand.size - 1) * interval, self.step, interval,
         )  # fmt: skip
         return run, current, current_slopes
 
@@ -150,27 +145,32 @@ class Shooting:
             measured current once it has begun; without, by its ramp alone.
         """
         run, current, current_slopes = self.run(shot, values)
-        answer = np.zeros(shot.time.size)
+        answer, driven = np.zeros(shot.time.size), None
         if zero is not None:
-            run, driven = self._driven(run, shot, zero)
-            more = simulate(replace(run, stimulus=_with(run, _MORE * driven)), ("p_mc",))
-            answer = (more["p_mc"] - simulate(run, ("p_mc",))["p_mc"]) / _MORE
+            driven = driven_by(run, shot, zero)
+            run = driven.calm
+            offset = np.where(np.arange(answer.size) >= driven.first, _MORE, 0.0)
+            more = simulate(replace(run, stimulus=with_more(run, offset)), ("p_mc",))["p_mc"]
+            answer = (more - simulate(run, ("p_mc",))["p_mc"]) / _MORE
         state, memory = self._start_slopes(run, shot)
         found = simulate_with_sensitivities(
             run, [*self.names, "stimulus.i_set"], ("p_mc",), state, memory
         )
-        columns = found.derivatives[:, 0]
+        p = found.trajectory["p_mc"]
+        if driven is not None:
+            p = simulate(driven.sampled, ("p_mc",))["p_mc"]
+        r, v, shift = overlaid(shot, p)
         # the demand begins at the breakaway current, and goes on as measured
-        slopes = columns[:, :-1] + np.outer(columns[:, -1] - answer, current_slopes)
-        r, v, shift = overlaid(shot, found.trajectory["p_mc"])
+        own, all_along = found.derivatives[:, 0, :-1], found.derivatives[:, 0, -1]
+        slopes = own + np.outer(all_along - answer, current_slopes)
         at = shot.clock - shift
-        J = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
-        J[at < 0.0] = 0.0
-        shift_slopes = (v @ J) / max(float(v @ v), 1e-300)
-        answer, J = J[:, -1], J - np.outer(v, shift_slopes)
+        kept = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
+        kept[at < 0.0] = 0.0
+        shift_slopes = (v @ kept) / max(float(v @ v), 1e-300)
+        J = kept - np.outer(v, shift_slopes)
         level, rate = onset_of(shot, shift + BEFORE)
         return Fitted(
-            residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=answer, speed=v,
+            residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=kept[:, -1], speed=v,
             breakaway=level - current,
             breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
             current=current, onset=float(shot.time[0] + shift + BEFORE),
@@ -188,30 +188,6 @@ class Shooting:
         slopes[:, -1] = (at(start + _MORE) - at(start - _MORE)) / (2.0 * _MORE)
         return slopes[: len(run.state)], slopes[len(run.state) :]
 
-    def _driven(self, ramp: Run, shot: Shot, zero: float) -> tuple[Run, Array]:
-        """Return the run driven by the measured current, and where it is (1, before 0)."""
-        middle = shot.clock + 0.5 * shot.interval
-        measured = _smooth(shot.current - zero, shot.interval)
-        run, more = ramp, np.zeros(middle.size)
-        for _ in range(_ALIGNED):
-            found = simulate(run, ("p_mc", "i"))
-            p, i = found["p_mc"], _smooth(found["i"], shot.interval)
-            shift = best_shift(shot, p, shot.steep)
-            travel = np.abs(p - p[0])
-            begun = np.where(travel > min(_BEGUN * travel.max(), _BEGUN_AT), 1.0, 0.0)
-            wanted = np.interp(np.asarray(middle + shift), shot.clock, measured)
-            more = begun * (more + wanted - np.interp(middle, shot.clock, i))
-            run = replace(ramp, stimulus=_with(ramp, more))
-        return run, begun
-
-
-def _with(run: Run, more: Array) -> Callable[[Array], Array]:
-    """Return the run's stimulus with more demand at each of its intervals."""
-    interval = run.record
-    demand = run.stimulus(np.arange(more.size, dtype=np.float64) * interval)[:, _I_SET]
-    return partial(_held, demand + more, interval)
-
-
 def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
     """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
 
@@ -220,18 +196,3 @@ def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
     level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
     way = float(np.sign(shot.rate)) or float(shot.slip.direction)
     return level, way * max(way * slope, way * shot.rate)
-
-
-def _held(ramp: Array, interval: float, at: Array) -> Array:
-    fields = MotorcycleBrake().Stimulus._fields
-    rows = np.zeros((at.size, len(fields)))
-    index = np.clip(np.floor(at / interval + 1e-6).astype(int), 0, ramp.size - 1)
-    rows[:, _I_SET] = ramp[index]
-    return rows
-
-
-def _smooth(values: NDArray[np.floating[Any]], interval: float) -> Array:
-    """Return the mean over a few samples around each."""
-    width = 2 * int(0.5 * _SMOOTHED / interval) + 1
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.asarray(np.convolve(padded, np.ones(width) / width, mode="valid"), dtype=float)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
 from bywire.assemblies.motorcycle_trim import state_at
 from bywire.core.errors import ParameterError
-from bywire.identification.stick_slip.slips import Slip
+from bywire.identification.stick_slip.slips import Slip, moving_mean
 
 Array = NDArray[np.float64]
 
@@ -20,6 +20,7 @@ LEAD = 0.05
 _LEAST = 8  # samples
 _RESTED = 1.0  # s of rest from which its pressure and the ramp of the current are read
 _COMPARED = 0.9  # of a slip's way: its end, like its beginning, is up to the current's ripple
+_SMOOTHED = 0.02  # s
 _SEEN = 0.016  # s: over which the current is read, short as its ripple moves it
 
 
@@ -67,7 +68,6 @@ class Shot:
         """Time since the first row [s], shape (n,)."""
         return np.arange(self.time.size, dtype=float) * self.interval
 
-
 def cut_out(
     time: Array, pressure: Array, current: Array, slips: Sequence[Slip], longest: float
 ) -> list[Shot]:
@@ -84,10 +84,11 @@ def cut_out(
     found = []
     lead, most, rested = (int(span / interval) for span in (LEAD, longest, _RESTED))
     seen = max(round(_SEEN / interval), 4)
+    smooth = moving_mean(pressure, max(round(_SMOOTHED / interval), 1))
     for k, slip in enumerate(slips):
         first = max(slip.begin - lead, 0)
         until = slips[k + 1].begin - lead if k + 1 < len(slips) else time.size
-        compared, half = (_passed(pressure, slip, 2 * lead, share) for share in (_COMPARED, 0.5))
+        compared, half = (_passed(smooth, slip, 2 * lead, share) for share in (_COMPARED, 0.5))
         last = min(compared, slip.begin + most, until)
         if last - first < _LEAST or slip.begin < 2:
             continue
@@ -114,7 +115,10 @@ def cut_out(
 
 
 def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:
-    """Return the sample at which a slip has gone a share of its way."""
+    """Return the sample at which a slip has gone a share of its way.
+
+    Of smoothed values: the first of noisy ones beyond is there by its noise, and would pull.
+    """
     end = float(values[slip.end : slip.end + rest].mean())
     beyond = slip.direction * (values[slip.begin :] - slip.rest) > share * abs(end - slip.rest)
     return slip.begin + int(np.argmax(beyond))

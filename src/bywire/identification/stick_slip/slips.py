@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.identification.noise import noise_of
+
 Array = NDArray[np.float64]
 
 _WINDOW = 0.02  # s: over which a change counts as motion
@@ -35,22 +37,6 @@ class Slip:
     rest: float
 
 
-def noise_of(values: Array) -> float:
-    """Return the standard deviation of a measured signal's noise, quantization included.
-
-    From differences of the third order, which a slow signal has not, by their median: slips do
-    not count.
-    """
-    third = np.diff(values, 3) / np.sqrt(20.0)
-    scatter = 1.4826 * float(np.median(np.abs(third)))
-    steps = np.abs(np.diff(values))
-    steps = steps[steps > 0]
-    step = float(steps.min()) if steps.size else 0.0
-    repeated = float(np.mean(np.diff(values) == 0.0))
-    quantized = step / np.sqrt(12.0) if 0.05 < repeated < 1.0 and step > 3.0 * scatter else 0.0
-    return max(scatter, quantized)
-
-
 def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
     """Return the slips of a signal.
 
@@ -64,7 +50,7 @@ def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
         Changes smaller than this are no slips, nor such as the noise of the rest before makes.
     """
     width = max(round(_WINDOW / interval), 1)
-    smooth = _mean(values, width)
+    smooth = moving_mean(values, width)
     change = np.zeros(values.size)
     change[width:-width] = smooth[2 * width :] - smooth[: -2 * width]
     threshold = max(_SURE * noise_of(values) * np.sqrt(2.0 / width), 0.01 * least)
@@ -82,7 +68,8 @@ def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
     return slips
 
 
-def _mean(values: Array, width: int) -> Array:
+def moving_mean(values: Array, width: int) -> Array:
+    """Return the mean of so many samples around each, shape (n,)."""
     padded = np.pad(values, (width // 2, width - 1 - width // 2), mode="edge")
     return np.convolve(padded, np.ones(width) / width, mode="valid")
 
