@@ -25,7 +25,7 @@ from bywire.catalog.registry import entries as parameter_sets
 from bywire.core.field_notes import field_notes
 from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
-from bywire.core.signals import Signal, signals_of
+from bywire.core.signals import merged_signals, places_of
 from bywire.report.wording import amount, range_text, unit_text
 
 HERE = Path(__file__).parent
@@ -138,15 +138,9 @@ def element_tuples() -> Iterator[tuple[str, type]]:
 
 def merged(tuples: Iterable[tuple[str, Any]]) -> list[tuple[str, ...]]:
     """Return one row per name, unit and meaning, with all places where it stands."""
-    places: dict[tuple[str, Signal], list[str]] = {}
-    for place, each in tuples:
-        for name, signal in signals_of(each).items():
-            key = name, Signal(signal.unit, signal.label)
-            if place not in places.setdefault(key, []):
-                places[key].append(place)
     return [
         (symbol(name), f"`{name}`", unit_text(s.unit) or "1", s.label, ", ".join(where))
-        for (name, s), where in places.items()
+        for name, s, where in merged_signals(tuples)
     ]
 
 
@@ -168,11 +162,8 @@ def notation() -> str:
         lines += [f"## Signals of {model.name}", ""]
         if not known:
             lines += ["A rig: its parameters are those of the brake that it tests.", ""]
-        places = {
-            "recording": model.Output, "state": model.State, "memory": model.Memory,
-            "stimulus": model.Stimulus, "integral": model.Flow,
-        }  # fmt: skip
-        lines += table(("symbol", "name", "unit", "meaning", "where"), merged(places.items()))
+        rows = merged(places_of(model).items())
+        lines += table(("symbol", "name", "unit", "meaning", "where"), rows)
     lines += ["## Signals of elements and control laws", ""]
     lines += table(("symbol", "name", "unit", "meaning", "element"), merged(element_tuples()))
     return "\n".join(lines)

@@ -13,6 +13,7 @@ import xarray as xr
 
 import bywire
 from bywire.core import ops
+from bywire.core.errors import ParameterError
 from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Unit
@@ -135,6 +136,10 @@ def identified(data):
     equation = Equation(ServoAxis(), "omega", "alpha", slowest=1.0)
     problem = equation, rough, parameters_of(rough, NAMES), filtered(data)
     first = inverse_dynamics(*problem, bandwidth=30.0)
+    if "J" in first.names and first["J"] < 0.0:
+        raise ParameterError(
+            f"theta goes against v (J = {first['J']:.2g} V s^2/rad): negate one of the two"
+        )
 
     known = rough.replace(first.parameters())
     bench = trial(ServoAxis(), known, data, inputs={"v": "v"}, outputs={"theta": NOISE})
@@ -158,7 +163,10 @@ def apart(one, other):
 
 if __name__ == "__main__":
     own = sys.argv[1:]  # a file with time [s], theta [rad] and v [V]
-    first, second, third = identified(bywire.read_measurement(own[0]) if own else measured())
+    try:
+        first, second, third = identified(bywire.read_measurement(own[0]) if own else measured())
+    except bywire.BywireError as error:
+        sys.exit(f"identify_servo_axis: {error}")
     print(f"angle left over: {NOISE * second.rms:.2g} rad; the encoder's noise, if all is well")
     print(f"output error\n{second}\n\ninverse dynamics with instruments\n{third}")
     for name in apart(first, second):

@@ -181,3 +181,25 @@ def test_parameters_go_on_as_a_bench_file(tmp_path: Path, dither: str) -> None:
     assert "# experiment 'open-loop' wants more than this file says" in driven
     path.write_text(driven)
     assert load(path).par.leaves()["motor.R_m"] == 0.321
+
+
+def test_values_lie_beside_their_checks_when_the_report_is_interrupted(
+    bywire: Bywire, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    out = tmp_path / "out"
+    arguments = ("identify", "motor-winding", "--synthetic", "1", "--option", "duration=0.1 s",
+                 "--out", out)  # fmt: skip
+    with monkeypatch.context() as stop:
+        stop.setattr("bywire.report.identification_report.save_figure", stopped)
+        outcome = bywire(*arguments)
+    assert outcome.status == 130
+    assert f"the report in {out} is not complete: the same command writes it" in outcome.err
+    assert {p.name for p in out.iterdir()} == {"measurement.nc", "parameters.toml", "estimate.json"}
+    left = json.loads((out / "estimate.json").read_text())
+    assert [check["holds"] for check in left["checks"]]
+    assert {Path(f).name for f in left["files"]} == {p.name for p in out.iterdir()}
+    assert bywire(*arguments).status == 0
+    assert (out / "report.html").exists()

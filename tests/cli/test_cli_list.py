@@ -7,9 +7,17 @@ from collections.abc import Callable
 import pytest
 from command_line import Outcome, refused
 
+from bywire.analysis.linear.plant_registry import all_plants
+from bywire.analysis.loop_registry import all_loops
 from bywire.analysis.study_registry import all_studies
 from bywire.bench.registry import all_experiments
 from bywire.catalog.registry import entries
+from bywire.cli.described_systems import (
+    described_drive,
+    described_loop,
+    described_plant,
+    systems,
+)
 from bywire.identification.method_registry import all_methods
 
 Bywire = Callable[..., Outcome]
@@ -74,3 +82,60 @@ def test_choices_and_plain_numbers_say_what_they_may_be(bywire: Bywire) -> None:
 
 def test_an_unknown_name_gets_the_nearest(bywire: Bywire) -> None:
     refused(bywire("list", "frction-ramp"), "unknown name 'frction-ramp'", "'friction-ramp'")
+
+
+@pytest.mark.parametrize("name", ["motorcycle-brake", "wedge-brake", "shaft-rig"])
+def test_an_assembly_says_its_signals_and_what_there_is_for_it(bywire: Bywire, name: str) -> None:
+    one = only(bywire("list", name, "--json"), "assembly")
+    model = systems()[name]
+    where = {(row["signal"], place) for row in one["signals"] for place in row["where"].split(", ")}
+    for place, fields in (("stimulus", model.Stimulus), ("recording", model.Output),
+                          ("state", model.State)):  # fmt: skip
+        assert {n for n, known in where if known == place} == set(fields._fields)
+    known = [e.name for e in all_experiments().values() if e.assembly == name]
+    assert one["experiments"] == ", ".join(known)
+
+
+def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
+    for name, one in all_experiments().items():
+        rows = described_drive(one)["drives"]
+        assert rows or one.static is not None, name
+    text = bywire("list", "hard-braking").out
+    assert "p_set   bar   pressure demand  motorcycle-brake" in text
+    assert "'bywire list motorcycle-brake': the signals that a recording holds" in text
+
+
+def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> None:
+    for loop in all_loops().values():
+        rows = described_loop(loop)["signals"]
+        told = {part: [r["signal"] for r in rows if r["as"] == part]
+                for part in ("input", "output", "cut open at", "state")}  # fmt: skip
+        assert told["input"] == list(loop.inputs)
+        assert told["output"] == [loop.output]
+        assert all(r["meaning"] for r in rows), loop.name
+        assert told["state"]
+    for plant in all_plants().values():
+        parts = {row["as"] for row in described_plant(plant)["signals"]}
+        assert parts == {"input", "output", "state"}
+    assert "i_source  A      source current             input" in bywire(
+        "list", "motorcycle-plant"
+    ).out
+
+
+def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
+    one = only(bywire("list", "motor.R_m", "--json"), "parameter")
+    assert one["summary"] == "winding resistance"
+    assert {"parameter set": "dardanelli2010", "value": "0.35 Ω"} in one["values"]
+    group = only(bywire("list", "seal", "--json"), "parameter group")
+    assert "seal.T_pr" in [row["name"] for row in group["parameters"]]
+    (row,) = only(bywire("list", "p_mc", "--json"), "signal")["found in"]
+    assert (row["system"], row["unit"]) == ("motorcycle-brake", "bar")
+    figure = only(bywire("list", "overshoot", "--json"), "KPI")
+    assert figure["unit"] == "%"
+    assert "hard-braking" in figure["experiments"].split(", ")
+    refused(bywire("list", "motor.R_n"), "unknown name 'motor.R_n'", "'motor.R_m'")
+
+
+def test_the_method_of_any_bench_says_where_its_signals_are(bywire: Bywire) -> None:
+    text = bywire("list", "output-error").out
+    assert "--input (stimulus), --output (recording) and --estimate-start (state)" in text

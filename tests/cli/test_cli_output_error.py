@@ -136,6 +136,13 @@ def test_refusals(bywire: Bywire, bench: Path, tmp_path: Path) -> None:
                    *UNKNOWNS), "--holdout is for measurement files")  # fmt: skip
     refused(bywire("identify", "friction-ramp", "--synthetic", "1", "--unknown", "motor.R_m"),
             "--unknown is for methods of any bench (output-error)")  # fmt: skip
+    refused(bywire("identify", "friction-ramp", "--synthetic", "1", "--loss", "huber"),
+            "--loss is for methods of any bench (output-error)")  # fmt: skip
+    refused(bywire(*given, "--holdout", tmp_path / ".." / tmp_path.name / "run.csv"), "run.csv is",
+            "which is fitted")  # fmt: skip
+    copy = tmp_path / "copy.csv"
+    copy.write_bytes(data.read_bytes())
+    refused(bywire(*given, "--holdout", copy), "has the same content as", "which is fitted")
     refused(bywire("identify", "output-eror"), "output-error")
 
 

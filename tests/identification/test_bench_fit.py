@@ -13,6 +13,7 @@ from bywire.core.errors import InputError
 from bywire.identification.fitting.asked import Asked
 from bywire.identification.fitting.bench_fit import BenchFit
 from bywire.identification.fitting.unknown_texts import starts_of, unknowns_of
+from bywire.identification.fitting.worth import starts_check
 from bywire.identification.method import Effort, Identified
 from bywire.identification.methods.output_error import METHOD
 from bywire.identification.output_error import output_error
@@ -41,8 +42,11 @@ def record(made_on: bywire.Bench, seed: int, asked: Asked = TWO) -> xr.Dataset:
     return METHOD.on(made_on, asked).synthetic(made_on.par, OPTIONS, seed)
 
 
-def identified(on: bywire.Bench, data: xr.Dataset, asked: Asked = TWO) -> Identified:
-    found: Identified = METHOD.on(on, asked).identify(data, on.par, OPTIONS, Effort(starts=1))
+def identified(
+    on: bywire.Bench, data: xr.Dataset, asked: Asked = TWO, loss: str = "linear"
+) -> Identified:
+    options = OPTIONS.replace({"loss": loss})
+    found: Identified = METHOD.on(on, asked).identify(data, on.par, options, Effort(starts=1))
     return found
 
 
@@ -159,10 +163,53 @@ def test_a_held_out_record_begins_where_it_did() -> None:
     assert found["validation.p_mc.nrmse"].value < 0.05
 
 
-def test_a_wrong_model_does_not_hold() -> None:
+LOSSES = ("linear", "soft_l1", "huber", "cauchy")
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_wrong_model_does_not_hold(loss: str) -> None:
     data = record(bench(), 7)
-    found = identified(bench(caliper__K_pd=8e5), data)
+    found = identified(bench(caliper__K_pd=8e5), data, loss=loss)
     assert not next(c for c in found.checks if c.name == "residual_over_noise").holds
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_few_outliers_are_counted_by_a_robust_loss(loss: str) -> None:
+    data = record(bench(), 2)
+    data["p_mc"][5::25] += 3e5
+    spoiled = data["p_mc"][5::25].size
+    found = identified(bench(), data, loss=loss)
+    checks = {c.name: c for c in found.checks}
+    if loss == "linear":
+        assert not checks["residual_over_noise"].holds
+        assert "take --loss huber" in checks["residual_over_noise"].note
+        return
+    assert all(check.holds for check in found.checks)
+    inside(found, {"motor.R_m": 0.35, "motor.K_e": 0.0304})
+    assert checks["outliers"].note.startswith(f"{spoiled} of ")
+    assert 0.9 < checks["residual_over_noise"].value < 1.1
+
+
+def test_noise_that_the_record_does_not_tell_is_no_proof_of_a_model() -> None:
+    data = record(bench(), 2)
+    data["p_mc"] = data["p_mc"] + 0.5e5 * (-1.0) ** np.arange(data.sizes["time"])
+    own = Asked(outputs={"p_mc": "", "i": ""}, unknowns=TWO.unknowns)
+    check = next(c for c in identified(bench(), data, own).checks if c.name == "noise_not_told")
+    assert check.value == 1.0
+    assert not check.holds
+    assert "p_mc changes itself from sample to sample" in check.note
+    assert '--output "p_mc=NOISE bar"' in check.note
+    assert all(c.holds for c in identified(bench(), record(bench(), 2), own).checks)
+    given = identified(bench(), record(bench(), 2)).checks
+    assert "noise_not_told" not in {c.name for c in given}
+
+
+def test_a_minimum_that_one_start_of_several_found_is_not_believed() -> None:
+    assert not starts_check(1, 3)
+    (alone,), (met,) = starts_check(1, 4), starts_check(2, 4)
+    assert not alone.holds
+    assert "--starts" in alone.note
+    assert met.holds
 
 
 def test_ranges_priors_and_starts() -> None:
@@ -232,5 +279,8 @@ def test_records_that_tell_nothing_are_refused() -> None:
     idle = Asked(outputs=TWO.outputs, unknowns={"pedal.x_max": ""})
     with pytest.raises(InputError, match=r"tells none of pedal\.x_max.*nothing measured depends"):
         identified(bench(), data, idle)
+    closed = Asked(outputs=TWO.outputs, unknowns={"fluid.V_air": ""})
+    with pytest.raises(InputError, match=r"fluid\.air = none.*switch it on"):
+        identified(bench(), data, closed)
     with pytest.raises(InputError, match="nothing measured drives the model"):
         identified(bench(), data.drop_vars("v_set"))

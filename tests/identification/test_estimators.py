@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import runpy
+from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +13,7 @@ import pytest
 import xarray as xr
 
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.data.writing import write_measurement
 from bywire.identification import (
     Equation,
     differentiated,
@@ -205,3 +207,23 @@ def test_uneven_time_is_refused(axis: ModuleType, data: xr.Dataset) -> None:
     holes = data.isel(time=np.r_[0:100, 120:400])
     with pytest.raises(ParameterError, match="not evenly spaced"):
         trial(axis.ServoAxis(), axis.TRUTH, holes, {"v": "v"}, {"theta": 1e-4})
+
+
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda d: d.rename(theta="phi"), "unknown measured signal 'theta': known are"),
+    (lambda d: d.isel(time=slice(None, None, 10)), "cutoff = 60 Hz is not admissible"),
+    (lambda d: d.assign(theta=-d["theta"]), r"theta goes against v \(J = -0.02 .*negate one"),
+    (None, "none.nc cannot be read"),
+])  # fmt: skip
+def test_the_example_says_what_is_wrong_with_a_record(
+    axis: ModuleType, data: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+    change: Callable[[xr.Dataset], xr.Dataset] | None, said: str,
+) -> None:  # fmt: skip
+    file = tmp_path / "none.nc"
+    if change is not None:
+        own = data.copy()
+        own["theta"].attrs["units"], own["v"].attrs["units"] = "rad", "V"
+        file = write_measurement(change(own), tmp_path / "axis.nc")
+    monkeypatch.setattr("sys.argv", [str(FILE), str(file)])
+    with pytest.raises(SystemExit, match=said):
+        runpy.run_path(str(FILE), run_name="__main__")

@@ -50,11 +50,12 @@ def test_the_rest_s_own_noise_is_no_slip() -> None:
 
 def test_slips_that_follow_at_once_are_left_out(data: xr.Dataset) -> None:
     t, p, i = (data[name].values for name in ("time", "p_mc", "i"))
-    crowded = [Slip(begin, begin + 3, 1, 1e5) for begin in (2, 40, 45)]
-    found = cut_out(t[:60], p[:60], i[:60], crowded, OPTIONS.longest)
-    assert [shot.slip.begin for shot in found] == [45]
-    with pytest.raises(ParameterError, match=r"none of the 1 slips.*check the unit"):
-        cut_out(t[:60], p[:60], i[:60], [Slip(1, 4, 1, 1e5)], OPTIONS.longest)
+    crowded = [Slip(begin, begin + 3, 1, 1e5) for begin in (2, 40, 400)]
+    found = cut_out(t[:600], p[:600], i[:600], crowded, OPTIONS.longest)
+    assert [shot.slip.begin for shot in found] == [400]
+    for slip in (Slip(1, 4, 1, 1e5), Slip(400, 403, -1, 1e5)):
+        with pytest.raises(ParameterError, match=r"none of the 1 slips.*check the unit"):
+            cut_out(t[:600], p[:600], i[:600], [slip], OPTIONS.longest)
 
 
 def test_a_wrong_unit_is_refused_in_a_sentence(data: xr.Dataset) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,9 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, SolverError
 from bywire.identification.confidence import autocorrelation, is_white, uncertainty
-from bywire.identification.least_squares import Problem, estimate, solve
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Loss, Problem, estimate, solve
+from bywire.identification.loss import influence, rho
 from bywire.identification.multistart import search
 from bywire.identification.unknown import Unknown, scattered
 
@@ -124,6 +127,93 @@ def test_a_robust_loss_shrugs_off_outliers() -> None:
     plain, robust = (estimate(decay(spoiled), loss) for loss in ("linear", "soft_l1"))
     assert abs(plain["a"] - 2.0) > 5.0 * abs(robust["a"] - 2.0)
     assert abs(robust["a"] - 2.0) < 0.01
+
+
+def line(seed: int, share: float, loss: Loss) -> Estimate:
+    """Return the fit of a straight line, a share of whose measurements are outliers."""
+    random = np.random.default_rng(seed)
+    X = np.column_stack((np.ones(60), np.linspace(-1.0, 1.0, 60)))
+    e = random.normal(size=60)
+    spoiled = random.random(60) < share
+    e[spoiled] += random.normal(0.0, 20.0, int(spoiled.sum()))
+    y = X @ [1.0, 2.0] + e
+    unknowns = (Unknown("a", 1.0, scale=9.0), Unknown("b", 2.0, scale=9.0))
+    return estimate(Problem(unknowns, lambda v: (X @ v - y, X)), loss)
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1", "huber", "cauchy"])
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_intervals_of_every_loss_are_honest(loss: Loss, share: float) -> None:
+    """An M-estimate's covariance has the mean slope of its influence, not its weight."""
+    found = [line(seed, share, loss) for seed in range(120)]
+    inside = np.mean([(f.intervals()[:, 0] < [1, 2]) & (f.intervals()[:, 1] > [1, 2])
+                      for f in found])  # fmt: skip
+    assert 0.9 <= inside <= 0.99
+    scatter = np.std([f.values for f in found], axis=0)
+    claimed = np.mean([f.deviations for f in found], axis=0)
+    np.testing.assert_allclose(claimed / scatter, 1.0, atol=0.25)
+
+
+@pytest.mark.parametrize("loss", ["soft_l1", "huber", "cauchy"])
+def test_a_loss_agrees_with_its_derivatives(loss: Loss) -> None:
+    z, h = np.array([0.1, 0.7, 1.5, 9.0, 400.0]), 1e-5
+    _, first, second = rho(z, loss)
+    up, down = rho(z + h, loss), rho(z - h, loss)
+    np.testing.assert_allclose((up[0] - down[0]) / (2 * h), first, rtol=1e-5)
+    np.testing.assert_allclose((up[1] - down[1]) / (2 * h), second, rtol=1e-4, atol=1e-10)
+    psi, slope = influence(np.sqrt(z), loss)
+    change = influence(np.sqrt(z) + h, loss)[0] - influence(np.sqrt(z) - h, loss)[0]
+    np.testing.assert_allclose(change / (2 * h), slope, rtol=1e-4, atol=1e-10)
+    np.testing.assert_allclose(psi, np.sqrt(z) * first)
+
+
+@pytest.mark.parametrize("loss", ["huber", "cauchy"])
+def test_a_robust_loss_leaves_priors_alone(loss: Loss) -> None:
+    """One measurement of 2 with unit noise against a prior of 9: the loss counts only the first."""
+    unknown = Unknown("x", 2.0, prior=(9.0, 0.01))
+    problem = Problem((unknown,), lambda v: (np.full(3, v[0] - 2.0), np.ones((3, 1))))
+    found = estimate(problem, loss)
+    assert found["x"] == pytest.approx(9.0, abs=1e-3)
+    assert not found.notes
+
+
+def test_a_prior_that_the_data_contradicts_is_named() -> None:
+    y = np.random.default_rng(3).normal(1.0, 0.5, 50)
+    unknown = Unknown("mean", 0.0, prior=(3.0, 0.01), unit="A")
+    far = Problem((unknown,), lambda v: ((v[0] - y) / 0.05, np.full((50, 1), 20.0)))
+    (note,) = estimate(far).notes
+    assert "deviations of its prior (3 A ± 0.01 A) away" in note
+    near = replace(far, unknowns=(replace(unknown, prior=(1.0, 1.0)),))
+    assert not estimate(near).notes
+
+
+def test_a_value_just_inside_its_bound_lies_at_it() -> None:
+    """Rough residuals keep the search from the last step; the data cannot tell the difference."""
+    y = np.random.default_rng(3).normal(1.0, 0.5, 50)
+    unknown = Unknown("mean", 2.0, low=1.5)
+
+    def rough(values: Array) -> tuple[Array, Array]:
+        wave = 1e-3 * np.cos(2e5 * (values[0] - 1.50003))
+        return (values[0] - y) / 0.5 - wave, np.full((50, 1), 2.0)
+
+    found = estimate(Problem((unknown,), rough))
+    assert 1.5 <= found["mean"] < 1.501
+    assert found.at_bounds() == {"mean": 1.5}
+    assert not estimate(Problem((replace(unknown, low=0.5),), rough)).at_bounds()
+
+
+def test_a_model_that_does_not_fit_is_not_sent_for_excitation() -> None:
+    y = np.linspace(0.0, 5.0, 50)
+    unknown = Unknown("x", 1.0, scale=1e-3)
+    poor = Problem((unknown,), lambda v: ((v[0] - y) / 0.01, np.full((50, 1), 100.0)))
+    with pytest.raises(ParameterError, match=r"the model does not fit.*check sign and unit"):
+        estimate(poor)
+    fair = Problem((unknown,), lambda v: ((v[0] - y) / 2.0, np.full((50, 1), 0.5)))
+    with pytest.raises(ParameterError, match="excite the system more"):
+        estimate(fair)
+    off = Problem((unknown,), lambda v: (y - 2.5, np.zeros((50, 1))), silent={"x": "law = none"})
+    with pytest.raises(ParameterError, match=r"depends on it \(law = none\); switch it on"):
+        estimate(off)
 
 
 def test_a_bound_that_is_met_is_said() -> None:

@@ -93,4 +93,18 @@ def test_a_band_is_named() -> None:
     coords = {"p": ("p", p, {"units": "Pa"}), "level": ("level", [1.0, 2.0], {"units": "s"})}
     (axes,) = method_curve(Curve("a", "b", xr.Dataset(values, coords), "p")).axes
     said = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert said == ["1 s", "2 s", "95 % band"]
+    assert said == ["1 s", "2 s", "95 % band (± 1 N at most)"]
+
+
+@pytest.mark.parametrize(("half", "said"), [
+    (0.1, "95 % band (± 0.1 N at most)"),
+    (1e-3, "95 % band (± 0.001 N at most, within the line)"),
+])  # fmt: skip
+def test_a_band_that_the_line_hides_is_told(half: float, said: str) -> None:
+    x = np.linspace(0.0, 1.0, 41)
+    data = {"value": ("x", x, FORCE), "low": ("x", x - half, FORCE), "high": ("x", x + half, FORCE)}
+    curve = Curve("a", "b", xr.Dataset(data, {"x": ("x", x, {"units": "m"})}), "x")
+    (axes,) = method_curve(curve).axes
+    legend = axes.get_legend()
+    assert legend is not None
+    assert [text.get_text() for text in legend.get_texts()] == ["modeled", said]

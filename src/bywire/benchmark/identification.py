@@ -17,8 +17,8 @@ from bywire.benchmark.result import Result, at_least
 from bywire.identification.method import Effort
 from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
 from bywire.identification.stick_slip.overlay import overlaid
-from bywire.identification.stick_slip.shooting import BEFORE, Shooting, onset_of
-from bywire.identification.stick_slip.shots import Shot
+from bywire.identification.stick_slip.shooting import Shooting
+from bywire.identification.stick_slip.shots import BEFORE, Shot, onset_of
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
 

@@ -17,6 +17,21 @@ from bywire.bench.stimuli.registry import entries as stimuli
 from bywire.catalog.registry import Entry as Set
 from bywire.catalog.registry import entries as sets
 from bywire.catalog.registry import entry, main_set
+from bywire.cli.described_parameters import (
+    described_group,
+    described_kpi,
+    described_parameter,
+    groups,
+    parameters,
+)
+from bywire.cli.described_systems import (
+    described_drive,
+    described_loop,
+    described_plant,
+    described_system,
+    signals,
+    systems,
+)
 from bywire.cli.option_rows import option_rows, option_table
 from bywire.core.errors import unknown_name
 from bywire.core.field_notes import field_notes
@@ -28,6 +43,10 @@ from bywire.identification.method_registry import all_methods, bench_methods
 
 Object = dict[str, Any]
 
+_LINES = ("assembly", "system", "at", "unit", "range", "experiment", "records", "source",
+          "parameter sets", "experiments", "loops", "plants", "studies", "methods")  # fmt: skip
+_TABLES = ("drives", "signals", "found in", "values", "estimates", "kpis")
+
 
 def described(name: str) -> list[Object]:
     """Return an object for everything that has a name: a method, an experiment, both.
@@ -38,15 +57,19 @@ def described(name: str) -> list[Object]:
         With the nearest known names.
     """
     kinds: Mapping[str, tuple[Mapping[str, Any], Callable[[Any], Object]]] = {
+        "assembly": (systems(), described_system),
         "method": (all_methods(), _method),
         "method of any bench": (bench_methods(), _bench_method),
         "experiment": (all_experiments(), _experiment),
         "study": (all_studies(), _study),
         "parameter set": (sets(), _set),
-        "loop": (all_loops(), _in_short),
-        "plant": (all_plants(), _in_short),
+        "loop": (all_loops(), described_loop),
+        "plant": (all_plants(), described_plant),
         "stimulus": (stimuli(), _stimulus),
-        "KPI": (definitions(), lambda one: {"summary": one.definition}),
+        "KPI": (definitions(), lambda one: described_kpi(one.name, one.definition)),
+        "parameter": ({n: n for n in parameters()}, described_parameter),
+        "parameter group": ({n: n for n in groups()}, described_group),
+        "signal": (signals(), lambda rows: {"summary": rows[0]["meaning"], "found in": rows}),
     }
     found: list[Object] = [
         {"kind": kind, "name": name, **describe(known[name])}
@@ -64,10 +87,10 @@ def described_text(one: Object) -> str:
     from bywire.report.wording import unit_text
 
     lines = [f"{one['kind']} {one['name']}: {one['summary']}"]
-    lines += [f"  {key}: {one[key]}" for key in ("assembly", "experiment", "records", "source")
-              if one.get(key)]  # fmt: skip
+    lines += [f"  {key}: {unit_text(one[key]) if key == 'unit' else one[key]}"
+              for key in _LINES if one.get(key)]  # fmt: skip
     parts = ["\n".join(lines)]
-    for key in ("signals", "estimates", "kpis"):
+    for key in _TABLES:
         rows = one.get(key)
         if rows:
             columns = list(rows[0])
@@ -80,6 +103,8 @@ def described_text(one: Object) -> str:
         if one.get(key):
             said = f"{key}, changed with {one['changed_with']}" if "changed_with" in one else key
             parts.append(f"{said}\n{table_text(option_table(one[key], heading))}")
+    if one.get("see"):
+        parts.append(one["see"])
     return "\n\n".join(parts)
 
 
@@ -105,6 +130,9 @@ def _bench_method(one: BenchMethod) -> Object:
         "records": "one or several",
         "options": option_rows(one.options, one.defaults, one.simulated),
         "changed_with": "--option NAME=VALUE",
+        "see": "'bywire list' with the name of the bench's assembly shows what --input (stimulus), "
+        "--output (recording) and --estimate-start (state) take, with a parameter's what --unknown "
+        "takes",
     }
 
 
@@ -124,6 +152,7 @@ def _experiment(one: Experiment) -> Object:
     return {
         "summary": one.summary,
         "assembly": one.assembly,
+        **described_drive(one),
         "kpis": [{"name": n, "unit": display_unit(u)} for n, u in one.kpis.items()],
         "options": option_rows(one.options, one.defaults),
         "changed_with": "--set options.NAME=VALUE",

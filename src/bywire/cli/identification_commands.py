@@ -102,7 +102,7 @@ def identify(
 
     on_bench = OnBench(
         bench, changes(input_, "--input"), named(output, "--output"), named(unknown, "--unknown"),
-        changes(prior, "--prior"), start or [], case, holdout,
+        changes(prior, "--prior"), start or [], case, holdout, loss,
     )  # fmt: skip
     options = changes([*(option or []), *([f"loss={loss}"] if loss else [])], "--option")
     wanted = Wanted(

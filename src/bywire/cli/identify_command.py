@@ -64,6 +64,7 @@ def _measured(chosen: Chosen, wanted: Wanted, progress: Progress) -> tuple[Measu
         found = measured(
             wanted.measurements, wanted.mapping, method.signals,
             optional=method.optional, gaps=method.gaps, progress=progress,
+            multiple=None if method.bench is None else method.bench.step,
         )  # fmt: skip
         return found, ", ".join(path.name for path in wanted.measurements)
     progress("simulated experiment", 0.0)
@@ -151,17 +152,28 @@ def _written(
     from bywire.report.identification_report import write_identification
 
     files: list[Path] = []
+    estimate = out / earlier_result.ESTIMATE
+
+    def listed(more: Sequence[Path]) -> Path:
+        text = json.dumps(as_object(one, [*files, *more, estimate]), indent=1) + "\n"
+        return write_bytes(estimate, text.encode())
+
     try:
         if wanted.synthetic is not None:
             from bywire.data.writing import write_measurement
 
             files.append(write_measurement(measured.data, out / "measurement.nc", overwrite=True))
         if one.found.parameters and chosen.par is not None:
+            parameters = out / "parameters.toml"
+            # Interrupted from here on, values lie beside the checks that say what they are worth.
+            listed([parameters])
             bench = bench_text(one, chosen.par, chosen.changes)
-            files.append(write_bytes(out / "parameters.toml", bench.encode()))
+            files.append(write_bytes(parameters, bench.encode()))
         files += write_identification(out, one)
-        shown = json.dumps(as_object(one, [*files, out / earlier_result.ESTIMATE]), indent=1) + "\n"
-        files.append(write_bytes(out / earlier_result.ESTIMATE, shown.encode()))
+        files.append(listed([]))
     except InputError as error:
         return files, error
+    except KeyboardInterrupt:
+        output.message(f"the report in {out} is not complete: the same command writes it")
+        raise
     return files, None

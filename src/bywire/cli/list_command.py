@@ -50,7 +50,10 @@ def execute(name: str | None, as_json: bool) -> None:
         for name, about in pairs:
             lines += _entry(name, about)
         lines.append("")
-    lines.append("'bywire list NAME' shows the options, signals and units of one of them")
+    lines.append(
+        "'bywire list NAME' shows the options, signals and units of one of them, of a parameter "
+        "(motor.R_m), a group of parameters (motor), or a signal (p_mc)"
+    )
     result("\n".join(lines))
 
 

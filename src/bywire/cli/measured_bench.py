@@ -28,6 +28,7 @@ class OnBench:
     states: Sequence[str]
     case: str
     holdout: Path | None
+    loss: str = ""
 
     @property
     def given(self) -> tuple[str, ...]:
@@ -36,6 +37,7 @@ class OnBench:
             "--bench": self.bench, "--input": self.inputs, "--output": self.outputs,
             "--unknown": self.unknowns, "--prior": self.priors, "--estimate-start": self.states,
             "--case": self.case, "--holdout": self.holdout,
+            "--loss": self.loss,
         }  # fmt: skip
         return tuple(name for name, value in options.items() if value)
 
@@ -88,7 +90,7 @@ def method_on_bench(
 
     held = measured(
         [wanted.holdout], mapping, method.signals, optional=method.optional, gaps=True,
-        progress=progress,
+        multiple=bench.step, progress=progress,
     )  # fmt: skip
     return found.on(bench, replace(asked, holdout=held.data))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import filecmp
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -82,11 +83,29 @@ def _method(name: str, wanted: Wanted) -> Method:
         return method
     if not wanted.measurements and wanted.on_bench.holdout is not None:
         raise ParameterError("--holdout is for measurement files: leave it out")
+    _require_not_fitted(wanted)
     own = {"parameters": wanted.parameters} if wanted.parameters else {}
     with progress_bar() as progress:
         return method_on_bench(
             found, wanted.on_bench, {**own, **wanted.changes}, wanted.mapping, progress
         )
+
+
+def _require_not_fitted(wanted: Wanted) -> None:
+    """Refuse a held-out file that is fitted too: it proves nothing."""
+    held = wanted.on_bench.holdout
+    if held is None:
+        return
+    for path in wanted.measurements:
+        try:
+            equal = filecmp.cmp(path, held, shallow=False)
+        except OSError:  # reading says what is wrong with it
+            continue
+        if equal:
+            same = "is" if path.samefile(held) else "has the same content as"
+            raise ParameterError(
+                f"--holdout {held} {same} {path}, which is fitted: hold out a record that is not"
+            )
 
 
 def _require_one_source(method: Method, wanted: Wanted) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import typing
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, NamedTuple, TypeVar
@@ -59,6 +60,31 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
             raise TypeError(f"{tuple_type.__qualname__}.{name} has no Signal annotation")
         found[name] = signal
     return found
+
+
+def places_of(model: Any) -> dict[str, type[NamedTuple]]:
+    """Return the signal tuples of a model by what they are in it."""
+    return {"recording": model.Output, "state": model.State, "memory": model.Memory,
+            "stimulus": model.Stimulus, "integral": model.Flow}  # fmt: skip
+
+
+def merged_signals(
+    tuples: Iterable[tuple[str, type[NamedTuple]]],
+) -> list[tuple[str, Signal, tuple[str, ...]]]:
+    """Return one row per name, unit and label, with all places where such a signal stands.
+
+    Parameters
+    ----------
+    tuples
+        Places and signal tuples, as of :func:`places_of`.
+    """
+    places: dict[tuple[str, Signal], list[str]] = {}
+    for place, each in tuples:
+        for name, signal in signals_of(each).items():
+            where = places.setdefault((name, Signal(signal.unit, signal.label)), [])
+            if place not in where:
+                where.append(place)
+    return [(name, signal, tuple(where)) for (name, signal), where in places.items()]
 
 
 def zeros(tuple_type: type[T]) -> T:

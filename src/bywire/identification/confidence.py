@@ -72,7 +72,11 @@ def uncertainty(
         if not found or colored:
             covariance = bread @ (middle + known) @ bread.T
             found.append(Uncertainty(covariance, freedom, colored))
-    worst = max(found, key=lambda one: float(np.sum(np.log(np.diag(one.covariance) + 1e-300))))
+
+    def volume(one: Uncertainty) -> float:
+        return float(np.sum(np.log(np.maximum(np.diag(one.covariance), 1e-300))))
+
+    worst = max(found, key=volume)
     return Uncertainty(worst.covariance / np.outer(scale, scale), worst.freedom, worst.colored)
 
 

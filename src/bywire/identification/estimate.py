@@ -9,11 +9,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.units import shown
 from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 
 _AT = 1e-6  # of an unknown's scale: nearer to a bound, it lies at it
+_INDISTINCT = 0.05  # of a standard deviation: nearer to a bound, the data does not tell it from it
 
 
 @dataclass(frozen=True)
@@ -48,7 +50,8 @@ class Estimate:
         Of the Jacobian whose columns are per unknown's scale, shape (p,), largest first: what
         is small beside the first one hardly shows in the data.
     residuals
-        Measured less computed, weighted, shape (n,): of size one where the noise is as assumed.
+        Computed less measured over the noise, shape (n,): of size one where the noise is as
+        assumed. A robust loss has not weighted them.
     freedom
         Degrees of freedom: independent residuals less unknowns.
     colored
@@ -97,9 +100,9 @@ class Estimate:
         """Return the unknowns that lie at a bound: label -> bound, SI."""
         return {
             u.label: end
-            for u, value in zip(self.unknowns, self.values, strict=True)
+            for u, value, d in zip(self.unknowns, self.values, self.deviations, strict=True)
             for end in (u.low, u.high)
-            if math.isfinite(end) and abs(value - end) < _AT * u.scale
+            if math.isfinite(end) and abs(value - end) < max(_AT * u.scale, _INDISTINCT * d)
         }
 
     def vague(self) -> dict[str, str]:
@@ -112,7 +115,7 @@ class Estimate:
         found = {}
         for u, value, half in zip(self.unknowns, self.values, reach, strict=True):
             if u.label in bounds:
-                found[u.label] = f"lies at its bound, {bounds[u.label]:.4g} {u.unit}"
+                found[u.label] = f"lies at its bound, {shown(bounds[u.label], u.unit)}"
             elif half > abs(value):
                 found[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: that may be nothing"
         return found
@@ -162,7 +165,7 @@ class Estimate:
 
     @property
     def rms(self) -> float:
-        """Root mean square of the weighted residuals; 1 where the noise is as assumed."""
+        """Root mean square of the residuals over the noise; 1 where that is as assumed."""
         return math.sqrt(float(np.mean(self.residuals**2)))
 
 

@@ -5,12 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.units import shown
 from bywire.identification.estimate import Estimate
+from bywire.identification.spread import robust_scale
 
 Array = NDArray[np.float64]
 
 _TOLD = 1.0  # standard deviation per scale above which nothing is known
 _FLAT = 1e-7  # singular value per the largest one: below it rounding decides
+_FAR = 10.0  # times the noise: residuals that no noise explains
+_CONTRADICTED = 3.0  # standard deviations of a prior
 
 
 def untold(found: Estimate, J: Array) -> tuple[int, str] | None:
@@ -30,20 +34,48 @@ def untold(found: Estimate, J: Array) -> tuple[int, str] | None:
     unknown = found.unknowns[index]
     return index, (
         f"its standard deviation would be {relative[index]:.2g} times its usual magnitude "
-        f"{unknown.scale:.3g} {unknown.unit} ({told})"
+        f"{shown(float(f'{unknown.scale:.3g}'), unknown.unit)} ({told})"
     )
 
 
+def advice(found: Estimate, silent: bool) -> str:
+    """Return what to do where the data tells nothing.
+
+    Parameters
+    ----------
+    found
+        Where the search ended, with its residuals.
+    silent
+        Whether it is known why nothing depends on the unknown.
+    """
+    left = robust_scale(found.residuals)
+    if left > _FAR:
+        return (
+            f"the model does not fit, it leaves {left:.2g} times the noise at its best: check sign "
+            "and unit of what was measured (--map), then what is taken as known"
+        )
+    return "switch it on, or name another unknown" if silent else "excite the system more"
+
+
 def notes_of(found: Estimate) -> tuple[str, ...]:
-    """Return what the user should know: unknowns that go together, or lie at a bound."""
+    """Return what the user should know: what goes together, lies at a bound, or off its prior."""
     notes = [
         f"{a} and {b} go together (correlation {c:.3f}): the data tells their combination better "
         "than either"
         for a, b, c in found.correlated()
     ]
-    units = {u.label: u.unit for u in found.unknowns}
-    notes += [
-        f"{label} lies at its bound, {end:.4g} {units[label]}"
-        for label, end in found.at_bounds().items()
-    ]
+    bounds = found.at_bounds()
+    for u, value in zip(found.unknowns, found.values, strict=True):
+        if u.label in bounds:
+            notes.append(f"{u.label} lies at its bound, {shown(bounds[u.label], u.unit)}")
+        if u.prior is None:
+            continue
+        mean, deviation = u.prior
+        away = abs(float(value) - mean) / deviation
+        if away > _CONTRADICTED:
+            notes.append(
+                f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} lies {away:.2g} deviations "
+                f"of its prior ({shown(mean, u.unit)} ± {shown(deviation, u.unit)}) away: the "
+                "prior or the model is wrong"
+            )
     return tuple(notes)

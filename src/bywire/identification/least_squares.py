@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,50 +10,17 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, SolverError
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
-from bywire.identification.identifiability import notes_of, untold
-from bywire.identification.unknown import Unknown
+from bywire.identification.identifiability import advice, notes_of, untold
+from bywire.identification.loss import Loss, bread, influence, of_data_alone
+from bywire.identification.problem import Problem, cost_of, with_priors
+
+__all__ = ["Loss", "Problem", "Solution", "estimate", "solve", "with_priors"]
 
 Array = NDArray[np.float64]
-Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
 _NEWTON = 8  # steps from the least sum to where instruments see no residual
 _WORSE = 0.02  # of the least sum of squares: more is another place
-
-
-@dataclass(frozen=True)
-class Problem:
-    """Residuals as a function of unknowns.
-
-    Parameters
-    ----------
-    unknowns
-        What is varied; p of them.
-    evaluate
-        ``evaluate(values) -> (residuals, jacobian)``, shapes (n,) and (n, p), weighted so that
-        residuals are of size one where the noise is as assumed.
-    apart
-        Last rows that are independent of all others and taken to be weighted rightly.
-    instrument
-        Whether the Jacobian is that of a model which the measured inputs' noise does not drive,
-        while it drives that of the residuals. Where their product vanishes, the estimate is then
-        free of the bias that the least sum of squares has.
-    """
-
-    unknowns: tuple[Unknown, ...]
-    evaluate: Callable[[Array], tuple[Array, Array]]
-    apart: int = 0
-    instrument: bool = False
-
-    def held(self, index: int) -> Problem:
-        """Return the problem with one unknown held at its start."""
-        value = self.unknowns[index].start
-        rest = self.unknowns[:index] + self.unknowns[index + 1 :]
-
-        def evaluate(values: Array) -> tuple[Array, Array]:
-            r, J = self.evaluate(np.insert(values, index, value))
-            return r, np.delete(J, index, axis=1)
-
-        return replace(self, unknowns=rest, evaluate=evaluate)
+_NEAR = 1e-2  # of the scale: how far from a bound a search with bounds may stop short of it
 
 
 @dataclass(frozen=True)
@@ -121,13 +86,34 @@ def solve(
         return both(z)[1]
 
     cache_size = [both(start / scale)[0].size]
+    priors = sum(u.prior is not None for u in unknowns)
     margin = 1e-9
     inner = np.clip(start / scale, low + margin, high - margin)
     found = optimize.least_squares(
-        residuals, inner, jacobian, bounds=(low, high), loss=loss, x_scale="jac",
+        residuals, inner, jacobian, bounds=(low, high),
+        loss=of_data_alone(loss, priors), x_scale="jac",
         xtol=1e-9, ftol=share, gtol=1e-9, max_nfev=most,
     )  # fmt: skip
-    return Solution(np.asarray(found.x) * scale, float(found.cost))
+    solution = Solution(np.asarray(found.x) * scale, float(found.cost))
+    return _at_bounds(problem, solution, loss)
+
+
+def _at_bounds(problem: Problem, solution: Solution, loss: Loss) -> Solution:
+    """Return the solution with unknowns at the bounds that the search only came near to."""
+    scale = np.array([u.scale for u in problem.unknowns])
+    for k, u in enumerate(problem.unknowns):
+        for end in (u.low, u.high):
+            if not 0.0 < abs(solution.values[k] - end) < _NEAR * scale[k]:
+                continue
+            values = solution.values.copy()
+            values[k] = end
+            try:
+                cost = cost_of(problem, values, loss)
+            except SolverError:
+                continue
+            if cost <= solution.cost:
+                solution = Solution(values, cost)
+    return solution
 
 
 def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
@@ -148,19 +134,6 @@ def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
         if np.abs(step).max() < 1e-7:
             break
     return Solution(values, cost)
-
-
-def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:
-    """Return residuals and Jacobian with one more row for every prior."""
-    r, J = problem.evaluate(values)
-    rows = [(k, u.prior) for k, u in enumerate(problem.unknowns) if u.prior is not None]
-    if not rows:
-        return r, J
-    more = np.array([(values[k] - mean) / deviation for k, (mean, deviation) in rows])
-    slopes = np.zeros((len(rows), len(values)))
-    for row, (k, (_, deviation)) in enumerate(rows):
-        slopes[row, k] = 1.0 / deviation
-    return np.concatenate((r, more)), np.vstack((J, slopes))
 
 
 def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None) -> Estimate:
@@ -189,14 +162,18 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
         if worst is None:
             return replace(found, kept=kept, notes=notes_of(found))
         index, reason = worst
-        first = next(u for u in origin.unknowns if u.label == problem.unknowns[index].label)
+        unknown = problem.unknowns[index]
+        if not J[:, index].any() and unknown.name in problem.silent:
+            reason = f"{reason} ({problem.silent[unknown.name]})"
+        first = next(u for u in origin.unknowns if u.label == unknown.label)
         kept = (*kept, Kept(first, reason))
         begin = np.delete(found.values, index)
         problem = problem.held(index)
         if not problem.unknowns:
-            names = ", ".join(k.unknown.label for k in kept)
             raise ParameterError(
-                f"the data tells none of {names}: {kept[0].reason}; excite the system more"
+                f"the data tells none of {', '.join(k.unknown.label for k in kept)}: of "
+                f"{kept[0].unknown.label}, {kept[0].reason}; "
+                f"{advice(found, kept[0].unknown.name in problem.silent)}"
             )
 
 
@@ -209,11 +186,15 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
         raise ParameterError(
             f"{data} measured values cannot tell {len(problem.unknowns)} unknowns: measure more"
         )
-    if loss != "linear":
-        weight = np.sqrt(_slope(r, loss))
-        r, J = r * weight, J * weight[:, None]
     scale = np.array([u.scale for u in problem.unknowns])
-    sure = uncertainty(J * scale, r, prior_rows=priors + problem.apart)
+    known = priors + problem.apart
+    # What is known beforehand is no outlier; only what was measured is weighted by the loss.
+    psi, slopes = influence(r[: r.size - known], loss)
+    rows = J.copy()
+    rows[: r.size - known] *= bread(slopes, len(problem.unknowns))
+    sure = uncertainty(
+        rows * scale, np.concatenate((psi, r[r.size - known :])), J * scale, prior_rows=known
+    )
     found = Estimate(
         unknowns=problem.unknowns,
         values=solution.values,
@@ -224,13 +205,3 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
         colored=sure.colored,
     )
     return found, J * scale
-
-
-def _slope(r: Array, loss: Loss) -> Array:
-    """Return the derivative of the loss by the squared residual: the weight of each residual."""
-    z = r**2
-    if loss == "soft_l1":
-        return np.asarray((1.0 + z) ** -0.5)
-    if loss == "huber":
-        return np.where(z <= 1.0, 1.0, np.maximum(z, 1.0) ** -0.5)
-    return np.asarray(1.0 / (1.0 + z))

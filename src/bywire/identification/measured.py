@@ -16,9 +16,13 @@ from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.file_format import Progress, no_progress
 from bywire.data.mapping_file import read_mapping
 from bywire.data.measurement import read_measurement
+from bywire.identification.noise import noise_of
 from bywire.identification.records import joined
 
 _UNEVEN = 1e-3  # of a step
+_FEWEST = 10  # samples that tell noise
+NOISE_OF_SAMPLES = "noise_of_samples"
+"""attribute of a signal that was resampled: noise of the samples before, SI"""
 
 
 @dataclass(frozen=True)
@@ -44,6 +48,7 @@ def measured(
     *,
     optional: Mapping[str, str] | None = None,
     interval: float | None = None,
+    multiple: float | None = None,
     gaps: bool = False,
     progress: Progress = no_progress,
 ) -> Measured:
@@ -61,6 +66,8 @@ def measured(
         What is taken too where it is there.
     interval
         Wanted step [s]; by default the median one of the record.
+    multiple
+        What that is rounded to multiples of where the record has to be resampled [s].
     gaps
         Whether samples may be missing.
     progress
@@ -78,7 +85,7 @@ def measured(
         if signals is not None:
             too = {n: unit for n, unit in (optional or {}).items() if n in data}
             data = data[list(require(data, {**signals, **too}, str(path)))]
-        even, said = as_even(data, interval)
+        even, said = as_even(data, interval, multiple)
         notes += [f"{path.name}: {text}" for text in said]
         _require_whole(even, path, gaps)
         label = path.stem if path.stem not in records else str(path)
@@ -106,7 +113,9 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
     return (*signals, *(("record",) if "record" in there and "record" not in signals else ()))
 
 
-def as_even(data: xr.Dataset, interval: float | None = None) -> tuple[xr.Dataset, list[str]]:
+def as_even(
+    data: xr.Dataset, interval: float | None = None, multiple: float | None = None
+) -> tuple[xr.Dataset, list[str]]:
     """Return signals on one evenly spaced axis, as they are where they lie on one already.
 
     Parameters
@@ -115,6 +124,8 @@ def as_even(data: xr.Dataset, interval: float | None = None) -> tuple[xr.Dataset
         What ``read_measurement`` gives.
     interval
         Wanted step [s]; the median one by default.
+    multiple
+        What that is rounded to multiples of where the signals have to be resampled [s].
     """
     steps = {str(dim): np.diff(data[dim].values) for dim in data.dims}
     if "record" in data and set(steps) == {"time"} and interval is None:
@@ -126,7 +137,13 @@ def as_even(data: xr.Dataset, interval: float | None = None) -> tuple[xr.Dataset
         return data if dim == "time" else data.rename({dim: "time"}), []
     if "record" in data:
         raise ParameterError("several records in one file cannot be resampled: give a file each")
+    if multiple is not None and interval is None:
+        step = float(f"{max(round(step / multiple), 1) * multiple:.9g}")
     found = resample(data, step)
+    for name, signal in found.dataset.data_vars.items():
+        values = data[name].values[np.isfinite(data[name].values)]
+        if values.size >= _FEWEST:
+            signal.attrs.setdefault(NOISE_OF_SAMPLES, noise_of(values))
     return found.dataset, [_said(found.report)]
 
 

@@ -12,6 +12,7 @@ from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 from bywire.identification.method import Curve
 from bywire.report import style
+from bywire.report.band_width import LINE, band_label
 from bywire.report.channel import FloatArray
 from bywire.report.decimation import kept_samples
 from bywire.report.record_marks import mark_records
@@ -115,7 +116,7 @@ def _bands(axes: Axes, curve: Curve) -> None:
             low, high = _row(data["low"], data[x], k), _row(data["high"], data[x], k)
             axes.fill_between(at, low, high, color=color, alpha=0.25, linewidth=0.0)
         axes.plot(
-            at, _row(data["value"], data[x], k), color=color, linewidth=1.3,
+            at, _row(data["value"], data[x], k), color=color, linewidth=LINE,
             label=style.plain(label or "modeled"),
         )  # fmt: skip
         if "measured" in data:
@@ -132,7 +133,9 @@ def _bands(axes: Axes, curve: Curve) -> None:
     entries = list(axes.get_legend_handles_labels()[0])
     if banded:
         shade = style.GRAY if len(family) > 1 else style.SEQUENCE[0]
-        entries.append(Patch(color=shade, alpha=0.25, linewidth=0.0, label="95 % band"))
+        half = 0.5 * np.asarray(data["high"].values - data["low"].values, dtype=float)
+        label = band_label(axes, half, str(value.attrs.get("units", "1")))
+        entries.append(Patch(color=shade, alpha=0.25, linewidth=0.0, label=label))
     style.legend_above(axes, entries)
 
 

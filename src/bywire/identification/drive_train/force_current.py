@@ -19,6 +19,7 @@ from bywire.identification.drive_train.cogging_waves import waves
 from bywire.identification.drive_train.steady_motion import windows
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
+from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ MEANINGS: Mapping[str, tuple[str, str]] = {
 """unknowns of the law -> SI unit and meaning"""
 
 NAMES = tuple(MEANINGS)
+_AGAINST = -0.5  # correlation of current and force: beyond chance
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,7 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     Raises
     ------
     ParameterError
-        When the motors do not move both ways.
+        When the motors do not move both ways, or their currents go against the force.
     """
     interval = even_interval(data["time"].values)
     q_1, q_2 = data["q_1"].values, data["q_2"].values
@@ -145,13 +147,15 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     lag = 1.0 / (2.0 * np.pi * par.rig.sensor.f_F)
     rate = np.gradient(low_passed(data["y_F"].values, interval, reading.cutoff), interval)
     F = means(data["y_F"].values + lag * rate)
+    i = means(0.5 * (data["i_1"].values - data["i_2"].values))
+    _require_along(i, F, where)
     each = 0.5 * np.abs(means(speed))
     stated = float(each.mean()) if reading.speed is None else reading.speed
     beyond = _speed_effect(F, each, stated, par)
     d = roller_screw.slope(par.screw) * (q_1 - q_2)
     skip = round(reading.margin / interval)
     return Squeeze(
-        i=means(0.5 * (data["i_1"].values - data["i_2"].values)) - ways * beyond,
+        i=i - ways * beyond,
         F=F,
         d=means(d),
         way=ways,
@@ -160,6 +164,15 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
         each=each,
         speed=stated,
     )
+
+
+def _require_along(i: Array, F: Array, where: str) -> None:
+    """Refuse currents that pull apart where the sensor shows compression."""
+    together = float(np.corrcoef(i, F)[0, 1]) if np.ptp(F) > 0.0 and np.ptp(i) > 0.0 else 0.0
+    if together < _AGAINST:
+        raise wrong_sign(
+            f"i_1 - i_2 of {where}", "y_F", f"correlation {together:.2f}, compression positive"
+        )
 
 
 def _speed_effect(F: Array, speed: Array, stated: float, par: WedgeParameters) -> Array:

@@ -18,6 +18,7 @@ from bywire.identification.method import Check, Curve, Identified
 from bywire.identification.moved_run import moved_run
 from bywire.identification.output_error import Trial, output_error
 from bywire.identification.unknown import parameters_of
+from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
 
 Array = NDArray[np.float64]
@@ -98,9 +99,8 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
         )
     together = float(np.corrcoef(demand, current)[0, 1]) if np.ptp(current) > 0.0 else 0.0
     if together < _AGAINST:
-        raise ParameterError(
-            f"{answer} of record {label or '1'} goes against {name} (correlation {together:.2f}): "
-            "one of the two has the wrong sign; write sign = -1 for it in the map"
+        raise wrong_sign(
+            f"{answer} of record {label or '1'}", name, f"correlation {together:.2f}"
         )
 
 

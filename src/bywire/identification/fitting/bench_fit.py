@@ -17,26 +17,30 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.values import number
-from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.signals import signals_of
 from bywire.identification.estimate import Estimate
 from bywire.identification.fitting.asked import Asked
 from bywire.identification.fitting.options import Options
-from bywire.identification.fitting.unknown_texts import is_parameter, starts_of, unknowns_of
+from bywire.identification.fitting.output_noise import output_noise, overestimated, resampled
+from bywire.identification.fitting.unknown_texts import (
+    is_parameter,
+    starts_of,
+    switched_off,
+    unknowns_of,
+)
 from bywire.identification.fitting.worth import (
     Compared,
     believable,
     checks_of,
     compared,
     figures_of,
+    noise_check,
+    starts_check,
     validation_of,
 )
-from bywire.identification.least_squares import estimate
+from bywire.identification.least_squares import Problem, estimate, solve
 from bywire.identification.method import Effort, Identified
-from bywire.identification.multistart import search
-from bywire.identification.noise import noise_of
+from bywire.identification.multistart import Search, search
 from bywire.identification.output_error import Trial, initial_states, output_error
 from bywire.identification.records import split
 from bywire.identification.replaying.measured_run import MeasuredRun, case_of, measured_run
@@ -46,8 +50,7 @@ Array = NDArray[np.float64]
 
 # Rounding has no derivative, closed loops would look open: these laws leave it out.
 _SMOOTH = {"adc.law": "ideal", "encoder.law": "ideal"}
-_FINEST = 1.0 / 65536.0  # of a signal's range: what a converter of 16 bits resolves
-_FEWEST = 10  # samples
+_ROUGH = 1e-4  # of the cost: enough to begin from
 _AT_REST = 5.0  # times the noise: a start below it is none that could be estimated
 
 
@@ -91,24 +94,37 @@ class BenchFit:
         unknowns = list(unknowns_of(case_of(bench, self.asked.case), bench.par, self.asked))
         for one, trial in zip(records.values(), trials, strict=True):
             unknowns += self.starts(one, trial)
-        problem = output_error(trials, unknowns)
+        problem = replace(
+            output_error(trials, unknowns), silent=switched_off(bench.par, unknowns, _SMOOTH)
+        )
         starts = starts_of(
             unknowns, self.asked.unknowns, effort.starts, effort.spread, effort.seed
         )
-        led = search(problem, starts, options.loss, effort.progress, effort.store, effort.threads)
+        led = search(
+            problem, starts, options.loss, effort.progress, effort.store, effort.threads,
+            # A loss that redescends has far minima wherever the record is missed altogether.
+            partial(_nearer, problem) if options.loss == "cauchy" else None,
+        )  # fmt: skip
         found = estimate(problem, options.loss, led.best.values)
+        reached = _reached(led, found)
         shown = [
             compared(one, trial, found)
             for one, trial in zip(records.values(), trials, strict=True)
         ]
         held = self._held_out(bench, found, options)
-        checks = checks_of(trials, found, options)
+        uneven = any(resampled(one) for one in records.values())
+        checks = checks_of(trials, found, options, uneven)
+        doubtful = overestimated(
+            list(records.values()), trials, found.residuals, self.asked.outputs
+        )
         return Identified(
             estimates={"output error": found},
             parameters=believable(found),
             figures=figures_of(shown, trials),
             checks=(
-                *checks, *(() if held is None else validation_of(held, options)),
+                *checks, *noise_check(doubtful, self.asked.outputs),
+                *starts_check(reached, effort.starts),
+                *(() if held is None else validation_of(held, options)),
             ),
             curves=(
                 *(curve for one in shown for curve in one.curves("fit")),
@@ -116,7 +132,7 @@ class BenchFit:
             ),
             notes=(
                 *_said(records, options, coarse=not checks[0].holds), *_smoothed(bench),
-                f"{led.reached} of {effort.starts} starts reached the minimum",
+                f"{reached} of {effort.starts} starts reached the minimum",
             ),
         )  # fmt: skip
 
@@ -144,28 +160,10 @@ class BenchFit:
         return Trial(
             replace(one.run, par=one.run.par.replace(smooth)),
             {name: np.concatenate((before, row)) for name, row in values.items()},
-            {name: self._noise(name, row, one) for name, row in values.items()},
+            {name: output_noise(one, name, self.asked.outputs[name]) for name in values},
             label,
             start=None if one.bench.definition.preview else partial(_begun, one.bench, one.case),
         )
-
-    def _noise(self, name: str, values: Array, one: MeasuredRun) -> float:
-        """Return the standard deviation of an output's noise, given or of the record."""
-        unit = signals_of(one.case.model.Output)[name].unit
-        if text := self.asked.outputs[name]:
-            return noise_given(name, text, unit)
-        there = values[np.isfinite(values)]
-        if there.size < _FEWEST:
-            raise ParameterError(
-                f"{name} has {there.size} samples: {_FEWEST} at least are needed to tell its noise"
-            )
-        span = float(np.ptp(there))
-        if not span > 0.0:
-            raise ParameterError(
-                f"{name} does not move: an output that rests tells nothing; leave it out, or "
-                "excite the system"
-            )
-        return max(noise_of(there), _FINEST * span)
 
     def starts(self, one: MeasuredRun, trial: Trial) -> tuple[Unknown, ...]:
         """Return a record's own unknowns: initial states, and a start told by a noisy sample."""
@@ -187,18 +185,16 @@ class BenchFit:
         return compared(one, self.trial(one, "held out"), found)
 
 
-def noise_given(name: str, text: str, unit: str) -> float:
-    """Return the standard deviation of an output's noise, written with its unit.
+def _nearer(problem: Problem, start: Array) -> Array:
+    """Return where a start leads with losses that have no minima of their own."""
+    return solve(problem, solve(problem, start, share=_ROUGH).values, "huber", share=_ROUGH).values
 
-    Raises
-    ------
-    UnitError, ParameterError
-        When it is no quantity of that unit, or not > 0.
-    """
-    found = number(text, unit, f"noise of {name}")
-    if not found > 0.0:
-        raise ParameterError(f"noise of {name} = {text} is not admissible: it must be > 0 {unit}")
-    return found
+
+def _reached(led: Search, found: Estimate) -> int:
+    """Return how many starts came within 1 % of the lowest minimum, or of what noise leaves."""
+    size = 0.5 * found.residuals.size
+    lowest = led.best.cost
+    return sum(one.cost <= lowest + 0.01 * max(lowest, size) for one in led.solutions)
 
 
 def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, Any]:

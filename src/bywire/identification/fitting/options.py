@@ -24,6 +24,8 @@ class Options(ParameterSet):
     as something smooth is that acts on the model faster than it was measured"""
     most_residual: Factor
     """residual over noise above which the model does not explain the record"""
+    most_outliers: Share
+    """residuals beyond four times the noise, of all, that a robust loss may set aside"""
     least_vaf: Share
     """variance of the held-out record that is to be accounted for, signal by signal"""
     noise: Share

@@ -12,8 +12,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.running import as_run
 from bywire.core.signals import Signal, signals_of
 from bywire.identification.fitting.asked import Asked
-from bywire.identification.fitting.bench_fit import noise_given
 from bywire.identification.fitting.options import Options
+from bywire.identification.fitting.output_noise import noise_given
 from bywire.identification.replaying.measured_run import case_of
 from bywire.simulation.run import simulate
 

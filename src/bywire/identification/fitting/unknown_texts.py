@@ -175,3 +175,28 @@ def starts_of(
     for start in others:
         start[given] = random.uniform(low, high)
     return (first, *others)
+
+
+def switched_off(
+    known: ParameterSet, unknowns: Iterable[Unknown], fitted: Mapping[str, str]
+) -> dict[str, str]:
+    """Return why nothing may depend on an unknown: name -> choices that stand beside it.
+
+    Parameters
+    ----------
+    known
+        Parameters of the bench.
+    unknowns
+        What is searched.
+    fitted
+        Choices that the fit makes itself: dotted name -> choice.
+    """
+    choices = {n: c for n, c in known.choices().items() if isinstance(c, str)}
+    choices |= {name: c for name, c in fitted.items() if name in choices}
+    found = {}
+    for one in unknowns:
+        group = one.name.rpartition(".")[0]
+        beside = [f"{n} = {c}" for n, c in choices.items() if n.rpartition(".")[0] == group]
+        if beside:
+            found[one.name] = f"here {', '.join(beside)}"
+    return found

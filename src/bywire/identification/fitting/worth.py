@@ -7,7 +7,9 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from bywire.identification.estimate import Estimate
 from bywire.identification.explained import explained
@@ -20,10 +22,19 @@ from bywire.identification.replaying.bench_replay import beside
 from bywire.identification.replaying.fit import fit_figures
 from bywire.identification.replaying.measured_run import MeasuredRun
 from bywire.identification.replaying.segments import Segment
+from bywire.identification.spread import FAR, outliers, robust_scale
 from bywire.simulation.run import simulate
+
+Array = NDArray[np.float64]
 
 _OWN = ("initial.", "start.")  # what each record has for itself
 _EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
+_BETWEEN = (
+    "; outputs were measured at uneven instants and interpolated: where they move fast from sample "
+    "to sample, that leaves errors of its own"
+)
+_FEW = 0.02  # of the residuals: as many as may be outliers
+_SEVERAL, _MET = 4, 2  # starts: so many are to tell whether one alone found a minimum
 
 
 @dataclass(frozen=True)
@@ -94,25 +105,85 @@ def compared(one: MeasuredRun, trial: Trial, found: Estimate) -> Compared:
     )  # fmt: skip
 
 
-def checks_of(trials: Sequence[Trial], found: Estimate, options: Options) -> tuple[Check, ...]:
+def checks_of(
+    trials: Sequence[Trial], found: Estimate, options: Options, resampled: bool = False
+) -> tuple[Check, ...]:
     """Return whether the model explains the records, and whether the values mean something.
 
     Noise alone is no proof of a model: where a record is nothing but noise, noise is what any
-    model leaves.
+    model leaves. What a robust loss sets aside is left out of the residual, and counted.
+
+    Parameters
+    ----------
+    trials, found
+        What was fitted, and how.
+    options
+        Loss and limits.
+    resampled
+        Whether outputs were measured at uneven instants.
     """
     vague = {n: why for n, why in found.vague().items() if _of_bench(found, n)}
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
     untold = [k.unknown.label for k in found.kept]
+    far = outliers(found.residuals)
+    robust = options.loss != "linear"
+    counted = ~far if robust else np.ones_like(far)
+    left = math.sqrt(float(np.mean(found.residuals[counted] ** 2)))
     return (
-        Check("residual_over_noise", found.rms, limit=options.most_residual,
-              note="1 where nothing but the sensors' noise is left"),
-        Check("variance_explained", explained(trials, found), limit=_EXPLAINED, at_least=True,
+        Check("residual_over_noise", left, limit=options.most_residual,
+              note="1 where nothing but the sensors' noise is left"
+              + _few(found.residuals, far, robust) + (_BETWEEN if resampled else "")),
+        *((_outliers(far, options),) if robust else ()),
+        Check("variance_explained", explained(trials, found, counted), limit=_EXPLAINED,
+              at_least=True,
               note="share of the outputs' variance, over their noise, that the model predicts"),
         Check("parameters_without_meaning", float(len(vague)), limit=0.0,
               note=said or "none at its bound, none with a 95 % interval wider than +-100 %"),
         Check("not_told", float(len(untold)),
               note=", ".join(untold) or "the data tells all that was asked for"),
     )  # fmt: skip
+
+
+def _few(r: Array, far: NDArray[np.bool_], robust: bool) -> str:
+    """Return what stands behind residuals without a robust loss: perhaps a few outliers."""
+    if robust or not 0.0 < float(far.mean()) < _FEW or robust_scale(r) > FAR:
+        return ""
+    return f"; {far.sum()} of {far.size} stand out: if they are outliers, take --loss huber"
+
+
+def _outliers(far: NDArray[np.bool_], options: Options) -> Check:
+    return Check(
+        "outliers", float(far.mean()), limit=options.most_outliers,
+        note=f"{far.sum()} of {far.size} residuals stand out by {FAR:g} times the noise or more: "
+        "beyond the limit they are the model's",
+    )  # fmt: skip
+
+
+def noise_check(doubtful: Mapping[str, str], given: Mapping[str, str]) -> tuple[Check, ...]:
+    """Return whether each output's noise is one, where the record itself had to tell it.
+
+    Parameters
+    ----------
+    doubtful
+        Outputs whose noise comes out too large -> why.
+    given
+        Noise by output, where it was given.
+    """
+    if all(given.values()):
+        return ()
+    note = "; ".join(doubtful.values()) or "what scatters in the record is noise"
+    return (Check("noise_not_told", float(len(doubtful)), limit=0.0, note=note),)
+
+
+def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
+    """Return whether another start met the lowest minimum too, where several were made."""
+    if starts < _SEVERAL:
+        return ()
+    note = "starts that met the lowest minimum"
+    if reached < _MET:
+        note += ": there may be a lower one; take more --starts, narrower ranges (--unknown " \
+                "NAME=LOW..HIGH), or fewer unknowns"
+    return (Check("starts_at_minimum", float(reached), limit=_MET, at_least=True, note=note),)
 
 
 def _of_bench(found: Estimate, label: str) -> bool:

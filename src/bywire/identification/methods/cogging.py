@@ -32,6 +32,7 @@ from bywire.identification.least_squares import estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
 from bywire.identification.simulated_record import Sensor, sensed, turned
+from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
@@ -77,13 +78,14 @@ def identify(
     Raises
     ------
     ParameterError
-        When the shaft turns one way only, too little, or no order stands out.
+        When the shaft turns one way only, too little, no order stands out, or a sign is wrong.
 
     References
     ----------
     Roberts et al. (2003), section "Motor": T_COG(theta).
     """
     turning = _turning(data, par, options)
+    _require_braking(turning)
     orders = standing_out(turning.angle, turning.leveled, options.highest)
     if not orders:
         raise ParameterError(
@@ -107,6 +109,14 @@ def identify(
         curves=(_folded(found),),
         notes=_notes(best, orders),
     )
+
+
+def _require_braking(turning: Turning) -> None:
+    """Refuse a motor that the friction drives: it has to push the shaft both ways."""
+    forward, backward = (float(turning.torque[turning.way == w].mean()) for w in (1.0, -1.0))
+    friction = 0.5 * (forward - backward)
+    if friction < 0.0:
+        raise wrong_sign("i_1", "q_1", f"friction {friction:.3g} N*m: it would drive the shaft")
 
 
 def _slope(par: WedgeParameters, turning: Turning) -> float:

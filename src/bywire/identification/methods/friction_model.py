@@ -13,18 +13,20 @@ from pydantic import Field
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Nodes, Unit
+from bywire.core.units import shown
+from bywire.identification.estimate import Estimate
 from bywire.identification.friction_models import LAWS, find_law, laws_for
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.model_choice import Choice, choose
 from bywire.identification.record_axis import after_one_another
 from bywire.identification.records import joined, split
+from bywire.identification.sliding_samples import sliding
 
 Array = NDArray[np.float64]
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, lt=1)]
 Size = Annotated[float, Unit("N", 10.0), Field(ge=0)]
 
 _BINS, _MISFIT = 12, 0.05
-_LEAST = 20  # samples each way
 
 
 class Truth(ParameterSet):
@@ -81,13 +83,14 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     Raises
     ------
     ParameterError
-        When too few samples slide both ways, or the law wanted needs a pressure that varies.
+        When too few samples slide both ways, friction drives, or the law wanted needs a pressure
+        that varies.
 
     References
     ----------
     Armstrong-Helouvry, Dupont, Canudas de Wit (1994), Automatica 30 (7), section 2: the laws.
     """
-    records = _sliding(split(data), options.slowest)
+    records = sliding(split(data), options.slowest)
     whole = xr.concat(list(records.values()), "time", combine_attrs="override")
     known = laws_for(whole)
     wanted = known if options.law == "choose" else (find_law(options.law),)
@@ -111,6 +114,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                   note="what is left on average at a speed or a pressure, over the friction"),
             Check("validation_over_training", best.validation_error / best.training_error,
                   limit=1.5, note="error on data held out over that on data fitted"),
+            _driving(best.estimate),
         ),
         curves=(_curve(records, whole, predicted),),
         notes=(f"held out: {choice.held_out}; chosen is the simplest law within a standard error "
@@ -118,31 +122,16 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     )  # fmt: skip
 
 
-def _sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.Dataset]:
-    names = ("friction", "speed", "pressure")
-    found = {}
-    for label, one in records.items():
-        kept = one[[n for n in names if n in one]]
-        v = np.abs(kept["speed"].values)
-        good = np.all([np.isfinite(kept[n].values) for n in kept.data_vars], axis=0)
-        rows = np.flatnonzero(good & (v > slowest * np.max(v[good], initial=0.0)))
-        found[label] = kept.isel(time=rows)
-    _require_both_ways(found, slowest)
-    return found
-
-
-def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> None:
-    """Refuse records in which too few samples slide forward, or backward."""
-    v = np.concatenate([one["speed"].values for one in sliding.values()])
-    counts = {"forward": int(np.sum(v > 0)), "backward": int(np.sum(v < 0))}
-    short = [way for way, count in counts.items() if count < _LEAST]
-    if short:
-        said = ", ".join(f"{count} {way}" for way, count in counts.items())
-        raise ParameterError(
-            f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
-            "record motion to and fro (speed changes its sign), or lower --option slowest, which "
-            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
-        )
+def _driving(found: Estimate) -> Check:
+    """Return whether a part of the law drives: its 95 % interval lies below zero."""
+    highest = dict(zip(found.names, found.intervals()[:, 1], strict=True))
+    below = [n for n, high in highest.items() if high < 0.0]
+    unit = {u.label: u.unit for u in found.unknowns}
+    said = "; ".join(f"{n} = {shown(float(f'{found[n]:.3g}'), unit[n])} drives" for n in below)
+    return Check(
+        "terms_that_drive", float(len(below)), limit=0.0,
+        note=said or "no part of the law has a sign that friction cannot have",
+    )  # fmt: skip
 
 
 def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:

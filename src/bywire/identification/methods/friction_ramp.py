@@ -11,9 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
-from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.bench.experiments import friction_ramp
 from bywire.bench.running import as_run
 from bywire.core.errors import ParameterError
@@ -22,15 +20,17 @@ from bywire.core.quantities import Current, Duration, Pressure, Unit
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
-from bywire.identification.multistart import nearer, search
+from bywire.identification.multistart import Search, nearer, search
 from bywire.identification.noise import noise_of
-from bywire.identification.output_error import even_interval, trial
+from bywire.identification.output_error import even_interval
 from bywire.identification.stick_slip.loss import Noise, SlipLoss
+from bywire.identification.stick_slip.ramp_replay import replayed
 from bywire.identification.stick_slip.shooting import Shooting
-from bywire.identification.stick_slip.shots import Shot, cut_out, require_reachable
+from bywire.identification.stick_slip.shots import Shot, cut_out, require_calm, require_reachable
 from bywire.identification.stick_slip.slips import find_slips
 from bywire.identification.stick_slip.stribeck_band import stribeck_band
 from bywire.identification.unknown import Unknown, parameters_of, scattered
+from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
 
 Array = NDArray[np.float64]
@@ -39,9 +39,9 @@ _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"
 # The search of several starts, coarse in time: first the beginnings of slips, which have few minima
 # once that is held which they hardly tell. The best minimum is then fitted in full.
-_QUICK_STEP, _BEGINNING, _QUICK_LENGTH = 1e-4, 0.3, 4.0  # s
+_QUICK_STEP, _BEGINNING, _QUICK_LENGTH = 1e-4, 0.6, 4.0  # s
 _HARDLY_TOLD = ("seal.c", "seal.mu_T")
-_LIMIT_REPLAY, _LIMIT_RESIDUAL = 0.1, 1.1
+_LIMIT_REPLAY, _LIMIT_RESIDUAL, _LIMIT_ZERO, _LIMIT_RIPPLE = 0.1, 1.1, 5.0, 3.0
 
 
 class Options(ParameterSet):
@@ -90,33 +90,18 @@ def identify(
     References
     ----------
     Dardanelli, Alli, Savaresi (2010), section 4.1; the loss is ours, see
-    ``stick_slip.loss``.
+    ``bywire.identification.stick_slip.loss``.
     """
     shots = shots_of(data, options)
     require_reachable(shots, par)
-    known = {_ZERO: options.zero, _RIPPLE: options.ripple}
-    unknowns = (
-        *parameters_of(par, [f"seal.{name}" for name in _NAMES]),
-        *(Unknown(k, 0.0, scale=v, unit="A", prior=(0.0, v)) for k, v in known.items()),
-    )
-    starts = scattered(unknowns, effort.starts, effort.spread, effort.seed)
-    beginning, longer = (
-        _problem(data, par, _quick(options, length), unknowns)
-        for length in (_BEGINNING, _QUICK_LENGTH)
-    )
-    found = search(
-        longer, starts, "linear", effort.progress, effort.store, effort.threads,
-        partial(nearer, beginning, _HARDLY_TOLD),
-    )  # fmt: skip
-    at = found.best.values
-    best = estimate(_problem(data, par, options, unknowns, at), start=at)
+    require_calm(shots, noise_of(data["i"].values), _LIMIT_RIPPLE * options.ripple)
+    found, best = _fitted(data, par, options, effort)
     values = best.parameters()
     own = par.replace(values)
-    shift = best[_ZERO] if _ZERO in best.names else 0.0
-    whole = _replay(data.assign(i=data["i"] - shift), own, options.step)
+    zero = best[_ZERO] if _ZERO in best.names else 0.0
+    whole = replayed(data.assign(i=data["i"] - zero), own, options.step)
     error = whole["modeled"] - whole["measured"]
     nrmse = float(np.sqrt((error**2).mean()) / np.ptp(data["p_mc"].values))
-    notes = [_counted(shots), f"{found.reached} of {effort.starts} starts reached the minimum"]
     return Identified(
         estimates={"seal friction": best},
         parameters=values,
@@ -125,6 +110,9 @@ def identify(
                   note="aligned slips: residual over the sensor's noise"),
             Check("replay_nrmse", nrmse, limit=_LIMIT_REPLAY,
                   note="whole ramp, computed less measured, over the range"),
+            Check("zero_over_usual", abs(zero) / options.zero, limit=_LIMIT_ZERO,
+                  note="reading of the current's sensor without current, over its usual size: more "
+                  "may also be the zero of the pressure's sensor, a unit, or the torque constant"),
             Check("starts_at_minimum", found.reached / effort.starts),
         ),
         curves=(
@@ -132,8 +120,37 @@ def identify(
                   whole, "time"),
             _stribeck(own, best),
         ),
-        notes=tuple(notes),
+        notes=(
+            _counted(shots), f"{found.reached} of {effort.starts} starts reached the minimum",
+        ),
     )  # fmt: skip
+
+
+def _fitted(
+    data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
+) -> tuple[Search, Estimate]:
+    """Return where the starts led, and the best minimum fitted in full."""
+    known = {_ZERO: options.zero, _RIPPLE: options.ripple}
+    unknowns = (
+        *parameters_of(par, [f"seal.{name}" for name in _NAMES]),
+        *(Unknown(k, 0.0, scale=v, unit="A", prior=(0.0, v)) for k, v in known.items()),
+    )
+    beginning, longer = (
+        _problem(data, par, _quick(options, length), unknowns)
+        for length in (_BEGINNING, _QUICK_LENGTH)
+    )
+    found = search(
+        longer, scattered(unknowns, effort.starts, effort.spread, effort.seed), "linear",
+        effort.progress, effort.store, effort.threads, partial(nearer, beginning, _HARDLY_TOLD),
+    )  # fmt: skip
+    at = found.best.values
+    best = estimate(_problem(data, par, options, unknowns, at), start=at)
+    if not any(name.startswith("seal.") for name in best.names):
+        raise ParameterError(
+            "the slips tell nothing of the seal's friction with this current: check the units of "
+            "i and p_mc, and motor.K_e, gear and cylinder, which are taken as known"
+        )
+    return found, best
 
 
 def _quick(options: Options, length: float) -> Options:
@@ -164,9 +181,12 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
     Raises
     ------
     ParameterError
-        When there is none.
+        When there is none, or the pressure falls where the current rises.
     """
     t, p, i = (data[name].values for name in ("time", "p_mc", "i"))
+    together = float(np.mean((p - p.mean()) * (i - i.mean())) / max(p.std() * i.std(), 1e-300))
+    if together < 0.0:
+        raise wrong_sign("p_mc", "i", f"correlation {together:.2f}")
     slips = find_slips(p, even_interval(t), options.least)
     if not slips:
         raise ParameterError(
@@ -178,23 +198,7 @@ def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
 
 def _counted(shots: Sequence[Shot]) -> str:
     up = sum(shot.slip.direction > 0 for shot in shots)
-    return f"{up} slips up, {len(shots) - up} down"
-
-
-def _replay(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
-    """Return the pressure over the whole ramp, measured and modeled."""
-    own = par.replace({"drive.mode": "current-source"})
-    start = max(float(data["p_mc"][0]), 0.0)
-    whole = trial(
-        MotorcycleBrake(), own, data, {"i_set": "i"}, {"p_mc": 1.0}, state=state_at(start, own),
-        memory=memory_at(start, own), step=step,
-    )  # fmt: skip
-    modeled = simulate(whole.run, ("p_mc",))["p_mc"]
-    attrs = {"units": "Pa", "long_name": "master-cylinder pressure"}
-    return xr.Dataset(
-        {"measured": ("time", data["p_mc"].values, attrs), "modeled": ("time", modeled, attrs)},
-        {"time": data["time"]},
-    )
+    return f"slips: {up} up, {len(shots) - up} down"
 
 
 def _stribeck(par: MotorcycleParameters, found: Estimate) -> Curve:

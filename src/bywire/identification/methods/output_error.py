@@ -12,8 +12,9 @@ from bywire.bench.experiment import Case
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.signals import signals_of
 from bywire.identification.fitting.asked import Asked, BenchMethod
-from bywire.identification.fitting.bench_fit import BenchFit, noise_given
+from bywire.identification.fitting.bench_fit import BenchFit
 from bywire.identification.fitting.options import Options
+from bywire.identification.fitting.output_noise import noise_given
 from bywire.identification.fitting.simulated import simulated
 from bywire.identification.fitting.unknown_texts import is_parameter, unknowns_of
 from bywire.identification.method import Method
@@ -21,7 +22,7 @@ from bywire.identification.replaying.measured_run import case_of
 
 _NAME = "output-error"
 _DEFAULTS = Options(
-    loss="linear", between="held", most_residual=1.3, least_vaf=0.9, noise=2e-3
+    loss="linear", between="held", most_residual=1.3, most_outliers=0.05, least_vaf=0.9, noise=2e-3
 )
 _SIMULATED = ("noise",)
 

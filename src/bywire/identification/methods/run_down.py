@@ -18,6 +18,7 @@ from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import run_down
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.core.units import shown
 from bywire.identification.drive_train.own_places import at_own_places
 from bywire.identification.drive_train.run_downs import (
     INERTIA,
@@ -105,9 +106,9 @@ def identify(
 def _untold(par: WedgeParameters) -> str:
     return (
         "the inertia is not told: a run-down alone tells friction and damping per inertia only. "
-        f"Those ratios are right; the torques hold for motor_1.J_M = {par.motor_1.J_M:g} kg*m**2 "
-        "as given. Add a record with a known inertia on the shaft (J_added), or with a known "
-        "current while it coasts"
+        "Those ratios are right; the torques hold for motor_1.J_M = "
+        f"{shown(par.motor_1.J_M, 'kg*m**2')} as given. Add a record with a known inertia on the "
+        "shaft (J_added), or with a known current while it coasts"
     )
 
 

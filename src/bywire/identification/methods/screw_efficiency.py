@@ -14,6 +14,7 @@ from bywire.assemblies.driven_shaft import DrivenShaft
 from bywire.assemblies.wedge_parameters import WedgeParameters
 from bywire.bench.experiments import load_sweep
 from bywire.core.errors import ParameterError
+from bywire.core.units import shown
 from bywire.identification.differentiation import differentiated
 from bywire.identification.drive_train.own_places import at_own_places
 from bywire.identification.drive_train.rig_measurement import (
@@ -33,6 +34,7 @@ from bywire.identification.equation import Equation
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.simulated_record import sensed, turned
 from bywire.identification.unknown import parameters_of
+from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 
@@ -66,7 +68,7 @@ def identify(
     Raises
     ------
     ParameterError
-        When the screw does not move enough, or the force does not change.
+        When the screw does not move enough, the force does not change, or a sign is wrong.
 
     References
     ----------
@@ -84,6 +86,7 @@ def identify(
                 f"{_ADVICE}"
             )
     _require_loads(shafts)
+    _require_losses(shafts, own)
     parts = [window_residuals(equation, own, unknowns, shaft) for shaft in shafts]
     best = steady_dynamics(parts, unknowns, _ADVICE)
     values = best.parameters()
@@ -101,7 +104,7 @@ def identify(
         curves=(_curve(made),),
         notes=(
             "a part of the bearings' friction that grows in proportion to the force (C_1) shows "
-            f"as loss of the screw: taken as {par.bearing.C_1:g} N*m/N",
+            f"as loss of the screw: taken as {shown(par.bearing.C_1, 'N*m/N')}",
             "the growth of the bearings' friction with speed is taken from the parameter set",
         ),
     )
@@ -141,6 +144,21 @@ def _require_loads(shafts: list[Motions]) -> None:
                    else f"the screw is never {word}")
                 + f"; {_ADVICE}"
             )  # fmt: skip
+
+
+def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
+    """Refuse a screw that gains power: both when it drives and when it is driven it loses some."""
+    k, K_T = roller_screw.slope(par.screw), servo_motor.torque_constant(par.motor_1)
+    for side, shaft in zip(("1", "2"), shafts, strict=True):
+        omega, F, i = (shaft.means(shaft.data[n].values) for n in ("omega", "F", "i"))
+        loss = np.sign(omega) * (K_T * i + k * F)
+        for kind, word in ((True, "driving"), (False, "driven back")):
+            least = float(np.median(loss[(F * omega < 0.0) == kind]))
+            if least < 0.0:
+                raise wrong_sign(
+                    f"i_{side}", "y_F", f"turning as q_{side} does, {word}, the screw would gain "
+                    f"{-least:.3g} N*m; or q_{side} is the wrong one"
+                )  # fmt: skip
 
 
 def _figures(par: WedgeParameters, made: list[Stroke]) -> dict[str, tuple[float, str]]:

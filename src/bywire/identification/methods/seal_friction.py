@@ -19,6 +19,7 @@ from bywire.identification.sealing.stroke_groups import (
     grouped,
     half_widths,
     pressure_between,
+    require_signs,
     require_told,
 )
 from bywire.identification.unknown import Unknown
@@ -85,7 +86,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     Raises
     ------
     ParameterError
-        When there are no strokes, one direction alone, or one pressure alone.
+        When there are no strokes, one direction alone, one pressure alone, or a wrong sign.
 
     References
     ----------
@@ -106,6 +107,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     problem = Problem(unknowns, lambda values: ((W @ values - F) / sigma, W / sigma))
     found = estimate(problem)
     friction = float(np.mean(found["F_0"] + found["f"] * p))
+    require_signs(found["A"], friction)
     loop = np.polyfit(*half_widths(groups), 1)
     return Identified(
         estimates={"seal friction": found},

@@ -11,8 +11,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.units import shown
 from bywire.identification.output_error import even_interval
 from bywire.identification.sealing.strokes import find_strokes, velocity
+from bywire.identification.wrong_sign import wrong_sign
 
 Array = NDArray[np.float64]
 
@@ -95,6 +97,28 @@ def require_told(groups: Sequence[Group]) -> None:
             f"f cannot be told from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
             f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more"
         )
+
+
+def require_signs(A: float, friction: float) -> None:
+    """Refuse an area below zero, and friction that drives.
+
+    Parameters
+    ----------
+    A
+        Force over pressure [m^2].
+    friction
+        In the mean over all strokes [N].
+
+    Raises
+    ------
+    ParameterError
+        When a signal has the wrong sign: the force pushes against the pressure, and more of it
+        outward than inward.
+    """
+    if A < 0.0:
+        raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}")
+    if friction < 0.0:
+        raise wrong_sign("F", "x", f"friction {friction:.3g} N in the mean: it would drive")
 
 
 def half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:

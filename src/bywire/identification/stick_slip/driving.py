@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.identification.stick_slip.overlay import best_shift
-from bywire.identification.stick_slip.shots import Shot
+from bywire.identification.stick_slip.shots import BEFORE, Shot
 from bywire.identification.stick_slip.slips import moving_mean
 from bywire.simulation.run import Run, simulate
 
@@ -39,14 +39,17 @@ class Driven:
         Driven by the current as it was measured.
     first
         Row from which both are driven.
+    onset
+        When the model breaks away [s].
     """
 
     calm: Run
     sampled: Run
     first: int
+    onset: float
 
 
-def driven_by(ramp: Run, shot: Shot, zero: float) -> Driven:
+def driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
     """Return a slip's run, driven by its ramp, as the measured current drives it.
 
     Parameters
@@ -55,17 +58,21 @@ def driven_by(ramp: Run, shot: Shot, zero: float) -> Driven:
         Its demand ramps through the current that breaks the model away.
     shot
         The measured slip.
+    current
+        That breaks the model away [A].
     zero
         Reading of the current's sensor without current [A].
     """
     middle = shot.clock + 0.5 * shot.interval
     width = 2 * int(0.5 * _SMOOTHED / shot.interval) + 1
     measured = moving_mean(shot.current - zero, width)
-    sampled, more, first = ramp, np.zeros(middle.size), 0
+    sampled, more, first, onset = ramp, np.zeros(middle.size), 0, BEFORE
     for _ in range(_ALIGNED):
-        found = simulate(sampled, ("p_mc", "i"))
+        found = simulate(sampled, ("p_mc", "i", "omega"))
         p, i = found["p_mc"], moving_mean(found["i"], width)
         shift = best_shift(shot, p, shot.steep)
+        rests = max(int(np.argmax(found["omega"] != 0.0)) - 1, 0)
+        onset = float(shot.clock[rests] + (current - found["i"][rests]) / shot.rate)
         travel = np.abs(p - p[0])
         first = int(np.argmax(travel > min(_BEGUN * travel.max(), _BEGUN_AT)))
         wanted = np.interp(np.asarray(middle + shift), shot.clock, measured)
@@ -78,7 +85,7 @@ def driven_by(ramp: Run, shot: Shot, zero: float) -> Driven:
         line = np.polynomial.Polynomial.fit(middle[late], more[late], 1)
         more[dipped:] = line(middle[dipped:])
         calm = replace(ramp, stimulus=with_more(ramp, more))
-    return Driven(calm, sampled, first)
+    return Driven(calm, sampled, first, onset)
 
 
 def with_more(run: Run, more: Array) -> Callable[[Array], Array]:

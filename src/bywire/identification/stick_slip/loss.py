@@ -50,9 +50,9 @@ class SlipLoss:
     shooting, shots, noise
         The model, the measured slips, and how sure they are.
     weighted_at
-        Values for which the slips are driven by the measured current, and at which the weights of
-        that current's noise are taken; None for the search: slips that only the ramp drives,
-        quick and with few minima.
+        Values at which the weights are taken; the slips are then driven by the measured current,
+        and the Jacobian does not know its noise: an instrument. None for the search: slips that
+        only the ramp drives, quick and with few minima.
     """
 
     def __init__(

@@ -26,15 +26,13 @@ from bywire.assemblies.motorcycle_trim import memory_at, state_at
 from bywire.identification.equation import Equation, EquationError
 from bywire.identification.stick_slip.driving import driven_by, held, with_more
 from bywire.identification.stick_slip.overlay import overlaid
-from bywire.identification.stick_slip.shots import Shot
+from bywire.identification.stick_slip.shots import BEFORE, Shot, onset_of
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 
 Array = NDArray[np.float64]
 
-BEFORE = 0.01
-"""rest before the model breaks away [s]"""
 _MORE = 1e-3  # A: with which the answer to an offset is computed
 
 
@@ -147,7 +145,7 @@ class Shooting:
         run, current, current_slopes = self.run(shot, values)
         answer, driven = np.zeros(shot.time.size), None
         if zero is not None:
-            driven = driven_by(run, shot, zero)
+            driven = driven_by(run, shot, current, zero)
             run = driven.calm
             offset = np.where(np.arange(answer.size) >= driven.first, _MORE, 0.0)
             more = simulate(replace(run, stimulus=with_more(run, offset)), ("p_mc",))["p_mc"]
@@ -168,12 +166,13 @@ class Shooting:
         kept[at < 0.0] = 0.0
         shift_slopes = (v @ kept) / max(float(v @ v), 1e-300)
         J = kept - np.outer(v, shift_slopes)
-        level, rate = onset_of(shot, shift + BEFORE)
+        onset = shift + (BEFORE if driven is None else driven.onset)
+        level, rate = onset_of(shot, onset)
         return Fitted(
             residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=kept[:, -1], speed=v,
             breakaway=level - current,
             breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
-            current=current, onset=float(shot.time[0] + shift + BEFORE),
+            current=current, onset=float(shot.time[0] + onset),
         )  # fmt: skip
 
     def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
@@ -187,12 +186,3 @@ class Shooting:
         slopes = np.zeros((len(run.state) + len(run.memory), self.count + 1))
         slopes[:, -1] = (at(start + _MORE) - at(start - _MORE)) / (2.0 * _MORE)
         return slopes[: len(run.state)], slopes[len(run.state) :]
-
-def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
-    """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
-
-    The rate is no slower than the ramp's: what brings the piston to breaking away drives it on.
-    """
-    level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
-    way = float(np.sign(shot.rate)) or float(shot.slip.direction)
-    return level, way * max(way * slope, way * shot.rate)

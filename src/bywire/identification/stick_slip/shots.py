@@ -17,7 +17,10 @@ Array = NDArray[np.float64]
 
 LEAD = 0.05
 """rest before the measured onset [s]"""
+BEFORE = 0.01
+"""rest before the model breaks away [s]"""
 _LEAST = 8  # samples
+_COARSEST = 4e-3  # s
 _RESTED = 1.0  # s of rest from which its pressure and the ramp of the current are read
 _COMPARED = 0.9  # of a slip's way: its end, like its beginning, is up to the current's ripple
 _SMOOTHED = 0.02  # s
@@ -68,19 +71,26 @@ class Shot:
         """Time since the first row [s], shape (n,)."""
         return np.arange(self.time.size, dtype=float) * self.interval
 
+
 def cut_out(
     time: Array, pressure: Array, current: Array, slips: Sequence[Slip], longest: float
 ) -> list[Shot]:
     """Return the measured slips with what lies around them, up to the next onset.
 
-    Those of too few samples to tell when they went half of their way are left out.
+    Left out are those of too few samples, those without a rest before, and those that no ramp of
+    the current brought about.
 
     Raises
     ------
     ParameterError
-        When none is left.
+        When none is left, or the sample time is too long for their beginnings.
     """
     interval = float(time[1] - time[0])
+    if interval > _COARSEST:
+        raise ParameterError(
+            f"a sample every {1e3 * interval:.3g} ms does not show how slips begin: measure at "
+            f"{1.0 / _COARSEST:g} Hz or faster"
+        )
     found = []
     lead, most, rested = (int(span / interval) for span in (LEAD, longest, _RESTED))
     seen = max(round(_SEEN / interval), 4)
@@ -90,15 +100,16 @@ def cut_out(
         until = slips[k + 1].begin - lead if k + 1 < len(slips) else time.size
         compared, half = (_passed(smooth, slip, 2 * lead, share) for share in (_COMPARED, 0.5))
         last = min(compared, slip.begin + most, until)
-        if last - first < _LEAST or slip.begin < 2:
+        rest = slice(max(slip.begin - rested, slips[k - 1].end + lead if k else 0), slip.begin)
+        if min(last - first, rest.stop - rest.start) < _LEAST:
             continue
-        since = max(slip.begin - rested, slips[k - 1].end + lead if k else 0)
-        rest = slice(min(since, slip.begin - 2), slip.begin)
         rows = slice(first, last)
         level, slope = _lines_before(current, first, last, seen)
         line = np.polynomial.Polynomial.fit(time[rest], current[rest], 1)
         unrest = float(np.std(current[rest] - line(time[rest])))
         rate = float(line.deriv()(time[first]))
+        if rate * slip.direction <= 0.0:
+            continue
         own = replace(slip, rest=float(pressure[rest].mean()))
         shot = Shot(
             own, time[rows], pressure[rows], current[rows], rate, unrest, level, slope / interval,
@@ -107,9 +118,9 @@ def cut_out(
         found.append(shot)
     if not found:
         raise ParameterError(
-            f"none of the {len(slips)} slips has {_LEAST} samples before the next one begins: they "
-            "are noise, or the signal's unit is wrong; check the unit, and raise what counts as a "
-            "slip (--option least=...)"
+            f"none of the {len(slips)} slips has {_LEAST} samples, a rest before it, and a current "
+            "that ramps toward it: they are noise, or the signal's unit is wrong; check the unit, "
+            "and raise what counts as a slip (--option least=...)"
         )
     return found
 
@@ -133,6 +144,35 @@ def _lines_before(values: Array, first: int, last: int, seen: int) -> tuple[Arra
     padded = np.concatenate((np.full(max(seen - 1 - first, 0), values[0]), values[:last]))
     windows = np.lib.stride_tricks.sliding_window_view(padded[-(last - first + seen - 1) :], seen)
     return np.asarray(windows @ level), np.asarray(windows @ slope)
+
+
+def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
+    """Return level [A] and rate [A/s] of the measured current at an instant of a shot.
+
+    The rate is no slower than the ramp's: what brings the piston to breaking away drives it on.
+    """
+    level, slope = (float(np.interp(shift, shot.clock, v)) for v in (shot.before, shot.slope))
+    way = float(np.sign(shot.rate)) or float(shot.slip.direction)
+    return level, way * max(way * slope, way * shot.rate)
+
+
+def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
+    """Refuse a current that does not follow its ramp while the piston rests.
+
+    Parameters
+    ----------
+    noise
+        Standard deviation of the current's measurement [A].
+    most
+        Largest standard deviation beside it [A].
+    """
+    unrest = float(np.median([np.sqrt(max(s.unrest**2 - noise**2, 0.0)) for s in shots]))
+    if unrest > most:
+        raise ParameterError(
+            f"between the slips the current varies by {unrest:.3g} A (standard deviation) around "
+            f"its ramp; at most {most:.3g} A make sense: switch the dither off, and check the "
+            "unit of i"
+        )
 
 
 def require_reachable(shots: Sequence[Shot], par: MotorcycleParameters) -> None:

@@ -1,0 +1,140 @@
+"""What ``bywire list NAME`` shows of assemblies, experiments, loops, plants: their signals."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping, Sequence
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from bywire import assemblies
+from bywire.analysis.linear.plant import Plant
+from bywire.analysis.linear.plant_registry import all_plants
+from bywire.analysis.loop import Loop
+from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.study_registry import all_studies
+from bywire.bench.experiment import Case, Experiment
+from bywire.bench.registry import all_experiments
+from bywire.catalog.registry import entries as sets
+from bywire.catalog.registry import entry, main_set
+from bywire.core.discovery import modules_of
+from bywire.core.quantities import display_unit
+from bywire.core.signals import merged_signals, places_of, signals_of
+from bywire.identification.method_registry import all_methods
+from bywire.report.wording import unit_text
+
+Object = dict[str, Any]
+
+
+@cache
+def systems() -> Mapping[str, type[Any]]:
+    """Return the complete models among the assemblies, rigs included, by name."""
+    found = {}
+    for module in modules_of(assemblies):
+        for value in vars(module).values():
+            own = isinstance(value, type) and value.__module__ == module.__name__
+            if own and hasattr(value, "Memory") and hasattr(value, "balance"):
+                found[value.name] = value
+    return found
+
+
+@cache
+def signals() -> Mapping[str, Sequence[Object]]:
+    """Return every signal of a system by name: in which systems, with unit, meaning and place."""
+    found: dict[str, list[Object]] = {}
+    for system, model in systems().items():
+        for name, signal, where in merged_signals(places_of(model).items()):
+            found.setdefault(name, []).append({
+                "system": system, "unit": display_unit(signal.unit), "meaning": signal.label,
+                "where": ", ".join(where),
+            })  # fmt: skip
+    return found
+
+
+def described_system(model: type[Any]) -> Object:
+    """Return an assembly, or a rig, with its signals and what there is for it."""
+    kinds: Mapping[str, Mapping[str, Any]] = {
+        "parameter sets": sets(), "experiments": all_experiments(), "loops": all_loops(),
+        "plants": all_plants(), "studies": all_studies(), "methods": all_methods(),
+    }  # fmt: skip
+    rows = [
+        {"signal": name, "unit": display_unit(signal.unit), "meaning": signal.label,
+         "where": ", ".join(where)}
+        for name, signal, where in merged_signals(places_of(model).items())
+    ]  # fmt: skip
+    there = {
+        kind: ", ".join(n for n, one in known.items() if one.assembly == model.name)
+        for kind, known in kinds.items()
+    }
+    # The class says what it is for; what it is stands at the head of its file.
+    about = inspect.getmodule(model).__doc__ or ""
+    summary = " ".join(about.strip().partition("\n\n")[0].split()).rstrip(".")
+    shown = "'bywire list' with the name of a parameter set shows its parameters"
+    return {"summary": summary, **there, "signals": rows,
+            "see": shown if there["parameter sets"] else ""}  # fmt: skip
+
+
+def described_drive(one: Experiment) -> Object:
+    """Return which signals an experiment drives, of which systems."""
+    if one.driven_unit is not None:
+        row = {"signal": "[stimulus]", "unit": display_unit(one.driven_unit(one.defaults)),
+               "meaning": "what this section of the bench file gives", "system": one.assembly}
+        return {"drives": [row], "see": _recorded([one.assembly])}  # fmt: skip
+    par = entry(main_set(one.assembly)).parameters()
+    rows: dict[tuple[str, str], Object] = {}
+    for case in (one.preview or one.cases)(par, one.defaults, None):
+        for name, unit, label in _driven(case):
+            key = name, case.model.name
+            rows[key] = {"signal": name, "unit": unit, "meaning": label, "system": key[1]}
+    ran = list(dict.fromkeys(system for _, system in rows))
+    return {"drives": list(rows.values()), "see": _recorded(ran)}
+
+
+def _recorded(ran: Sequence[str]) -> str:
+    """Return where the signals of what ran are shown."""
+    commands = " and ".join(f"'bywire list {name}'" for name in ran)
+    return f"{commands}: the signals that a recording holds" if ran else ""
+
+
+def _driven(case: Case) -> list[tuple[str, str, str]]:
+    known = signals_of(case.model.Stimulus)
+    return [(name, display_unit(known[name].unit), known[name].label)
+            for name in known if name in case.stimulus(np.zeros(1))]  # fmt: skip
+
+
+def described_loop(loop: Loop) -> Object:
+    """Return a loop with its inputs, output, states, and where it is cut and looked at."""
+    par = loop.smooth(entry(main_set(loop.assembly)).parameters())
+    model = loop.point(par, loop.at.default).model
+    known = {name: (s.unit, s.label) for name, s, _ in merged_signals(places_of(model).items())}
+    parts = {
+        "input": loop.inputs, "output": (loop.output,), "cut open at": (loop.cut,),
+        "state": tuple(model.State._fields),
+    }  # fmt: skip
+    rows = [
+        {"signal": name, "unit": display_unit(known.get(name, ("1", ""))[0]),
+         "meaning": known.get(name, ("1", ""))[1], "as": part}
+        for part, names in parts.items() for name in names
+    ]  # fmt: skip
+    at = f"{loop.at.name} [{unit_text(display_unit(loop.at.unit))}]"
+    return {"summary": loop.summary, "assembly": loop.assembly, "system": model.name, "at": at,
+            "signals": rows}  # fmt: skip
+
+
+def described_plant(plant: Plant) -> Object:
+    """Return a plant with its inputs, outputs and states."""
+    model = plant.model(entry(main_set(plant.assembly)).parameters(), plant.usual)
+    own = places_of(systems()[plant.assembly]).items()
+    meaning = {name: signal.label for name, signal, _ in merged_signals(own)}
+    parts = (
+        ("input", model.inputs, model.input_units), ("output", model.outputs, model.output_units),
+        ("state", model.states, model.state_units),
+    )  # fmt: skip
+    rows = [
+        {"signal": name, "unit": display_unit(unit), "meaning": meaning.get(name, ""), "as": part}
+        for part, names, units in parts for name, unit in zip(names, units, strict=True)
+    ]
+    at = " or ".join(f"{q.name} [{unit_text(display_unit(q.unit))}]" for q in plant.at)
+    return {"summary": plant.summary, "assembly": plant.assembly, "at": at, "signals": rows}
