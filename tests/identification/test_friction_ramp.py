@@ -64,6 +64,24 @@ def test_a_wrong_unit_is_refused_in_a_sentence(data: xr.Dataset) -> None:
         METHOD.identify(data.assign(p_mc=10.0 * data["p_mc"]), PAR, OPTIONS, Effort(starts=1))
 
 
+def test_records_that_cannot_be_such_a_ramp_are_refused(data: xr.Dataset) -> None:
+    t = data["time"].values
+    dithered = data.assign(i=data["i"] + 0.5 * np.sin(2.0 * np.pi * 50.0 * t))
+    for record, message in (
+        (dithered, r"varies by 0\.35.* A .*switch the dither off"),
+        (data.isel(time=slice(None, None, 10)), "a sample every 10 ms.*250 Hz or faster"),
+        (data.assign(i=-data["i"]), r"p_mc goes against i.*sign = -1"),
+    ):
+        with pytest.raises(ParameterError, match=message):
+            METHOD.identify(record, PAR, OPTIONS, Effort(starts=1))
+
+
+def test_a_pressure_whose_zero_is_off_is_found_out(data: xr.Dataset) -> None:
+    off = data.assign(p_mc=data["p_mc"] + 0.3e5)
+    found = METHOD.identify(off, PAR, OPTIONS, Effort(starts=1))
+    assert not next(c for c in found.checks if c.name == "zero_over_usual").holds
+
+
 def test_derivatives_of_a_slip(data: xr.Dataset) -> None:
     """Residuals with their best shift, and breakaway, against central differences.
 

@@ -284,3 +284,27 @@ def test_starts_that_cannot_be_computed_are_counted() -> None:
     assert found.failed == 1
     with pytest.raises(SolverError, match="no start could be computed"):
         search(problem, [np.array([2.0])])
+
+
+def test_an_instrument_takes_off_the_bias_of_a_noisy_input() -> None:
+    """A gain of 2 whose input is measured with a tenth of its size as noise (errors in variables).
+
+    Least squares find 2 / (1 + 0.1^2); from there, derivatives by an input without noise lead to 2.
+    """
+    random = np.random.default_rng(4)
+    clean = random.normal(size=40000)
+    seen = clean + 0.1 * random.normal(size=clean.size)
+    y = 2.0 * clean + 0.1 * random.normal(size=clean.size)
+    biased = 2.0 / 1.01
+
+    def found(derivative: Array, instrument: bool) -> float:
+        problem = Problem(
+            (Unknown("gain", biased, scale=1.0),),
+            lambda v: (v[0] * seen - y, derivative[:, None]),
+            instrument=instrument,
+        )
+        return estimate(problem)["gain"]
+
+    assert found(seen, False) == pytest.approx(biased, abs=0.005)
+    assert found(clean, False) == pytest.approx(biased, abs=0.005)
+    assert found(clean, True) == pytest.approx(2.0, abs=0.005)
