@@ -53,10 +53,6 @@ class Fitted:
     breakaway, breakaway_slopes
         Measured less computed current at the instant of breaking away [A], and its
         derivatives, shape (p,).
-    current
-        At which the model breaks away [A].
-    onset
-        When, on the measurement's clock [s].
     """
 
     residuals: Array
@@ -66,8 +62,6 @@ class Fitted:
     speed: Array
     breakaway: float
     breakaway_slopes: Array
-    current: float
-    onset: float
 
 
 class Shooting:
@@ -143,19 +137,19 @@ class Shooting:
             measured current once it has begun; without, by its ramp alone.
         """
         run, current, current_slopes = self.run(shot, values)
-        answer, driven = np.zeros(shot.time.size), None
-        if zero is not None:
-            driven = driven_by(run, shot, current, zero)
+        driven = None if zero is None else driven_by(run, shot, current, zero)
+        if driven is not None:
             run = driven.calm
-            offset = np.where(np.arange(answer.size) >= driven.first, _MORE, 0.0)
-            more = simulate(replace(run, stimulus=with_more(run, offset)), ("p_mc",))["p_mc"]
-            answer = (more - simulate(run, ("p_mc",))["p_mc"]) / _MORE
         state, memory = self._start_slopes(run, shot)
         found = simulate_with_sensitivities(
             run, [*self.names, "stimulus.i_set"], ("p_mc",), state, memory
         )
         p = found.trajectory["p_mc"]
+        answer = np.zeros(p.size)
         if driven is not None:
+            offset = np.where(np.arange(p.size) >= driven.first, _MORE, 0.0)
+            more = simulate(replace(run, stimulus=with_more(run, offset)), ("p_mc",))["p_mc"]
+            answer = (more - p) / _MORE
             p = simulate(driven.sampled, ("p_mc",))["p_mc"]
         r, v, shift = overlaid(shot, p)
         # the demand begins at the breakaway current, and goes on as measured
@@ -172,7 +166,6 @@ class Shooting:
             residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=kept[:, -1], speed=v,
             breakaway=level - current,
             breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
-            current=current, onset=float(shot.time[0] + onset),
         )  # fmt: skip
 
     def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
