@@ -85,7 +85,9 @@ def install(recipe: str) -> None:
     stamp = VENV / "installed"
     done = stamp.read_text().split() if stamp.exists() else []
     for name in LOCKS[recipe]:
-        digest = hashlib.sha256((ROOT / name).read_bytes()).hexdigest()
+        # Of pyproject.toml as well: it names the entry points by which brakes are found.
+        content = (ROOT / name).read_bytes() + (ROOT / "pyproject.toml").read_bytes()
+        digest = hashlib.sha256(content).hexdigest()
         if digest in done:
             continue
         print(f"installing {name}", flush=True)

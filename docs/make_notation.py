@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from bywire import assemblies, control, plant
-from bywire.analysis.linear.plant_registry import all_plants
-from bywire.analysis.loop_registry import all_loops
-from bywire.bench.kpis.registry import families
-from bywire.bench.registry import all_experiments
-from bywire.bench.stimuli.registry import entries as stimuli
-from bywire.catalog.registry import entries as parameter_sets
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import LOOPS
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.kpis.registry import FAMILIES
+from bywire.bench.stimuli.registry import STIMULI
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.field_notes import field_notes
 from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
@@ -153,7 +153,7 @@ def notation() -> str:
         "Signs: [sign-conventions.md](sign-conventions.md).", "",
     ]  # fmt: skip
     for model in models():
-        known = [e for e in parameter_sets().values() if e.assembly == model.name]
+        known = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
         if known:
             sets = ", ".join(f"`{e.name}`" for e in known)
             lines += [f"## Parameters of {model.name}", "", f"Parameter sets: {sets}.", ""]
@@ -177,7 +177,7 @@ def bench_reference() -> str:
         "## Experiments", "",
     ]  # fmt: skip
     titles = ("", "option", "", "default", "range or choices", "meaning")
-    for e in all_experiments().values():
+    for e in EXPERIMENTS.all().values():
         driven = ", takes a `[stimulus]`" if e.driven_unit else ""
         summary = e.summary[0].upper() + e.summary[1:]
         lines += [f"### {e.name}", "", f"{summary}. For a {e.assembly}{driven}.", ""]
@@ -189,26 +189,26 @@ def bench_reference() -> str:
     rows = (
         (f"`{one.name}`", one.summary, one.assembly, f"{one.at.name} [{unit_text(one.at.unit)}]",
          ", ".join(f"`{name}`" for name in one.inputs), f"`{one.output}`", f"`{one.cut}`")
-        for one in all_loops().values()
+        for one in LOOPS.all().values()
     )  # fmt: skip
     lines += table(("loop", "meaning", "of", "at", "from", "to", "cut at"), rows)
     lines += ["## Plants", "", "What `linearize` knows besides loops.", ""]
     rows = (
         (f"`{one.name}`", one.summary, one.assembly,
          ", ".join(f"{q.name} [{unit_text(q.unit)}]" for q in one.at), f"{one.band:g} Hz")
-        for one in all_plants().values()
+        for one in PLANTS.all().values()
     )  # fmt: skip
     lines += table(("plant", "meaning", "of", "at one of", "judged up to"), rows)
     lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]
-    for s in stimuli().values():
-        lines += [f"### {s.kind}", "", s.summary, ""]
+    for s in STIMULI.all().values():
+        lines += [f"### {s.name}", "", s.summary, ""]
         rows = (("", *row[1:3], "", *row[4:]) for row in parameter_rows(s.parameter_class))
         lines += table(("", "parameter", "unit", "", "range or choices", "meaning"), rows)
     lines += ["## Key figures", ""]
     titles = ("name", "meaning", "family")
     known = (
         (f"`{m.name}`", m.definition, family.name)
-        for family in families().values() for m in family.measures.values()
+        for family in FAMILIES.all().values() for m in family.measures.values()
     )  # fmt: skip
     lines += table(titles, known)
     return "\n".join(lines)

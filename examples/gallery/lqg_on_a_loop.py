@@ -20,14 +20,14 @@ from matplotlib.figure import Figure
 
 import bywire
 from bywire.analysis.linear.closed_loop import closed_loop
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 
 parser = ArgumentParser(description="Design an LQG regulator for the pressure loop.")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 out = parser.parse_args().out
 
 BAR, AT = 1e5, 20e5
-loop, par = find_loop("pressure"), bywire.parameters("dardanelli2010")
+loop, par = LOOPS.find("pressure"), bywire.parameters("dardanelli2010")
 point = loop.point(loop.smooth(par), AT)
 current = point.par.replace({"drive.mode": "current"})
 whole = closed_loop(point.model, current, point.state, point.memory,

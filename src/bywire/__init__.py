@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from bywire.bench.bench_file import load
     from bywire.bench.result import Result
     from bywire.bench.running import run
-    from bywire.catalog.registry import parameters
+    from bywire.core.catalog import parameters
     from bywire.core.errors import BywireError
     from bywire.data.alignment import resample
     from bywire.data.measurement import read_measurement
@@ -39,7 +39,7 @@ _HOMES = {
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
     "load": "bench.bench_file",
-    "parameters": "catalog.registry",
+    "parameters": "core.catalog",
     "read_measurement": "data.measurement",
     "read_recording": "data.netcdf",
     "resample": "data.alignment",

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from bywire.reproduction.dardanelli2010 import PARTS, reproduce
+from bywire.brakes.motorcycle.paper.dardanelli2010 import PARTS, reproduce
 from bywire.reproduction.reproduction import Reproduction
 from bywire.reproduction.results import as_json, write
 

@@ -13,9 +13,9 @@ from typing import Any
 
 import pytest
 
+from bywire.brakes.wedge.paper.roberts2003 import PARTS, reproduce
 from bywire.reproduction.reproduction import Reproduction
 from bywire.reproduction.results import as_json, write
-from bywire.reproduction.roberts2003 import PARTS, reproduce
 
 Items = Mapping[str, dict[str, Any]]
 TAN_ALPHA = math.tan(math.radians(20.0))

@@ -9,12 +9,12 @@ import pytest
 
 from bywire.analysis.design.loop_figures import LoopFigures
 from bywire.analysis.linear.analog_gain import analog_gain
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.robustness import margins
-from bywire.catalog.registry import parameters
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 
-LOOP = find_loop("drive-current")
+LOOP = LOOPS.find("drive-current")
 PAR = parameters("roberts2003")
 
 

@@ -7,28 +7,27 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.dither.averaged_map import (
+from bywire.analysis.loop import LOOPS, Point
+from bywire.analysis.periodic.averaged_map import (
     PeriodicModel,
     dithered_loop,
     periodic_model,
     unrounded,
 )
-from bywire.analysis.dither.dithered_plant import dithered_plant
-from bywire.analysis.dither.periodic_orbit import find_orbit, period_of
-from bywire.analysis.loop import Point
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.periodic.periodic_orbit import find_orbit, period_of
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.assemblies.motorcycle_trim import holding_current
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
+from bywire.brakes.motorcycle.trim import holding_current
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, SolverError
 from bywire.simulation.reversals import reversals
 from bywire.simulation.stroboscope import Stroboscope
 from systems.describing import Held
 from systems.dithered import DITHERED, Dithered, Driven, Shaken, mobility, multiplier
 
-PRESSURE = find_loop("pressure")
-RETUNED = entry("dardanelli2010-retuned").parameters()
+PRESSURE = LOOPS.find("pressure")
+RETUNED = PARAMETER_SETS.find("dardanelli2010-retuned").parameters()
 STEP = 2e-6
 
 
@@ -154,7 +153,7 @@ def test_small_sines_on_the_nonlinear_brake_answer_as_the_model_says() -> None:
 
 
 def test_the_dithered_plant_has_the_slope_of_its_own_mean() -> None:
-    par = entry("dardanelli2010").parameters()
+    par = PARAMETER_SETS.find("dardanelli2010").parameters()
     low, high = (dithered_plant(par, p, 20e-6) for p in (19e5, 21e5))
     slope = (high.model.mean - low.model.mean) / (high.i - low.i)
     assert slope == pytest.approx(0.5 * (low.gain + high.gain), rel=2e-3)

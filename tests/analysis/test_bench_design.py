@@ -19,14 +19,14 @@ from bywire.analysis.design.optimizer import Problem
 from bywire.analysis.design.requirement import read
 from bywire.analysis.design.trial import Trial
 from bywire.analysis.design.verification import verify
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.robustness import margins
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
-from bywire.catalog.registry import main_set, parameters
+from bywire.core.catalog import main_set, parameters
 
 PAPER = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
          "steady-state error <= 0 %")  # fmt: skip
@@ -41,7 +41,7 @@ MET = {
 
 
 def of(name: str):
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     return loop, parameters(main_set(loop.assembly))
 
 

@@ -8,11 +8,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.broadband import Broadband, broadband_response
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.catalog.registry import main_set, parameters
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 from systems.describing import SATURATION, Saturation, at_rest, saturation
 
@@ -20,7 +20,7 @@ from systems.describing import SATURATION, Saturation, at_rest, saturation
 @pytest.mark.parametrize("kind", ["multisine", "chirp"])
 @pytest.mark.parametrize("name", ["screw-position", "moment"])
 def test_a_smooth_loop_answers_as_to_sines(kind, name) -> None:
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     par = loop.smooth(parameters(main_set(loop.assembly)))
     run = loop.point(par, loop.at.default).run()
     low, high = max(loop.band[0], 4.0), loop.band[1]

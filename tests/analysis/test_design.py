@@ -14,10 +14,10 @@ from bywire.analysis.design.linear_case import NOMINAL, LinearCase, cases_of
 from bywire.analysis.design.loop_figures import LoopFigures
 from bywire.analysis.design.requirement import FIGURES, read
 from bywire.analysis.linear.rational import first_orders
-from bywire.analysis.loop_registry import all_loops, find_loop
-from bywire.analysis.pressure_loop import PressureLoop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.robustness import margins
-from bywire.catalog.registry import main_set, parameters
+from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.simulation.run import simulate
 
@@ -26,7 +26,7 @@ PI = {"ecu.pressure.k_p": (1e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3)}
 
 
 def of(name: str):
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     return loop, parameters(main_set(loop.assembly))
 
 
@@ -37,7 +37,7 @@ def designed(name: str, texts: tuple[str, ...], over: Any = None, **changes: Any
     return design(loop.tunables, read(texts), cases, start, **changes)
 
 
-@pytest.mark.parametrize("name", sorted(all_loops()))
+@pytest.mark.parametrize("name", sorted(LOOPS.all()))
 def test_figures_are_those_of_the_margins(name: str) -> None:
     loop, par = of(name)
     (case,) = cases_of(loop, par, loop.at.default, {})

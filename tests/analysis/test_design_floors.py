@@ -18,15 +18,15 @@ from bywire.analysis.design.linear_case import NOMINAL, LinearCase, cases_of
 from bywire.analysis.design.loop_figures import LoopFigures
 from bywire.analysis.design.requirement import read
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margin
 from bywire.analysis.robustness import margins
-from bywire.catalog.registry import main_set, parameters
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import UnitError
 
 
 def case_of(name: str) -> tuple[Any, Any, LinearCase]:
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     par = parameters(main_set(loop.assembly))
     return loop, par, cases_of(loop, par, loop.at.default, {})[0]
 

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.dither.choice import best_of, candidates, crossing, least
-from bywire.analysis.dither.ramp import area_ratios
-from bywire.analysis.dither.reach import (
+from bywire.brakes.motorcycle.dither.choice import best_of, candidates, crossing, least
+from bywire.brakes.motorcycle.dither.ramp import area_ratios
+from bywire.brakes.motorcycle.dither.reach import (
     admissible_frequencies,
     attenuation,
     breakaway_torques,
@@ -18,14 +18,14 @@ from bywire.analysis.dither.reach import (
     reach,
     waveform,
 )
-from bywire.analysis.dither.trial import Trial, tried
-from bywire.analysis.studies import dither
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.dither.trial import Trial, tried
+from bywire.brakes.motorcycle.studies import dither
 from bywire.control.dither import breakaway_current
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.report.contour import contour
 
-PAR = entry("dardanelli2010").parameters()
+PAR = PARAMETER_SETS.find("dardanelli2010").parameters()
 SHORT = Trial(settle=2.0, window=0.5)
 LIMITS = {"stuck": 0.1, "band": 0.05, "ripple_caliper": 2.0, "current_share": 1.0,
           "duty_share": 1.0}  # fmt: skip

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.analysis.sizing.drive_train_limits import active, around, failures
-from bywire.analysis.sizing.drive_train_options import DEFAULTS
-from bywire.analysis.study_registry import find_study
-from bywire.catalog.registry import parameters
+from bywire.analysis.study import STUDIES
+from bywire.brakes.wedge.sizing.limits import active, around, failures
+from bywire.brakes.wedge.sizing.options import DEFAULTS
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 
 MU = (0.25, 0.45)
@@ -82,12 +82,12 @@ def test_what_never_gets_there_is_not_late():
 )
 def test_keys_without_effect_are_refused(study, name, text):
     with pytest.raises(ParameterError, match=text):
-        find_study(study).require_effect([name])
-    find_study(study).require_effect(["motor_1.R_ref"])
+        STUDIES.find(study).require_effect([name])
+    STUDIES.find(study).require_effect(["motor_1.R_ref"])
 
 
 def test_every_ruled_key_exists():
     for name, base in (("drive-train", "roberts2003"), ("actuator-sizing", "dardanelli2010")):
         known = parameters(base).flat()
-        for key in find_study(name).ruled:
+        for key in STUDIES.find(name).ruled:
             assert any(one == key or one.startswith(f"{key}.") for one in known), key

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.loop_registry import find_loop
-from bywire.assemblies import screw_rig_plant as plant
-from bywire.catalog.registry import parameters
+from bywire.analysis.loop import LOOPS
+from bywire.brakes.wedge.rigs import screw_rig_plant as plant
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
 from bywire.plant import force_sensor, roller_screw
@@ -18,7 +18,7 @@ from bywire.simulation.run import simulate
 
 @pytest.mark.parametrize("force", [0.0, 400.0, -250.0])
 def test_the_rig_rests_at_its_force(force):
-    loop = find_loop("force-against")
+    loop = LOOPS.find("force-against")
     run = replace(loop.point(loop.smooth(parameters("roberts2003")), force).run(), duration=0.05)
     found = simulate(run, signals=("y_F", "F", "omega_1", "omega_2"))
     np.testing.assert_allclose(found["F"], force, atol=1e-6)
@@ -28,7 +28,7 @@ def test_the_rig_rests_at_its_force(force):
 
 def test_slowly_shaken_the_force_is_that_of_three_springs_in_a_row():
     """Both controllers give way as springs; so does the line between them."""
-    loop, par = find_loop("force-against"), parameters("roberts2003")
+    loop, par = LOOPS.find("force-against"), parameters("roberts2003")
     k, own = roller_screw.slope(par.screw), loop.point(par, 0.0).par
     line = force_sensor.stiffness(plant.line(zeros(plant.State), own), own.rig.sensor) * k**2
     control = own.control.position
@@ -39,10 +39,10 @@ def test_slowly_shaken_the_force_is_that_of_three_springs_in_a_row():
 
 
 def test_equal_motors_on_one_reference_press_nothing():
-    loop = find_loop("force-fight")
+    loop = LOOPS.find("force-fight")
     f = np.array([2.0, 20.0, 100.0])
     fight = replace(loop, output="F").closed(parameters("roberts2003"), 0.0).response(f)
-    alone = find_loop("force-against").closed(parameters("roberts2003"), 0.0).response(f)
+    alone = LOOPS.find("force-against").closed(parameters("roberts2003"), 0.0).response(f)
     assert np.abs(fight).max() < 1e-6 * np.abs(alone).max()
     other = parameters("roberts2003").replace({"motor_2.K_ref": 0.09})
     assert np.abs(replace(loop, output="F").closed(other, 0.0).response(f)).max() > 10.0
@@ -50,4 +50,4 @@ def test_equal_motors_on_one_reference_press_nothing():
 
 def test_a_force_beyond_the_drives_is_refused():
     with pytest.raises(ParameterError, match=r"control\.position\.i_max"):
-        find_loop("force-fight").point(parameters("roberts2003"), 1e5)
+        LOOPS.find("force-fight").point(parameters("roberts2003"), 1e5)

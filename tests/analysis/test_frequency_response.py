@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.response.dataset import Sweep, response_data
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_start import memory_at, state_at
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.simulation.run import Run
 

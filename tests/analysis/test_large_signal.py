@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.design.describing_function import loop_gain
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.large_signal import (
@@ -21,7 +21,7 @@ from bywire.analysis.response.large_signal import (
 from bywire.analysis.response.measured_bandwidth import complex_values
 from bywire.analysis.response.saturation import Saturation
 from bywire.analysis.robustness import margins
-from bywire.catalog.registry import parameters
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 
 
@@ -37,7 +37,7 @@ def response(variants, frequencies, amplitudes, **more):
 
 @pytest.mark.parametrize("name", ["moment", "screw-position"])
 def test_without_friction_the_figures_are_the_linear_ones(name):
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     par = loop.smooth(parameters("roberts2003"))
     expected = margins(loop, par, loop.at.default)
     one = Variant(loop, par, loop.at.default)
@@ -51,7 +51,7 @@ def test_without_friction_the_figures_are_the_linear_ones(name):
 
 def test_loop_gain_from_the_linear_models_is_that_of_the_laws():
     """Of the pressure loop, friction and dither on: two ways to what the controller is."""
-    loop, par = find_loop("pressure"), parameters("dardanelli2010")
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010")
     one = Variant(loop, par, 20e5)
     found = response([one], (1.0, 2.5, 5.0), (3e5,), most=6).isel(variant=0, amplitude=0)
     closed, f = complex_values(found), found["frequency"].values
@@ -61,7 +61,7 @@ def test_loop_gain_from_the_linear_models_is_that_of_the_laws():
 
 
 def test_large_signals_meet_the_current_limit_and_lose_bandwidth():
-    loop, par = find_loop("position"), parameters("roberts2003")
+    loop, par = LOOPS.find("position"), parameters("roberts2003")
     (one,) = variants_over(Variant(loop, par, 0.0), "control.position.f_n", [60.0])
     f = [20.0, 30.0, 40.0, 60.0, 80.0]
     found = response([one], f, (0.25, 1.0), most=4)
@@ -75,7 +75,7 @@ def test_large_signals_meet_the_current_limit_and_lose_bandwidth():
 
 
 def test_a_range_has_operating_points_of_its_own_and_names_the_worst():
-    loop, par = find_loop("moment"), parameters("roberts2003")
+    loop, par = LOOPS.find("moment"), parameters("roberts2003")
     base = Variant(loop, loop.smooth(par), 200.0)
     variants = variants_over(base, "wedge.mu_B", [0.45, 0.25])
     f = [3.0, 5.0, 8.0, 12.0, 20.0]
@@ -91,13 +91,13 @@ def test_a_range_has_operating_points_of_its_own_and_names_the_worst():
 
 
 def test_refusals():
-    loop, par = find_loop("moment"), parameters("roberts2003")
+    loop, par = LOOPS.find("moment"), parameters("roberts2003")
     base = Variant(loop, par, 200.0)
     with pytest.raises(UnknownNameError, match=r"wedge\.mu_B"):
         variants_over(base, "wedge.mu_b", [0.3])
     with pytest.raises(ParameterError, match="at least one"):
         variants_over(base, "wedge.mu_B", [])
-    other = [base.point.run(), Variant(find_loop("position"), par, 0.0).point.run()]
+    other = [base.point.run(), Variant(LOOPS.find("position"), par, 0.0).point.run()]
     sweep = Sweep(loop.inputs, loop.output, (5.0,), (1.0,))
     with pytest.raises(ParameterError, match="variant 1"):
         frequency_response(other[0], sweep, points=other)

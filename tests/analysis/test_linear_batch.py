@@ -7,8 +7,8 @@ import pytest
 
 from bywire.analysis.linear.linear_batch import linearize_many
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.loop_registry import find_loop
-from bywire.catalog.registry import main_set, parameters
+from bywire.analysis.loop import LOOPS
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 
 NAMES = {"moment": (("i_1_ref", "i_2_ref"), ("y_M", "F_N")), "pressure": (("duty",), ("p_mc", "i"))}
@@ -16,7 +16,7 @@ NAMES = {"moment": (("i_1_ref", "i_2_ref"), ("y_M", "F_N")), "pressure": (("duty
 
 @pytest.mark.parametrize(("name", "values"), [("moment", (100.0, 500.0)), ("pressure", (5e5, 3e6))])
 def test_every_point_is_that_of_linearize(name, values) -> None:
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     inputs, outputs = NAMES[name]
     points = [loop.point(parameters(main_set(loop.assembly)), value) for value in values]
     model, par = points[0].model, points[0].par
@@ -33,7 +33,7 @@ def test_every_point_is_that_of_linearize(name, values) -> None:
 
 
 def test_bad_requests() -> None:
-    p = find_loop("moment").point(parameters("roberts2003"), 200.0)
+    p = LOOPS.find("moment").point(parameters("roberts2003"), 200.0)
     one, held = np.array([p.state]), np.array([p.memory])
     with pytest.raises(UnknownNameError, match="i_1_ref"):
         linearize_many(p.model, p.par, one, held, inputs=("i1_ref",), outputs=())

@@ -7,13 +7,13 @@ import pytest
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.motorcycle_linear import linear_model, theoretical
-from bywire.assemblies.motorcycle_brake import MotorcycleBrake
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_trim import holding_current, memory_at, state_at, travel_at
-from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.linear.brake import linear_model, theoretical
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at, travel_at
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.simulation.run import simulate
 
@@ -23,7 +23,7 @@ P = 20e5
 
 
 def brake(name: str, **changes: Any) -> MotorcycleParameters:
-    base = entry(name).parameters()
+    base = PARAMETER_SETS.find(name).parameters()
     own = {"drive.mode": "current-source", **NO_COULOMB, **changes}
     found = base.replace(own)
     assert isinstance(found, MotorcycleParameters)

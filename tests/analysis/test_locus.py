@@ -11,16 +11,16 @@ import pytest
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import locus, locus_of
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.loop_registry import find_loop
 from bywire.analysis.robustness import margins
-from bywire.catalog.registry import main_set, parameters
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 
 
 def test_a_loop_turns_unstable_at_its_gain_margin_and_swings_at_the_phase_crossover() -> None:
     """The crossover frequency of the moment controller is a factor of its loop gain."""
-    loop = find_loop("moment")
+    loop = LOOPS.find("moment")
     par = parameters(main_set(loop.assembly))
     f_c = par.leaves()["control.moment.f_c"]
     curve = loop_curve(loop, par, 200.0, margins(loop, par, 200.0))
@@ -35,7 +35,7 @@ def test_a_loop_turns_unstable_at_its_gain_margin_and_swings_at_the_phase_crosso
 
 
 def test_poles_are_followed_from_value_to_value() -> None:
-    loop = find_loop("screw-position")
+    loop = LOOPS.find("screw-position")
     par = parameters(main_set(loop.assembly))
     values = np.linspace(10.0, 100.0, 40).tolist()
     found = locus(loop, par, loop.at.default, "control.position.f_n", "Hz", values)

@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_curves import Family, LoopCurve, disk, loop_curve, varied
-from bywire.analysis.loop_registry import find_loop
 from bywire.analysis.robustness import UNSTABLE, margins
-from bywire.catalog.registry import main_set, parameters
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 
 
 def curve_of(name: str, changes: dict[str, float] | None = None) -> LoopCurve:
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     par = parameters(main_set(loop.assembly)).replace(changes or {})
     return loop_curve(loop, par, loop.at.default, margins(loop, par, loop.at.default), 4000)
 
@@ -43,7 +43,7 @@ def test_a_disk_ends_where_gain_alone_may_go() -> None:
 
 @pytest.mark.parametrize("name", ["moment", "pressure"])
 def test_the_gain_margin_is_read_at_the_phase_crossover(name: str) -> None:
-    curve, loop = curve_of(name), find_loop(name)
+    curve, loop = curve_of(name), LOOPS.find(name)
     par = parameters(main_set(loop.assembly))
     (at,) = loop.gain(par, loop.at.default).response(np.array([curve.phase_crossover]))[:, 0, 0]
     assert complex(at) == pytest.approx(-1.0 / curve.margins.gain, rel=1e-3)
@@ -65,7 +65,7 @@ def test_unstable_is_worse_than_any_margin() -> None:
 
 
 def test_the_operating_point_varies_as_a_parameter_does() -> None:
-    loop = find_loop("pressure")
+    loop = LOOPS.find("pressure")
     par = parameters(main_set(loop.assembly))
     assert varied(loop, par, 20e5, "pressure", [5e5, 30e5]) == [(par, 5e5), (par, 30e5)]
     ((own, value),) = varied(loop, par, 20e5, "ecu.pressure.k_p", [1e-5])

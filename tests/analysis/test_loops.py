@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 from bywire.analysis.agreement import agreement
-from bywire.analysis.loop_registry import all_loops, find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.robustness import margins, over, worst
-from bywire.catalog.registry import main_set, parameters
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, StepError, UnknownNameError
 
-LOOPS = sorted(all_loops())
+LOOPS = sorted(LOOPS.all())
 
 
 def of(name: str):
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     return loop, parameters(main_set(loop.assembly))
 
 

@@ -4,18 +4,18 @@ import control
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.motorcycle_linear import (
+from bywire.brakes.motorcycle.linear.brake import (
     linear_model,
     theoretical,
 )
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.catalog import PARAMETER_SETS
 
 SETS = ("dardanelli2010", "dardanelli2010-table1")
 
 
 def brake(name: str) -> MotorcycleParameters:
-    found = entry(name).parameters()
+    found = PARAMETER_SETS.find(name).parameters()
     assert isinstance(found, MotorcycleParameters)
     return found
 

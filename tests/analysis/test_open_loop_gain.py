@@ -10,12 +10,12 @@ import pytest
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.open_loop import open_loop
 from bywire.analysis.margins import margin
-from bywire.analysis.pressure_loop import PressureLoop
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_start import force_for, memory_at, state_at, travel_for
-from bywire.catalog.registry import parameters
-from bywire.control import moment_control
+from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.wedge.laws import moment_control
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.start import force_for, memory_at, state_at, travel_for
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 
 FRICTIONLESS = {
@@ -81,9 +81,9 @@ def test_what_cannot_be_cut() -> None:
 
 def test_pressure_loop_agrees_with_its_chain() -> None:
     """The motorcycle's loop cut at the measured pressure, against the chain of its parts."""
-    from bywire.analysis.linear.motorcycle_linear import theoretical
-    from bywire.assemblies import motorcycle_trim as trim
-    from bywire.assemblies.motorcycle_brake import MotorcycleBrake
+    from bywire.brakes.motorcycle import trim
+    from bywire.brakes.motorcycle.linear.brake import theoretical
+    from bywire.brakes.motorcycle.model import MotorcycleBrake
 
     smooth = {
         "seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0, "seal.mu_T": 0.0,

@@ -10,14 +10,18 @@ import pytest
 
 from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.motorcycle_linear import (
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.reduction.error import reduction_error
+from bywire.brakes.motorcycle.linear.brake import (
     theoretical,
     two_pole,
     two_pole_error,
     with_slow_pair,
 )
-from bywire.analysis.linear.plant_registry import all_plants, find_plant
-from bywire.analysis.linear.wedge_linear import (
+from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.trim import holding_current, travel_at
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.linear import (
     MECHANICAL,
     SMOOTH,
     full,
@@ -26,21 +30,18 @@ from bywire.analysis.linear.wedge_linear import (
     rigid,
     rigid_rate,
 )
-from bywire.analysis.reduction.error import reduction_error
-from bywire.assemblies.motorcycle_trim import holding_current, travel_at
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_start import force_for
-from bywire.catalog.registry import main_set, parameters
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.start import force_for
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.plant import roller_screw, wedge
-from bywire.reproduction import dardanelli2010_facts as facts
+from bywire.plant import roller_screw
 from bywire.simulation.run import simulate
 
-PLANTS = sorted(all_plants())
+PLANTS = sorted(PLANTS.all())
 
 
 def of(name: str):
-    plant = find_plant(name)
+    plant = PLANTS.find(name)
     return plant, parameters(main_set(plant.assembly))
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.reach import leaving
-from bywire.catalog.registry import main_set, parameters
 from bywire.cli.response_warnings import purity, warnings
+from bywire.core.catalog import main_set, parameters
 
 
 @pytest.mark.parametrize(
@@ -25,7 +25,7 @@ from bywire.cli.response_warnings import purity, warnings
     ],
 )
 def test_a_sine_beyond_the_range_has_a_reason(name, value, amplitude, text) -> None:
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     found = leaving(loop, parameters(main_set(loop.assembly)), value, amplitude)
     assert text in found
     assert bool(found) == bool(text)

@@ -10,14 +10,14 @@ from small_linear_models import model_of
 
 from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.motorcycle_linear import linear_model
 from bywire.analysis.linear.transfer import transfer
-from bywire.analysis.linear.wedge_linear import full
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.reduction.error import reduction_error
 from bywire.analysis.reduction.reduce import reduce
 from bywire.analysis.reduction.residualized import residualized
-from bywire.catalog.registry import main_set, parameters
+from bywire.brakes.motorcycle.linear.brake import linear_model
+from bywire.brakes.wedge.linear import full
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 
 
@@ -27,7 +27,7 @@ def wedge(mu_B: float = 0.35) -> LinearModel:
 
 
 def moment_loop() -> LinearModel:
-    loop = find_loop("moment")
+    loop = LOOPS.find("moment")
     return loop.closed(parameters(main_set(loop.assembly)), loop.at.default)
 
 
@@ -73,7 +73,7 @@ def test_integrators_and_unstable_poles_are_kept() -> None:
     assert found.kept == 1
     assert np.abs(found.model.poles() - grows).min() < 1e-8 * abs(grows)
     assert not found.model.is_stable
-    gain = find_loop("moment").gain(parameters("roberts2003"), 200.0)
+    gain = LOOPS.find("moment").gain(parameters("roberts2003"), 200.0)
     less = reduce(gain, band=50.0)
     assert less.kept == 1
     assert np.abs(less.model.poles() - 1.0).min() < 1e-9

@@ -7,21 +7,21 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
-from bywire.analysis.current_loop import current_loop
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.rational import first_orders
-from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.pressure_loop import PressureLoop, cancelling_pi
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.measured_bandwidth import complex_values, fall
-from bywire.assemblies.motorcycle_brake import MotorcycleBrake
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_trim import memory_at, state_at
-from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.linear.current_loop import current_loop
+from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop, cancelling_pi
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.control import current_pi, low_pass_2, pressure_pid
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import UnknownNameError
 from bywire.core.signals import zeros
 from bywire.simulation.run import simulate
@@ -34,7 +34,7 @@ FRICTIONLESS = {
 
 
 def brake(**changes: Any) -> MotorcycleParameters:
-    found = entry("dardanelli2010").parameters().replace(changes)
+    found = PARAMETER_SETS.find("dardanelli2010").parameters().replace(changes)
     assert isinstance(found, MotorcycleParameters)
     return found
 
@@ -68,7 +68,7 @@ def test_closed_pressure_loop_is_that_of_sine_tests() -> None:
         inputs=("p_set",), outputs=("p_mc",),
     )  # fmt: skip
     sweep = Sweep(("p_set",), "p_mc", (0.5, 2.0, 10.0), (1e4,), flags=())
-    found = frequency_response(find_loop("pressure").point(own, p).run(), sweep)
+    found = frequency_response(LOOPS.find("pressure").point(own, p).run(), sweep)
     expected = linear.response(found["frequency"].values)[:, 0, 0]
     measured = complex_values(found.isel(variant=0, amplitude=0))
     np.testing.assert_allclose(measured, expected, rtol=2e-3)

@@ -18,10 +18,10 @@ from bywire.analysis.design.schedule_outcome import ScheduleDesign
 from bywire.analysis.design.schedule_verification import verify_schedule
 from bywire.analysis.design.trial import Trial
 from bywire.analysis.design.verification import verify
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.robustness import margins
 from bywire.bench.bench import Bench
-from bywire.catalog.registry import parameters
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 
 ON = {"ecu.schedule.law": "regions"}
@@ -29,18 +29,18 @@ LOW_K_P = "ecu.schedule.low.k_p"
 
 
 def test_operating_points_by_region() -> None:
-    loop, par = find_loop("pressure"), parameters("dardanelli2010")
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010")
     found = points_by_region(loop, par, (37e5, 10e5, 5e5, 20e5, 7e5))
     assert found == {"low": (5e5, 7e5), "medium": (10e5, 20e5), "high": (37e5,)}
     assert [len(own) for own in points_by_region(loop, par, ()).values()] == [1, 1, 1]
     with pytest.raises(ParameterError, match=r"region 'low'.*10 bar and 35 bar.*--at"):
         points_by_region(loop, par, (20e5, 37e5))
     with pytest.raises(ParameterError, match="no gain schedule"):
-        points_by_region(find_loop("moment"), parameters("roberts2003"), ())
+        points_by_region(LOOPS.find("moment"), parameters("roberts2003"), ())
 
 
 def test_a_region_is_designed_and_the_whole_schedule_is_looked_at() -> None:
-    loop, par = find_loop("pressure"), parameters("dardanelli2010-retuned").replace(ON)
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010-retuned").replace(ON)
     requirements = read(["bandwidth >= 5 Hz", "phase margin >= 70 deg"])
     tunables = {"low": {LOW_K_P: (5e-6, 4e-5)}, "medium": {}, "high": {}}
     points = points_by_region(loop, par, ())
@@ -78,7 +78,7 @@ def test_a_region_is_designed_and_the_whole_schedule_is_looked_at() -> None:
 
 
 def test_a_region_that_falls_short_on_the_bench_is_retuned_alone() -> None:
-    loop, par = find_loop("pressure"), parameters("dardanelli2010-retuned").replace(ON)
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010-retuned").replace(ON)
     requirements = read(["bandwidth >= 8 Hz", "phase margin >= 55 deg"])
     points = {"low": (5e5,), "medium": (20e5,), "high": (37e5,)}
     gains = {LOW_K_P: 7e-6}
@@ -115,7 +115,7 @@ def test_a_step_that_passes_all_points_counts_at_each_of_them() -> None:
 
 
 def test_friction_that_no_linear_model_knows_is_found_at_a_corner() -> None:
-    loop, par = find_loop("pressure"), parameters("dardanelli2010-retuned")
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010-retuned")
     requirements = read(["bandwidth >= 10 Hz", "phase margin >= 60 deg"])
     cases = cases_of(loop, par, 20e5, {"seal.f_cfr_p": [1.2e-8, 1.6e-8, 2e-8]})
     gains = {"ecu.pressure.b": 1.0}
@@ -139,7 +139,7 @@ def test_friction_that_no_linear_model_knows_is_found_at_a_corner() -> None:
 
 
 def test_the_scheduled_set_has_more_margin_at_low_pressure_and_meets_the_paper() -> None:
-    loop, par = find_loop("pressure"), parameters("dardanelli2010-scheduled")
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010-scheduled")
     retuned = parameters("dardanelli2010-retuned")
     same = {"ecu.pressure.b": [1.0]}
     bench = Bench("hard-braking", "dardanelli2010-scheduled")
@@ -163,7 +163,7 @@ def test_the_scheduled_set_has_more_margin_at_low_pressure_and_meets_the_paper()
 
 
 def test_corners_are_the_ends_of_the_ranges_and_the_worst_model() -> None:
-    loop, par = find_loop("moment"), parameters("roberts2003")
+    loop, par = LOOPS.find("moment"), parameters("roberts2003")
     requirements = read(["crossover >= 5 Hz", "phase margin >= 60 deg"])
     start = {"control.moment.f_c": 8.0}
 
@@ -187,6 +187,6 @@ def test_corners_are_the_ends_of_the_ranges_and_the_worst_model() -> None:
 
 
 def test_a_region_of_its_own_cannot_be_a_range() -> None:
-    loop, par = find_loop("pressure"), parameters("dardanelli2010")
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010")
     with pytest.raises(ParameterError, match="cannot also be a range"):
         cases_of(loop, par, 20e5, {LOW_K_P: [1e-5]})

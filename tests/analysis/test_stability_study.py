@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.robustness import margins
-from bywire.analysis.studies.stability import DEFAULTS, compute
-from bywire.analysis.wedge_stability import brake, controlled, motion, neutral
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.stability import brake, controlled, motion, neutral
+from bywire.brakes.wedge.studies.stability import DEFAULTS, compute
+from bywire.core.catalog import parameters
 
 ROUGH = DEFAULTS.replace(
     {"coefficients": 4, "slopes": 3, "mu_B_min": 0.15, "mu_B_max": 0.75}
@@ -55,7 +55,7 @@ def test_damping_of_the_shafts_does_not_move_the_neutral_point() -> None:
 
 
 def test_the_moment_loop_of_the_map_is_that_of_the_margins(found) -> None:
-    par, loop = parameters("roberts2003"), find_loop("moment")
+    par, loop = parameters("roberts2003"), LOOPS.find("moment")
     own = brake(par, 0.55, 0.4)
     disk = found.data["disk_moment"].sel(mu_B=0.55, tan_alpha=0.4, method="nearest")
     assert float(disk) == pytest.approx(margins(loop, own, 200.0).disk, rel=2e-3)
@@ -73,7 +73,7 @@ def test_a_controller_that_knows_the_friction_keeps_its_margin() -> None:
 
 def test_the_border_of_the_moment_loop_is_named(found) -> None:
     (border,) = [one for one in found.kpis if one.name == "moment_mu_B"]
-    loop, par = find_loop("moment"), parameters("roberts2003")
+    loop, par = LOOPS.find("moment"), parameters("roberts2003")
     sides = [loop.closed(par.replace({"wedge.mu_B": share * border.value}), 200.0).is_stable
              for share in (0.999, 1.001)]  # fmt: skip
     assert sides == [True, False]

@@ -10,20 +10,20 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.analysis.sizing import actuator_demand
-from bywire.analysis.sizing.actuator_trial import sine_figures
-from bywire.analysis.sizing.drive_train_answer import Demand
-from bywire.analysis.sizing.drive_train_design import answer, closing_speed, redesigned
-from bywire.analysis.studies import actuator_sizing, drive_train
-from bywire.analysis.study import Map, Mark
-from bywire.analysis.study_registry import all_studies
-from bywire.catalog.registry import entry
+from bywire.analysis.study import STUDIES, Map, Mark
+from bywire.brakes.motorcycle.sizing import demand as actuator_demand
+from bywire.brakes.motorcycle.sizing.trial import sine_figures
+from bywire.brakes.motorcycle.studies import actuator_sizing
+from bywire.brakes.wedge.sizing.answer import Demand
+from bywire.brakes.wedge.sizing.design import answer, closing_speed, redesigned
+from bywire.brakes.wedge.studies import drive_train
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.plant import seal_friction
 from bywire.report.contour import contour, levels_between
 
-WEDGE = entry("roberts2003").parameters().replace({"control.moment.omega_gap": 60.0})
-MOTORCYCLE = entry("dardanelli2010").parameters()
+WEDGE = PARAMETER_SETS.find("roberts2003").parameters().replace({"control.moment.omega_gap": 60.0})
+MOTORCYCLE = PARAMETER_SETS.find("dardanelli2010").parameters()
 MU = (0.25, 0.35, 0.45)
 
 
@@ -32,7 +32,7 @@ def silent(label: str, share: float) -> None:
 
 
 def test_every_study_sizes_an_assembly_that_there_is() -> None:
-    assert {one.assembly for one in all_studies().values()} == {"wedge-brake", "motorcycle-brake"}
+    assert {one.assembly for one in STUDIES.all().values()} == {"wedge-brake", "motorcycle-brake"}
 
 
 def test_a_design_answers_as_it_does_on_the_bench() -> None:

@@ -10,17 +10,17 @@ import pytest
 from small_linear_models import model_of
 
 from bywire.analysis.linear.minimal import Realization, minimal
-from bywire.analysis.linear.motorcycle_linear import linear_model, theoretical
 from bywire.analysis.linear.transfer import transfer
-from bywire.analysis.linear.wedge_linear import INPUTS, full, mechanical
-from bywire.analysis.loop_registry import all_loops, find_loop
-from bywire.catalog.registry import main_set, parameters
+from bywire.analysis.loop import LOOPS
+from bywire.brakes.motorcycle.linear.brake import linear_model, theoretical
+from bywire.brakes.wedge.linear import INPUTS, full, mechanical
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 
 
-@pytest.mark.parametrize("name", sorted(all_loops()))
+@pytest.mark.parametrize("name", sorted(LOOPS.all()))
 def test_response_is_that_of_the_model_to_1e_9_over_the_band(name: str) -> None:
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     par = parameters(main_set(loop.assembly))
     for model in (loop.closed(par, loop.at.default), loop.gain(par, loop.at.default)):
         nyquist = 0.499 / model.period if model.period else math.inf
@@ -91,7 +91,7 @@ def test_motors_driven_as_one_do_not_move_against_each_other() -> None:
 
 
 def test_polynomials_that_cannot_hold_the_model_are_refused() -> None:
-    loop = find_loop("position")
+    loop = LOOPS.find("position")
     found = transfer(loop.gain(parameters(main_set(loop.assembly)), loop.at.default))
     assert isinstance(found.transfer_function(), control.TransferFunction)
     with pytest.raises(ParameterError, match="polynomials of degree"):

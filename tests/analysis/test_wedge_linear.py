@@ -11,14 +11,15 @@ import pytest
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_start import force_for, memory_at, state_at, travel_for
 from bywire.bench.experiment import Case
 from bywire.bench.running import as_run
-from bywire.catalog.registry import parameters
-from bywire.control import moment_control
-from bywire.plant import roller_screw, wedge
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.laws import moment_control
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.start import force_for, memory_at, state_at, travel_for
+from bywire.core.catalog import parameters
+from bywire.plant import roller_screw
 from bywire.simulation.run import simulate
 
 FRICTIONLESS = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bywire.catalog.registry import entry
 from bywire.control import dither
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import adc
 
 
@@ -20,7 +20,7 @@ def test_twelve_bits_are_4096_distinct_codes() -> None:
 
 def square(f: float, T: float, count: int) -> np.ndarray:
     par = dither.Parameters(waveform="square", f_dit=f, gain=1.0)
-    believed = entry("dardanelli2010").parameters().ecu.est_par  # type: ignore[attr-defined]
+    believed = PARAMETER_SETS.find("dardanelli2010").parameters().ecu.est_par  # type: ignore[attr-defined]
     x, wave = dither.State(phase=0.0), []
     for _ in range(count):
         x, out = dither.output(x, 20e5, T, par, believed)

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.assemblies.driven_shaft import DrivenShaft, Load, Motion
 from bywire.bench.experiment import Case
-from bywire.bench.experiments import load_sweep, run_down
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.experiments import load_sweep, run_down
+from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed
+from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft, Load, Motion
+from bywire.core.catalog import parameters
 from bywire.identification.output_error import trial
-from bywire.identification.simulated_record import Sensor, sensed
 from bywire.simulation.run import simulate
 
 STEP = 20e-6

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.assemblies.motorcycle_brake import MotorcycleBrake
-from bywire.assemblies.motorcycle_parameters import DriveMode, MotorcycleParameters
 from bywire.bench.bench import as_run
-from bywire.bench.motorcycle_case import Signals, case_from_rest
 from bywire.bench.recording import energy_residual, record
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.case import Signals, case_from_rest
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import choice_fields
 from bywire.core.signals import signals_of
 from bywire.simulation.compiler import find_compiler
@@ -55,7 +55,7 @@ def stimulus(t: np.ndarray) -> Signals:
 
 @cache
 def recorded(name: str, value: str, engine: str = "auto") -> xr.Dataset:
-    base = entry("dardanelli2010").parameters()
+    base = PARAMETER_SETS.find("dardanelli2010").parameters()
     assert isinstance(base, MotorcycleParameters)
     changes = {name: value, **CHOICES[name][value]} if name else {}
     mode: DriveMode = changes.pop("drive.mode", "pressure")
@@ -65,7 +65,7 @@ def recorded(name: str, value: str, engine: str = "auto") -> xr.Dataset:
 
 
 def test_no_choice_is_forgotten() -> None:
-    base = entry("dardanelli2010").parameters()
+    base = PARAMETER_SETS.find("dardanelli2010").parameters()
     for name in choice_fields(MotorcycleParameters):
         options: Any = MotorcycleParameters
         for part in name.split("."):

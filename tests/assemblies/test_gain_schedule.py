@@ -10,15 +10,15 @@ import pytest
 
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.rational import first_orders
-from bywire.analysis.loop_registry import find_loop
-from bywire.analysis.pressure_loop import PressureLoop
-from bywire.assemblies import motorcycle_ecu
-from bywire.assemblies.motorcycle_brake import MotorcycleBrake
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.analysis.loop import LOOPS
 from bywire.bench.bench import Bench
 from bywire.bench.running import run
-from bywire.catalog.registry import parameters
+from bywire.brakes.motorcycle import ecu as motorcycle_ecu
+from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import gain_schedule, pressure_pid
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.simulation.run import simulate
 
@@ -79,7 +79,7 @@ def test_new_gains_at_a_constant_input_leave_the_demand_as_it_was() -> None:
 
 def one_tick(par: MotorcycleParameters, p_before: float) -> float:
     """Return the demand of a tick that finds 10 bar after another pressure at the last one."""
-    point = find_loop("pressure").point(par, 10e5)
+    point = LOOPS.find("pressure").point(par, 10e5)
     memory: Any = point.memory
     share = (10e5 + par.ecu.p_atm) / (par.pressure_sensor.p_high - par.pressure_sensor.p_low)
     readings = motorcycle_ecu.Readings(p=share, i=0.5)
@@ -105,7 +105,7 @@ def test_the_ecu_hands_over_from_the_gains_of_its_last_pressure() -> None:
 @pytest.mark.parametrize("p", PRESSURES)
 def test_small_motion_knows_the_frozen_gains_only(p: float) -> None:
     """Exactly: with b = 1 matrix by matrix, else in every response."""
-    loop = find_loop("pressure")
+    loop = LOOPS.find("pressure")
     par = of(b=1.0)
     for make in (loop.gain, loop.closed):
         ours, theirs = make(par, p), make(frozen(par, p), p)
@@ -123,7 +123,7 @@ def test_without_the_transfer_small_motion_would_know_the_slope(monkeypatch: Any
     """A gate that can fail: the naive schedule has a loop of its own within a blend."""
     monkeypatch.setattr(pressure_pid, "transferred", lambda x, u, k_p, par: x)
     par = of(b=0.4)
-    loop = find_loop("pressure")
+    loop = LOOPS.find("pressure")
     p, f = 10e5, np.array([1.0, 5.0])
 
     class Naive(MotorcycleBrake):
@@ -161,7 +161,7 @@ def test_a_schedule_of_equal_gains_is_none() -> None:
 
 @pytest.mark.parametrize("p", [5e5, 10e5, 36e5])
 def test_the_equilibrium_of_a_scheduled_loop_rests(p: float) -> None:
-    loop = find_loop("pressure")
+    loop = LOOPS.find("pressure")
     own = loop.smooth(of(b=0.7))
     found = simulate(replace(loop.point(own, p).run(), duration=0.2))
     np.testing.assert_allclose(found["p_mc"], p, rtol=1e-6)

@@ -7,9 +7,9 @@ import pytest
 import xarray as xr
 
 from bywire.bench.bench import as_run
-from bywire.bench.motorcycle_case import Signals, case_from_rest
 from bywire.bench.recording import energy_residual, record
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.case import Signals, case_from_rest
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.simulation.run import simulate
 
 
@@ -19,7 +19,7 @@ def pulse(t: np.ndarray) -> Signals:
 
 
 def recorded(**changes: float) -> xr.Dataset:
-    par = entry("dardanelli2010").parameters()
+    par = PARAMETER_SETS.find("dardanelli2010").parameters()
     own = {"gear.law": "directional", **{k.replace("__", "."): v for k, v in changes.items()}}
     case = case_from_rest("run", par, "current-source", 0.0, pulse, 0.5, own)  # type: ignore[arg-type]
     run = as_run(case, 20e-6)

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from bywire.catalog.registry import entry
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 
 AIR = {"fluid.air": "entrained"}
@@ -14,7 +14,7 @@ DEAD = {"port.law": "dead-stroke"}
 
 
 def changed(changes: dict[str, Any]) -> None:
-    entry("dardanelli2010").parameters().replace(changes)
+    PARAMETER_SETS.find("dardanelli2010").parameters().replace(changes)
 
 
 @pytest.mark.parametrize(

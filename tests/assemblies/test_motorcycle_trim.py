@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 
 import bywire
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_trim import (
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import (
     highest_pressure,
     holding_current,
     memory_at,
     state_at,
     travel_at,
 )
-from bywire.catalog.registry import entry
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.plant import brake_fluid, caliper, master_cylinder
 
@@ -37,7 +37,7 @@ LAWS: dict[str, dict[str, Any]] = {
 
 
 def brake(changes: dict[str, Any], name: str = "dardanelli2010") -> MotorcycleParameters:
-    found = entry(name).parameters().replace(changes)
+    found = PARAMETER_SETS.find(name).parameters().replace(changes)
     assert isinstance(found, MotorcycleParameters)
     return found
 

@@ -4,23 +4,23 @@ from __future__ import annotations
 
 import json
 import math
-import pkgutil
+from pathlib import Path
 
 import pytest
 
 import bywire
-from bywire.bench import experiments
-from bywire.bench.registry import all_experiments
-from bywire.bench.stimuli.registry import entries as stimuli
-from bywire.catalog.registry import entries
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.stimuli.registry import STIMULI
+from bywire.core.brake import brakes
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.bench_figures import bench_figures
 from bywire.report.bench_results import as_json
 
-NAMES = sorted(all_experiments())
+NAMES = sorted(EXPERIMENTS.all())
 PAIRS = [
     (experiment.name, found.name)
-    for experiment in all_experiments().values()
-    for found in entries().values()
+    for experiment in EXPERIMENTS.all().values()
+    for found in PARAMETER_SETS.all().values()
     if found.assembly == experiment.assembly
 ]
 FIRST = dict(reversed(PAIRS))  # of every experiment, the first parameter set that fits it
@@ -35,7 +35,7 @@ def results(tmp_path_factory) -> dict[str, bywire.Result]:
     found = {}
     for name in NAMES:
         path = folder / f"{name}.toml"
-        driven = all_experiments()[name].driven_unit is not None
+        driven = EXPERIMENTS.all()[name].driven_unit is not None
         lines = LINES.format(name, FIRST[name])
         path.write_text(lines + (STEP.format("A") if driven else ""))
         found[name] = bywire.run(bywire.load(path))
@@ -56,7 +56,7 @@ def test_two_lines_are_enough(results, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_kpis_are_those_declared(results, name):
-    declared = all_experiments()[name].kpis_with(results[name].bench.chosen_options)
+    declared = EXPERIMENTS.all()[name].kpis_with(results[name].bench.chosen_options)
     assert {kpi.name: kpi.unit for kpi in results[name].kpis} == declared
     for kpi in results[name].kpis:
         assert kpi.definition.endswith(".")
@@ -66,7 +66,7 @@ def test_kpis_are_those_declared(results, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_every_figure_it_names_exists(results, name):
     shown = bench_figures(results[name])
-    kinds = all_experiments()[name].figures
+    kinds = EXPERIMENTS.all()[name].figures
     assert kinds
     for kind in kinds:
         assert any(figure.name.startswith(kind) for figure in shown)
@@ -75,7 +75,7 @@ def test_every_figure_it_names_exists(results, name):
 @pytest.mark.parametrize("name", NAMES)
 def test_results_are_json(results, name):
     text = json.dumps(as_json(results[name], []), allow_nan=False)
-    assert set(json.loads(text)["kpis"]) <= set(all_experiments()[name].kpis)
+    assert set(json.loads(text)["kpis"]) <= set(EXPERIMENTS.all()[name].kpis)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -88,7 +88,7 @@ def test_every_signal_has_unit_and_name(results, name):
 
 @pytest.mark.parametrize(("name", "parameters"), PAIRS)
 def test_every_parameter_set_of_the_assembly_fits(name, parameters):
-    definition = all_experiments()[name]
+    definition = EXPERIMENTS.all()[name]
     stimulus = {"kind": "step", "start": 0, "end": 1, "t_step": 0} if definition.driven_unit else {}
     bench = bywire.Bench(name, parameters, stimulus=stimulus)
     for case in bench.cases():
@@ -96,11 +96,14 @@ def test_every_parameter_set_of_the_assembly_fits(name, parameters):
 
 
 def test_names_are_those_of_their_files():
-    modules = {module.name for module in pkgutil.iter_modules(experiments.__path__)}
-    assert {name.replace("-", "_") for name in NAMES} == modules
+    """By which one experiment is found without loading all."""
+    for brake in brakes().values():
+        folder = Path(brake.file).parent / "experiments"
+        files = {path.stem for path in folder.glob("[!_]*.py")}
+        assert {name.replace("-", "_") for name in EXPERIMENTS.of(brake.module)} == files
 
 
-@pytest.mark.parametrize("kind", sorted(stimuli()))
+@pytest.mark.parametrize("kind", sorted(STIMULI.all()))
 @pytest.mark.parametrize(
     ("source", "unit"),
     [

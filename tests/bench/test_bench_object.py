@@ -10,7 +10,7 @@ import pytest
 
 import bywire
 from bywire.bench.bench_file import flattened, from_mapping, load
-from bywire.catalog.registry import entry
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import (
     FileError,
     InputError,
@@ -163,8 +163,12 @@ def test_override_without_effect_is_refused(name, value, options):
 
 
 def test_set_of_another_assembly_is_refused(monkeypatch):
-    other = dataclasses.replace(entry(SET), name="wedge", assembly="wedge-brake")
-    monkeypatch.setattr("bywire.bench.bench.entry", lambda name: other)
+    other = dataclasses.replace(PARAMETER_SETS.find(SET), name="wedge", assembly="wedge-brake")
+    find = type(PARAMETER_SETS).find
+    monkeypatch.setattr(
+        type(PARAMETER_SETS), "find",
+        lambda kind, name: other if kind is PARAMETER_SETS else find(kind, name),
+    )  # fmt: skip
     with pytest.raises(ParameterError, match=r"tests a motorcycle-brake.* is for a wedge-brake"):
         bywire.Bench("hard-braking", "wedge")
 

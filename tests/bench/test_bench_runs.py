@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.motorcycle_operating_point import settled_start
 from bywire.bench.running import as_run
+from bywire.brakes.motorcycle.operating_point import settled_start
 
 SET = "dardanelli2010"
 STEP = {"kind": "step", "start": 0, "end": "1 A", "t_step": "10 ms"}

@@ -9,8 +9,8 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.bench.experiments import pedal_tracking
-from bywire.bench.registry import find_experiment
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.brakes.motorcycle.experiments import pedal_tracking
 from bywire.core.errors import ParameterError
 
 SET = "dardanelli2010"
@@ -22,7 +22,7 @@ def judged(lag: float, demand=lambda t: 20e5 + 5e5 * np.sin(2.0 * np.pi * 0.4 * 
     signals = {"p_ref": demand(T), "p_mc": demand(T - lag)}
     variables = {name: ("time", y, {"units": "Pa"}) for name, y in signals.items()}
     run = xr.Dataset(variables, coords={"time": ("time", T, {"units": "s"})})
-    experiment = find_experiment("pedal-tracking")
+    experiment = EXPERIMENTS.find("pedal-tracking")
     options = experiment.defaults.replace({"smoothing": 0.0})
     return {kpi.name: kpi for kpi in experiment.judge({"run": run}, options)}
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.assemblies.motorcycle_ecu import Stimulus
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.benchmark.peers.hand_c import OUTPUTS, THREADS, HandWritten, indices
-from bywire.benchmark.peers.problem import braking_run, hard_braking
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.benchmarks.hand_c import OUTPUTS, THREADS, HandWritten, indices
+from bywire.brakes.motorcycle.benchmarks.problem import braking_run, hard_braking
+from bywire.brakes.motorcycle.ecu import Stimulus
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import CompilerError
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 
 def parameters(changes: Mapping[str, float] | None = None) -> MotorcycleParameters:
-    par = entry("dardanelli2010").parameters().replace(changes or {})
+    par = PARAMETER_SETS.find("dardanelli2010").parameters().replace(changes or {})
     assert isinstance(par, MotorcycleParameters)
     return par
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from bywire.benchmark import measurement_files
+from bywire.benchmark.parts import measurement_files
 
 
 def test_reading_is_measured(monkeypatch):

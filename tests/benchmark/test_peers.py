@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_plant import State
-from bywire.benchmark.peers import cvodes, diffrax, lsoda, pathsim
-from bywire.benchmark.peers.problem import (
+from bywire.brakes.motorcycle.benchmarks import cvodes, diffrax, lsoda, pathsim
+from bywire.brakes.motorcycle.benchmarks.problem import (
     SCALE,
     Solution,
     braking_run,
@@ -21,8 +19,10 @@ from bywire.benchmark.peers.problem import (
     reference,
     rest,
 )
-from bywire.benchmark.peers.symbolic import slope_and_jacobian
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.benchmarks.symbolic import slope_and_jacobian
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.plant import State
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.simulation.run import simulate
 
 SHORT = 0.03
@@ -31,7 +31,7 @@ WIDTH = 3e-4
 
 @pytest.fixture(scope="module")
 def par() -> MotorcycleParameters:
-    found = entry("dardanelli2010").parameters()
+    found = PARAMETER_SETS.find("dardanelli2010").parameters()
     assert isinstance(found, MotorcycleParameters)
     return found
 

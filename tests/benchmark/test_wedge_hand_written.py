@@ -15,13 +15,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_start import memory_at, state_at
-from bywire.benchmark import wedge_brake
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, Call
-from bywire.benchmark.peers.hand_wedge import SUBJECT, HandWrittenWedge
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.benchmarks import wedge_brake
+from bywire.brakes.wedge.benchmarks.hand_wedge import SUBJECT, HandWrittenWedge
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.core.catalog import parameters
 from bywire.core.errors import CompilerError
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import Run, Trajectory, simulate

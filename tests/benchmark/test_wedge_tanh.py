@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.benchmark import wedge_brake
-from bywire.benchmark.peers.tanh_rk4 import SIGNALS, Solution, solve
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.benchmarks import wedge_brake
+from bywire.brakes.wedge.benchmarks.tanh_rk4 import SIGNALS, Solution, solve
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.catalog import parameters
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import Run, simulate
 

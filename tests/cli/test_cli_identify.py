@@ -10,8 +10,8 @@ import pytest
 from command_line import Outcome, no_half_files, refused
 
 from bywire.bench.bench_file import load
-from bywire.catalog.registry import parameters
-from bywire.identification.method_registry import all_methods
+from bywire.core.catalog import parameters
+from bywire.identification.method import METHODS
 from bywire.identification.parameter_file import parameter_file
 
 Bywire = Callable[..., Outcome]
@@ -61,7 +61,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
 
 
 def test_options_that_only_simulate_are_options() -> None:
-    for method in all_methods().values():
+    for method in METHODS.all().values():
         assert set(method.simulated) <= set(method.options.model_fields), method.name
         assert method.simulated
 

@@ -7,18 +7,18 @@ from collections.abc import Callable
 import pytest
 from command_line import Outcome, refused
 
-from bywire.analysis.linear.plant_registry import all_plants
-from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.study_registry import all_studies
-from bywire.bench.registry import all_experiments
-from bywire.catalog.registry import entries
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import LOOPS
+from bywire.analysis.study import STUDIES
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.cli.described_systems import (
     described_drive,
     described_loop,
     described_plant,
-    systems,
 )
-from bywire.identification.method_registry import all_methods
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.model import ASSEMBLIES
+from bywire.identification.method import METHODS
 
 Bywire = Callable[..., Outcome]
 
@@ -28,9 +28,9 @@ def only(found: Outcome, kind: str) -> dict[str, object]:
     return one
 
 
-@pytest.mark.parametrize("name", all_methods())
+@pytest.mark.parametrize("name", METHODS.all())
 def test_a_method_says_all_that_its_use_takes(bywire: Bywire, name: str) -> None:
-    method = all_methods()[name]
+    method = METHODS.all()[name]
     one = only(bywire("list", name, "--json"), "method")
     assert [row["name"] for row in one["options"]] == list(method.defaults.flat())
     for row in one["options"]:
@@ -59,9 +59,10 @@ def test_what_is_found_under_a_name_of_several_kinds(bywire: Bywire) -> None:
 
 def test_experiments_studies_and_sets_list_their_values(bywire: Bywire) -> None:
     cases = (
-        ("experiment", "options", {n: e.defaults for n, e in all_experiments().items()}),
-        ("study", "options", {n: s.defaults for n, s in all_studies().items()}),
-        ("parameter set", "parameters", {n: e.parameters() for n, e in entries().items()}),
+        ("experiment", "options", {n: e.defaults for n, e in EXPERIMENTS.all().items()}),
+        ("study", "options", {n: s.defaults for n, s in STUDIES.all().items()}),
+        ("parameter set", "parameters",
+         {n: e.parameters() for n, e in PARAMETER_SETS.all().items()}),
     )
     for kind, key, known in cases:
         for name, values in known.items():
@@ -87,17 +88,17 @@ def test_an_unknown_name_gets_the_nearest(bywire: Bywire) -> None:
 @pytest.mark.parametrize("name", ["motorcycle-brake", "wedge-brake", "shaft-rig"])
 def test_an_assembly_says_its_signals_and_what_there_is_for_it(bywire: Bywire, name: str) -> None:
     one = only(bywire("list", name, "--json"), "assembly")
-    model = systems()[name]
+    model = ASSEMBLIES.all()[name]
     where = {(row["signal"], place) for row in one["signals"] for place in row["where"].split(", ")}
     for place, fields in (("stimulus", model.Stimulus), ("recording", model.Output),
                           ("state", model.State)):  # fmt: skip
         assert {n for n, known in where if known == place} == set(fields._fields)
-    known = [e.name for e in all_experiments().values() if e.assembly == name]
+    known = [e.name for e in EXPERIMENTS.all().values() if e.assembly == name]
     assert one["experiments"] == ", ".join(known)
 
 
 def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
-    for name, one in all_experiments().items():
+    for name, one in EXPERIMENTS.all().items():
         rows = described_drive(one)["drives"]
         assert rows or one.static is not None, name
     text = bywire("list", "hard-braking").out
@@ -106,7 +107,7 @@ def test_every_experiment_says_what_it_drives(bywire: Bywire) -> None:
 
 
 def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> None:
-    for loop in all_loops().values():
+    for loop in LOOPS.all().values():
         rows = described_loop(loop)["signals"]
         told = {part: [r["signal"] for r in rows if r["as"] == part]
                 for part in ("input", "output", "cut open at", "state")}  # fmt: skip
@@ -114,7 +115,7 @@ def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> No
         assert told["output"] == [loop.output]
         assert all(r["meaning"] for r in rows), loop.name
         assert told["state"]
-    for plant in all_plants().values():
+    for plant in PLANTS.all().values():
         parts = {row["as"] for row in described_plant(plant)["signals"]}
         assert parts == {"input", "output", "state"}
     assert "i_source  A      source current             input" in bywire(

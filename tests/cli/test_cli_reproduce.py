@@ -8,13 +8,13 @@ import time
 import pytest
 from command_line import refused
 
-from bywire.reproduction.registry import sources
+from bywire.reproduction.reproduction import SOURCES
 
 
 @pytest.fixture
 def quick(monkeypatch):
     """Put an empty reproduction in place of the long computation, and count its calls."""
-    source = next(iter(sources().values()))
+    source = next(iter(SOURCES.all().values()))
     calls = []
 
     class Quick:

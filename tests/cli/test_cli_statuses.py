@@ -13,7 +13,7 @@ import pytest
 from command_line import BRAKING, OPEN_LOOP, QUICK, SCRIPT, refused
 
 from bywire import __version__
-from bywire.bench.registry import find_experiment
+from bywire.bench.experiment import EXPERIMENTS
 
 STRICT = QUICK + '\n[requirements]\npeak_current = "<= 1 A"\nenergy = ">= 1 kJ"\n'
 
@@ -106,7 +106,7 @@ def test_list_is_complete(bywire):
         assert content
         assert all(f"  {name}" in text for name in content)
     for name, kpis in found["kpis_of_experiments"].items():
-        assert kpis == dict(find_experiment(name).kpis)
+        assert kpis == dict(EXPERIMENTS.find(name).kpis)
         assert all(kpi in text for kpi in kpis)
 
 

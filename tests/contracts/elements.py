@@ -14,10 +14,11 @@ from typing import Any
 from annotated_types import Ge, Gt, Le, Lt
 
 from bywire import control, plant
+from bywire.brakes.wedge import elements, laws
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import Signal
 
-PACKAGES = (plant, control)
+PACKAGES = (plant, control, elements, laws)
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.assemblies import motorcycle_ecu
-from bywire.assemblies.motorcycle_ecu import Readings, Stimulus
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
+from bywire.brakes.motorcycle import ecu as motorcycle_ecu
+from bywire.brakes.motorcycle.ecu import Readings, Stimulus
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.plant import current_sensor, pressure_sensor
 from bywire.simulation.run import Run
 from reference.event_driven import STATES, Controller, Plant, simulate

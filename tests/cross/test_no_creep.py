@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.motorcycle_trim import holding_current
 from bywire.bench.experiment import fixed
-from bywire.bench.motorcycle_case import case_from_rest
 from bywire.bench.running import as_run
-from bywire.catalog.registry import entry
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import holding_current
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.simulation.run import Run, Trajectory, simulate
 from cross.motorcycle_reference import plant_of
 from reference.event_driven import excess
@@ -22,7 +22,7 @@ P_HELD = 10e5
 
 def held_at(share: float, sigma: int, law: str, mode: str, duration: float) -> Run:
     """Return a run from rest at 10 bar with a share of the breakaway torque applied."""
-    par = entry("dardanelli2010").parameters().replace({"gear.law": law})
+    par = PARAMETER_SETS.find("dardanelli2010").parameters().replace({"gear.law": law})
     assert isinstance(par, MotorcycleParameters)
     plant, i = plant_of(par), holding_current(P_HELD, par)
     breakaway = -excess(plant, sigma, i, P_HELD) / plant.direction(sigma)[0]

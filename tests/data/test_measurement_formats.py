@@ -10,7 +10,7 @@ from measurement_files import FORMATS, NEEDS, file_of, measurement, with_slow_si
 from scipy.io import loadmat, savemat
 
 from bywire.core.errors import FileError, UnknownNameError
-from bywire.data.format_registry import all_formats
+from bywire.data.format_registry import FORMATS as KNOWN
 from bywire.data.measurement import read_measurement
 from bywire.data.writing import write_measurement
 
@@ -37,7 +37,7 @@ def same(found, wanted):
 
 
 def test_every_format_is_tested():
-    assert set(all_formats()) == set(FORMATS)
+    assert set(KNOWN.all()) == set(FORMATS)
 
 
 def test_ours_comes_back_exactly(tmp_path, name):
@@ -48,7 +48,7 @@ def test_ours_comes_back_exactly(tmp_path, name):
 
 def test_signals_on_other_instants(tmp_path, name):
     dataset = with_slow_signal(measurement())
-    if all_formats()[name].has_many_axes:
+    if KNOWN.all()[name].has_many_axes:
         same(read_measurement(file_of(tmp_path, name, dataset)), dataset)
     else:
         with pytest.raises(FileError, match=r"different instants \(time, time_T\)"):

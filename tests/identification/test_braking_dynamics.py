@@ -11,16 +11,16 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.dither.dithered_plant import dithered_plant
-from bywire.analysis.linear.motorcycle_linear import with_slow_pair
-from bywire.catalog.registry import parameters
+from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
+from bywire.brakes.motorcycle.linear.brake import with_slow_pair
+from bywire.brakes.motorcycle.methods.braking.fit import fit, five_of
+from bywire.brakes.motorcycle.methods.braking.records import REGIONS, block_of, regions_of, step_at
+from bywire.brakes.motorcycle.methods.braking.sine_lines import lines, measured_points
+from bywire.brakes.motorcycle.methods.braking.slow_pair import NAMES, log_response, response
+from bywire.brakes.motorcycle.methods.braking_dynamics import METHOD, pair_shows, truth
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
-from bywire.identification.braking.fit import fit, five_of
-from bywire.identification.braking.records import REGIONS, block_of, regions_of, step_at
-from bywire.identification.braking.sine_lines import lines, measured_points
-from bywire.identification.braking.slow_pair import NAMES, log_response, response
 from bywire.identification.method import Effort, Identified
-from bywire.identification.methods.braking_dynamics import METHOD, pair_shows, truth
 from bywire.identification.records import joined, split
 
 Array = NDArray[np.float64]

@@ -9,11 +9,12 @@ import pytest
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.catalog.registry import parameters
+from bywire.brakes.motorcycle.methods import current_loop, motor_winding
+from bywire.brakes.wedge.methods import drive_current_loop
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.identification.electrics.loop_records import levels, noise_of_levels
 from bywire.identification.method import Effort, Identified, Method
-from bywire.identification.methods import current_loop, drive_current_loop, motor_winding
 from bywire.identification.records import joined
 
 Array = NDArray[np.float64]

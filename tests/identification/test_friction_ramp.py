@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.catalog.registry import parameters
+from bywire.brakes.motorcycle.methods.friction_ramp import METHOD, Options, shots_of
+from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
+from bywire.brakes.motorcycle.methods.stick_slip.shots import cut_out
+from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, find_slips
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.identification.method import Effort
-from bywire.identification.methods.friction_ramp import METHOD, Options, shots_of
 from bywire.identification.noise import noise_of
-from bywire.identification.stick_slip.shooting import Shooting
-from bywire.identification.stick_slip.shots import cut_out
-from bywire.identification.stick_slip.slips import Slip, find_slips
 from bywire.identification.trust import trust
 from bywire.identification.unknown import parameters_of
 

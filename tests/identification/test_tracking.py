@@ -7,7 +7,7 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.catalog.registry import parameters
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.identification.replaying.tracking import track
 

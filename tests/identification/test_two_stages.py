@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.catalog.registry import parameters
-from bywire.identification.drive_train.cogging_waves import waves
-from bywire.identification.drive_train.force_current import Squeeze
-from bywire.identification.drive_train.two_stages import Contacts, clear_of
+from bywire.brakes.wedge.methods.drive_train.cogging_waves import waves
+from bywire.brakes.wedge.methods.drive_train.force_current import Squeeze
+from bywire.brakes.wedge.methods.drive_train.two_stages import Contacts, clear_of
+from bywire.brakes.wedge.methods.stiffness import METHOD, truth
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.catalog import parameters
 from bywire.identification.method import Effort
-from bywire.identification.methods.stiffness import METHOD, truth
 
 Array = NDArray[np.float64]
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
+from bywire.identification.fitting.asked import find_method
 from bywire.identification.method import Effort, Identified, Method
-from bywire.identification.method_registry import find_method
 from bywire.identification.records import joined, split
 from bywire.identification.trust import trust
 

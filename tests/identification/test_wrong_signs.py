@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.catalog.registry import entry, main_set
+from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import ParameterError
-from bywire.identification.method import Effort
-from bywire.identification.method_registry import all_methods
+from bywire.identification.method import METHODS, Effort
 
 
 def negated(data: xr.Dataset, name: str) -> xr.Dataset:
@@ -28,8 +27,8 @@ REFUSED = {
 
 @pytest.mark.parametrize("name", REFUSED)
 def test_signs_that_do_not_fit_together_are_refused(name: str) -> None:
-    method = all_methods()[name]
-    par = entry(main_set(method.assembly)).parameters() if method.assembly else None
+    method = METHODS.all()[name]
+    par = PARAMETER_SETS.find(main_set(method.assembly)).parameters() if method.assembly else None
     data = method.synthetic(par, method.defaults, 1)
     assert all(c.holds for c in method.identify(data, par, method.defaults, Effort()).checks)
     for signal, words in REFUSED[name].items():
@@ -41,8 +40,8 @@ def test_signs_that_do_not_fit_together_are_refused(name: str) -> None:
     ("run-down", ("i_1", "q_1")), ("force-calibration", ("i_1", "i_2")),
 ])  # fmt: skip
 def test_signs_that_only_the_misfit_shows_fail(name: str, signals: tuple[str, ...]) -> None:
-    method = all_methods()[name]
-    par = entry(main_set(method.assembly)).parameters()
+    method = METHODS.all()[name]
+    par = PARAMETER_SETS.find(main_set(method.assembly)).parameters()
     data = method.synthetic(par, method.defaults, 1)
     for signal in signals:
         found = method.identify(negated(data, signal), par, method.defaults, Effort())
@@ -51,7 +50,7 @@ def test_signs_that_only_the_misfit_shows_fail(name: str, signals: tuple[str, ..
 
 def test_a_seal_that_drives_is_refused() -> None:
     """Travel that is measured inward: the area is right, and the friction below zero."""
-    method = all_methods()["seal-friction"]
+    method = METHODS.all()["seal-friction"]
     data = method.synthetic(None, method.defaults, 1)
     middle = method.defaults.x_low + method.defaults.x_high  # type: ignore[attr-defined]
     with pytest.raises(ParameterError, match=r"F goes against x \(friction -\S+ N in the mean"):
@@ -65,7 +64,7 @@ def test_a_part_of_the_friction_that_drives_fails() -> None:
     F = 20.0 * np.sign(v) - 60.0 * v + 0.1 * np.random.default_rng(1).standard_normal(t.size)
     data = xr.Dataset({"friction": ("time", F, {"units": "N"}),
                        "speed": ("time", v, {"units": "m/s"})}, {"time": t})  # fmt: skip
-    method = all_methods()["friction-model"]
+    method = METHODS.all()["friction-model"]
     viscous = method.defaults.replace({"law": "viscous"})
     checks = {c.name: c for c in method.identify(data, None, viscous, Effort()).checks}
     assert checks["misfit_over_friction"].holds

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from bywire.catalog.provenance import chosen, paper
 from bywire.core.parameters import ParameterSet
+from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.table_html import table_html

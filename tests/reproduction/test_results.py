@@ -13,8 +13,7 @@ from bywire.core.errors import FileError, UnknownNameError
 from bywire.data.netcdf import read_recording
 from bywire.report.tables import text_table
 from bywire.reproduction.item import Fact, compared, found
-from bywire.reproduction.registry import find_source, sources
-from bywire.reproduction.reproduction import Exhibit, Part, Reproduction
+from bywire.reproduction.reproduction import SOURCES, Exhibit, Part, Reproduction
 from bywire.reproduction.results import as_json, as_table, write
 from bywire.reproduction.root_cause import RootCause
 from bywire.reproduction.tally import Tally, tallies
@@ -113,7 +112,7 @@ def test_folder_that_cannot_be_made_is_one_clear_error(
 
 
 def test_sources_are_found_by_name() -> None:
-    assert find_source("dardanelli2010").summary
-    assert set(sources()) >= {"dardanelli2010"}
+    assert SOURCES.find("dardanelli2010").summary
+    assert set(SOURCES.all()) >= {"dardanelli2010"}
     with pytest.raises(UnknownNameError, match="dardanelli2010"):
-        find_source("dardaneli2010")
+        SOURCES.find("dardaneli2010")

@@ -6,8 +6,9 @@ import math
 
 import pytest
 
-from bywire.reproduction import roberts2003_fig5, roberts2003_fig6
-from bywire.reproduction.roberts2003_frequency_causes import causes
+from bywire.brakes.wedge.paper import fig5 as roberts2003_fig5
+from bywire.brakes.wedge.paper import fig6 as roberts2003_fig6
+from bywire.brakes.wedge.paper.frequency_causes import causes
 from bywire.reproduction.runs import Runs
 
 

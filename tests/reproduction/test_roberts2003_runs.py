@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bywire.brakes.wedge.figures.brake_factor import FARTHEST, WedgeForces, brake_factor
+from bywire.brakes.wedge.paper.runs import order_spectrum, settled, stacked
 from bywire.core.errors import ParameterError
-from bywire.report.brake_factor import FARTHEST, WedgeForces, brake_factor
-from bywire.reproduction.roberts2003_runs import order_spectrum, settled, stacked
 
 
 def coasting(waves: dict[float, float], duration: float = 3.2) -> xr.Dataset:

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.assemblies.screw_rig import ScrewRig
-from bywire.assemblies.shaft_rig import ShaftRig
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
+from bywire.core.catalog import parameters
 from bywire.core.signals import zeros
 from bywire.simulation.run import Run, Trajectory, simulate
 

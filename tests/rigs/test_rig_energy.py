@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from rig_runs import drive, residual, rig
 
-from bywire.assemblies.screw_rig import ScrewRig
-from bywire.assemblies.shaft_rig import ShaftRig
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 
 STIMULI = {
     "theta_1_set": lambda t: 0.5 * (t > 0.01),

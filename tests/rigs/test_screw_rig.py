@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig_runs import FRICTIONLESS, SLOPE, drive, emf_inertia, rig
 
-from bywire.assemblies.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
 
 BOTH = {"rig.mode_1": "current", "rig.mode_2": "current"}
 

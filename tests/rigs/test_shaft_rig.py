@@ -9,7 +9,7 @@ import pytest
 from rig_runs import FRICTIONLESS, SLOPE, drive, emf_inertia, rig
 from scipy import signal
 
-from bywire.assemblies.shaft_rig import ShaftRig
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 
 DUMMY = {"rig.load": "dummy", "rig.clamp": "open", "rig.mode_1": "position"}
 CURRENT = {"rig.mode_1": "current", "encoder.law": "ideal"}

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.catalog.registry import parameters
+from bywire.core.catalog import parameters
 from bywire.simulation import window as part
 from bywire.simulation.ensemble import LaneKernel
 from bywire.simulation.repetition import Repeated, repeat
@@ -24,7 +24,7 @@ from bywire.simulation.run import Run
 
 def position(*frequencies: float) -> tuple[Run, Sweep]:
     """Return the position loop of the wedge brake, and what to measure in it."""
-    loop = find_loop("position")
+    loop = LOOPS.find("position")
     point = loop.point(parameters("roberts2003"), loop.at.default)
     whole = loop.whole(point.par)
     return point.run(), Sweep(loop.inputs, loop.output, frequencies, [0.25], whole=whole)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.assemblies.motorcycle_brake import MotorcycleBrake
 from bywire.bench.bench import Bench
 from bywire.bench.recording import energy_residual, record
 from bywire.bench.running import as_run
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.plant import battery_supply, caliper, dc_motor, master_cylinder, pipeline
 from bywire.simulation.run import simulate
 

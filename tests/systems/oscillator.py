@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, NamedTuple
 
-from bywire.core.model import Bounds, Matrix, Task
+from bywire.core.model import Bounds, Matrix, Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Force, Mass, Stiffness
 from bywire.core.signals import Signal
@@ -60,7 +60,7 @@ START = State(0.1, 3.0)
 
 
 @dataclass(frozen=True)
-class Oscillator:
+class Oscillator(Model):
     """The model, with or without friction."""
 
     rubs: bool = False

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core import ops
-from bywire.core.model import Bounds, Matrix, Task
+from bywire.core.model import Bounds, Matrix, Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
     Damping,
@@ -150,7 +150,7 @@ def _fast(x: State, m: Memory, u: Stimulus, par: Parameters) -> Memory:
     )
 
 
-class ThreeContacts:
+class ThreeContacts(Model):
     """The model."""
 
     name: ClassVar[str] = "three-contacts"

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core import ops
-from bywire.core.model import Bounds, Matrix, Task
+from bywire.core.model import Bounds, Matrix, Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
     Damping,
@@ -109,7 +109,7 @@ IDLE = Memory(0.0)
 
 
 @dataclass(frozen=True)
-class TwoMass:
+class TwoMass(Model):
     """The model; ``rare`` declares the wall as rarely touched, which must not change results."""
 
     rare: bool = False

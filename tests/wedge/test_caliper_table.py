@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from wedge_runs import FRICTIONLESS, IDEAL, TAN_ALPHA, brake, drive, residual
 
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_start import memory_at, state_at, travel_for
 from bywire.bench import bench_file
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.start import memory_at, state_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.simulation.run import Run, simulate
 

@@ -9,7 +9,7 @@ import pytest
 from wedge_runs import IDEAL, brake, drive, residual
 
 import bywire
-from bywire.control.moment_control import GAP, MOMENT, PARKED, RETRACTING
+from bywire.brakes.wedge.laws.moment_control import GAP, MOMENT, PARKED, RETRACTING
 
 NAMES = ("moment-pulses", "moment-ramp", "moment-pulse-950", "power-off-hold")
 

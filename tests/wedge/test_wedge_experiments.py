@@ -10,14 +10,14 @@ import pytest
 from wedge_runs import TAN_ALPHA
 
 import bywire
-from bywire.assemblies import wedge_control
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_control import Memory, Readings, Stimulus
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_plant import State
 from bywire.bench.recording import record
 from bywire.bench.running import as_run
-from bywire.bench.wedge_series import FRICTIONLESS
+from bywire.brakes.wedge import control as wedge_control
+from bywire.brakes.wedge.control import Memory, Readings, Stimulus
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.plant import State
+from bywire.brakes.wedge.series import FRICTIONLESS
 from bywire.simulation.run import simulate
 
 NAMES = ("moment-release", "position-step", "disc-stop")

@@ -8,7 +8,7 @@ import pytest
 from wedge_runs import TAN_ALPHA
 
 import bywire
-from bywire.bench.wedge_series import tag
+from bywire.brakes.wedge.series import tag
 from bywire.core.errors import UnknownNameError
 
 NAMES = ("friction-sweep", "static-force")

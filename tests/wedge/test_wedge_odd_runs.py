@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.wedge_watch import watch_wedge
+from bywire.brakes.wedge.watch import watch_wedge
 from bywire.core.errors import InputError
 
 

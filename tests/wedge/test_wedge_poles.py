@@ -9,9 +9,10 @@ import pytest
 from wedge_runs import FRICTIONLESS, TAN_ALPHA, brake, drive
 
 from bywire.analysis.linear.linearize import linearize
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_start import memory_at, state_at, travel_for
-from bywire.plant import brake_heart, roller_screw
+from bywire.brakes.wedge.elements import brake_heart
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.start import memory_at, state_at, travel_for
+from bywire.plant import roller_screw
 
 # A current loop of the usual gains acts on the shaft like 2.5 % more inertia.
 OPEN_LOOP = FRICTIONLESS | {

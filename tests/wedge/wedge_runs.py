@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.assemblies.wedge_brake import WedgeBrake
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.assemblies.wedge_plant import State
-from bywire.assemblies.wedge_start import memory_at, state_at
-from bywire.catalog.registry import parameters
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.plant import State
+from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.core.catalog import parameters
 from bywire.simulation.run import Run, Trajectory, simulate
 
 Array = NDArray[np.float64]

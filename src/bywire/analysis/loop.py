@@ -17,6 +17,7 @@ from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.registry import Kind, instances
 from bywire.simulation.run import Run
 
 Array = NDArray[np.float64]
@@ -181,3 +182,7 @@ class Loop:
             p.model, p.par, p.state, p.memory,
             cut=self.cut, stimulus=p.stimulus, locked=self.locked,
         )  # fmt: skip
+
+
+LOOPS = Kind("loop", ("loops",), instances(Loop))
+"""every control loop"""

@@ -11,6 +11,7 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.registry import Kind, instances
 
 Progress = Callable[[str, float], None]
 """called with a label and the finished share, 0 to 1"""
@@ -160,3 +161,7 @@ class Study:
 def variable(values: Any, dims: tuple[str, ...], unit: str, label: str) -> xr.Variable:
     """Return a variable with its unit and label."""
     return xr.Variable(dims, values, {"units": unit, "long_name": label})
+
+
+STUDIES = Kind("study", ("studies",), instances(Study))
+"""every sizing study"""

@@ -7,16 +7,14 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from bywire.bench.experiment import Case, Cases, Experiment
+from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment
 from bywire.bench.extent import check_seed, checked_interval, checked_step
-from bywire.bench.registry import find_experiment
 from bywire.bench.requirements import check
 from bywire.bench.running import as_run
-from bywire.bench.stimuli import registry as stimuli
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
 from bywire.bench.stimulus_file import with_nodes
 from bywire.bench.values import parsed
-from bywire.catalog.registry import entry
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.simulation.run import Run
@@ -76,7 +74,7 @@ class Bench:
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
-        chosen, found = find_experiment(self.experiment), entry(self.parameters)
+        chosen, found = EXPERIMENTS.find(self.experiment), PARAMETER_SETS.find(self.parameters)
         if chosen.assembly != found.assembly:
             raise ParameterError(
                 f"experiment {chosen.name!r} tests a {chosen.assembly}, but parameter set "
@@ -94,7 +92,7 @@ class Bench:
     def _check_names(self) -> None:
         """Refuse options that stand among the parameters, the likeliest mistake of all."""
         options = self.definition.defaults.flat().keys()
-        parameters = entry(self.parameters).values.keys()
+        parameters = PARAMETER_SETS.find(self.parameters).values.keys()
         for name in self.overrides:
             if name in options and name not in parameters:
                 raise unknown_name("parameter", name, [f"options.{name}"])
@@ -102,12 +100,12 @@ class Bench:
     @property
     def definition(self) -> Experiment:
         """The experiment behind the name."""
-        return find_experiment(self.experiment)
+        return EXPERIMENTS.find(self.experiment)
 
     @cached_property
     def par(self) -> ParameterSet:
         """Validated parameters, overrides applied."""
-        base = entry(self.parameters).parameters()
+        base = PARAMETER_SETS.find(self.parameters).parameters()
         return base.replace(parsed(type(base), self.overrides, "parameter"))
 
     @cached_property
@@ -127,9 +125,9 @@ class Bench:
         values = dict(self.stimulus)
         kind = values.pop("kind", None)
         if not isinstance(kind, str):
-            raise ParameterError(f"[stimulus] needs a kind: {', '.join(sorted(stimuli.entries()))}")
+            raise ParameterError(f"[stimulus] needs a kind: {', '.join(sorted(STIMULI.all()))}")
         unit = driven_unit(self.chosen_options)
-        return stimuli.create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
+        return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs that the experiment consists of, with settling times as they are run."""

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.registry import all_experiments, find_experiment
-from bywire.bench.stimuli import registry as stimuli
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.values import parsed, require_unit, require_units
-from bywire.catalog.registry import entry, main_set
+from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.data.toml_file import read_toml
 
@@ -115,9 +115,9 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def _of_experiment(file: Path) -> dict[str, Any]:
     """Return the shortest bench file of an experiment; nothing where there is a file instead."""
     name = str(file)
-    if not _NAME.fullmatch(name) or file.is_file() or name not in all_experiments():
+    if not _NAME.fullmatch(name) or file.is_file() or name not in EXPERIMENTS.all():
         return {}
-    assembly = find_experiment(name).assembly
+    assembly = EXPERIMENTS.find(name).assembly
     return {"experiment": name, "parameters": main_set(assembly)}
 
 
@@ -126,7 +126,7 @@ def _nearest(file: Path) -> str:
     with contextlib.suppress(OSError):
         there = [path.name for path in file.parent.glob("*.toml")]
         near = get_close_matches(file.name, there, n=1, cutoff=0.5)
-        near += get_close_matches(str(file), all_experiments(), n=1, cutoff=0.7)
+        near += get_close_matches(str(file), EXPERIMENTS.all(), n=1, cutoff=0.7)
         if near:
             return f"did you mean {file.with_name(near[0])}?"
     return "check the path, or name an experiment of 'bywire list'"
@@ -152,11 +152,11 @@ def _require_shape(content: Mapping[str, Any]) -> None:
 
 def _require_units(content: Mapping[str, Any]) -> None:
     """Refuse plain numbers where a unit is wanted: 37 is not 37 bar, and hardly 37 Pa."""
-    definition = find_experiment(content["experiment"])
+    definition = EXPERIMENTS.find(content["experiment"])
     options = flattened(content.get("options", {}))
     require_units(definition.options, options)
     overrides = flattened(content.get("set", {}))
-    require_units(type(entry(content["parameters"]).parameters()), overrides)
+    require_units(type(PARAMETER_SETS.find(content["parameters"]).parameters()), overrides)
     simulation, stimulus = content.get("simulation", {}), content.get("stimulus", {})
     for key in ("step", "record"):
         require_unit(simulation.get(key), "s", f"simulation.{key}")
@@ -165,7 +165,7 @@ def _require_units(content: Mapping[str, Any]) -> None:
     if definition.driven_unit is not None and isinstance(kind, str):
         values = parsed(definition.options, options, f"option of {definition.name}")
         unit = definition.driven_unit(definition.defaults.replace(values))
-        require_units(stimuli.entry(kind).parameter_class, stimulus, unit)
+        require_units(STIMULI.find(kind).parameter_class, stimulus, unit)
 
 
 def _simulation(section: Mapping[str, Any]) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.stimuli.registry import entry as stimulus_entry
+from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.parameters import ParameterSet, leaf_fields
 
 _PATHS = ("trace", "file")  # keys that name files: they must hold from any folder
@@ -38,7 +38,7 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     stimulus: dict[str, str] = {}
     if "kind" in bench.stimulus and definition.driven_unit is not None:
         level = definition.driven_unit(bench.chosen_options)
-        stimulus = _units(stimulus_entry(str(bench.stimulus["kind"])).parameter_class, level)
+        stimulus = _units(STIMULI.find(str(bench.stimulus["kind"])).parameter_class, level)
     simulation: dict[str, Any] = {"step": bench.step} if bench.step != Bench.step else {}
     simulation |= {} if bench.record is None else {"record": bench.record}
     simulation |= {"seed": bench.seed} if bench.seed else {}

@@ -16,6 +16,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.registry import Kind, instances
 from bywire.simulation.schedule import plan
 
 Recordings = Mapping[str, xr.Dataset]
@@ -160,3 +161,9 @@ class Experiment:
 def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]]:
     """Return a stimulus that holds constant levels [SI]."""
     return lambda t: {name: np.full(t.shape, value) for name, value in levels.items()}
+
+
+EXPERIMENTS = Kind(
+    "experiment", ("experiments",), instances(Experiment), "bywire.bench.experiments"
+)
+"""every experiment: the generic ones, and those of the brakes"""

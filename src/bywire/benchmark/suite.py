@@ -1,4 +1,4 @@
-"""The whole benchmark, in one run."""
+"""The whole benchmark, in one run: what the toolkit and every brake measure."""
 
 from __future__ import annotations
 
@@ -6,17 +6,31 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from bywire.assemblies.motorcycle_parameters import MotorcycleParameters
-from bywire.assemblies.wedge_parameters import WedgeParameters
-from bywire.benchmark import frequency, identification, measurement_files, wedge_brake
-from bywire.benchmark.engine import ensemble, single_and_sensitivities
-from bywire.benchmark.others import others
-from bywire.benchmark.processes import processes
 from bywire.benchmark.result import Result, machine
-from bywire.catalog.registry import parameters
 from bywire.core.errors import CompilerError
+from bywire.core.registry import Kind, instances
 from bywire.report.tables import Table, text_table
 from bywire.simulation.compiler import find_compiler
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of the benchmark.
+
+    Parameters
+    ----------
+    name
+        What the progress bar calls it.
+    measure
+        ``measure()``: its figures.
+    """
+
+    name: str
+    measure: Callable[[], list[Result]]
+
+
+PARTS = Kind("part of the benchmark", ("benchmarks",), instances(Part), "bywire.benchmark.parts")
+"""every part of the benchmark"""
 
 
 @dataclass(frozen=True)
@@ -37,25 +51,12 @@ def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
     """
     if find_compiler() is None:
         raise CompilerError("the benchmark compares compiled C: install a C compiler")
-    par, wedge = parameters("dardanelli2010"), parameters("roberts2003")
-    assert isinstance(par, MotorcycleParameters)
-    assert isinstance(wedge, WedgeParameters)
-    parts: dict[str, Callable[[], list[Result]]] = {
-        "single run": lambda: single_and_sensitivities(par),
-        "ensemble": lambda: ensemble(par),
-        "other simulators": lambda: others(par),
-        "wedge brake": lambda: wedge_brake.measured(wedge),
-        "frequency responses": lambda: frequency.measured(wedge),
-        "measurement files": measurement_files.measured,
-        "identification": lambda: identification.measured(par),
-        "start-up": processes,
-    }
     here = machine()
     results: list[Result] = []
-    for label, part in parts.items():
+    for label, part in PARTS.all().items():
         if progress is not None:
             progress(f"benchmark: {label}", 0.0)
-        results += part()
+        results += part.measure()
         if progress is not None:
             progress(f"benchmark: {label}", 1.0)
     return Benchmark(here, tuple(results))

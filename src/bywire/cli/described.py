@@ -5,18 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from bywire.analysis.linear.plant_registry import all_plants
-from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.study import Study
-from bywire.analysis.study_registry import all_studies
-from bywire.bench.experiment import Experiment
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import LOOPS
+from bywire.analysis.study import STUDIES, Study
+from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.kpis.registry import definitions
-from bywire.bench.registry import all_experiments
-from bywire.bench.stimuli.registry import Entry as Stimulus
-from bywire.bench.stimuli.registry import entries as stimuli
-from bywire.catalog.registry import Entry as Set
-from bywire.catalog.registry import entries as sets
-from bywire.catalog.registry import entry, main_set
+from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.cli.described_parameters import (
     described_group,
     described_kpi,
@@ -30,16 +24,17 @@ from bywire.cli.described_systems import (
     described_plant,
     described_system,
     signals,
-    systems,
 )
 from bywire.cli.option_rows import option_rows, option_table
+from bywire.core.catalog import PARAMETER_SETS, main_set
+from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import unknown_name
 from bywire.core.field_notes import field_notes
+from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
-from bywire.identification.fitting.asked import BenchMethod
-from bywire.identification.method import Method
-from bywire.identification.method_registry import all_methods, bench_methods
+from bywire.identification.fitting.asked import BENCH_METHODS, BenchMethod
+from bywire.identification.method import METHODS, Method
 
 Object = dict[str, Any]
 
@@ -57,15 +52,15 @@ def described(name: str) -> list[Object]:
         With the nearest known names.
     """
     kinds: Mapping[str, tuple[Mapping[str, Any], Callable[[Any], Object]]] = {
-        "assembly": (systems(), described_system),
-        "method": (all_methods(), _method),
-        "method of any bench": (bench_methods(), _bench_method),
-        "experiment": (all_experiments(), _experiment),
-        "study": (all_studies(), _study),
-        "parameter set": (sets(), _set),
-        "loop": (all_loops(), described_loop),
-        "plant": (all_plants(), described_plant),
-        "stimulus": (stimuli(), _stimulus),
+        "assembly": (ASSEMBLIES.all(), described_system),
+        "method": (METHODS.all(), _method),
+        "method of any bench": (BENCH_METHODS.all(), _bench_method),
+        "experiment": (EXPERIMENTS.all(), _experiment),
+        "study": (STUDIES.all(), _study),
+        "parameter set": (PARAMETER_SETS.all(), _set),
+        "loop": (LOOPS.all(), described_loop),
+        "plant": (PLANTS.all(), described_plant),
+        "stimulus": (STIMULI.all(), _stimulus),
         "KPI": (definitions(), lambda one: described_kpi(one.name, one.definition)),
         "parameter": ({n: n for n in parameters()}, described_parameter),
         "parameter group": ({n: n for n in groups()}, described_group),
@@ -140,7 +135,7 @@ def _estimates(one: Method) -> list[Object]:
     """Return the names that a method finds, parameters of the assembly first."""
     rows = []
     if one.assembly and one.unknowns:
-        cls = entry(main_set(one.assembly)).parameter_class
+        cls = PARAMETER_SETS.find(main_set(one.assembly)).parameter_class
         leaves, notes = leaf_fields(cls), field_notes(cls)
         rows += [{"name": n, "unit": display_unit(leaves[n].unit.symbol), "meaning": notes[n]}
                  for n in one.unknowns if n in leaves]  # fmt: skip
@@ -170,7 +165,7 @@ def _set(one: Set) -> Object:
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
 
 
-def _stimulus(one: Stimulus) -> Object:
+def _stimulus(one: StimulusKind) -> Object:
     return {"summary": one.summary, "parameters": option_rows(one.parameter_class, None)}
 
 

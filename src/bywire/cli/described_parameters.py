@@ -6,10 +6,9 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
-from bywire.bench.registry import all_experiments
-from bywire.catalog.registry import entries as sets
-from bywire.catalog.registry import entry, main_set
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.cli.option_rows import option_rows
+from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.field_notes import field_notes
 from bywire.core.quantities import display_unit
 
@@ -20,8 +19,8 @@ Object = dict[str, Any]
 def parameters() -> Mapping[str, str]:
     """Return the assembly of every parameter by dotted name; none is in two."""
     found = {}
-    for assembly in sorted({e.assembly for e in sets().values()}):
-        for name in field_notes(entry(main_set(assembly)).parameter_class):
+    for assembly in sorted({e.assembly for e in PARAMETER_SETS.all().values()}):
+        for name in field_notes(PARAMETER_SETS.find(main_set(assembly)).parameter_class):
             found[name] = assembly
     return found
 
@@ -34,7 +33,7 @@ def groups() -> Mapping[str, str]:
 def described_parameter(name: str) -> Object:
     """Return unit, range and meaning of a parameter, and its value in every set."""
     assembly, values = parameters()[name], []
-    for one in sets().values():
+    for one in PARAMETER_SETS.all().values():
         if one.assembly == assembly:
             rows = option_rows(one.parameter_class, one.parameters())
             (row,) = (row for row in rows if row["name"] == name)
@@ -48,7 +47,7 @@ def described_parameter(name: str) -> Object:
 def described_group(name: str) -> Object:
     """Return the parameters of a group, with the values of the assembly's main set."""
     assembly = groups()[name]
-    one = entry(main_set(assembly))
+    one = PARAMETER_SETS.find(main_set(assembly))
     rows = [row for row in option_rows(one.parameter_class, one.parameters())
             if row["name"].rpartition(".")[0] == name]  # fmt: skip
     return {"summary": f"parameters, with the values of {one.name}", "assembly": assembly,
@@ -57,6 +56,6 @@ def described_group(name: str) -> Object:
 
 def described_kpi(name: str, definition: str) -> Object:
     """Return a key figure's meaning, its unit, and the experiments that tell it."""
-    known = {e.name: e.kpis[name] for e in all_experiments().values() if name in e.kpis}
+    known = {e.name: e.kpis[name] for e in EXPERIMENTS.all().values() if name in e.kpis}
     units = sorted({display_unit(unit) for unit in known.values()})
     return {"summary": definition, "unit": " or ".join(units), "experiments": ", ".join(known)}

@@ -9,42 +9,25 @@ from typing import Any
 
 import numpy as np
 
-from bywire import assemblies
-from bywire.analysis.linear.plant import Plant
-from bywire.analysis.linear.plant_registry import all_plants
-from bywire.analysis.loop import Loop
-from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.study_registry import all_studies
-from bywire.bench.experiment import Case, Experiment
-from bywire.bench.registry import all_experiments
-from bywire.catalog.registry import entries as sets
-from bywire.catalog.registry import entry, main_set
-from bywire.core.discovery import modules_of
+from bywire.analysis.linear.plant import PLANTS, Plant
+from bywire.analysis.loop import LOOPS, Loop
+from bywire.analysis.study import STUDIES
+from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
+from bywire.core.catalog import PARAMETER_SETS, main_set
+from bywire.core.model import ASSEMBLIES
 from bywire.core.quantities import display_unit
 from bywire.core.signals import merged_signals, places_of, signals_of
-from bywire.identification.method_registry import all_methods
+from bywire.identification.method import METHODS
 from bywire.report.wording import unit_text
 
 Object = dict[str, Any]
 
 
 @cache
-def systems() -> Mapping[str, type[Any]]:
-    """Return the complete models among the assemblies, rigs included, by name."""
-    found = {}
-    for module in modules_of(assemblies):
-        for value in vars(module).values():
-            own = isinstance(value, type) and value.__module__ == module.__name__
-            if own and hasattr(value, "Memory") and hasattr(value, "balance"):
-                found[value.name] = value
-    return found
-
-
-@cache
 def signals() -> Mapping[str, Sequence[Object]]:
     """Return every signal of a system by name: in which systems, with unit, meaning and place."""
     found: dict[str, list[Object]] = {}
-    for system, model in systems().items():
+    for system, model in ASSEMBLIES.all().items():
         for name, signal, where in merged_signals(places_of(model).items()):
             found.setdefault(name, []).append({
                 "system": system, "unit": display_unit(signal.unit), "meaning": signal.label,
@@ -56,8 +39,9 @@ def signals() -> Mapping[str, Sequence[Object]]:
 def described_system(model: type[Any]) -> Object:
     """Return an assembly, or a rig, with its signals and what there is for it."""
     kinds: Mapping[str, Mapping[str, Any]] = {
-        "parameter sets": sets(), "experiments": all_experiments(), "loops": all_loops(),
-        "plants": all_plants(), "studies": all_studies(), "methods": all_methods(),
+        "parameter sets": PARAMETER_SETS.all(), "experiments": EXPERIMENTS.all(),
+        "loops": LOOPS.all(), "plants": PLANTS.all(), "studies": STUDIES.all(),
+        "methods": METHODS.all(),
     }  # fmt: skip
     rows = [
         {"signal": name, "unit": display_unit(signal.unit), "meaning": signal.label,
@@ -82,7 +66,7 @@ def described_drive(one: Experiment) -> Object:
         row = {"signal": "[stimulus]", "unit": display_unit(one.driven_unit(one.defaults)),
                "meaning": "what this section of the bench file gives", "system": one.assembly}
         return {"drives": [row], "see": _recorded([one.assembly])}  # fmt: skip
-    par = entry(main_set(one.assembly)).parameters()
+    par = PARAMETER_SETS.find(main_set(one.assembly)).parameters()
     rows: dict[tuple[str, str], Object] = {}
     for case in (one.preview or one.cases)(par, one.defaults, None):
         for name, unit, label in _driven(case):
@@ -106,7 +90,7 @@ def _driven(case: Case) -> list[tuple[str, str, str]]:
 
 def described_loop(loop: Loop) -> Object:
     """Return a loop with its inputs, output, states, and where it is cut and looked at."""
-    par = loop.smooth(entry(main_set(loop.assembly)).parameters())
+    par = loop.smooth(PARAMETER_SETS.find(main_set(loop.assembly)).parameters())
     model = loop.point(par, loop.at.default).model
     known = {name: (s.unit, s.label) for name, s, _ in merged_signals(places_of(model).items())}
     parts = {
@@ -125,8 +109,8 @@ def described_loop(loop: Loop) -> Object:
 
 def described_plant(plant: Plant) -> Object:
     """Return a plant with its inputs, outputs and states."""
-    model = plant.model(entry(main_set(plant.assembly)).parameters(), plant.usual)
-    own = places_of(systems()[plant.assembly]).items()
+    model = plant.model(PARAMETER_SETS.find(main_set(plant.assembly)).parameters(), plant.usual)
+    own = places_of(ASSEMBLIES.all()[plant.assembly]).items()
     meaning = {name: signal.label for name, signal, _ in merged_signals(own)}
     parts = (
         ("input", model.inputs, model.input_units), ("output", model.outputs, model.output_units),

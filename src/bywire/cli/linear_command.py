@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from bywire.analysis.linear.plant_registry import all_plants
-from bywire.analysis.loop_registry import all_loops
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import LOOPS
 from bywire.cli import linearize_command, plant_command, plant_locus
 from bywire.core.errors import ParameterError, unknown_name
 
@@ -25,7 +25,7 @@ def execute(
     as_json: bool,
 ) -> None:
     """Print the exact linear model of what has the name."""
-    if name in all_plants():
+    if name in PLANTS.all():
         if dither:
             raise ParameterError("--dither is for loops: leave it out, or name a loop")
         if locus:
@@ -39,12 +39,12 @@ def execute(
             name, parameters, at, changes, friction, speed, reduce, out, as_json
         )  # fmt: skip
         return
-    if name not in all_loops():
-        raise unknown_name("loop or plant", name, (*all_loops(), *all_plants()))
+    if name not in LOOPS.all():
+        raise unknown_name("loop or plant", name, (*LOOPS.all(), *PLANTS.all()))
     for option, given in (("--friction", friction), ("--speed", speed)):
         if given:
             raise ParameterError(
-                f"{option} is for plants ({', '.join(all_plants())}): controllers are linearized "
+                f"{option} is for plants ({', '.join(PLANTS.all())}): controllers are linearized "
                 "without dry friction; leave it out"
             )
     linearize_command.execute(name, parameters, at, changes, locus, reduce, dither, out, as_json)

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire.analysis.dither.averaged_map import PeriodicModel
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import Locus, locus
+from bywire.analysis.periodic.averaged_map import PeriodicModel
 from bywire.cli import output, periodic_choice, reduction_choice
 from bywire.cli.locus_object import locus_object
 from bywire.cli.loop_choice import Chosen, choose, over_range, subject

@@ -6,16 +6,16 @@ import json
 from collections.abc import Iterable
 from textwrap import wrap
 
-from bywire.analysis.linear.plant_registry import all_plants
-from bywire.analysis.loop_registry import all_loops
-from bywire.analysis.study_registry import all_studies
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import LOOPS
+from bywire.analysis.study import STUDIES
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
-from bywire.bench.registry import all_experiments
-from bywire.bench.stimuli.registry import entries as stimuli
-from bywire.catalog.registry import entries
+from bywire.bench.stimuli.registry import STIMULI
 from bywire.cli.output import result
-from bywire.identification.method import Method
-from bywire.identification.method_registry import all_methods, bench_methods
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.identification.fitting.asked import BENCH_METHODS
+from bywire.identification.method import METHODS, Method
 
 _WIDTH = 100  # characters of a line
 _NAME = 26  # columns of a name
@@ -26,17 +26,17 @@ def execute(name: str | None, as_json: bool) -> None:
     if name is not None:
         _print_one(name, as_json)
         return
-    experiments = all_experiments()
+    experiments = EXPERIMENTS.all()
     found = {
-        "assemblies": sorted({e.assembly for e in entries().values()}),
-        "parameter_sets": {e.name: e.summary for e in entries().values()},
+        "assemblies": sorted({e.assembly for e in PARAMETER_SETS.all().values()}),
+        "parameter_sets": {e.name: e.summary for e in PARAMETER_SETS.all().values()},
         "experiments": {e.name: f"{e.summary} ({e.assembly})" for e in experiments.values()},
-        "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in all_loops().values()},
-        "plants": {one.name: f"{one.summary} ({one.assembly})" for one in all_plants().values()},
-        "studies": {one.name: f"{one.summary} ({one.assembly})" for one in all_studies().values()},
-        "methods": {one.name: _method(one) for one in all_methods().values()}
-        | {one.name: f"{one.summary} (any, with --bench)" for one in bench_methods().values()},
-        "stimuli": {e.kind: e.summary for e in stimuli().values()},
+        "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in LOOPS.all().values()},
+        "plants": {one.name: f"{one.summary} ({one.assembly})" for one in PLANTS.all().values()},
+        "studies": {one.name: f"{one.summary} ({one.assembly})" for one in STUDIES.all().values()},
+        "methods": {one.name: _method(one) for one in METHODS.all().values()}
+        | {one.name: f"{one.summary} (any, with --bench)" for one in BENCH_METHODS.all().values()},
+        "stimuli": {e.name: e.summary for e in STIMULI.all().values()},
         "kpis": {m.name: m.definition for m in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments.values()},
     }

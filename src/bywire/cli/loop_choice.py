@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from bywire.analysis.loop import Loop, Quantity
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS, Loop, Quantity
 from bywire.bench.values import number
 from bywire.cli.parameter_choice import parameters_for
 from bywire.core.errors import ParameterError, unknown_name
@@ -50,7 +49,7 @@ def choose(name: str, parameters: str, at: str, changes: Mapping[str, str]) -> C
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    loop = find_loop(name)
+    loop = LOOPS.find(name)
     own, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
     return Chosen(loop, own, par, value)

@@ -69,16 +69,16 @@ def choose(name: str, wanted: Wanted) -> Chosen:
 
 def _method(name: str, wanted: Wanted) -> Method:
     """Return a method by its name; one for any bench is made for the bench that is given."""
-    from bywire.identification.method_registry import bench_methods, find_method
+    from bywire.identification.fitting.asked import BENCH_METHODS, find_method
 
-    found = bench_methods().get(name)
+    found = BENCH_METHODS.all().get(name)
     given = wanted.on_bench.given
     if found is None:
         method = find_method(name)
         if given:
             raise ParameterError(
-                f"{given[0]} is for methods of any bench ({', '.join(bench_methods())}): leave it "
-                f"out for {name}"
+                f"{given[0]} is for methods of any bench ({', '.join(BENCH_METHODS.all())}): leave "
+                f"it out for {name}"
             )
         return method
     if not wanted.measurements and wanted.on_bench.holdout is not None:

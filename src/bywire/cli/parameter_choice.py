@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from bywire.bench.values import parsed
-from bywire.catalog.registry import Entry, entry, main_set
+from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 
 
-def set_for(subject: str, assembly: str, name: str) -> Entry:
+def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     """Return a parameter set of a brake.
 
     Parameters
@@ -23,7 +23,7 @@ def set_for(subject: str, assembly: str, name: str) -> Entry:
     InputError
         For names that are unknown, and sets of another brake.
     """
-    found = entry(name or main_set(assembly))
+    found = PARAMETER_SETS.find(name or main_set(assembly))
     if found.assembly != assembly:
         raise ParameterError(
             f"{subject} is for a {assembly}, but parameter set {found.name!r} is for a "

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.dither.averaged_map import PeriodicModel, dithered_loop
 from bywire.analysis.linear.rates import rates
+from bywire.analysis.periodic.averaged_map import PeriodicModel, dithered_loop
 from bywire.cli.loop_choice import Chosen
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of

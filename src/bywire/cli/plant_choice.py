@@ -7,8 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, get_args
 
 from bywire.analysis.linear.linearize import Friction
-from bywire.analysis.linear.plant import Plant, PlantPoint
-from bywire.analysis.linear.plant_registry import find_plant
+from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.loop import Quantity
 from bywire.bench.values import number
 from bywire.cli.parameter_choice import parameters_for
@@ -52,7 +51,7 @@ def choose(
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    plant = find_plant(name)
+    plant = PLANTS.find(name)
     own, par = parameters_for(f"plant {plant.name!r}", plant.assembly, parameters, changes)
     quantity, value = _operating_point(plant, at)
     kind, omega = _friction(friction, speed)

@@ -112,9 +112,9 @@ def _figures(tracks: Sequence[Track], par: Any) -> dict[str, Any]:
 
     known = par.leaves()
     return {
-        f"track-{one.relation.name}": (
-            track_figure(one, known.get(one.relation.name)),
-            f"{one.relation.name} tracked from {', '.join(one.relation.signals)}: "
+        f"track-{one.relation.parameter}": (
+            track_figure(one, known.get(one.relation.parameter)),
+            f"{one.relation.parameter} tracked from {', '.join(one.relation.signals)}: "
             f"{one.relation.assumption}.",
         )
         for one in tracks
@@ -172,7 +172,7 @@ def _as_object(one: Replay, tracks: Sequence[Track], files: Sequence[Path]) -> d
                 }
                 for fit in one.fits
             ],
-            "tracked": {t.relation.name: _tracked(t) for t in tracks},
+            "tracked": {t.relation.parameter: _tracked(t) for t in tracks},
             "files": [str(path) for path in files],
         }
     )  # fmt: skip
@@ -211,5 +211,5 @@ def _text(one: Replay, tracks: Sequence[Track]) -> str:
                 f"to {amount(float(ends['high'][k]), unit)})"
                 for k in (0, -1)
             )
-            parts.append(f"{each.relation.name} tracked: at first {first}, at last {last}")
+            parts.append(f"{each.relation.parameter} tracked: at first {first}, at last {last}")
     return "\n\n".join(parts)

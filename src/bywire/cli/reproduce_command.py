@@ -14,11 +14,11 @@ from bywire.core.errors import FileError
 
 def execute(source: str, out: Path | None, as_json_object: bool) -> None:
     """Reproduce a source; a known disagreement is no error."""
-    from bywire.reproduction.registry import find_source
+    from bywire.reproduction.reproduction import SOURCES
     from bywire.reproduction.results import as_json, write
     from bywire.reproduction.terminal_text import terminal_text
 
-    chosen = find_source(source)
+    chosen = SOURCES.find(source)
     if out is not None:
         require_folder(out)
     with progress_bar() as progress:

@@ -15,7 +15,7 @@ from bywire.analysis.design.schedule_designer import (
 )
 from bywire.analysis.design.schedule_verification import verify_schedule
 from bywire.analysis.design.verification import Verification
-from bywire.analysis.loop_registry import find_loop
+from bywire.analysis.loop import LOOPS
 from bywire.cli import output
 from bywire.cli.design_ending import exit_status, reported, written
 from bywire.cli.design_inputs import Wanted, requirements_of, trial_of
@@ -36,7 +36,7 @@ def execute(
     as_json: bool,
 ) -> int:
     """Design a gain schedule and return the exit status: 1 where requirements are not met."""
-    own = find_loop(loop)
+    own = LOOPS.find(loop)
     schedule = scheduled(own)
     changes = {**changes, **schedule.changes}
     chosen = choose(loop, parameters, "", changes)

@@ -11,8 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.study import Found, Study
-from bywire.analysis.study_registry import find_study
+from bywire.analysis.study import STUDIES, Found, Study
 from bywire.bench.values import parsed
 from bywire.cli import output
 from bywire.cli.output_folder import require_folder
@@ -26,7 +25,7 @@ def execute(
     name: str, parameters: str, changes: Mapping[str, str], out: Path | None, as_json: bool
 ) -> None:
     """Compare designs of a brake, and show the best of them."""
-    study = find_study(name)
+    study = STUDIES.find(name)
     found_set = set_for(f"study {study.name!r}", study.assembly, parameters)
     par, options = _changed(study, found_set.parameters(), changes)
     if out is not None:

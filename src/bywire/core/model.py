@@ -17,9 +17,12 @@ differentiated for the Newton matrix. Use it for slowly varying geometry and per
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any, NamedTuple, Protocol
+
+from bywire.core.registry import Kind
 
 Bounds = tuple[float, float]
 Matrix = tuple[tuple[float, ...], ...]
@@ -159,3 +162,27 @@ class Model(Protocol):
     ) -> Any:
         """Return what is recorded at an instant; ``reaction`` is that of the last substep."""
         ...
+
+    def watch(self, recording: Any, par: Any) -> list[str]:
+        """Return what the user should know of a recording: validity left, stops met, none here.
+
+        Parameters
+        ----------
+        recording
+            An xarray.Dataset of at least one row; it may hold a selection of the signals.
+        par
+            The run's parameters.
+        """
+        return []
+
+
+def _declared(module: ModuleType) -> Iterator[type[Any]]:
+    """Yield the complete models that a module defines."""
+    for value in vars(module).values():
+        defined = isinstance(value, type) and value.__module__ == module.__name__
+        if defined and hasattr(value, "Memory") and hasattr(value, "balance"):
+            yield value
+
+
+ASSEMBLIES: Kind[Any] = Kind("assembly", ("model", "models", "rigs"), _declared)
+"""the complete models of every brake, rigs included: classes, by their ``name``"""

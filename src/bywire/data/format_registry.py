@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
 from pathlib import Path
 
-from bywire.core.discovery import declared, pick
 from bywire.core.errors import FileError, quoted
-from bywire.data import formats
+from bywire.core.registry import Kind, instances
 from bywire.data.file_format import FileFormat
 
 _HEAD = 1024
 
 
-@cache
-def all_formats() -> Mapping[str, FileFormat]:
-    """Return every format: the ``FORMAT`` of each module in ``formats``."""
-    return declared(formats, "FORMAT", FileFormat)
-
-
-def find_format(name: str) -> FileFormat:
-    """Return one format.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest known names.
-    """
-    return pick(all_formats(), name, "file format")
+FORMATS = Kind("file format", ("formats",), instances(FileFormat), "bywire.data.formats")
+"""every format of measurement files"""
 
 
 def format_to_read(path: Path, name: str = "") -> FileFormat:
@@ -48,11 +32,11 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     UnknownNameError
         When there is no such format.
     """
-    wanted = [find_format(name)] if name else _of_ending(path)
+    wanted = [FORMATS.find(name)] if name else _of_ending(path)
     head = _head(path)
     if not head:
         raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
-    holds = [one for one in all_formats().values() if one.recognizes(head)]
+    holds = [one for one in FORMATS.all().values() if one.recognizes(head)]
     for one in wanted or holds:
         if one in holds:
             return one
@@ -78,19 +62,19 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
         When there is no such format.
     """
     if name:
-        return find_format(name)
+        return FORMATS.find(name)
     for one in _of_ending(path):
         return one
-    endings = ", ".join(dict.fromkeys(e for one in all_formats().values() for e in one.endings))
+    endings = ", ".join(dict.fromkeys(e for one in FORMATS.all().values() for e in one.endings))
     raise FileError(f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}")
 
 
 def _of_ending(path: Path) -> list[FileFormat]:
-    return [one for one in all_formats().values() if path.suffix.lower() in one.endings]
+    return [one for one in FORMATS.all().values() if path.suffix.lower() in one.endings]
 
 
 def _names() -> str:
-    return ", ".join(all_formats())
+    return ", ".join(FORMATS.all())
 
 
 def _head(path: Path) -> bytes:

@@ -12,6 +12,7 @@ import xarray as xr
 from bywire.bench.bench import Bench
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.registry import Kind, instances
 from bywire.identification.estimate import Estimate
 
 Progress = Callable[[str, float], None]
@@ -204,3 +205,7 @@ class Method:
         for name in self.signals:
             if name not in data:
                 raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+
+
+METHODS = Kind("method", ("methods",), instances(Method), "bywire.identification.methods")
+"""every method that needs no bench"""

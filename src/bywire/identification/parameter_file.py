@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.bench.bench import Bench
-from bywire.bench.registry import all_experiments, find_experiment
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -78,8 +78,8 @@ def _accepted(
 
 def _alternatives(experiment: str) -> list[str]:
     """Return the other experiments of the same assembly that bring all they need."""
-    assembly = find_experiment(experiment).assembly
-    return [one.name for one in all_experiments().values()
+    assembly = EXPERIMENTS.find(experiment).assembly
+    return [one.name for one in EXPERIMENTS.all().values()
             if one.assembly == assembly and one.driven_unit is None]  # fmt: skip
 
 

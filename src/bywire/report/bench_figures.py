@@ -11,9 +11,8 @@ from matplotlib.figure import Figure
 
 from bywire.bench.energy_ledger import actuator_ledger, disc_ledger
 from bywire.bench.result import Result
-from bywire.bench.wedge_series import tag
 from bywire.core.errors import ParameterError
-from bywire.report.brake_factor import WedgeForces, brake_factor
+from bywire.core.registry import Kind, instances
 from bywire.report.energy_balance import ledger_bars
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.overlaid_traces import overlaid_traces
@@ -33,11 +32,27 @@ class Shown:
     caption: str
 
 
+@dataclass(frozen=True)
+class FigureKind:
+    """A kind of figure that experiments name.
+
+    Parameters
+    ----------
+    name
+        What experiments call it.
+    draw
+        ``draw(result)``: the figures that show a result.
+    """
+
+    name: str
+    draw: Callable[[Result], list[Shown]]
+
+
 def bench_figures(result: Result) -> list[Shown]:
     """Return the figures of a result, in the order in which its experiment names them."""
     shown: list[Shown] = []
     for kind in result.bench.definition.figures:
-        shown += _KINDS[kind](result)
+        shown += FIGURES.find(kind).draw(result)
     return shown
 
 
@@ -96,21 +111,6 @@ def _overlaid_traces(result: Result) -> list[Shown]:
     ]
 
 
-def _brake_factor(result: Result) -> list[Shown]:
-    """Return the figure of a static test of the wedge brake, from its key figures."""
-    kpis = {kpi.name: kpi.value for kpi in result.kpis}
-    tried = sorted(result.bench.chosen_options.flat()["mu_B"])
-    r_B = result.bench.par.flat()["caliper.r_B"]
-    moment = float(result.bench.chosen_options.flat()["M_hold"])
-    free, rising, falling = (
-        [kpis[f"{name}_{tag(mu_B)}"] * 2.0 * mu_B * r_B / moment for mu_B in tried]
-        for name in ("F_M", "F_M_rising", "F_M_falling")
-    )
-    figure = brake_factor(WedgeForces(tried, free, rising, falling), kpis["neutral_mu_closed"])
-    caption = "Actuation force over normal force, and brake factor, over the pads' friction."
-    return [Shown("brake-factor", figure, caption)]
-
-
 def _energy_balance(result: Result) -> list[Shown]:
     shown = []
     for label, recording in result.recordings.items():
@@ -145,13 +145,15 @@ def _tracking(result: Result) -> list[Shown]:
     return [Shown("tracking", figure, "Pressure and its set point from the pedal.")]
 
 
-_KINDS: dict[str, Callable[[Result], list[Shown]]] = {
-    "step-response": _step_response,
-    "time-traces": _time_traces,
-    "overlaid-traces": _overlaid_traces,
-    "brake-factor": _brake_factor,
-    "energy-balance": _energy_balance,
-    "hysteresis-loop": _hysteresis_loop,
-    "stribeck-curve": _stribeck_curve,
-    "tracking": _tracking,
-}
+GENERAL = (
+    FigureKind("step-response", _step_response),
+    FigureKind("time-traces", _time_traces),
+    FigureKind("overlaid-traces", _overlaid_traces),
+    FigureKind("energy-balance", _energy_balance),
+    FigureKind("hysteresis-loop", _hysteresis_loop),
+    FigureKind("stribeck-curve", _stribeck_curve),
+    FigureKind("tracking", _tracking),
+)
+
+FIGURES = Kind("figure", ("figures",), instances(FigureKind), "bywire.report.bench_figures")
+"""every kind of figure that experiments may name"""

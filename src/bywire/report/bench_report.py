@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 
 from bywire.bench.result import Result
-from bywire.catalog.registry import entry
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import FileError
 from bywire.data.netcdf import write_recording
 from bywire.report.bench_figures import Shown, bench_figures
@@ -54,7 +54,7 @@ def write_result(result: Result, folder: Path) -> list[Path]:
 
 def _page(result: Result, shown: list[Shown], path: Path) -> Path:
     bench = result.bench
-    cited = entry(bench.parameters)
+    cited = PARAMETER_SETS.find(bench.parameters)
     met = sum(v.met for v in result.verdicts)
     verdict = "none" if not result.verdicts else "good" if result.status == "passed" else "bad"
     text = f"{met} of {len(result.verdicts)} requirements met" if result.verdicts else "done"

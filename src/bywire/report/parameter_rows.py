@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bywire.catalog.provenance import Cited
 from bywire.core.field_notes import field_notes
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.provenance import Cited
 from bywire.report.tables import ParameterRow
 from bywire.report.wording import range_text
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from bywire.catalog.registry import entry
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import ParameterSet
 from bywire.report.page import Details, Paragraph, Section, TableBlock
 from bywire.report.parameter_rows import parameter_rows
@@ -46,7 +46,7 @@ def made(subject: Subject, *notes: str) -> Section:
     UnknownNameError
         When the parameter set is unknown.
     """
-    cited = entry(subject.parameters)
+    cited = PARAMETER_SETS.find(subject.parameters)
     rows = parameter_rows(subject.par, cited.values)
     return Section(
         "How it was made",

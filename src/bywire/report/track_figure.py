@@ -22,7 +22,7 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
         Value of the parameter set, drawn as a dashed line.
     """
     figure, (axes,) = style.new_figure(3.6)
-    data, name = track.data.isel(parameter=0), track.relation.name
+    data, name = track.data.isel(parameter=0), track.relation.parameter
     symbol = track.relation.units[0]
     factor = convert(1.0, symbol, display_unit(symbol))
     scale, unit = style.time_scale(data["time"].values)

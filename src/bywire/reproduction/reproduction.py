@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from bywire.bench.running import Progress
+from bywire.core.registry import Kind, instances
 from bywire.report.tables import Table
 from bywire.reproduction.item import Item
 from bywire.reproduction.root_cause import RootCause
@@ -116,3 +117,7 @@ class Source:
     name: str
     summary: str
     reproduce: Callable[[Progress | None], Reproduction]
+
+
+SOURCES = Kind("source", ("paper",), instances(Source))
+"""every source that can be reproduced"""

@@ -111,7 +111,7 @@ def test_moving_average_of_a_period_is_exact_on_ramps_and_blind_to_ripple():
 
 def test_every_figure_is_declared_for_listings():
     found = registry.definitions()
-    assert set(registry.families()) == {"effort", "hysteresis", "occupation", "step_response"}
+    assert set(registry.FAMILIES.all()) == {"effort", "hysteresis", "occupation", "step_response"}
     assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
     for figure in found.values():
         assert figure.definition.endswith(".")

@@ -19,7 +19,7 @@ def sampled(kind, values, t, unit="A"):
 
 
 def test_every_kind_is_found_and_described():
-    found = registry.entries()
+    found = registry.STIMULI.all()
     assert set(found) == {"chirp", "multisine", "ramp", "sine", "step", "table"}
     assert all(entry.summary for entry in found.values())
 

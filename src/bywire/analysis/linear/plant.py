@@ -9,6 +9,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.loop import Quantity
 from bywire.core.parameters import ParameterSet
+from bywire.core.registry import Kind, instances
 
 
 @dataclass(frozen=True)
@@ -65,3 +66,7 @@ class Plant:
     def usual(self) -> PlantPoint:
         """Where it is usually looked at."""
         return PlantPoint(self.at[0], self.at[0].default)
+
+
+PLANTS = Kind("plant", ("plants",), instances(Plant))
+"""every plant and simplified model of one"""

@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any
 
 import xarray as xr
 
-from bywire.bench import kpis
 from bywire.bench.kpis.kpi import Kpi, Measure
-from bywire.core.discovery import modules_of, pick
+from bywire.core.registry import Kind
 
 
 @dataclass(frozen=True)
@@ -41,42 +40,29 @@ class Family:
     measures: Mapping[str, Measure[Any]]
 
 
-@cache
-def families() -> Mapping[str, Family]:
-    """Return every family: the modules in this folder that declare figures."""
-    found: dict[str, Family] = {}
-    for loaded in modules_of(kpis):
-        name = loaded.__name__.rpartition(".")[2]
-        figures = {m.name: m for m in vars(loaded).values() if isinstance(m, Measure)}
-        if figures:
-            summary = (loaded.__doc__ or "").strip().splitlines()[0]
-            found[name] = Family(
-                name, summary, loaded.Setting, loaded.select, figures
-            )
-    return found
+def _declared(module: ModuleType) -> Iterator[Family]:
+    """Yield the family that a module is: every module that declares figures."""
+    figures = {m.name: m for m in vars(module).values() if isinstance(m, Measure)}
+    if figures:
+        summary = (module.__doc__ or "").strip().splitlines()[0]
+        name = module.__name__.rpartition(".")[2]
+        yield Family(name, summary, module.Setting, module.select, figures)
+
+
+FAMILIES = Kind("family of key figures", ("kpis",), _declared, "bywire.bench.kpis")
+"""every family of key figures"""
 
 
 @cache
 def definitions() -> Mapping[str, Measure[Any]]:
     """Return every key figure by name, for listings; names are unique over the families."""
     found: dict[str, Measure[Any]] = {}
-    for each in families().values():
+    for each in FAMILIES.all().values():
         twice = found.keys() & each.measures.keys()
         if twice:
             raise TypeError(f"key figures declared twice: {', '.join(sorted(twice))}")
         found |= each.measures
     return found
-
-
-def family(name: str) -> Family:
-    """Return one family.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest known names.
-    """
-    return pick(families(), name, "family of key figures")
 
 
 def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:
@@ -90,7 +76,7 @@ def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) ->
         SI unit of every placeholder that their figures declare, for instance
         ``{"level": "Pa"}``.
     """
-    figures = (figure for name in names for figure in family(name).measures.values())
+    figures = (figure for name in names for figure in FAMILIES.find(name).measures.values())
     return {figure.name: resolved.get(figure.unit, figure.unit) for figure in figures}
 
 
@@ -113,6 +99,6 @@ def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:
     ParameterError
         When a signal has more dimensions than time.
     """
-    chosen = family(name)
+    chosen = FAMILIES.find(name)
     data = chosen.select(recording, setting)
     return {figure.name: figure(data) for figure in chosen.measures.values()}

@@ -2,30 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from types import ModuleType
 from typing import Any, get_origin
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench import stimuli
 from bywire.bench.values import nodes, number
-from bywire.core.discovery import modules_of, pick
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.registry import Kind
 
 Value = str | float | Sequence[str | float]
 
 
 @dataclass(frozen=True)
-class Entry:
+class StimulusKind:
     """A kind of stimulus.
 
     Parameters
     ----------
-    kind
+    name
         What bench files and the command line call it: the name of its module.
     summary
         One line for listings.
@@ -35,7 +34,7 @@ class Entry:
         ``function(t, par)``: its samples [level] at the times [s].
     """
 
-    kind: str
+    name: str
     summary: str
     parameter_class: type[ParameterSet]
     function: Callable[[NDArray[np.float64], Any], NDArray[np.float64]]
@@ -58,30 +57,19 @@ class Stimulus:
 
     def sample(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return the samples at times [s], in the SI unit of the driven signal."""
-        return entry(self.kind).function(t, self.parameters)
+        return STIMULI.find(self.kind).function(t, self.parameters)
 
 
-@cache
-def entries() -> Mapping[str, Entry]:
-    """Return every kind of stimulus: the modules in this folder that offer ``sample``."""
-    found: dict[str, Entry] = {}
-    for loaded in modules_of(stimuli):
-        name = loaded.__name__.rpartition(".")[2]
-        if hasattr(loaded, "sample") and hasattr(loaded, "Parameters"):
-            summary = (loaded.__doc__ or "").strip().splitlines()[0]
-            found[name] = Entry(name, summary, loaded.Parameters, loaded.sample)
-    return found
+def _declared(module: ModuleType) -> Iterator[StimulusKind]:
+    """Yield the kind that a module is: every module that offers ``Parameters`` and ``sample``."""
+    if hasattr(module, "sample") and hasattr(module, "Parameters"):
+        summary = (module.__doc__ or "").strip().splitlines()[0]
+        name = module.__name__.rpartition(".")[2]
+        yield StimulusKind(name, summary, module.Parameters, module.sample)
 
 
-def entry(kind: str) -> Entry:
-    """Return one kind of stimulus.
-
-    Raises
-    ------
-    UnknownNameError
-        With the nearest known names.
-    """
-    return pick(entries(), kind, "stimulus")
+STIMULI = Kind("stimulus", ("stimuli",), _declared, "bywire.bench.stimuli")
+"""every kind of stimulus"""
 
 
 def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
@@ -112,7 +100,7 @@ def create(kind: str, values: Mapping[str, Value], level_unit: str) -> Stimulus:
     >>> step.sample(np.array([0.0, 0.1]))
     array([0.  , 0.35])
     """
-    cls = entry(kind).parameter_class
+    cls = STIMULI.find(kind).parameter_class
     leaves = leaf_fields(cls)
     numbers: dict[str, Any] = dict(values)
     for name in [name for name in values if name in leaves]:

@@ -8,8 +8,10 @@ from dataclasses import dataclass, field, replace
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
-from bywire.identification.method import Method
+from bywire.core.registry import Kind, instances
+from bywire.identification.method import METHODS, Method
 
 
 @dataclass(frozen=True)
@@ -71,3 +73,22 @@ class BenchMethod:
     defaults: ParameterSet
     simulated: tuple[str, ...]
     on: Callable[[Bench, Asked], Method]
+
+
+BENCH_METHODS = Kind(
+    "method", ("methods",), instances(BenchMethod), "bywire.identification.methods"
+)
+"""the methods that are made for a bench"""
+
+
+def find_method(name: str) -> Method:
+    """Return one method that needs no bench.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names, those of methods for a bench among them.
+    """
+    if name not in METHODS.all():
+        raise unknown_name("method", name, (*METHODS.all(), *BENCH_METHODS.all()))
+    return METHODS.all()[name]

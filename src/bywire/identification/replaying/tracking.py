@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from bywire.identification.output_error import even_interval
 from bywire.identification.replaying.recursive import Tracked, kalman, likeliest
-from bywire.identification.replaying.track_relations import Relation, Rows, find_relation
+from bywire.identification.replaying.relation import Relation, Rows, find_relation
 
 Array = NDArray[np.float64]
 

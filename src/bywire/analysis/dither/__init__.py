@@ -1,1 +1,0 @@
-"""Dither: the orbit it makes, what it does to the plant, and its choice."""

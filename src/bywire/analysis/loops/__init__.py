@@ -1,1 +1,0 @@
-"""Control loops of the brakes, one file each."""

@@ -1,0 +1,1 @@
+"""Periodic orbits of a shaken brake, and the map averaged over them."""

@@ -1,0 +1,240 @@
+"""Exact linear models about a periodic operating point: friction and dither left on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.loop import Loop, Point
+from bywire.analysis.periodic.periodic_orbit import (
+    PeriodicOrbit,
+    find_orbit,
+    magnitudes,
+    period_of,
+    restored,
+)
+from bywire.core.errors import SolverError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
+from bywire.simulation.run import Run
+from bywire.simulation.stroboscope import Derivatives, Stroboscope
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+STEPS = (10e-6, 5e-6, 2.5e-6)
+"""substeps [s], the next one where a motion does not repeat itself with the one before: the longer
+they are, the more they disturb a piston that rests and breaks away by a hair; at the first one
+the gain of the dithered pressure loop is within 2 % of what short steps give"""
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicModel:
+    r"""Deviations from a periodic orbit, over one period and tick by tick within it.
+
+    .. math:: z_{k+1} = A z_k + \sum_j B_j u_{k,j}, \quad
+        y_{k,r} = C_r z_k + \sum_j D_{r,j} u_{k,j}
+
+    with the state z at the beginning of period k, the input u at its ticks j, and the output y
+    at its instants r: the lifted form of a periodic system. The derivatives are those of what is
+    simulated, every decision between stick and slip included; they hold for deviations that
+    change none of the decisions but their instants.
+
+    Parameters
+    ----------
+    run
+        One period of the system: its duration.
+    inputs, output
+        Signals.
+    orbit
+        The operating point.
+    derivatives
+        A, B, C, D over the period.
+    """
+
+    run: Run
+    inputs: tuple[str, ...]
+    output: str
+    orbit: PeriodicOrbit
+    derivatives: Derivatives
+
+    @property
+    def mean(self) -> float:
+        """Mean of the output over a period, SI."""
+        return float(self.orbit.rows[:, 0].mean())
+
+    @property
+    def ripple(self) -> float:
+        """Output from peak to peak over a period, SI."""
+        return float(np.ptp(self.orbit.rows[:, 0]))
+
+    @cached_property
+    def averaged(self) -> LinearModel:
+        """The model from an input held over a period to the output's mean over that period."""
+        d = self.derivatives
+        return self._model("averaged", d.C[:, 0].mean(axis=0), d.D[:, 0].sum(axis=1).mean())
+
+    @cached_property
+    def sampled(self) -> LinearModel:
+        """The model from an input held over a period to the output at the period's beginning."""
+        d = self.derivatives
+        return self._model("sampled", d.C[0, 0], d.D[0, 0].sum())
+
+    def _model(self, kind: str, C: Array, D: float) -> LinearModel:
+        model = self.run.model
+        states, held = signals_of(model.State), signals_of(model.Memory)
+        units = [signal.unit for signal in states.values()]
+        return LinearModel(
+            f"{model.name}, {kind} over {self.run.duration * 1e3:g} ms",
+            self.derivatives.A, self.derivatives.B.sum(axis=1, keepdims=True),
+            C[None, :], np.array([[D]]),
+            (*states, *(f"d({name})" for name in states), *(f"{name}[k]" for name in held)),
+            self.inputs[:1], (self.output,),
+            (*units, *units, *(signal.unit for signal in held.values())),
+            (signals_of(model.Stimulus)[self.inputs[0]].unit,),
+            (signals_of(model.Output)[self.output].unit,),
+            np.zeros(len(self.derivatives.A)), self.run.duration,
+        )  # fmt: skip
+
+    @property
+    def steady_gain(self) -> float:
+        """Change of the output's mean over that of a constant input, SI."""
+        d = self.derivatives
+        moved = restored(d.A, d.B.sum(axis=1), magnitudes(self.run))
+        return float(d.C[:, 0].mean(axis=0) @ moved + d.D[:, 0].sum(axis=1).mean())
+
+    def response(self, frequencies: Array) -> Complex:
+        r"""Return the answer at the frequency of a sine in the input, ticks and all.
+
+        A periodic system answers at f + k/T as well; what is returned is the line at f,
+
+        .. math:: Y = \frac{1}{n_r} \sum_r (C_r Z + D_r U) e^{-j \omega t_r}, \quad
+            (e^{j \omega T} I - A) Z = B U, \quad U_j = e^{j \omega t_j}
+
+        which is what `frequency_response` measures at small amplitude.
+
+        Parameters
+        ----------
+        frequencies
+            Frequencies [Hz], not 0, shape (m,); below the Nyquist frequency of the ticks.
+
+        Returns
+        -------
+        numpy.ndarray
+            Output over input, SI, shape (m,).
+        """
+        d, T = self.derivatives, self.run.duration
+        rows, ticks = d.D.shape[0], d.D.shape[2]
+        found = []
+        for f in np.asarray(frequencies, dtype=float):
+            U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
+            Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
+            wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
+            found.append(wave @ (d.C[:, 0] @ Z + d.D[:, 0] @ U) / rows)
+        return np.array(found, dtype=np.complex128)
+
+
+def periodic_model(
+    point: Point,
+    inputs: Sequence[str],
+    output: str,
+    whole: Sequence[float],
+    step: float | None = None,
+) -> PeriodicModel:
+    """Return the linear model about the orbit that a system settles to.
+
+    Parameters
+    ----------
+    point
+        Where it starts; stays within what the orbit attracts.
+    inputs
+        Signals of the stimulus that move together.
+    output
+        Signal that answers; its mean is taken over samples at the fastest controller's ticks.
+    whole
+        Frequencies [Hz] of what is periodic, such as a dither. None: the orbit is a rest, the
+        period the common sample time.
+    step
+        Substep [s]; one of `STEPS` unless given.
+
+    Raises
+    ------
+    SolverError
+        When no motion repeats itself.
+    ParameterError
+        When a period is no whole number of substeps, or a controller rounds what it samples.
+    CompilerError
+        When there is no compiler.
+    """
+    *trials, last = STEPS if step is None else (step,)
+    for one in trials:
+        with suppress(SolverError):
+            return _about(point, inputs, output, whole, one)
+    return _about(point, inputs, output, whole, last)
+
+
+def _about(
+    point: Point, inputs: Sequence[str], output: str, whole: Sequence[float], step: float
+) -> PeriodicModel:
+    intervals = [task.period for task in point.model.tasks(point.par)]
+    duration = period_of(whole, intervals, step)
+    run = replace(point.run(step), duration=duration, record=min(intervals))
+    stroboscope = Stroboscope(run, inputs, (output,))
+    orbit = find_orbit(stroboscope, run)
+    derivatives = stroboscope.derivatives(orbit.start)
+    return PeriodicModel(run, tuple(inputs), output, orbit, derivatives)
+
+
+def dithered_loop(
+    loop: Loop, par: ParameterSet, value: float, step: float | None = None
+) -> PeriodicModel:
+    """Return a closed loop's linear model with friction and dither, about its periodic orbit.
+
+    Parameters
+    ----------
+    loop, par, value
+        The loop and its operating point. Converters and encoders count as ideal: what is rounded
+        has no derivative.
+    step
+        As in `periodic_model`.
+
+    Raises
+    ------
+    InputError, SolverError, CompilerError
+        As `periodic_model`, and when the operating point does not exist or all of it sticks.
+    """
+    own = unrounded(loop, par)
+    found = periodic_model(
+        loop.point(own, value), loop.inputs, loop.output, loop.whole(own), step
+    )
+    require_moving(found)
+    return found
+
+
+def require_moving(model: PeriodicModel) -> None:
+    """Refuse a motion that is none: what sticks throughout has no gain.
+
+    Raises
+    ------
+    SolverError
+        When all dry frictions stick during the whole period.
+    """
+    if model.orbit.stuck == 1.0:
+        raise SolverError(
+            f"{model.run.model.name}: it sticks during the whole period, and answers to nothing "
+            "small: raise the dither's gain (ecu.dither.gain)"
+        )
+
+
+def unrounded(loop: Loop, par: ParameterSet) -> ParameterSet:
+    """Return parameters whose converters and encoders have no resolution."""
+    changes = {
+        name: law for off in loop.causes.values() for name, law in off.items() if law == "ideal"
+    }
+    return par.replace(changes)

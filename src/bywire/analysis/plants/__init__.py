@@ -1,1 +1,0 @@
-"""Plants of the brakes and their simplified models, one file each."""

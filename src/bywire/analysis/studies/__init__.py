@@ -1,1 +1,0 @@
-"""Sizing studies of the brakes, one file each."""

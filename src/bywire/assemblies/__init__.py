@@ -1,1 +1,0 @@
-"""Complete brakes, rigs and ECUs: wiring of elements, nothing else."""

@@ -1,0 +1,57 @@
+"""Seconds of pieces of work, measured in turn, and of one call of a compiled kernel."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from statistics import median
+
+import numpy as np
+
+from bywire.simulation.engine import prepare
+from bywire.simulation.run import Run, initial_vector, request_for
+
+Work = Callable[[], float]
+
+
+def interleaved(works: dict[str, Work], rounds: int) -> dict[str, list[float]]:
+    """Run pieces of work in turn and return their seconds; each returns its own."""
+    for work in works.values():
+        work()  # warm
+    seconds: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(rounds):
+        for name, work in works.items():
+            seconds[name].append(work())
+    return seconds
+
+
+def ratio(seconds: dict[str, list[float]], over: str, under: str) -> float:
+    """Return the median of the ratios of neighbors: the machine's drift cancels."""
+    return median(a / b for a, b in zip(seconds[over], seconds[under], strict=True))
+
+
+def timed(work: Callable[[], object]) -> Work:
+    """Return work that tells its seconds."""
+
+    def measured() -> float:
+        begin = time.perf_counter()
+        work()
+        return time.perf_counter() - begin
+
+    return measured
+
+
+def kernel(run: Run) -> Work:
+    """Return one call of the compiled kernel with everything prepared, as its opponent has it."""
+    engine = prepare(run.model, run.par).engine("compiled")
+    request = request_for(run)
+    rows = np.empty((request.schedule.rows, request.selection.size))
+    start = initial_vector(engine.layout, run.state, run.memory)
+
+    def work() -> float:
+        vector = start.copy()
+        begin = time.perf_counter()
+        engine.advance(request, vector, 0, request.schedule.frames, rows)
+        return time.perf_counter() - begin
+
+    return work

@@ -1,0 +1,1 @@
+"""Speed: the same problem by hand and by other simulators."""

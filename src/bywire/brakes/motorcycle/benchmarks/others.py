@@ -1,0 +1,78 @@
+"""The same braking in the simulators that users would pick instead."""
+
+from __future__ import annotations
+
+import importlib
+from dataclasses import dataclass
+from functools import partial
+from statistics import median
+from types import ModuleType
+from typing import cast
+
+from bywire.benchmark.result import Result, at_least
+from bywire.benchmark.suite import Part
+from bywire.benchmark.timing import timed
+from bywire.brakes.motorcycle.benchmarks.problem import (
+    Solution,
+    braking_run,
+    error,
+    hard_braking,
+    reference,
+)
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.catalog import parameters
+from bywire.core.extras import how_to_install
+from bywire.simulation.run import simulate
+
+
+@dataclass(frozen=True)
+class Peer:
+    """A peer, how much faster bywire shall be, and how long a braking it computes [s]."""
+
+    name: str
+    goal: float
+    duration: float = 1.2
+
+
+PEERS = (
+    Peer("cvodes", 30.0),
+    Peer("lsoda", 200.0),
+    Peer("diffrax", 50.0),
+    Peer("pathsim", 1000.0, 0.3),
+)
+
+
+def others(par: MotorcycleParameters) -> list[Result]:
+    """Measure how much faster bywire is than each peer, at no worse an error."""
+    exact = reference(par, hard_braking)
+    return [_compare(par, peer, exact) for peer in PEERS]
+
+
+def _compare(par: MotorcycleParameters, peer: Peer, exact: Solution) -> Result:
+    module: ModuleType = importlib.import_module(f"bywire.brakes.motorcycle.benchmarks.{peer.name}")
+    if not module.available():
+        note = f"not installed: {how_to_install('benchmark')}"
+        return Result(f"peer.{peer.name}", None, "times faster", f">= {peer.goal:g}", None, note)
+    run = braking_run(par, hard_braking, peer.duration)
+    own = simulate(run, ("p_mc",))
+    before = _plain(run)
+    solution = module.solve(par, hard_braking, peer.duration)
+    seconds = median((*before, *_plain(run)))
+    own_error = error(Solution(own.time, own["p_mc"], 0.0), exact)
+    peer_error = error(solution, exact)
+    note = f"errors: bywire {own_error:.4f} bar, {peer.name} {peer_error:.4f} bar"
+    if peer_error < own_error:
+        note += "; the peer is the more exact here"
+    return at_least(
+        f"peer.{peer.name}", solution.seconds / seconds, peer.goal, "times faster", note
+    )
+
+
+def _plain(run: object) -> tuple[float, ...]:
+    work = timed(partial(simulate, run, ("p_mc",)))  # type: ignore[arg-type]
+    return tuple(work() for _ in range(15))
+
+
+PART = Part(
+    "other simulators", lambda: others(cast(MotorcycleParameters, parameters("dardanelli2010")))
+)

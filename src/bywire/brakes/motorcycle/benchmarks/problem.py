@@ -1,0 +1,149 @@
+"""The one problem that all peers solve: hard braking of the motorcycle brake from rest.
+
+Plant and sensors in continuous time, the ECU's duty cycle held between its ticks. The peers
+integrate smooth differential equations only, so that the dry friction is regularized for them,
+and the stops become one-sided springs; all else is the model's own equations. The limit of the
+chamber pressure at zero is left out: hard braking never meets it. The states are divided by their
+nominal magnitudes, so that one absolute tolerance serves all of them.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.brakes.motorcycle import ecu as motorcycle_ecu
+from bywire.brakes.motorcycle.ecu import Memory, Readings, Stimulus
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.plant import State
+from bywire.core import ops
+from bywire.core.signals import signals_of, zeros
+from bywire.plant import current_sensor, pressure_sensor
+from bywire.simulation.run import Run, simulate
+
+Array = NDArray[np.float64]
+Demand = Callable[[Array], Array]
+Advance = Callable[[Array, float], Array]
+
+DURATION = 1.2
+SCALE = np.array([signal.nominal for signal in signals_of(State).values()])
+
+
+class Solution(NamedTuple):
+    """What a peer computed.
+
+    Parameters
+    ----------
+    time, p_mc
+        Ticks of the ECU [s] and master-cylinder pressure there [Pa], shape (rows,).
+    seconds
+        Time spent in the integrator alone: without compilation, and without the ECU where it
+        runs in Python, which favors the peer.
+    """
+
+    time: Array
+    p_mc: Array
+    seconds: float
+
+
+def hard_braking(t: Array) -> Array:
+    """Return the stimulus: from 6 to 37 bar after 0.2 s; rows of Stimulus at the times ``t``."""
+    rows = np.zeros((t.size, len(Stimulus._fields)))
+    rows[:, Stimulus._fields.index("p_set")] = np.where(t >= 0.2 - 1e-9, 37e5, 6e5)
+    return rows
+
+
+def rest(par: MotorcycleParameters) -> State:
+    """Return the retracted piston at rest without pressure."""
+    return zeros(State)._replace(
+        theta=par.master_cylinder.x_rest / par.gear.k_g,
+        y_p=pressure_sensor.reading(par.fluid.p_atm, par.pressure_sensor),
+        y_i=current_sensor.reading(0.0, par.current_sensor),
+    )
+
+
+def braking_run(
+    par: MotorcycleParameters, stimulus: Demand, duration: float = DURATION, step: float = 20e-6
+) -> Run:
+    """Return the problem as a run of bywire."""
+    model = MotorcycleBrake()
+    return Run(model, par, rest(par), zeros(Memory), stimulus, duration, step, par.ecu.T_s)
+
+
+def reference(par: MotorcycleParameters, stimulus: Demand, duration: float = DURATION) -> Solution:
+    """Return bywire's own solution with steps of 2.5 us, which errors are taken against."""
+    done = simulate(braking_run(par, stimulus, duration, 2.5e-6), ("p_mc",))
+    return Solution(done.time, done["p_mc"], 0.0)
+
+
+def error(solution: Solution, exact: Solution) -> float:
+    """Return the largest difference of the pressures at the solution's ticks [bar]."""
+    return float(np.abs(solution.p_mc - exact.p_mc[: solution.p_mc.size]).max()) / 1e5
+
+
+def rates(z: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
+    """Return dz/dt of the regularized plant, for floats, symbols or traced arrays.
+
+    Parameters
+    ----------
+    z
+        Scaled state, x = SCALE * z.
+    duty
+        Duty cycle.
+    par
+        Parameters.
+    width
+        Speed over which the friction changes its sign, as tanh(omega / width) [rad/s].
+    """
+    model = MotorcycleBrake()
+    x = State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
+    memory = zeros(Memory)._replace(duty=duty)
+    contact = tuple(
+        ops.fmax(gap / compliance, 0.0)
+        for (gap,), ((compliance,),) in zip(
+            model.gap(x, x, par), model.compliance(par), strict=True
+        )
+    )
+    smooth = model.balance(x, x, memory, par, contact)
+    ((low, high),) = model.bounds(x, x, memory, par, contact)
+    grip = ops.where(x.omega > 0, low, -high) * tanh(x.omega / width)
+    driven = smooth._replace(omega=smooth.omega + grip)
+    mass = model.mass(x, par)
+    return tuple(f / (m * float(s)) for f, m, s in zip(driven, mass, SCALE, strict=True))
+
+
+def tanh(z: Any) -> Any:
+    """Return the hyperbolic tangent, in a form that cannot overflow."""
+    decay = ops.exp(-2.0 * ops.fabs(z))
+    return ops.where(z > 0, 1.0, -1.0) * (1.0 - decay) / (1.0 + decay)
+
+
+def march(
+    advance: Advance, par: MotorcycleParameters, stimulus: Demand, duration: float
+) -> Solution:
+    """Run the ECU tick by tick in Python around a peer's integrator, which alone is timed.
+
+    Parameters
+    ----------
+    advance
+        ``advance(z, duty) -> z``: integrates the scaled state over one sample time.
+    """
+    ticks = round(duration / par.ecu.T_s)
+    times = np.arange(ticks + 1, dtype=np.float64) * par.ecu.T_s
+    demand = stimulus(times)
+    z, m = np.array(rest(par)) / SCALE, zeros(Memory)
+    p_mc, seconds = np.empty(ticks + 1), 0.0
+    for k, row in enumerate(demand.tolist()):
+        state = State(*(SCALE * z).tolist())
+        p_mc[k] = state.p_mc
+        m = motorcycle_ecu.tick(Readings(state.y_p, state.y_i), m, Stimulus(*row), par)
+        if k < ticks:
+            begin = time.perf_counter()
+            z = advance(z, m.duty)
+            seconds += time.perf_counter() - begin
+    return Solution(times, p_mc, seconds)

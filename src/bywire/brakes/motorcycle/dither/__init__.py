@@ -1,0 +1,1 @@
+"""Dither: what it must do, what it costs, and the choice."""

@@ -1,0 +1,155 @@
+"""Signal chain of the motorcycle's ECU: sensors and controllers at one sampling instant."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.control import current_pi, dither, low_pass_2, pedal_map, pressure_pid
+from bywire.core import ops
+from bywire.core.signals import Signal
+from bywire.plant import adc, current_sensor, h_bridge, pedal, pressure_sensor
+
+
+class Stimulus(NamedTuple):
+    """External inputs; which of them act depends on ``drive.mode``."""
+
+    p_set: Annotated[float, Signal("Pa", "pressure demand", 2e6)]
+    pedal_force: Annotated[float, Signal("N", "foot force", 100.0)]
+    i_set: Annotated[float, Signal("A", "current demand", 5.0)]
+    v_set: Annotated[float, Signal("V", "voltage demand", 5.0)]
+    noise_p: Annotated[float, Signal("1", "noise of the pressure channel")]
+    noise_i: Annotated[float, Signal("1", "noise of the current channel")]
+
+
+class Memory(NamedTuple):
+    """What ECU and sources hold between sampling instants."""
+
+    p_meas: Annotated[float, Signal("Pa", "measured pressure", 2e6)]
+    i_meas: Annotated[float, Signal("A", "measured current", 5.0)]
+    V_pedal: Annotated[float, Signal("V", "potentiometer voltage", 2.5)]
+    p_ref: Annotated[float, Signal("Pa", "pressure set point", 2e6)]
+    i_star: Annotated[float, Signal("A", "current demand", 5.0)]
+    i_dit: Annotated[float, Signal("A", "dither current", 1.0)]
+    i_ref: Annotated[float, Signal("A", "current set point", 5.0)]
+    duty: Annotated[float, Signal("1", "duty cycle", 0.3)]
+    v_source: Annotated[float, Signal("V", "source voltage", 5.0)]
+    i_source: Annotated[float, Signal("A", "source current", 5.0)]
+    sat_current: Annotated[float, Signal("1", "current demand saturated")]
+    sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
+    pid_integral: Annotated[float, Signal("A", "integral part of the pressure PID", 5.0)]
+    pid_slope: Annotated[float, Signal("A", "derivative part of the pressure PID", 1.0)]
+    pid_last: Annotated[float, Signal("Pa", "last differentiated signal", 2e6)]
+    pi_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
+    lp_s1: Annotated[float, Signal("A", "low-pass state 1", 1.0)]
+    lp_s2: Annotated[float, Signal("A", "low-pass state 2", 5.0)]
+    dit_phase: Annotated[float, Signal("1", "dither phase", 0.5)]
+
+
+class Readings(NamedTuple):
+    """Filtered sensor readings at the converter's inputs, shares of the spans."""
+
+    p: Annotated[float, Signal("1", "pressure reading", 0.5)]
+    i: Annotated[float, Signal("1", "current reading", 0.5)]
+
+
+def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
+    """Run the ECU once: convert, close the pressure loop if asked to, close the current loop."""
+    p_share = adc.sample(readings.p, u.noise_p, par.adc)
+    i_share = adc.sample(readings.i, u.noise_i, par.adc)
+    p_before = m.p_meas
+    m = m._replace(**_values(p_share, i_share, par))
+    if par.drive.mode == "current-direct":
+        m = m._replace(i_star=u.i_set, i_dit=0.0, i_ref=u.i_set)
+    else:
+        m = _shaped(_demand(m, p_before, u, par), par)
+    limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
+    pi, out = current_pi.output(
+        current_pi.State(m.pi_integral),
+        current_pi.Input(i_ref=m.i_ref, i_meas=m.i_meas, D_lim=limit),
+        par.ecu.T_s,
+        par.ecu.current,
+    )
+    saturated = ops.where(ops.fabs(out.duty) >= limit, 1.0, 0.0)
+    return m._replace(duty=out.duty, sat_duty=saturated, pi_integral=pi.integral)
+
+
+def source_tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) -> Memory:
+    """Hold the value of an ideal source, and what the converters see meanwhile.
+
+    Nothing reads that but the recording, and ``shown`` rounds it: a rounding within a tick would
+    look like a loop through which derivatives are lost.
+    """
+    p_share = adc.noisy(readings.p, u.noise_p, par.adc)
+    i_share = adc.noisy(readings.i, u.noise_i, par.adc)
+    m = m._replace(**_values(p_share, i_share, par))
+    if par.drive.mode == "voltage-source":
+        return m._replace(v_source=u.v_set)
+    return m._replace(i_source=u.i_set, i_ref=u.i_set)
+
+
+def shown(m: Memory, par: MotorcycleParameters) -> dict[str, float]:
+    """Return the measurements as the converters give them, in all modes."""
+    if par.drive.mode not in ("voltage-source", "current-source") or par.adc.law == "ideal":
+        return {"p_meas": m.p_meas, "i_meas": m.i_meas}
+    p = pressure_sensor.reading(m.p_meas + par.ecu.p_atm, par.pressure_sensor)
+    i = current_sensor.reading(m.i_meas, par.current_sensor)
+    return _values(adc.rounded(p, par.adc), adc.rounded(i, par.adc), par)
+
+
+def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
+    """Return the measurements that the shares of the two spans stand for."""
+    return {
+        "p_meas": pressure_sensor.value(p, par.pressure_sensor) - par.ecu.p_atm,
+        "i_meas": current_sensor.value(i, par.current_sensor),
+    }
+
+
+def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) -> Memory:
+    """Return the memory with the unfiltered current demand renewed.
+
+    ``p_before`` is the pressure of the last tick, whose gains a schedule hands over from.
+    """
+    if par.drive.mode == "current":
+        return m._replace(i_star=u.i_set)
+    p_ref = u.p_set
+    if par.drive.mode == "pedal":
+        V_pedal = pedal.output(pedal.Input(force=u.pedal_force), par.pedal).V
+        p_ref = pedal_map.output(V_pedal, par.ecu.pedal_map)
+        m = m._replace(V_pedal=V_pedal)
+    state = pressure_pid.State(m.pid_integral, m.pid_slope, m.pid_last)
+    signals = pressure_pid.Input(p_ref=p_ref, p_meas=m.p_meas)
+    own = par.ecu.pressure_at(m.p_meas)
+    if par.ecu.schedule.law != "off":
+        last = par.ecu.pressure_at(p_before)
+        state = pressure_pid.transferred(state, signals, last.k_p, own)
+    pid, out = pressure_pid.output(state, signals, par.ecu.T_s, own)
+    saturated = ops.where(ops.fabs(out.i) >= par.ecu.pressure.i_max, 1.0, 0.0)
+    return m._replace(
+        p_ref=p_ref,
+        i_star=out.i,
+        sat_current=saturated,
+        pid_integral=pid.integral,
+        pid_slope=pid.slope,
+        pid_last=pid.last,
+    )
+
+
+def _shaped(m: Memory, par: MotorcycleParameters) -> Memory:
+    """Return the memory with dither added and the low-pass filter run."""
+    ecu = par.ecu
+    dit, wave = dither.output(dither.State(m.dit_phase), m.p_meas, ecu.T_s, ecu.dither, ecu.est_par)
+    filter_first = ecu.filter.place == "before-dither"
+    low, filtered = low_pass_2.output(
+        low_pass_2.State(m.lp_s1, m.lp_s2),
+        m.i_star if filter_first else m.i_star + wave.i,
+        ecu.T_s,
+        ecu.filter,
+    )
+    return m._replace(
+        i_dit=wave.i,
+        i_ref=filtered.y + wave.i if filter_first else filtered.y,
+        dit_phase=dit.phase,
+        lp_s1=low.s1,
+        lp_s2=low.s2,
+    )

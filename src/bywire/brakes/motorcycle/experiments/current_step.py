@@ -1,0 +1,64 @@
+"""Current step: the current loop alone (Dardanelli 2010, Fig. 3)."""
+
+from __future__ import annotations
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import effort, step_response
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.case import case_from_rest, step_at_zero
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Duration
+
+
+class Options(ParameterSet):
+    """The step."""
+
+    i_step: Current
+    """current demand after the step"""
+    duration: Duration
+    """time recorded after the step"""
+    record: Duration
+    """recording interval, finer than the ECU's sample time"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the one run: from the retracted piston, past dither and low-pass filter."""
+    stimulus = step_at_zero("i_set", 0.0, options.i_step)
+    return (
+        case_from_rest(
+            "run", par, "current-direct", 0.0, stimulus, options.duration,
+            settle=5e-3, keep=5e-3, record=options.record,
+        ),
+    )  # fmt: skip
+
+
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the motor current."""
+    return step_response.Setting("i", 0.0, 0.0, options.i_step)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the step's KPIs of the motor current."""
+    run = recordings["run"]
+    found = evaluate("step_response", run, step(options))
+    found |= evaluate("effort", run, effort.Setting())
+    return tuple(found.values())
+
+
+EXPERIMENT = Experiment(
+    name="current-step",
+    assembly="motorcycle-brake",
+    summary="step of 0.73 A in the closed current loop (Fig. 3)",
+    options=Options,
+    defaults=Options(i_step=0.73, duration=0.04, record=1e-4),
+    cases=cases,
+    judge=judge,
+    kpis=units_of("step_response", "effort", resolved={"level": "A"}),
+    figures=("step-response", "time-traces"),
+    step=step,
+)

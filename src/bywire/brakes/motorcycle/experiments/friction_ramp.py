@@ -1,0 +1,110 @@
+"""Friction ramp: a slow current ramp up and down, with and without dither (2010, Fig. 5)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import hysteresis, occupation
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli import ramp
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.case import case_from_rest, smoothing
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, CurrentRate, Frequency, TimeConstant
+
+WITHOUT, WITH = "without-dither", "with-dither"
+
+
+class Options(ParameterSet):
+    """The ramp of eq. (17)."""
+
+    i_max: Current
+    """current demand at the turning point"""
+    slope: CurrentRate
+    """slope of the demand"""
+    f_filter: Frequency
+    """cut-off of the first-order low-pass on the measured current"""
+    smoothing: TimeConstant
+    """moving average for the loop's KPIs; one dither period unless given, 0 for the raw signals"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the two runs, from the retracted piston; closed current loop."""
+    shape = ramp.Parameters(
+        start=0.0, end=options.i_max, slope=options.slope, t_start=0.0, t_hold=0.0, after="return"
+    )
+    waveform = par.ecu.dither.waveform if par.ecu.dither.waveform != "off" else "sine"
+    duration = 2.0 * options.i_max / options.slope
+    return tuple(
+        case_from_rest(
+            label, par, "current", 0.0, lambda t: {"i_set": ramp.sample(t, shape)}, duration,
+            {"ecu.dither.waveform": chosen},
+        )
+        for label, chosen in ((WITHOUT, "off"), (WITH, waveform))
+    )  # fmt: skip
+
+
+def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
+    """Add the measured current behind the low-pass filter, as the paper plots it."""
+    from scipy import signal  # slow to load, and only this experiment needs it
+
+    interval = float(recording["time"][1] - recording["time"][0])
+    decay = float(np.exp(-2.0 * np.pi * options.f_filter * interval))
+    raw = recording["i_meas"].values
+    filtered, _ = signal.lfilter([1.0 - decay], [1.0, -decay], raw, zi=[decay * raw[0]])
+    attrs = {"units": "A", "long_name": "measured current, filtered"}
+    return recording.assign(i_filtered=("time", filtered, attrs))
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return each loop's KPIs and their ratio."""
+    found: dict[str, Kpi] = {}
+    setting = hysteresis.Setting("i_filtered", "p_mc", smoothing=options.smoothing)
+    for label, suffix in ((WITHOUT, "undithered"), (WITH, "dithered")):
+        run = recordings[label]
+        kpis = evaluate("hysteresis", run, setting) | evaluate(
+            "occupation", run, occupation.Setting()
+        )
+        kpis["p_max"] = Kpi(
+            "p_max", float(run["p_mc"].max()), "Pa", "Largest master-cylinder pressure."
+        )
+        for name, kpi in kpis.items():
+            found[f"{name}_{suffix}"] = replace(kpi, name=f"{name}_{suffix}")
+    ratio = Kpi(
+        "loop_area_ratio",
+        found["loop_area_dithered"].value / found["loop_area_undithered"].value,
+        "1",
+        "Area of the loop with dither over that without.",
+        found["loop_area_undithered"].note,
+    )
+    return (*found.values(), ratio)
+
+
+_LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*response": "A*Pa"})
+
+EXPERIMENT = Experiment(
+    name="friction-ramp",
+    assembly="motorcycle-brake",
+    summary="slow current ramp to 5 A and back, without and with dither (Fig. 5, eq. 17)",
+    options=Options,
+    defaults=Options(i_max=5.0, slope=0.2, f_filter=20.0, smoothing=0.02),
+    cases=cases,
+    judge=judge,
+    kpis={
+        f"{name}_{suffix}": unit
+        for suffix in ("undithered", "dithered")
+        for name, unit in {**_LOOP, "p_max": "Pa"}.items()
+    }
+    | {"loop_area_ratio": "1"},
+    figures=("hysteresis-loop", "time-traces"),
+    finish=finish,
+    following=smoothing,
+)

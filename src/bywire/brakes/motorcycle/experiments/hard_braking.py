@@ -1,0 +1,72 @@
+"""Hard braking: a step of the pressure demand in closed loop (Dardanelli 2010, Fig. 7a)."""
+
+from __future__ import annotations
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import effort, occupation, step_response
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Pressure, TimeConstant
+
+
+class Options(ParameterSet):
+    """The braking maneuver."""
+
+    p_from: Pressure
+    """pressure demand before the step"""
+    p_to: Pressure
+    """pressure demand after the step"""
+    duration: Duration
+    """time recorded after the step"""
+    settle: TimeConstant
+    """time before the step in which dither and loop settle"""
+    smoothing: TimeConstant
+    """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the one run."""
+    stimulus = step_at_zero("p_set", options.p_from, options.p_to)
+    return (
+        case_from_rest(
+            "run", par, "pressure", options.p_from, stimulus, options.duration,
+            settle=options.settle, keep=min(options.settle, 0.1),
+        ),
+    )  # fmt: skip
+
+
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the pressure."""
+    return step_response.Setting(
+        "p_mc", 0.0, options.p_from, options.p_to, smoothing=options.smoothing
+    )
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the step's, the effort's and the occupation's KPIs, of the pressure p_mc."""
+    run = recordings["run"]
+    found = evaluate("step_response", run, step(options))
+    found |= evaluate("effort", run, effort.Setting())
+    found |= evaluate("occupation", run, occupation.Setting())
+    return tuple(found.values())
+
+
+EXPERIMENT = Experiment(
+    name="hard-braking",
+    assembly="motorcycle-brake",
+    summary="pressure step 6 to 37 bar in closed loop, dither on (Fig. 7a)",
+    options=Options,
+    defaults=Options(p_from=6e5, p_to=37e5, duration=1.2, settle=1.0, smoothing=0.02),
+    cases=cases,
+    judge=judge,
+    kpis=units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
+    figures=("step-response", "time-traces", "energy-balance"),
+    step=step,
+    following=smoothing,
+)

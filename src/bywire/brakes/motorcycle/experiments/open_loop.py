@@ -1,0 +1,113 @@
+"""Open loop: any stimulus at the motor, from an ideal source, or through the ECU."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import xarray as xr
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
+from bywire.brakes.motorcycle.trim import holding_current
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, TimeConstant, Unit
+
+_SOURCES: dict[str, tuple[DriveMode, str, str]] = {
+    "current": ("current-source", "i_set", "A"),
+    "voltage": ("voltage-source", "v_set", "V"),
+    "current-loop": ("current", "i_set", "A"),
+    "current-direct": ("current-direct", "i_set", "A"),
+    "pressure": ("pressure", "p_set", "Pa"),
+}  # drive mode, driven signal and its unit
+_IDEAL = ("current", "voltage")
+# What only the ECU gives a meaning.
+_SIGNALS = ("p_ref", "duty", "i_star", "i_dit", "sat_current", "sat_duty")
+_KPIS = ("share_sat_current", "share_sat_duty")
+
+
+class Options(ParameterSet):
+    """The source."""
+
+    source: Literal["current", "voltage", "current-loop", "current-direct", "pressure"]
+    """what is driven: an ideal source, or a demand to the ECU; -direct is without dither"""
+    add_holding: bool
+    """whether what holds p_start is added to the stimulus: current, voltage, or p_start itself"""
+    p_start: Annotated[float, Unit("Pa", 2e6), Field(ge=0, allow_inf_nan=False)]
+    """pressure from whose equilibrium the run starts"""
+    duration: Duration
+    """length of the run"""
+    record: Duration
+    """recording interval"""
+    settle: TimeConstant
+    """time before zero, at the stimulus' first value"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, stimulus: Stimulus | None
+) -> tuple[Case, ...]:
+    """Return the one run."""
+    if stimulus is None:
+        raise ParameterError(
+            "open-loop needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine or "
+            "table, with its parameters"
+        )
+    mode, name, unit = _SOURCES[options.source]
+    i = holding_current(options.p_start, par)
+    holding = {"A": i, "V": par.motor.R_m * i, "Pa": options.p_start}[unit]
+    offset = holding if options.add_holding else 0.0
+    return (
+        case_from_rest(
+            "run",
+            par,
+            mode,
+            options.p_start,
+            lambda t: {name: offset + stimulus.sample(t)},
+            options.duration,
+            settle=options.settle,
+            record=options.record,
+        ),
+    )
+
+
+def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
+    """Leave out what has no meaning without the ECU."""
+    return recording.drop_vars(_SIGNALS) if options.source in _IDEAL else recording
+
+
+def without(options: Options) -> tuple[str, ...]:
+    """Return the KPIs that have no meaning without the ECU."""
+    return _KPIS if options.source in _IDEAL else ()
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return effort and occupation."""
+    run = recordings["run"]
+    found = evaluate("effort", run, effort.Setting())
+    found |= evaluate("occupation", run, occupation.Setting())
+    peak = Kpi("p_max", float(run["p_mc"].max()), "Pa", "Largest master-cylinder pressure.")
+    return (*(kpi for name, kpi in found.items() if name not in without(options)), peak)
+
+
+EXPERIMENT = Experiment(
+    name="open-loop",
+    assembly="motorcycle-brake",
+    summary="any stimulus, as ideal current or voltage, or as a demand to the ECU",
+    options=Options,
+    defaults=Options(
+        source="current", add_holding=False, p_start=0.0, duration=1.0, record=1e-3, settle=0.0
+    ),
+    cases=cases,
+    judge=judge,
+    kpis={**units_of("effort", "occupation"), "p_max": "Pa"},
+    figures=("time-traces", "energy-balance"),
+    finish=finish,
+    driven_unit=lambda options: _SOURCES[options.source][2],
+    without=without,
+)

@@ -1,0 +1,170 @@
+"""Pedal tracking: the pressure follows the rider's pedal (Dardanelli 2010, Fig. 7b)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.kpis.smoothing import smoothed, treatment
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.case import case_from_rest, smoothing
+from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
+from bywire.control import pedal_map
+from bywire.core.errors import FileError, ParameterError, quoted
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import TimeConstant
+from bywire.core.units import shown
+from bywire.data.trace import column_names, read_trace
+from bywire.plant import pedal
+
+_COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the best one first
+# Built-in ride: pedal travel [mm] over time [s], our choice: three pulls of rising haste, a
+# modulated one, and a hold; the map makes 5 to 30 bar of it, the range of Fig. 7b.
+_TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
+_TRAVELS = (9, 9, 26, 26, 12, 12, 33, 33, 16, 16, 36, 36, 30, 37, 31, 37, 12, 12)
+
+_LONGEST_LAG = 0.3  # s: longer delays are not looked for
+
+
+class Options(ParameterSet):
+    """The ride."""
+
+    trace: str
+    """CSV file with columns time and pedal travel or foot force; empty for the built-in ride"""
+    max_gap: TimeConstant
+    """longest gap of the file that is bridged by a straight line"""
+    smoothing: TimeConstant
+    """moving average for the tracking KPIs; one dither period unless given, 0 for raw ones"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the one run; it starts at rest at the first sample's pressure."""
+    ride = _ride(par, options)
+    t = ride["time"].values - float(ride["time"][0])
+    mode: DriveMode = "pressure" if "pressure" in ride else "pedal"
+    signal = "p_set" if mode == "pressure" else "pedal_force"
+    values = ride["pressure" if "pressure" in ride else "force"].values
+
+    def stimulus(at: NDArray[np.float64]) -> Mapping[str, NDArray[np.float64]]:
+        return {signal: np.interp(at, t, values)}
+
+    start = float(values[0]) if mode == "pressure" else _set_point(float(values[0]), par)
+    return (case_from_rest("run", par, mode, start, stimulus, float(t[-1]), settle=1.0, keep=0.0),)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return how well the pressure follows its set point."""
+    run = recordings["run"]
+    t, p_ref = run["time"].values, run["p_ref"].values
+    p = smoothed(t, run["p_mc"].values, options.smoothing)
+    note = treatment(options.smoothing)
+    lag, reason = _lag(t, p_ref, p)
+    shifted = np.interp(t - lag, t, p_ref)
+    own = (
+        Kpi("tracking_rms", float(np.sqrt(np.mean((p - p_ref) ** 2))), "Pa",
+            "Root mean square of pressure less set point.", note),
+        Kpi("tracking_max", float(np.max(np.abs(p - p_ref))), "Pa",
+            "Largest magnitude of pressure less set point.", note),
+        Kpi("tracking_lag", lag, "s",
+            "Delay of the set point that fits the pressure best, in the mean square.",
+            reason or note),
+        Kpi("tracking_rms_without_lag", float(np.sqrt(np.mean((p - shifted) ** 2))), "Pa",
+            "Root mean square of pressure less the delayed set point.", reason or note),
+    )  # fmt: skip
+    found = evaluate("effort", run, effort.Setting())
+    found |= evaluate("occupation", run, occupation.Setting())
+    return (*own, *found.values())
+
+
+def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
+    """Return the ride with a variable ``force`` [N], or ``pressure`` [Pa] where it has one."""
+    if not options.trace:
+        from scipy.interpolate import PchipInterpolator
+
+        times = np.arange(0.0, _TIMES[-1], 1e-2)
+        travel = PchipInterpolator(_TIMES, np.array(_TRAVELS) * 1e-3)(times)
+        ride = xr.Dataset({"pedal": ("time", travel)}, coords={"time": times})
+    else:
+        names = column_names(options.trace)
+        chosen = next((name for name in _COLUMNS if name in names), None)
+        if chosen is None:
+            raise FileError(
+                f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
+                "force [N] or pressure [bar]: rename the one that the brake shall follow"
+            )
+        wanted = {chosen: _COLUMNS[chosen]}
+        ride = read_trace(options.trace, wanted, max_gap=max(options.max_gap, 1e-9))
+    _require_within_stop(ride, par, options.trace or "the built-in ride")
+    if "pedal" not in ride:
+        return ride
+    return ride.assign(force=pedal.force_at(ride["pedal"], par.pedal))  # type: ignore[arg-type]
+
+
+def _require_within_stop(ride: xr.Dataset, par: MotorcycleParameters, source: str) -> None:
+    """Refuse a ride that the pedal's stop would cut off."""
+    x_max = par.pedal.x_max
+    limits = {"pedal": (x_max, "m"), "force": (pedal.force_at(x_max, par.pedal), "N")}
+    for name, (limit, unit) in limits.items():
+        largest = float(ride[name].max()) if name in ride else 0.0
+        if largest > limit * (1.0 + 1e-9):
+            raise ParameterError(
+                f"{source}: {name} goes up to {shown(largest, unit)}, but the pedal meets its stop "
+                f"at {shown(limit, unit)} (pedal.x_max = {shown(x_max, 'm')}): change one of them"
+            )
+
+
+def _set_point(force: float, par: MotorcycleParameters) -> float:
+    voltage = pedal.output(pedal.Input(force=force), par.pedal).V
+    return pedal_map.output(voltage, par.ecu.pedal_map)
+
+
+def _lag(
+    t: NDArray[np.float64], demand: NDArray[np.float64], p: NDArray[np.float64]
+) -> tuple[float, str]:
+    """Return the delay of the demand [s] that fits best, or NaN and why there is none."""
+    from scipy import optimize  # slow to load, and only this experiment needs it
+
+    if np.ptp(demand) == 0.0:
+        return float("nan"), "the set point does not move"
+
+    def misfit(delay: float) -> float:
+        return float(np.mean((p - np.interp(t - delay, t, demand)) ** 2))
+
+    delays = np.linspace(0.0, _LONGEST_LAG, 61)
+    best = float(delays[int(np.argmin([misfit(d) for d in delays]))])
+    bounds = (max(best - delays[1], 0.0), min(best + delays[1], _LONGEST_LAG))
+    fine = optimize.minimize_scalar(misfit, bounds=bounds, method="bounded")
+    if misfit(0.0) <= fine.fun:
+        return float("nan"), "no delay fits better than none"
+    if misfit(_LONGEST_LAG) <= fine.fun:
+        return float("nan"), f"the delay that fits best is not below {_LONGEST_LAG:g} s"
+    return float(fine.x), ""
+
+
+EXPERIMENT = Experiment(
+    name="pedal-tracking",
+    assembly="motorcycle-brake",
+    summary="pressure follows the rider's pedal, built in or from a CSV file (Fig. 7b)",
+    options=Options,
+    defaults=Options(trace="", max_gap=0.1, smoothing=0.02),
+    cases=cases,
+    judge=judge,
+    kpis={
+        "tracking_rms": "Pa",
+        "tracking_max": "Pa",
+        "tracking_lag": "s",
+        "tracking_rms_without_lag": "Pa",
+        **units_of("effort", "occupation"),
+    },
+    figures=("tracking", "time-traces"),
+    following=smoothing,
+)

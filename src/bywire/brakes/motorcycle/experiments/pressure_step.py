@@ -1,0 +1,106 @@
+"""Pressure step: the braking system's answer to a current step (Dardanelli 2010, Fig. 6)."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import effort, occupation, step_response
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
+from bywire.brakes.motorcycle.operating_point import settled_start
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import holding_current
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Duration, Pressure, TimeConstant
+
+
+class Options(ParameterSet):
+    """The step of the current demand."""
+
+    p_start: Pressure
+    """pressure before the step"""
+    start: Literal["settled", "frictionless"]
+    """whether the pressure under dither settles at p_start, or the equilibrium without friction"""
+    i_step: Current
+    """height of the step of the current demand"""
+    duration: Duration
+    """time recorded after the step"""
+    settle: TimeConstant
+    """time before the step in which the dithered pressure settles"""
+    smoothing: TimeConstant
+    """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the one run, open pressure loop, closed current loop."""
+    p = options.p_start
+    if options.start == "settled" and options.settle > 0:
+        p = settled_start(p, par, options.settle)
+    return _from(p, par, options)
+
+
+def preview(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the run as if the pressure settled at the equilibrium without friction."""
+    return _from(options.p_start, par, options)
+
+
+def _from(p: float, par: MotorcycleParameters, options: Options) -> tuple[Case, ...]:
+    i = holding_current(p, par)
+    stimulus = step_at_zero("i_set", i, i + options.i_step)
+    return (
+        case_from_rest(
+            "run", par, "current", p, stimulus, options.duration,
+            settle=options.settle, keep=min(options.settle, 0.5),
+        ),
+    )  # fmt: skip
+
+
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the pressure; its levels are those of the response."""
+    return step_response.Setting("p_mc", 0.0, smoothing=options.smoothing)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the step's KPIs, and the static gain."""
+    run = recordings["run"]
+    setting = step(options)
+    found = evaluate("step_response", run, setting)
+    found |= evaluate("effort", run, effort.Setting())
+    found |= evaluate("occupation", run, occupation.Setting())
+    data = step_response.select(run, setting)
+    gain = Kpi(
+        "static_gain",
+        (data.end - data.start) / options.i_step,
+        "Pa/A",
+        "Change of the mean pressure per change of the current demand.",
+        data.note,
+    )
+    return (*found.values(), gain)
+
+
+EXPERIMENT = Experiment(
+    name="pressure-step",
+    assembly="motorcycle-brake",
+    summary="current step of 0.35 A at 25 bar from equilibrium, dither on (Fig. 6)",
+    options=Options,
+    defaults=Options(
+        p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02
+    ),
+    cases=cases,
+    judge=judge,
+    kpis={
+        **units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
+        "static_gain": "Pa/A",
+    },
+    figures=("step-response", "time-traces"),
+    step=step,
+    following=smoothing,
+    preview=preview,
+)

@@ -1,0 +1,92 @@
+"""Stribeck curves: the seals' friction torque over speed at several pressures (2010, Fig. 4)."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Nodes, Unit
+from bywire.plant import seal_friction
+
+
+class Options(ParameterSet):
+    """Where the curves are drawn."""
+
+    pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=1)]
+    """master-cylinder pressures, one curve each"""
+    omega_max: Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]
+    """largest motor speed, both directions"""
+
+
+def cases(
+    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return no run: the curve is a static characteristic."""
+    return ()
+
+
+def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]:
+    """Return friction torque over pressure and speed; at rest the breakaway torque of each side.
+
+    The speeds contain -0 and +0: both ends of the interval in which the torque lies at rest.
+    """
+    side = np.linspace(0.0, options.omega_max, 401)
+    speeds = np.concatenate((-side[::-1], side))
+    forward = np.arange(speeds.size) >= side.size
+    torque = np.empty((len(options.pressures), speeds.size))
+    for k, p in enumerate(options.pressures):
+        for j, omega in enumerate(speeds):
+            friction = seal_friction.output(seal_friction.Input(float(omega), p), par.seal)
+            torque[k, j] = friction.T_p if forward[j] else -friction.T_n
+    curve = xr.Dataset(
+        {
+            "T_fr": (
+                ("p_mc", "omega"),
+                torque,
+                {"units": "N*m", "long_name": "friction torque"},
+            )
+        },
+        coords={
+            "p_mc": (
+                "p_mc",
+                np.array(options.pressures),
+                {"units": "Pa", "long_name": "master-cylinder pressure"},
+            ),
+            "omega": ("omega", speeds, {"units": "rad/s", "long_name": "motor speed"}),
+        },
+    )
+    return {"curve": curve}
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the breakaway torques at the highest pressure."""
+    curve = recordings["curve"]
+    torque = curve["T_fr"].values[int(np.argmax(curve["p_mc"].values))]
+    return (
+        Kpi("breakaway_apply", float(torque.max()), "N*m",
+            "Largest friction torque while applying, at the highest pressure."),
+        Kpi("breakaway_release", float(-torque.min()), "N*m",
+            "Largest friction torque while releasing, at the highest pressure."),
+    )  # fmt: skip
+
+
+EXPERIMENT = Experiment(
+    name="stribeck",
+    assembly="motorcycle-brake",
+    summary="friction torque over speed at 2, 20 and 40 bar (Fig. 4)",
+    options=Options,
+    defaults=Options(pressures=(2e5, 20e5, 40e5), omega_max=2.0),
+    cases=cases,
+    judge=judge,
+    kpis={"breakaway_apply": "N*m", "breakaway_release": "N*m"},
+    figures=("stribeck-curve",),
+    static=static,
+)

@@ -1,0 +1,161 @@
+"""The sampled pressure loop around a linear model of the braking system."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.rational import Rational
+from bywire.analysis.margins import Margin, margin
+from bywire.brakes.motorcycle.linear import control_laws
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+BAND = (0.02, 200.0)
+"""frequencies over which margins are looked for [Hz]"""
+
+
+@dataclass(frozen=True, eq=False)
+class PressureLoop:
+    """PID, low-pass, sampled current loop and anti-alias filters around a linear brake.
+
+    The current loop is that of the locked rotor: a model from current to pressure has the
+    rotor's motion in it. Converters are ideal, the dither is off.
+
+    Parameters
+    ----------
+    par
+        Parameters of ECU, motor, supply and filters.
+    brake
+        Transfer function from motor current to pressure [Pa/A].
+    p
+        Pressure of the operating point [Pa].
+    """
+
+    par: MotorcycleParameters
+    brake: Rational
+    p: float = 25e5
+
+    @cached_property
+    def plant(self) -> LinearModel:
+        """Sampled model from duty cycle to measured current, pressure and measured pressure."""
+        mode = {"drive.mode": "current-direct", "adc.law": "ideal"}
+        own = self.par.replace(mode)
+        motor = linearize(
+            MotorcycleBrake(), own, state_at(self.p, own), memory_at(self.p, own),
+            inputs=("duty",), outputs=("i", "y_i"),
+        ).reduced(("i", "y_i"), held=True)  # fmt: skip
+        sensor = own.current_sensor
+        span = np.diag([1.0, sensor.i_high - sensor.i_low])
+        motor = replace(motor, C=span @ motor.C, outputs=("i", "i_meas"), output_units=("A", "A"))
+        return _cascade(motor, self.brake, own.anti_alias.f_aa).sampled(own.ecu.T_s)
+
+    def open(self, frequencies: Array) -> Complex:
+        """Return the open loop, cut at the measured pressure, at frequencies [Hz]."""
+        return self._pid("pressure_feedback", frequencies) * self._inner(frequencies, 2)
+
+    def closed(self, frequencies: Array) -> Complex:
+        """Return pressure over its set point, at frequencies [Hz]."""
+        drive = self._pid("pressure_demand", frequencies)
+        return drive * self._inner(frequencies, 1) / (1.0 + self.open(frequencies))
+
+    def models(self) -> tuple[LinearModel, LinearModel]:
+        """Return loop gain (cut at the measured pressure) and closed loop, one model each."""
+        import control
+
+        def block(made: LinearModel) -> Any:
+            return control.ss(made.A, made.B, made.C, made.D, made.period)
+
+        ecu, T = self.par.ecu, self.plant.period
+        current = control.ss([], [], [], [[1.0, 0.0, 0.0]], T)
+        inner = control.feedback(block(self.plant) * block(control_laws.current_control(ecu)),
+                                 current)  # fmt: skip
+        path = inner * block(control_laws.demand_filter(ecu))
+        gain = path[2, 0] * block(control_laws.pressure_feedback(ecu, self.p))
+        # The measured pressure goes back into the second input of the pressure control.
+        ahead = path * block(control_laws.pressure_control(ecu, self.p))
+        back = control.ss([], [], [], [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]], T)
+        closed = control.feedback(ahead, back, sign=1)[1, 0]
+        return _single(gain, "p_meas"), _single(closed, "p")
+
+    def margin(self) -> Margin:
+        """Return crossover and phase margin."""
+        return margin(self.open, BAND)
+
+    def _pid(self, name: str, frequencies: Array) -> Complex:
+        law: LinearModel = getattr(control_laws, name)(self.par.ecu, self.p)
+        return law.response(frequencies)[:, 0, 0]
+
+    def _law(self, name: str, frequencies: Array) -> Complex:
+        law: LinearModel = getattr(control_laws, name)(self.par.ecu)
+        return law.response(frequencies)[:, 0, 0]
+
+    def _inner(self, frequencies: Array, output: int) -> Complex:
+        """Return the way from the current demand to an output of the plant."""
+        plant = self.plant.response(frequencies)[:, :, 0]
+        pi = self._law("current_control", frequencies)
+        current = pi / (1.0 + pi * plant[:, 0])
+        return self._law("demand_filter", frequencies) * current * plant[:, output]
+
+
+def cancelling_pi(loop: PressureLoop, T: float, crossover: float) -> PressureLoop:
+    """Return the loop with a PI whose zero cancels a time constant T [s].
+
+    Parameters
+    ----------
+    loop
+        The loop whose PID is replaced.
+    T
+        Time constant [s].
+    crossover
+        Frequency [Hz] at which the gain shall be 1.
+    """
+    unit = loop.par.replace(
+        {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5 / T, "ecu.pressure.k_d": 0.0}
+    )
+    gain = float(np.abs(PressureLoop(unit, loop.brake, loop.p).open(np.array([crossover])))[0])
+    k_p = 1e-5 / gain
+    tuned = unit.replace({"ecu.pressure.k_p": k_p, "ecu.pressure.k_i": k_p / T})
+    return PressureLoop(tuned, loop.brake, loop.p)
+
+
+def _single(block: Any, output: str) -> LinearModel:
+    """Return a block with one pressure in and one out as a plain model."""
+    states = tuple(f"x{k}" for k in range(block.nstates))
+    return LinearModel(
+        "pressure-loop", block.A, block.B, block.C, block.D, states, ("p_ref",), (output,),
+        tuple("1" for _ in states), ("Pa",), ("Pa",), np.zeros(len(states)), float(block.dt),
+    )  # fmt: skip
+
+
+def _cascade(motor: LinearModel, brake: Rational, f_aa: float) -> LinearModel:
+    """Return motor, brake and the pressure channel's filter in a row, continuous.
+
+    The motor's first state is the current that drives the brake.
+    """
+    from scipy.signal import tf2ss
+
+    G, g, c, _ = tf2ss(brake.num, brake.den)
+    n, w = G.shape[0], 2.0 * np.pi * f_aa
+    A = np.zeros((n + 3, n + 3))
+    A[:2, :2] = motor.A
+    A[2 : n + 2, :1], A[2 : n + 2, 2 : n + 2] = g, G
+    A[n + 2, 2 : n + 2], A[n + 2, n + 2] = w * c[0], -w
+    C = np.zeros((3, n + 3))
+    C[0, :2], C[1, 2 : n + 2], C[2, n + 2] = motor.C[1], c[0], 1.0
+    internal = tuple(f"g{k}" for k in range(n))
+    return LinearModel(
+        brake.name, A, np.vstack([motor.B, np.zeros((n + 1, 1))]), C, np.zeros((3, 1)),
+        (*motor.states, *internal, "y_p"), motor.inputs, ("i_meas", "p", "p_meas"),
+        (*motor.state_units, *("1" for _ in internal), "Pa"), motor.input_units,
+        ("A", "Pa", "Pa"), np.zeros(n + 3),
+    )  # fmt: skip

@@ -1,0 +1,149 @@
+"""Resistance, inductance and back-EMF from voltage and current (2010, eq. 1)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from bywire.bench.running import as_run
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import holding_current
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Duration, Pressure, Unit, Voltage
+from bywire.identification.electrics.loop_records import (
+    as_curve,
+    believable,
+    checks_of,
+    levels,
+    noise_of_levels,
+    require_steps,
+)
+from bywire.identification.electrics.winding import winding_trial
+from bywire.identification.least_squares import estimate
+from bywire.identification.method import Effort, Identified, Method
+from bywire.identification.output_error import output_error
+from bywire.identification.records import split
+from bywire.identification.unknown import parameters_of
+from bywire.simulation.run import simulate
+
+_NAMES = ("motor.R_m", "motor.L_m", "motor.K_e")
+_TURNS = 1.0  # rad/s: below, a shaft counts as locked
+_STEP = 2e-6  # of the simulated experiment [s]: a coarse step shows in L_m where the shaft turns
+
+
+class Options(ParameterSet):
+    """The synthetic experiment."""
+
+    rotor: Literal["stuck", "turning"]
+    """whether friction holds the shaft under pressure, or it turns from the retracted end"""
+    p_start: Pressure
+    """pressure that the stuck piston holds"""
+    i_low: Current
+    """stuck: how far steps go below the holding current, within breakaway"""
+    i_high: Current
+    """stuck: how far they go above it"""
+    v_high: Voltage
+    """turning: highest voltage"""
+    dwell: Duration
+    """time from one step of the voltage to the next"""
+    duration: Duration
+    """length of the record"""
+    interval: Duration
+    """sample time"""
+    sigma_i: Annotated[float, Unit("A", 1e-2), Field(ge=0)]
+    """noise of the measured current"""
+    sigma_omega: Annotated[float, Unit("rad/s", 0.1), Field(ge=0)]
+    """noise of the measured speed"""
+
+
+def identify(
+    data: xr.Dataset, par: MotorcycleParameters, options: Options, effort: Effort
+) -> Identified:
+    """Return R_m and L_m, and K_e where the shaft turns.
+
+    Parameters
+    ----------
+    data
+        ``v``: voltage at the motor, held between samples [V]; ``omega``: speed, zeros where the
+        rotor is locked or sticks [rad/s]; ``i``: current behind the anti-alias filter, whose corner
+        is ``anti_alias.f_aa`` [A]. One or several records.
+
+    Raises
+    ------
+    ParameterError
+        When neither voltage nor current moves.
+
+    References
+    ----------
+    Dardanelli, Alli, Savaresi (2010), eq. (1), first line.
+    """
+    records = split(data)
+    trials = []
+    for label, one in records.items():
+        require_steps(one, "v", "i", label)
+        sigma = noise_of_levels(one["i"].values, one["v"].values)
+        names = {"v": "v", "omega": "omega", "i": "i"}
+        trials.append(winding_trial(par.motor, one, names, par.anti_alias.f_aa, sigma, label))
+    turning = any(float(np.ptp(one["omega"].values)) > _TURNS for one in records.values())
+    unknowns = parameters_of(par, _NAMES if turning else _NAMES[:2])
+    found = estimate(output_error(trials, unknowns))
+    notes = () if turning else (
+        "the shaft does not turn: nothing tells K_e; let it turn, and measure its speed",
+    )  # fmt: skip
+    return Identified(
+        estimates={"winding": found}, parameters=believable(found),
+        checks=checks_of(trials, found), curves=tuple(as_curve(t, found) for t in trials),
+        notes=notes,
+    )  # fmt: skip
+
+
+def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
+    """Return steps of the voltage on the whole brake, simulated, with the sensors' noise."""
+    random = np.random.default_rng(seed)
+    stuck = options.rotor == "stuck"
+    own = par.replace({"drive.T_source": options.interval, "adc.law": "ideal"})
+    p = options.p_start if stuck else 0.0
+    low, high = 0.0, options.v_high
+    if stuck:
+        hold, R = holding_current(p, own), own.motor.R_m
+        low, high = R * (hold - options.i_low), R * (hold + options.i_high)
+    v = levels(low, high, options.duration, options.dwell, options.interval, seed=1)
+    case = case_from_rest(
+        "run", own, "voltage-source", p, lambda t: {"v_set": v(t)}, options.duration,
+        record=options.interval,
+    )  # fmt: skip
+    made = simulate(as_run(case, _STEP), ("i_meas", "omega"))
+    n = made.time.size
+    omega = made["omega"] + (0.0 if stuck else random.normal(0.0, options.sigma_omega, n))
+    return xr.Dataset(
+        {"v": ("time", v(made.time), {"units": "V", "long_name": "motor voltage"}),
+         "omega": ("time", omega, {"units": "rad/s", "long_name": "motor speed"}),
+         "i": ("time", made["i_meas"] + random.normal(0.0, options.sigma_i, n),
+               {"units": "A", "long_name": "measured current"})},
+        {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
+    )  # fmt: skip
+
+
+METHOD = Method(
+    name="motor-winding",
+    assembly="motorcycle-brake",
+    summary="R_m and L_m from voltage steps, K_e where the shaft turns (2010, eq. 1)",
+    experiment="open-loop",
+    signals={"v": "V", "omega": "rad/s", "i": "A"},
+    options=Options,
+    defaults=Options(
+        rotor="stuck", p_start=20e5, i_low=0.7, i_high=2.0, v_high=3.0, dwell=5e-3, duration=0.5,
+        interval=1e-4, sigma_i=1e-2, sigma_omega=0.05,
+    ),
+    identify=identify,
+    synthetic=synthetic,
+    unknowns=_NAMES,
+    several=True,
+    simulated=tuple(Options.model_fields),
+    bench_note="the record was made with a voltage source, its rotor locked or at a speed of its "
+    "own; the bench's shaft is free, and does not replay it: take over the values alone",
+)  # fmt: skip

@@ -1,0 +1,181 @@
+"""Every slip of a ramp shot from its own rest and laid over the measured one.
+
+A fit to the whole pressure curve fails from starts a few percent off: a slip that begins too
+early or too late costs as much as one that is not there. So each slip is run by itself, from the
+rest that was measured, beginning where the model breaks away, and moved in time to where it lies
+best on the measured one. What breaking away tells, the current at which it happened, is a residual
+of its own.
+
+The run's demand ramps through the model's own breakaway current, and the modeled control answers to
+the motor's induced voltage: the current dips as it did on the bench, at the right time. From where
+the slip has begun, the demand is corrected by how far the measured current lies beside that.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.brakes.motorcycle.methods.stick_slip.driving import driven_by, held, with_more
+from bywire.brakes.motorcycle.methods.stick_slip.overlay import overlaid
+from bywire.brakes.motorcycle.methods.stick_slip.shots import BEFORE, Shot, onset_of
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.identification.equation import Equation, EquationError
+from bywire.identification.unknown import Unknown
+from bywire.simulation.run import Run, simulate
+from bywire.simulation.sensitivity import simulate_with_sensitivities
+
+Array = NDArray[np.float64]
+
+_MORE = 1e-3  # A: with which the answer to an offset is computed
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A slip of the model, laid over the measured one.
+
+    Parameters
+    ----------
+    residuals
+        Computed less measured pressure [Pa], shape (n,).
+    slopes
+        Their derivatives by the unknowns with the shift at its best, shape (n, p).
+    by_current
+        Derivative of the residuals by an offset of the current along the slip [Pa/A], shape (n,).
+    answer, speed
+        The same with the shift kept [Pa/A], and how fast the pressure moves [Pa/s], shape (n,).
+    breakaway, breakaway_slopes
+        Measured less computed current at the instant of breaking away [A], and its
+        derivatives, shape (p,).
+    """
+
+    residuals: Array
+    slopes: Array
+    by_current: Array
+    answer: Array
+    speed: Array
+    breakaway: float
+    breakaway_slopes: Array
+
+
+class Shooting:
+    """Runs slips of the motorcycle brake for values of the unknowns.
+
+    Parameters
+    ----------
+    par
+        Everything that is known.
+    unknowns
+        Friction parameters.
+    step
+        Substep [s].
+    """
+
+    def __init__(
+        self,
+        par: MotorcycleParameters,
+        unknowns: Sequence[Unknown],
+        step: float = 20e-6,
+    ) -> None:
+        self.par = par.replace(
+            {"drive.mode": "current", "ecu.dither.waveform": "off",
+             "adc.law": "ideal", "adc.noise": 0.0}
+        )  # fmt: skip
+        self._source = par.replace({"drive.mode": "current-source"})
+        self.names = tuple(u.name for u in unknowns)
+        self.count = len(self.names)
+        self.model, self.step = MotorcycleBrake(), step
+        self._error = EquationError(Equation(self.model, "omega", "alpha"), self._source, unknowns)
+
+    def breakaway(self, rest: float, direction: int, values: Array) -> tuple[float, Array]:
+        """Return the current [A] that breaks away from a rest [Pa], and its derivatives.
+
+        Where motor, pressure and breakaway torque balance: the equation of motion without
+        motion, which is affine in the current.
+        """
+        columns = self._error.at(
+            state_at(max(rest, 0.0), self._source)._replace(omega=direction * 1e-12),
+            memory_at(max(rest, 0.0), self._source), "i_source", (0.0, 1.0),
+        )  # fmt: skip
+        e, slopes = self._error(columns, values)
+        per_ampere = e[1] - e[0]
+        return -e[0] / per_ampere, -slopes[0] / per_ampere
+
+    def run(self, shot: Shot, values: Array) -> tuple[Run, float, Array]:
+        """Return the run of one slip, the current [A] it breaks away at, and its derivatives.
+
+        The demand ramps past that current as the measured one did; the control answers to what
+        the motor induces, as it did on the bench.
+        """
+        slip, interval = shot.slip, shot.interval
+        current, current_slopes = self.breakaway(slip.rest, slip.direction, values)
+        par = self.par.replace(dict(zip(self.names, values.tolist(), strict=True)))
+        after = shot.clock + 0.5 * interval - BEFORE  # what is held over an interval, without lag
+        demand = current + shot.rate * after
+        rest, start = max(slip.rest, 0.0), float(demand[0])
+        run = Run(
+            self.model, par, state_at(rest, par, start), memory_at(rest, par, start),
+            partial(held, demand, interval), (demand.size - 1) * interval, self.step, interval,
+        )  # fmt: skip
+        return run, current, current_slopes
+
+    def fit(self, shot: Shot, values: Array, zero: float | None = None) -> Fitted:
+        """Run one slip and lay it over the measured one.
+
+        Parameters
+        ----------
+        values
+            Of the unknowns.
+        zero
+            Reading of the current's sensor without current [A]. The slip is then driven by the
+            measured current once it has begun; without, by its ramp alone.
+        """
+        run, current, current_slopes = self.run(shot, values)
+        driven = None if zero is None else driven_by(run, shot, current, zero)
+        if driven is not None:
+            run = driven.calm
+        state, memory = self._start_slopes(run, shot)
+        found = simulate_with_sensitivities(
+            run, [*self.names, "stimulus.i_set"], ("p_mc",), state, memory
+        )
+        p = found.trajectory["p_mc"]
+        answer = np.zeros(p.size)
+        if driven is not None:
+            offset = np.where(np.arange(p.size) >= driven.first, _MORE, 0.0)
+            more = simulate(replace(run, stimulus=with_more(run, offset)), ("p_mc",))["p_mc"]
+            answer = (more - p) / _MORE
+            p = simulate(driven.sampled, ("p_mc",))["p_mc"]
+        r, v, shift = overlaid(shot, p)
+        # the demand begins at the breakaway current, and goes on as measured
+        own, all_along = found.derivatives[:, 0, :-1], found.derivatives[:, 0, -1]
+        slopes = own + np.outer(all_along - answer, current_slopes)
+        at = shot.clock - shift
+        kept = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
+        kept[at < 0.0] = 0.0
+        shift_slopes = (v @ kept) / max(float(v @ v), 1e-300)
+        J = kept - np.outer(v, shift_slopes)
+        onset = shift + (BEFORE if driven is None else driven.onset)
+        level, rate = onset_of(shot, onset)
+        return Fitted(
+            residuals=r, slopes=J[:, :-1], by_current=J[:, -1], answer=kept[:, -1], speed=v,
+            breakaway=level - current,
+            breakaway_slopes=rate * shift_slopes[:-1] - current_slopes,
+        )  # fmt: skip
+
+    def _start_slopes(self, run: Run, shot: Shot) -> tuple[Array, Array]:
+        """Return derivatives of the start by the unknowns, and by an offset of the demand."""
+        rest, start = max(shot.slip.rest, 0.0), float(run.state.i)
+
+        def at(current: float) -> Array:
+            both = (*state_at(rest, self.par, current), *memory_at(rest, self.par, current))
+            return np.array(both)
+
+        slopes = np.zeros((len(run.state) + len(run.memory), self.count + 1))
+        slopes[:, -1] = (at(start + _MORE) - at(start - _MORE)) / (2.0 * _MORE)
+        return slopes[: len(run.state)], slopes[len(run.state) :]

@@ -1,0 +1,192 @@
+"""Fig. 5: quasi-static characteristic, with and without dither, and the dither's waveform."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.loop_width import closed_above
+from bywire.analysis.response.harmonics import amplitudes
+from bywire.bench.bench import Bench
+from bywire.bench.kpis import hysteresis
+from bywire.bench.kpis.smoothing import smoothed
+from bywire.bench.result import Result
+from bywire.bench.running import as_run
+from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
+from bywire.brakes.motorcycle.paper.tolerances import LEVEL, LOOP
+from bywire.brakes.motorcycle.staircase import jumps
+from bywire.report.hysteresis_loop import hysteresis_loop
+from bywire.reproduction.item import Item, compared, found
+from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import kpis, peak, selected
+from bywire.simulation.run import simulate
+
+WITHOUT, WITH = "without-dither", "with-dither"
+REMOVED = 0.1
+"""width, as a share of the undithered loop's at mid-height, below which a loop counts as removed"""
+SLOWER = 10.0
+"""how many times slower than eq. (17) the slow ramp is"""
+LEVELS = np.arange(LEVEL.size, 45.0, 0.1) * BAR
+DAMPINGS = (0.5, 1.0)
+"""other damping ratios of the 80 Hz filter: the paper prints none"""
+
+
+@dataclass(frozen=True)
+class Loops:
+    """The two loops of a parameter set, and what is measured on them."""
+
+    result: Result
+
+    @property
+    def values(self) -> dict[str, float]:
+        """KPIs, SI."""
+        return kpis(self.result)
+
+    @property
+    def area_ratio(self) -> float:
+        """Area with dither in % of that without."""
+        return 100.0 * self.values["loop_area_ratio"]
+
+    def p_max(self, label: str) -> float:
+        """Return the largest pressure [bar]."""
+        return peak(self.result.recordings[label], "p_mc") / BAR
+
+    @property
+    def removed_above(self) -> float:
+        """Pressure [bar] above which the dithered loop counts as removed."""
+        setting = hysteresis.Setting("i_filtered", "p_mc", smoothing=0.02)
+        loop = hysteresis.select(self.result.recordings[WITH], setting)
+        width = REMOVED * self.values["loop_width_mid_undithered"]
+        return closed_above(loop, width, LEVELS) / BAR
+
+    @property
+    def dither_passed(self) -> float:
+        """Share [%] of the dither's amplitude that the motor current has, half-way up."""
+        recording = self.result.recordings[WITH]
+        t = recording["time"].values
+        inside = (t > 12.0 - 1e-9) & (t < 12.5 - 1e-9)
+        sent, got = (
+            np.abs(_ripple(t[inside], recording[name].values[inside])) for name in ("i_dit", "i")
+        )
+        return float(100.0 * got / sent)
+
+
+def part(runs: Runs) -> Part:
+    """Return the ramp of eq. (17) for both parameter sets."""
+    items: list[Item] = []
+    for name, suffix in SETS.items():
+        items += _set_items(name, suffix, Loops(runs.bench("friction-ramp", name)))
+    for zeta in DAMPINGS:
+        other = Loops(runs.bench("friction-ramp", MAIN, {"ecu.filter.zeta": zeta}))
+        note = f"with the 80 Hz filter's damping ratio {zeta:g}; ours is 1/sqrt(2)"
+        items += [
+            found(f"fig5.p_max.dither.zeta{zeta:g}", "bar", other.p_max(WITH), note),
+            found(f"fig5.loop_area_ratio.zeta{zeta:g}", "%", other.area_ratio, note),
+        ]
+    ideal = Loops(runs.bench("friction-ramp", MAIN, {"adc.law": "ideal"}))
+    items.append(
+        found(
+            "fig5.p_max.ideal_adc", "bar", ideal.p_max(WITHOUT),
+            "without dither, converters of infinite resolution: the jumps are a little higher",
+        )
+    )  # fmt: skip
+    text = (
+        "Without dither the pressure climbs in stick-slip jumps. With dither the loop shrinks to "
+        "a fraction. Most of what is left is no friction hysteresis but delay: a ramp ten times "
+        "slower leaves next to nothing. Dither turns dry friction into damping, which "
+        "makes the brake slower; and because seals rub more while applying, it lowers the gain. "
+        "The largest pressure depends on how much of the dither reaches the motor, hence on the "
+        "damping of the 80 Hz filter, which is not printed."
+    )
+    recordings = {
+        f"fig5-{label}{suffix}": selected(
+            runs.bench("friction-ramp", name).recordings[label],
+            "i", "i_meas", "i_filtered", "i_star", "i_dit", "p_mc", "omega", "x_mc", "stuck",
+        )
+        for name, suffix in SETS.items()
+        for label in (WITHOUT, WITH)
+    }  # fmt: skip
+    exhibits = tuple(_exhibit(runs, name, suffix) for name, suffix in SETS.items())
+    return Part("Figure 5: friction and dither", text, tuple(items), exhibits, recordings)
+
+
+def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
+    """Return Fig. 5 for one parameter set."""
+    recordings = runs.bench("friction-ramp", name).recordings
+    return Exhibit(
+        f"fig5{suffix.replace('@', '-')}",
+        hysteresis_loop(recordings, current="i_filtered", average=0.02),
+        "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow ramp, "
+        f"averaged over one dither period; pale: with its ripple. Parameter set {name}.",
+    )
+
+
+def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
+    values = loops.values
+    stairs = jumps(loops.result.recordings[WITHOUT])
+    levels = ", ".join(f"{level / BAR:.2f}" for level in stairs.levels)
+    slow = 100.0 * _slow_area(name) / values["loop_area_undithered"]
+    return [
+        compared(
+            f"fig5.p_max{suffix}", facts.FIG5_TOP, loops.p_max(WITHOUT), "<=", "without dither"
+        ),
+        compared(
+            f"fig5.p_max.dither{suffix}", facts.FIG5_TOP, loops.p_max(WITH), "<=", "with dither"
+        ),
+        compared(
+            f"fig5.loop_area_ratio{suffix}", facts.FIG5_LOOP, loops.area_ratio, LOOP.size,
+            "area with dither over that without, averaged over one dither period; mostly delay",
+        ),
+        compared(
+            f"fig5.loop_area_ratio.slow{suffix}", facts.FIG5_LOOP, slow, LOOP.size,
+            f"the same with dither on a ramp {SLOWER:g} times slower: friction alone",
+        ),
+        compared(
+            f"fig5.removed_above{suffix}", facts.FIG5_REMOVED, loops.removed_above,
+            LEVEL.size,
+            f"pressure above which the width stays below {100 * REMOVED:g} % of the undithered "
+            f"loop's at mid-height; {LEVEL.size:g} bar is the lowest level looked at",
+        ),
+        compared(
+            f"fig5.i_max.dither{suffix}", facts.FIG5_CURRENT,
+            peak(loops.result.recordings[WITH], "i_filtered"), "<=",
+            "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more ripple "
+            "than the figure has room for",
+        ),
+        found(f"fig5.jumps{suffix}", "1", float(stairs.levels.size), f"ending at {levels} bar"),
+        found(
+            f"fig5.share_stuck{suffix}", "%", 100.0 * values["share_stuck_undithered"],
+            "of the time, without dither",
+        ),
+        found(
+            f"fig5.share_stuck.dither{suffix}", "%", 100.0 * values["share_stuck_dithered"],
+            "of the time, with dither",
+        ),
+        found(
+            f"fig5.dither_passed{suffix}", "%", loops.dither_passed,
+            "motor current at 50 Hz over the dither, through the 80 Hz filter and the current "
+            "loop; section 4.2, without a number: the loop correctly tracks the dither",
+        ),
+    ]  # fmt: skip
+
+
+def _slow_area(name: str) -> float:
+    """Return the dithered loop's area [A Pa] on a slower ramp, from two signals only."""
+    slope = facts.RAMP_PEAK.value / 25.0 / SLOWER
+    bench = Bench("friction-ramp", name, options={"slope": slope})
+    case = next(c for c in bench.cases() if c.label == WITH)
+    found_run = simulate(as_run(case, bench.step), signals=("i", "p_mc"))
+    if found_run.status == "interrupted":
+        raise KeyboardInterrupt
+    t = found_run.time
+    period = 1.0 / parameters(name).ecu.dither.f_dit
+    i, p = (smoothed(t, found_run[signal], period) for signal in ("i", "p_mc"))
+    return hysteresis.loop_area(hysteresis.Loop(t, i, p)).value
+
+
+def _ripple(t: NDArray[np.float64], y: NDArray[np.float64]) -> complex:
+    """Return the complex amplitude at 50 Hz without the ramp's trend."""
+    return complex(amplitudes(t, y - np.polyval(np.polyfit(t, y, 1), t), 50.0, 1)[0])

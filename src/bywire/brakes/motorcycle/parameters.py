@@ -1,0 +1,127 @@
+"""Parameters of the motorcycle brake: one group per element, the ECU's apart."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+
+from bywire.control import current_pi, dither, gain_schedule, low_pass_2, pedal_map, pressure_pid
+from bywire.control.dither import Believed
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Pressure
+from bywire.plant import (
+    adc,
+    anti_alias_filter,
+    ball_screw_gear,
+    battery_supply,
+    brake_fluid,
+    caliper,
+    current_sensor,
+    dc_motor,
+    end_stop,
+    h_bridge,
+    master_cylinder,
+    pedal,
+    pipeline,
+    pressure_sensor,
+    reservoir_port,
+    seal_friction,
+)
+
+DriveMode = Literal[
+    "pressure", "pedal", "current", "current-direct", "voltage-source", "current-source"
+]
+
+
+class DriveParameters(ParameterSet):
+    """What commands the motor.
+
+    ``pressure`` and ``pedal`` close the pressure loop; ``current`` is a demand to the current
+    loop through dither and low-pass filter, ``current-direct`` past both; ``voltage-source`` and
+    ``current-source`` are ideal sources at the motor, open loop.
+    """
+
+    mode: DriveMode
+    """what the stimulus commands"""
+    T_source: Duration
+    """interval over which an ideal source holds its value"""
+
+
+class EcuParameters(ParameterSet):
+    """The ECU: its sample time, its controllers, and what it believes of the plant."""
+
+    T_s: Duration
+    """sample time of both control loops"""
+    pressure: pressure_pid.Parameters
+    schedule: gain_schedule.Parameters
+    current: current_pi.Parameters
+    filter: low_pass_2.Parameters
+    dither: dither.Parameters
+    est_par: Believed
+    p_atm: Pressure
+    """ambient pressure that the ECU takes off the absolute reading"""
+    pedal_map: pedal_map.Parameters
+
+    @model_validator(mode="after")
+    def _fits_sampling(self) -> EcuParameters:
+        if self.filter.f_c * self.T_s >= 0.5:
+            raise ValueError(
+                f"ecu.filter.f_c = {self.filter.f_c:g} Hz must stay below half the sample rate, "
+                f"{0.5 / self.T_s:g} Hz"
+            )
+        if self.dither.waveform != "off" and self.dither.f_dit * self.T_s >= 0.5:
+            raise ValueError(
+                f"ecu.dither.f_dit = {self.dither.f_dit:g} Hz must stay below half the sample "
+                f"rate, {0.5 / self.T_s:g} Hz: lower it, sample faster (ecu.T_s), or set "
+                "ecu.dither.waveform = 'off'"
+            )
+        return self
+
+    def pressure_at(self, p: float) -> pressure_pid.Parameters:
+        """Return the pressure PID with the gains that its schedule gives at a pressure [Pa]."""
+        if self.schedule.law == "off":
+            return self.pressure
+        gains = gain_schedule.output(p, self.pressure, self.schedule)
+        # Between valid gains; symbols could not be validated.
+        return pressure_pid.Parameters.model_construct(**{**dict(self.pressure), **gains._asdict()})
+
+
+class MotorcycleParameters(ParameterSet):
+    """The whole motorcycle brake: plant (``par``), sensors, pedal, and ECU."""
+
+    supply: battery_supply.Parameters
+    bridge: h_bridge.Parameters
+    motor: dc_motor.Parameters
+    gear: ball_screw_gear.Parameters
+    seal: seal_friction.Parameters
+    master_cylinder: master_cylinder.Parameters
+    stop: end_stop.Parameters
+    port: reservoir_port.Parameters
+    fluid: brake_fluid.Parameters
+    pipeline: pipeline.Parameters
+    caliper: caliper.Parameters
+    pressure_sensor: pressure_sensor.Parameters
+    current_sensor: current_sensor.Parameters
+    anti_alias: anti_alias_filter.Parameters
+    adc: adc.Parameters
+    pedal: pedal.Parameters
+    ecu: EcuParameters
+    drive: DriveParameters
+
+    @model_validator(mode="after")
+    def _chamber_has_room(self) -> MotorcycleParameters:
+        cylinder = self.master_cylinder
+        stroke, closed = cylinder.x_end - cylinder.x_rest, reservoir_port.closed_at(self.port)
+        if not closed < stroke:
+            raise ValueError(
+                f"port.x_port = {self.port.x_port:g} m must be less than the piston's stroke "
+                f"x_end - x_rest = {stroke:g} m: the port would never close"
+            )
+        room = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest - closed)
+        if self.fluid.air == "entrained" and not self.fluid.V_air < room:
+            raise ValueError(
+                f"fluid.V_air = {self.fluid.V_air:g} m**3 must be less than the chamber's volume "
+                f"where pressure begins to build up, {room:g} m**3"
+            )
+        return self

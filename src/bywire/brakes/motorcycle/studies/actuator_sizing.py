@@ -1,0 +1,192 @@
+"""Sizing of the motorcycle actuator: gear ratio and motor power for a bandwidth and a pressure."""
+
+from __future__ import annotations
+
+import math
+from typing import cast
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
+from bywire.bench.kpis.kpi import Kpi
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.sizing import trial as actuator_trial
+from bywire.brakes.motorcycle.sizing.demand import (
+    Course,
+    breakaway_current,
+    geared,
+    motion,
+    sine,
+    step,
+)
+from bywire.brakes.motorcycle.sizing.map import SIZES, mapped, sizes_of
+from bywire.brakes.motorcycle.sizing.options import ASSUMPTIONS, Options
+from bywire.brakes.motorcycle.trim import highest_pressure
+from bywire.core.errors import ParameterError
+
+Array = NDArray[np.float64]
+Par = MotorcycleParameters
+
+_BISECTIONS, _SECTIONS, _ROWS = 50, 60, 13
+_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+
+
+def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
+    """Return the wanted pressure at a bandwidth [Hz]."""
+    if (demand or options.demand) == "sine":
+        return sine(par, options.p_peak, options.amplitude, f)
+    return step(par, options.p_from, options.p_peak, f)
+
+
+def compute(par: Par, options: Options, progress: Progress) -> Found:
+    """Return power over gear ratio and bandwidth, the best ratio, and its trial on the bench.
+
+    Raises
+    ------
+    ParameterError
+        When the piston cannot reach the peak pressure.
+    """
+    highest = highest_pressure(par)
+    if not options.p_peak < highest:
+        raise ParameterError(
+            f"p_peak = {options.p_peak / 1e5:g} bar is not admissible: it must be < "
+            f"{highest / 1e5:.4g} bar, where the piston meets its end stop: lower it, or move the "
+            "stop (master_cylinder.x_end)"
+        )
+    data = _mapped(par, options, options.ratios,
+                   np.geomspace(options.f_min, options.f_max, options.frequencies))  # fmt: skip
+    k_best = _best_ratio(par, options)
+    chosen = geared(par, k_best)
+    f, power = options.bandwidth, float(_electrical(chosen, options).max())
+    kpis = [
+        Kpi("optimum_k_g", k_best, "m/rad", "Gear ratio that needs the least electrical power."),
+        *_figures("optimum", chosen, options),
+        Kpi("given_k_g", par.gear.k_g, "m/rad", "Gear ratio of the parameter set."),
+        *_figures("given", par, options),
+    ]
+    warnings = _warnings(kpis, k_best, options)
+    for n, (label, own) in enumerate((("optimum", chosen), ("given", par))):
+        progress("bench", 0.5 * n)
+        kpis += actuator_trial.sine_figures(label, own, options.p_peak, options.amplitude, f)
+        kpis += actuator_trial.braking_figures(label, own, options.p_from, options.p_peak)
+    progress("bench", 1.0)
+    marks = (Mark("optimum", k_best, f), Mark("given gear ratio", par.gear.k_g, f))
+    limits = {"current limit": ("current_share", 1.0), "voltage limit": ("voltage_share", 1.0)}
+    caption = f"Electrical power of the motor for a {options.demand}: {power:.3g} W at the optimum."
+    maps = {"power": Map("electrical", "k_g", "frequency", caption, marks, limits)}
+    return Found(data, tuple(kpis), ASSUMPTIONS, maps, (_cut(par, options),), warnings)
+
+
+def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, float]:
+    done = motion(par, course(par, options, f, demand))
+    return sizes_of(par, done, breakaway_current(par, options.p_peak))
+
+
+def _electrical(par: Par, options: Options) -> Array:
+    return motion(par, course(par, options, options.bandwidth)).electrical
+
+
+def _best_ratio(par: Par, options: Options) -> float:
+    """Return the gear ratio [m/rad] of least electrical power, by golden section in its log."""
+
+    def power(z: float) -> float:
+        return _at(geared(par, math.exp(z)), options, options.bandwidth)["electrical"]
+
+    # The power has one minimum: inertia falls with the ratio, the load grows with it.
+    low, high = math.log(options.k_g_min), math.log(options.k_g_max)
+    for _ in range(_SECTIONS):
+        a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
+        low, high = (low, b) if power(a) < power(b) else (a, high)
+    return math.exp(0.5 * (low + high))
+
+
+def fastest(par: Par, options: Options, demand: str) -> float:
+    """Return the highest bandwidth [Hz] within current and voltage limit; NaN for none."""
+
+    def fits(f: float) -> bool:
+        sizes = _at(par, options, f, demand)
+        return max(sizes["current_share"], sizes["voltage_share"]) <= 1.0
+
+    low, high = 1e-2, 1e3
+    if not fits(low):
+        return math.nan
+    for _ in range(_BISECTIONS):
+        middle = math.sqrt(low * high)
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low
+
+
+def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
+    sizes = _at(par, options, options.bandwidth)
+    texts = {
+        "electrical": "Largest electrical power of the motor, copper loss included.",
+        "mechanical": "Largest mechanical power: the motor's rating.",
+        "torque": "Largest torque, breakaway at the peak pressure included.",
+        "speed": "Largest speed.",
+        "current": "Largest current, breakaway at the peak pressure included.",
+        "inertia_share": "Largest torque of rotor and piston inertia over the largest torque.",
+        "voltage_share": "Largest voltage over what the bridge gives at its current.",
+    }
+    own = course(par, options, options.bandwidth)
+    copper = par.motor.R_m * np.mean(motion(par, own).current ** 2)
+    dither = par.ecu.est_par
+    A_dit = dither.k_brk_p * (dither.T_pr + dither.f_cfr_p * options.p_peak) / dither.K_e
+    note = "" if par.ecu.dither.waveform != "off" else "dither is off"
+    return [
+        *(Kpi(f"{label}_{name}", sizes[name], SIZES[name][0], text)
+          for name, text in texts.items()),
+        Kpi(f"{label}_copper", float(copper), "W", "Mean copper loss over the course."),
+        Kpi(f"{label}_dither_current", A_dit * par.ecu.dither.gain, "A",
+            "Amplitude of the dither's current at the peak pressure, eq. (20).", note),
+        *(Kpi(f"{label}_fastest_{kind}", fastest(par, options, kind), "Hz",
+              f"Highest bandwidth of the {kind} within current and voltage limit.")
+          for kind in ("sine", "step")),
+    ]  # fmt: skip
+
+
+def _mapped(par: Par, options: Options, ratios: int, frequencies: Array) -> xr.Dataset:
+    k_g = np.geomspace(options.k_g_min, options.k_g_max, ratios)
+    return mapped(par, options.p_peak, k_g, frequencies, lambda own, f: course(own, options, f))
+
+
+def _cut(par: Par, options: Options) -> Cut:
+    """Return what changes along the gear ratio at the bandwidth wanted."""
+    row = _mapped(par, options, _ROWS, np.array([options.bandwidth])).isel(frequency=0)
+    names = ("electrical", "mechanical", "torque", "speed", "inertia_share", "current_share",
+             "voltage_share")  # fmt: skip
+    return Cut(f"{options.demand} at a bandwidth of {options.bandwidth:g} Hz", row, ("k_g", *names))
+
+
+def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ...]:
+    value = {one.name: one.value for one in kpis}
+    found: list[str] = []
+    fast = value[f"optimum_fastest_{options.demand}"]
+    if not fast >= options.bandwidth:
+        found.append(
+            f"this motor cannot follow the {options.demand} at {options.bandwidth:g} Hz: at the "
+            f"best gear ratio its limits allow {fast:.3g} Hz"
+        )
+    for edge in (options.k_g_min, options.k_g_max):
+        if math.isclose(k_best, edge, rel_tol=1e-3):
+            at = f"k_g = {1e3 * edge:g} mm/rad"
+            found.append(f"the optimum lies at the edge, {at}: widen the range")
+    return tuple(found)
+
+
+STUDY = Study(
+    name="actuator-sizing",
+    assembly="motorcycle-brake",
+    summary="gear ratio and motor power for a bandwidth and a peak pressure, and their trial",
+    options=Options,
+    defaults=Options(
+        bandwidth=10.0, p_peak=37e5, amplitude=3e5, p_from=6e5, demand="sine", k_g_min=1e-4,
+        k_g_max=1e-3, ratios=41, f_min=1.0, f_max=30.0, frequencies=31,
+    ),
+    compute=lambda par, options, progress: compute(cast(Par, par), options, progress),
+    ruled={
+        "drive.mode": "the study demands pressures",
+        "pedal": "the study demands pressures without it",
+    },
+)

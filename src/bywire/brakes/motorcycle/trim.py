@@ -1,0 +1,142 @@
+"""Equilibria of the motorcycle brake: states and ECU memory that hold a pressure at rest."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+from bywire.brakes.motorcycle.ecu import Memory
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.plant import State
+from bywire.control import low_pass_2, pressure_pid
+from bywire.core.errors import ParameterError
+from bywire.core.signals import zeros
+from bywire.plant import brake_fluid, caliper, current_sensor, pressure_sensor, reservoir_port
+
+Par = MotorcycleParameters
+_INNER, _OUTER = (math.sqrt(5.0 + sign * 2.0 * math.sqrt(10.0 / 7.0)) / 3.0 for sign in (-1, 1))
+_LARGE, _SMALL = ((322.0 + sign * 13.0 * math.sqrt(70.0)) / 900.0 for sign in (1, -1))
+_GAUSS = (
+    (-_OUTER, _SMALL),
+    (-_INNER, _LARGE),
+    (0.0, 128.0 / 225.0),
+    (_INNER, _LARGE),
+    (_OUTER, _SMALL),
+)
+_HALVINGS = 60
+
+
+def travel_at(p: float, par: Par) -> float:
+    r"""Return the piston travel [m] at a pressure [Pa], filled slowly from the retracted end.
+
+    With port law "dead-stroke" the filling begins where the port is covered.
+
+    Notes
+    -----
+    The piston displaces what compresses the chamber and what fills the caliper. The chamber's
+    fluid, F = A_mc (s_mc - x) - V_g(p) with the gas V_g, then follows
+
+    .. math:: \frac{dF}{dp} = -\frac{F}{\beta} - C_{pd}(p), \quad
+        F(p) = F(0) e^{-p/\beta} - \int_0^p C_{pd}(s) e^{(s - p)/\beta} ds
+
+    The integral runs from node to node of the caliper's table, by Gauss: it never looks at a node,
+    where the slope jumps.
+    """
+    cylinder, fluid = par.master_cylinder, par.fluid
+    start = cylinder.x_rest + reservoir_port.closed_at(par.port)
+    empty = cylinder.A_mc * (cylinder.s_mc - start) - brake_fluid.gas_volume(0.0, fluid)
+    taken = 0.0
+    for low, high in pairwise((0.0, *(node for node in par.caliper.p_table if 0 < node < p), p)):
+        for share, weight in _GAUSS:
+            at = 0.5 * (low + high) + 0.5 * (high - low) * share
+            slope = caliper.mass(caliper.State(at), par.caliper, fluid)
+            taken += 0.5 * (high - low) * weight * slope * math.exp((at - p) / fluid.beta)
+    left = empty * math.exp(-p / fluid.beta) - taken
+    return cylinder.s_mc - (left + brake_fluid.gas_volume(p, fluid)) / cylinder.A_mc
+
+
+def highest_pressure(par: Par) -> float:
+    """Return the pressure [Pa] at which a slow piston meets its far end stop."""
+    x_end, low, high = par.master_cylinder.x_end, 0.0, 1e6
+    while travel_at(high, par) < x_end:
+        high *= 2.0
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if travel_at(middle, par) < x_end else (low, middle)
+    return low
+
+
+def holding_current(p: float, par: Par) -> float:
+    """Return the current [A] that balances a pressure [Pa] without friction."""
+    torque = par.gear.k_g * p * par.master_cylinder.A_mc
+    efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0
+    return torque / (efficiency * par.motor.K_e)
+
+
+def state_at(p: float, par: Par, current: float | None = None) -> State:
+    """Return the state at rest at a pressure [Pa]; the friction holds what is left over.
+
+    Without pressure the piston rests at its retracted end.
+
+    Parameters
+    ----------
+    current
+        Through the motor [A]; what balances the pressure without friction by default.
+
+    Raises
+    ------
+    ParameterError
+        When the piston would have to stand beyond its end stop, or the pressure is negative.
+    """
+    x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
+    if not (p >= 0 and x <= par.master_cylinder.x_end):
+        limit = math.floor(highest_pressure(par) / 1e3) / 100.0
+        raise ParameterError(
+            f"a start at rest at {p / 1e5:g} bar is not admissible: it must be >= 0 bar and "
+            f"<= {limit:g} bar, where the piston meets its end stop: start lower, or move the "
+            "stop (master_cylinder.x_end)"
+        )
+    held = holding_current(p, par) if current is None else current
+    return State(
+        i=0.0 if par.drive.mode == "current-source" else held,
+        theta=x / par.gear.k_g,
+        omega=0.0,
+        p_mc=p,
+        p_pd=p,
+        y_p=pressure_sensor.reading(p + par.fluid.p_atm, par.pressure_sensor),
+        y_i=current_sensor.reading(held, par.current_sensor),
+    )
+
+
+def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
+    """Return the memory in which every controller, or the ideal source, holds that state."""
+    i = holding_current(p, par) if current is None else current
+    measured = zeros(Memory)._replace(p_meas=p, i_meas=i)
+    if par.drive.mode == "voltage-source":
+        return measured._replace(v_source=par.motor.R_m * i)
+    if par.drive.mode == "current-source":
+        return measured._replace(i_source=i, i_ref=i)
+    own = par.ecu.pressure_at(p)
+    pid = pressure_pid.at_rest(pressure_pid.Input(p_ref=p, p_meas=p), i, own)
+    low = low_pass_2.at_rest(i)
+    duty = _duty_for(i, par)
+    return measured._replace(
+        p_ref=p,
+        i_star=i,
+        i_ref=i,
+        duty=duty,
+        v_source=par.motor.R_m * i,
+        i_source=i,
+        pid_integral=pid.integral,
+        pid_slope=pid.slope,
+        pid_last=pid.last,
+        pi_integral=duty,
+        lp_s1=low.s1,
+        lp_s2=low.s2,
+    )
+
+
+def _duty_for(i: float, par: Par) -> float:
+    """Return the duty cycle at which v = D (V_bat - R_bat D i) drives i at standstill."""
+    v, V, drop = par.motor.R_m * i, par.supply.V_bat, par.supply.R_bat * i
+    return 2.0 * v / (V + math.sqrt(max(V * V - 4.0 * drop * v, 0.0)))

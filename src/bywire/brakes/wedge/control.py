@@ -1,0 +1,147 @@
+"""Controllers of the wedge brake at their sampling instants: moment at 1 kHz, position at 5 kHz."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.brakes.wedge.laws import moment_control, screw_offset
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.control import position_pd
+from bywire.core import ops
+from bywire.core.signals import Signal
+
+
+class Stimulus(NamedTuple):
+    """External inputs; which of them act depends on ``command.mode``."""
+
+    M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
+    theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
+    theta_2_set: Annotated[float, Signal("rad", "demanded angle 2", 3.0)]
+    i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
+    i_2_set: Annotated[float, Signal("A", "current demand 2", 5.0)]
+    power_off: Annotated[float, Signal("1", "power stages switched off")]
+
+
+class Memory(NamedTuple):
+    """What the controllers hold between their sampling instants."""
+
+    on: Annotated[float, Signal("1", "power stages on")]
+    M_set: Annotated[float, Signal("N*m", "moment demand", 300.0)]
+    M_meas: Annotated[float, Signal("N*m", "sampled moment", 300.0)]
+    mode: Annotated[float, Signal("1", "mode: 0 parked, 1 gap, 2 moment, 3 retracting")]
+    direction: Annotated[float, Signal("1", "direction toward clamping, +1 or -1")]
+    rate: Annotated[float, Signal("rad/s", "speed of the reference", 50.0)]
+    theta_c: Annotated[float, Signal("rad", "contact position, estimated", 1.7)]
+    sat_rate: Annotated[float, Signal("1", "software rate limit reached")]
+    theta_ref: Annotated[float, Signal("rad", "common angle reference", 3.0)]
+    delta: Annotated[float, Signal("m", "offset of each screw", 4e-5)]
+    theta_1_ref: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
+    theta_2_ref: Annotated[float, Signal("rad", "angle reference 2", 3.0)]
+    last_1: Annotated[float, Signal("rad", "encoder 1 at the last sample", 3.0)]
+    last_2: Annotated[float, Signal("rad", "encoder 2 at the last sample", 3.0)]
+    speed_1: Annotated[float, Signal("rad/s", "measured speed 1", 50.0)]
+    speed_2: Annotated[float, Signal("rad/s", "measured speed 2", 50.0)]
+    i_1_ref: Annotated[float, Signal("A", "current demand 1", 5.0)]
+    i_2_ref: Annotated[float, Signal("A", "current demand 2", 5.0)]
+
+
+class Readings(NamedTuple):
+    """What the sensors show at a sampling instant."""
+
+    theta_1: Annotated[float, Signal("rad", "encoder 1", 3.0)]
+    theta_2: Annotated[float, Signal("rad", "encoder 2", 3.0)]
+    M: Annotated[float, Signal("N*m", "moment sensor", 300.0)]
+    Omega: Annotated[float, Signal("rad/s", "disc speed", 60.0)]
+
+
+def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
+    """Run the moment control once: its output is the speed of the common angle reference."""
+    control, T = par.control.moment, par.control.T_slow
+    rotation = ops.where(r.Omega < 0, -1.0, 1.0)
+    direction = ops.where(m.mode < 0.5, rotation, m.direction)
+    measured = rotation * r.M
+    found = moment_control.output(
+        moment_control.State(m.mode, m.rate, m.theta_c),
+        moment_control.Input(
+            M_set=u.M_set,
+            M_meas=measured,
+            theta=direction * 0.5 * (r.theta_1 + r.theta_2),
+            theta_ref=direction * m.theta_ref,
+            Omega=r.Omega,
+        ),
+        T,
+        control,
+    )
+    limited = ops.where(ops.fabs(found.rate) >= control.rate_max, 1.0, 0.0)
+    in_moment = ops.where((found.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0)
+    return m._replace(
+        M_set=u.M_set,
+        M_meas=measured,
+        direction=direction,
+        mode=found.mode,
+        rate=found.rate,
+        theta_c=found.theta_c,
+        sat_rate=limited * in_moment,
+    )
+
+
+def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
+    """Run the position control of both motors once."""
+    on = 1.0 - u.power_off
+    m = _references(m._replace(on=on), r, u, par)
+    rate = m.direction * m.rate if par.command.mode == "moment" else 0.0 * m.rate
+    control, T = par.control.position, par.control.T_fast
+    x_1, out_1 = position_pd.output(
+        position_pd.State(m.last_1, m.speed_1),
+        position_pd.Input(m.theta_1_ref, rate, r.theta_1),
+        T,
+        control,
+    )
+    x_2, out_2 = position_pd.output(
+        position_pd.State(m.last_2, m.speed_2),
+        position_pd.Input(m.theta_2_ref, rate, r.theta_2),
+        T,
+        control,
+    )
+    return m._replace(
+        last_1=x_1.last,
+        last_2=x_2.last,
+        speed_1=x_1.speed,
+        speed_2=x_2.speed,
+        i_1_ref=on * out_1.i,
+        i_2_ref=on * out_2.i,
+    )
+
+
+def current_tick(m: Memory, u: Stimulus) -> Memory:
+    """Hand the demanded currents to the drives."""
+    on = 1.0 - u.power_off
+    return m._replace(on=on, i_1_ref=on * u.i_1_set, i_2_ref=on * u.i_2_set)
+
+
+def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Memory:
+    """Return the memory with the references of both shafts renewed."""
+    if par.command.mode == "position":
+        return m._replace(theta_1_ref=u.theta_1_set, theta_2_ref=u.theta_2_set)
+    advanced = m.theta_ref + _allowed(m, par) * par.control.T_fast
+    # While the power is off the reference follows the shafts, so that nothing jumps afterwards.
+    common = ops.where(m.on > 0.5, advanced, 0.5 * (r.theta_1 + r.theta_2))
+    position, offset = par.control.position, par.control.offset
+    F_M = position.K_hat * (m.i_1_ref + m.i_2_ref) / offset.k_hat
+    target = screw_offset.offset(F_M, offset)
+    delta = screw_offset.advance(m.delta, target, par.control.T_fast, offset)
+    both = screw_offset.output(common, delta, offset)
+    return m._replace(
+        theta_ref=common, delta=delta, theta_1_ref=both.theta_1, theta_2_ref=both.theta_2
+    )
+
+
+def _allowed(m: Memory, par: WedgeParameters) -> float:
+    """Return the speed of the common reference [rad/s]: 0 where both motors are on their limit.
+
+    Anti-wind-up: a reference that went on would have to come all the way back at a release.
+    """
+    limit, speed = par.control.position.i_max, m.direction * m.rate
+    push = ops.where(speed < 0, -1.0, 1.0)
+    least = ops.fmin(push * m.i_1_ref, push * m.i_2_ref)
+    return ops.where(least < limit, speed, 0.0 * speed)

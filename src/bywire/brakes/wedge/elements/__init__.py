@@ -1,0 +1,1 @@
+"""Elements of this brake alone."""

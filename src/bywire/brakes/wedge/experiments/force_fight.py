@@ -1,0 +1,124 @@
+"""Force fight: two motors follow one reference, and differ; a force sensor between their screws."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.position_steps import SomeAngle
+from bywire.brakes.wedge.rigs.rig_case import mean_between, peak, screw_case
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, Unit
+
+Share = Annotated[float, Unit("1", 0.05), Field(gt=-1, le=10, allow_inf_nan=False)]
+SomeSpeed = Annotated[float, Unit("rad/s", 50.0), Field(gt=0, allow_inf_nan=False)]
+
+_MOTIONS = ("step", "ramp", "sine")
+_LABELS = tuple(f"{motion}_{pair}" for motion in _MOTIONS for pair in ("equal", "unequal"))
+_UNITS = {f"peak_force_{label}": "N" for label in _LABELS}
+_UNITS |= {f"static_force_{pair}": "N" for pair in ("equal", "unequal")}
+_UNITS |= {"peak_difference_sine_unequal": "rad"}
+
+
+class Options(ParameterSet):
+    """Three motions of the common reference, and by which shares motor 2 is changed."""
+
+    a_step: SomeAngle
+    """step of the reference"""
+    omega_ramp: SomeSpeed
+    """speed of the ramp"""
+    a_sine: SomeAngle
+    """amplitude of the sine"""
+    f_sine: Frequency
+    """frequency of the sine"""
+    more_K: Share
+    """torque constant of motor 2 over that of the parameter set, less one"""
+    more_J: Share
+    """inertia of motor 2 over that of the parameter set, less one"""
+    more_R: Share
+    """resistance of motor 2 over that of the parameter set, less one"""
+    more_D: Share
+    """viscous damping of motor 2 over that of the parameter set, less one"""
+    duration: Duration
+    """time recorded of each motion"""
+    record: Duration
+    """recording interval"""
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return every motion with the motors of the parameter set, and with motor 2 different."""
+    modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
+    own = par.motor_2
+    different = {
+        "motor_2.K_ref": own.K_ref * (1.0 + options.more_K),
+        "motor_2.J_M": own.J_M * (1.0 + options.more_J),
+        "motor_2.R_ref": own.R_ref * (1.0 + options.more_R),
+        "motor_2.D_M": own.D_M * (1.0 + options.more_D),
+    }
+    return tuple(
+        screw_case(
+            f"{motion}_{pair}", par, _reference(motion, options), options.duration,
+            modes | changes, record=options.record,
+        )
+        for motion in _MOTIONS
+        for pair, changes in (("equal", {}), ("unequal", different))
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the largest forces, with and without the difference between the motors."""
+    found = [
+        Kpi(f"peak_force_{label}", peak(recordings[label], "y_F"), "N",
+            "Largest magnitude that the force sensor shows.")
+        for label in _LABELS
+    ]  # fmt: skip
+    for pair in ("equal", "unequal"):
+        run = recordings[f"step_{pair}"]
+        held = abs(mean_between(run, "y_F", 0.9 * options.duration, options.duration))
+        text = "Magnitude of the mean force in the last tenth of the time after the step."
+        found.append(Kpi(f"static_force_{pair}", held, "N", text))
+    run = recordings["sine_unequal"]
+    apart = float(np.abs(run["q_1"].values - run["q_2"].values).max())
+    found.append(
+        Kpi("peak_difference_sine_unequal", apart, "rad", "Largest difference of the encoders.")
+    )
+    return tuple(found)
+
+
+def _reference(motion: str, options: Options) -> Any:
+    """Return the common reference of both motors, of one motion."""
+    w = 2.0 * math.pi * options.f_sine
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        after = np.maximum(t, 0.0)
+        theta = {
+            "step": np.where(t >= -1e-9, options.a_step, 0.0),
+            "ramp": options.omega_ramp * after,
+            "sine": options.a_sine * np.sin(w * after),
+        }[motion]
+        return {"theta_1_set": theta, "theta_2_set": theta}
+
+    return stimulus
+
+
+EXPERIMENT = Experiment(
+    name="force-fight",
+    assembly="wedge-brake",
+    summary="force between two motors that follow one reference, equal and unequal",
+    options=Options,
+    defaults=Options(
+        a_step=1.0, omega_ramp=60.0, a_sine=0.5, f_sine=20.0,
+        more_K=-0.05, more_J=0.05, more_R=0.10, more_D=0.50, duration=0.3, record=2e-4,
+    ),
+    cases=cases,
+    judge=judge,
+    kpis=_UNITS,
+    figures=("time-traces", "energy-balance"),
+)  # fmt: skip

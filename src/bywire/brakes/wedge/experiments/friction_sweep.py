@@ -1,0 +1,157 @@
+"""Friction sweep: a moment step in closed loop for several friction coefficients of the pads.
+
+Above tan(alpha) the wedge is unstable without control; the paper names extreme coefficients as
+the next tests (Roberts et al. 2003, sections "Introduction" and "Programme status").
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.step_response import Setting
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge.case import case_from_parked, figure, mean, steps
+from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+
+_BAND = 0.05  # of the step: half width of the band in which a stable loop ends
+_LAST = 0.2  # of the hold
+_NO_ROW = "no row of the recording lies there: record more often"
+
+_EACH = {"stable": "1", "overshoot": "%", "settling_time": "s", "hold_power": "W"}
+_ALL = {
+    "unstable": "1",
+    "overshoot_max": "%",
+    "settling_time_max": "s",
+    "hold_power_min": "W",
+    "hold_power_max": "W",
+}
+
+
+class Options(ParameterSet):
+    """The step and what is varied.
+
+    ``slope``: ``"known"`` lets the controller believe in the slope of moment over angle that
+    belongs to each coefficient; ``"fixed"`` leaves it the slope of the parameter set.
+    ``friction``: ``"none"`` takes the brake's dry friction away, which helps to hold.
+    """
+
+    M_step: SomeMoment
+    """moment demanded"""
+    t_hold: Duration
+    """time recorded after the step"""
+    mu_B: Coefficients
+    """friction coefficients of the pads"""
+    slope: Literal["known", "fixed"]
+    """whether the controller knows the friction coefficient"""
+    friction: Literal["kept", "none"]
+    """whether the brake has its own dry friction"""
+    settle: Duration
+    """time parked before the step"""
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return one run for each friction coefficient, on a true disc: its ripple would hide all."""
+    levels = {0.0: options.M_step}
+    changes: dict[str, Any] = {"flywheel.runout": 0.0}
+    if options.friction == "none":
+        changes |= FRICTIONLESS
+    return tuple(
+        case_from_parked(
+            par, lambda t: {"M_set": steps(t, levels)}, options.t_hold,
+            changes | with_friction(par, mu_B, options.slope == "known"),
+            label=tag(mu_B), settle=options.settle, keep=options.settle,
+        )
+        for mu_B in options.mu_B
+    )  # fmt: skip
+
+
+def _stable(run: xr.Dataset, options: Options, name: str) -> Kpi:
+    """Return whether a moment ends within 5 % of the step, without the help of an end stop."""
+    text = "1 where the last fifth of the hold stays within 5 % of the step, no end stop met."
+    last = run.sel(time=slice((1.0 - _LAST) * options.t_hold, None))
+    if not last.sizes["time"]:
+        return Kpi(name, math.nan, "1", text, _NO_ROW)
+    if not last["F_N"].values.any():
+        return Kpi(name, math.nan, "1", text, "the pads do not press: there is no loop to judge")
+    away = np.abs(np.abs(last["M_B"].values) - options.M_step).max()
+    inside = away <= _BAND * options.M_step and not run["F_end"].values.any()
+    return Kpi(name, float(inside), "1", text)
+
+
+def _one(run: xr.Dataset, mu_B: float, options: Options) -> tuple[Kpi, ...]:
+    """Return the figures of one friction coefficient."""
+    backward = float(run["Omega"].values[0]) < 0
+    end = -options.M_step if backward else options.M_step
+    step = evaluate("step_response", run, Setting("M_B", t_step=0.0, start=0.0, end=end))
+    begin = (1.0 - _LAST) * options.t_hold
+    at = f"_{tag(mu_B)}"
+    return (
+        _stable(run, options, "stable" + at),
+        replace(step["overshoot"], name="overshoot" + at),
+        replace(step["settling_time"], name="settling_time" + at),
+        figure("hold_power" + at, mean(run, "P_in", begin, options.t_hold), "W",
+               "Mean input power in the last fifth of the hold, standby included.", _NO_ROW),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the figures of every friction coefficient, and the worst of them."""
+    each = {mu_B: _one(recordings[tag(mu_B)], mu_B, options) for mu_B in options.mu_B}
+    stable, overshoot, settling, power = (
+        [kpi.value for kpi in column] for column in zip(*each.values(), strict=True)
+    )
+    slow = [f"{m:g}" for m, t in zip(options.mu_B, settling, strict=True) if math.isnan(t)]
+    note = f"not settled at mu_B = {', '.join(slow)}" if slow else ""
+    unjudged = sum(math.isnan(value) for value in stable)
+    return (
+        *(kpi for kpis in each.values() for kpi in kpis),
+        Kpi("unstable", math.nan if unjudged else float(sum(value == 0 for value in stable)), "1",
+            "Number of friction coefficients at which the loop is not stable.",
+            f"{unjudged} of them cannot be judged" if unjudged else ""),
+        Kpi("overshoot_max", max(overshoot), "%", "Largest overshoot."),
+        Kpi("settling_time_max", math.nan if slow else max(settling), "s",
+            "Largest settling time (2 %).", note),
+        figure("hold_power_min", min(power), "W", "Smallest hold power.", _NO_ROW),
+        figure("hold_power_max", max(power), "W", "Largest hold power.", _NO_ROW),
+    )  # fmt: skip
+
+
+def named(options: Options) -> dict[str, str]:
+    """Return the unit of every key figure."""
+    each = {f"{name}_{tag(mu_B)}": unit for mu_B in options.mu_B for name, unit in _EACH.items()}
+    return each | _ALL
+
+
+_DEFAULTS = Options(
+    M_step=200.0,
+    t_hold=1.0,
+    mu_B=(0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6),
+    slope="known",
+    friction="kept",
+    settle=0.05,
+)
+
+EXPERIMENT = Experiment(
+    name="friction-sweep",
+    assembly="wedge-brake",
+    summary="200 N m steps at pad friction 0.2 to 0.6: stability, overshoot, settling, hold power",
+    options=Options,
+    defaults=_DEFAULTS,
+    cases=cases,
+    judge=judge,
+    kpis=named(_DEFAULTS),
+    figures=("overlaid-traces",),
+    named=named,
+)

@@ -1,0 +1,219 @@
+"""Position step: both motors of the assembled brake follow a step within the clearance.
+
+Roberts et al. (2003), section "Position control of wedge": very little difference to the motors
+with their screws alone, because of the large reduction. Both are run beside the brake.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Annotated, Any
+
+import numpy as np
+import xarray as xr
+from pydantic import AfterValidator, Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.step_response import Setting
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge.case import case_from_parked, parameters_of, steps
+from bywire.brakes.wedge.elements import brake_heart
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, Position, Unit
+from bywire.plant import roller_screw
+
+BRAKE, SCREWS, MOTORS = "brake", "screws", "motors"
+_BANDS = ("low", "high")
+_AWAY = 1.0  # free-play [m] that no motor crosses
+
+_EACH = {
+    "rise_time": "s",
+    "overshoot": "%",
+    "settling_time": "s",
+    "steady_state_error": "rad",
+    "peak_current": "A",
+    "current_limited": "%",
+}
+_OVER = {"difference_screws": "%", "difference_motors": "%", "normal_force": "N"}
+
+
+def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
+    tags = [_tag(value) for value in values]
+    for k, value in enumerate(values):
+        if tags[k] in tags[:k]:
+            raise ValueError(f"{value:g} rad stands there twice: leave one out")
+    return values
+
+
+def _tag(amplitude: float) -> str:
+    """Return what labels and key figures call an amplitude, in thousandths of a radian."""
+    return f"{1e3 * amplitude:.10g}mrad".replace(".", "p")
+
+
+Amplitude = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Amplitudes = Annotated[
+    tuple[Amplitude, ...],
+    Unit("rad", 0.5),
+    Field(min_length=1, max_length=100),
+    AfterValidator(_distinct),
+]
+
+
+class Options(ParameterSet):
+    """The steps; from parking, toward clamping on the positive side."""
+
+    amplitudes: Amplitudes
+    """angles of the steps; the pads touch at clearance / tan(alpha) of wedge travel"""
+    f_low: Frequency
+    """natural frequency of the position loop of low bandwidth"""
+    f_high: Frequency
+    """natural frequency of the position loop of high bandwidth"""
+    delta: Position
+    """offset of each screw, which preloads the wedge; that of the parameters unless given"""
+    duration: Duration
+    """time recorded after each step"""
+    settle: Duration
+    """time at rest before it"""
+
+
+def following(par: WedgeParameters) -> Mapping[str, Any]:
+    """Return the preload of the parameters."""
+    return {"delta": par.control.offset.delta_preload}
+
+
+def _arrangements(par: WedgeParameters, delta: float) -> dict[str, dict[str, float]]:
+    """Return the changes that take the wedge, and then the other motor's screw, away.
+
+    The screws alone push on each other, tip to tip, with the force that they had on the wedge.
+    """
+    heart = par.heart
+    c = brake_heart.compliances(heart)
+    preload = max(0.0, (delta - 0.5 * (heart.g_1 + heart.g_2)) / c.wedge)
+    together = -0.5 * (heart.g_12 + preload * c.tips)
+    no_wedge = {"heart.g_1": _AWAY, "heart.g_2": _AWAY}
+    return {
+        BRAKE: {"control.offset.delta_preload": delta},
+        SCREWS: {"control.offset.delta_preload": together, **no_wedge},
+        MOTORS: {"control.offset.delta_preload": delta, **no_wedge, "heart.g_12": _AWAY},
+    }
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return a run for every arrangement, bandwidth and amplitude."""
+    bands = dict(zip(_BANDS, (options.f_low, options.f_high), strict=True))
+    return tuple(
+        _case(par, options, amplitude, f"{kind}-{band}-{_tag(amplitude)}",
+              {"command.mode": "position", "control.position.f_n": f_n, **changes})
+        for kind, changes in _arrangements(par, options.delta).items()
+        for band, f_n in bands.items()
+        for amplitude in options.amplitudes
+    )  # fmt: skip
+
+
+def _case(
+    par: WedgeParameters, options: Options, amplitude: float, label: str, changes: Mapping[str, Any]
+) -> Case:
+    apart = changes["control.offset.delta_preload"] / roller_screw.slope(par.screw)
+    return case_from_parked(
+        par,
+        lambda t: {
+            "theta_1_set": steps(t, {0.0: amplitude}) - apart,
+            "theta_2_set": steps(t, {0.0: amplitude}) + apart,
+        },
+        options.duration, changes, label, settle=options.settle, keep=options.settle,
+    )  # fmt: skip
+
+
+def finish(run: xr.Dataset, _: Options) -> xr.Dataset:
+    """Add the mean angle of both motors."""
+    attrs = {"units": "rad", "long_name": "mean motor angle"}
+    mean = 0.5 * (run["theta_1"].values + run["theta_2"].values)
+    return run.assign(theta=("time", mean, attrs))
+
+
+def _one(run: xr.Dataset, amplitude: float, ending: str) -> tuple[Kpi, ...]:
+    """Return the figures of one step of the assembled brake."""
+    setting = Setting("theta", t_step=0.0, start=0.0, end=amplitude)
+    step = evaluate("step_response", run, setting)
+    after, par = run.sel(time=slice(-1e-9, None)), parameters_of(run)
+    limit = min(par.control.position.i_max, par.drive.i_max) * (1.0 - 1e-9)
+    wanted = np.maximum(np.abs(after["i_1_ref"].values), np.abs(after["i_2_ref"].values))
+    found = np.maximum(np.abs(after["i_1"].values), np.abs(after["i_2"].values))
+    names = ("rise_time", "overshoot", "settling_time", "steady_state_error")
+    return (
+        *(replace(step[name], name=name + ending) for name in names),
+        Kpi("peak_current" + ending, float(found.max()), "A", "Largest current of a motor."),
+        Kpi("current_limited" + ending, 100.0 * float(np.mean(wanted >= limit)), "%",
+            "Share of the time after the step on the current limit."),
+    )  # fmt: skip
+
+
+def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...]:
+    """Return how far the brake and the arrangements without wedge differ, over all amplitudes."""
+    worst, touching = {SCREWS: 0.0, MOTORS: 0.0}, 0.0
+    for amplitude in options.amplitudes:
+        ending = f"-{band}-{_tag(amplitude)}"
+        brake = recordings[BRAKE + ending]
+        touching = max(touching, float(brake["F_N"].max()))
+        for kind in worst:
+            apart = np.abs(brake["theta"].values - recordings[kind + ending]["theta"].values)
+            worst[kind] = max(worst[kind], 100.0 * float(apart.max()) / amplitude)
+    note = "the pads touch the disc: the step leaves the clearance" if touching > 0 else ""
+    rest = "largest over time and amplitudes, in % of the step."
+    return (
+        Kpi(f"difference_screws_{band}", worst[SCREWS], "%",
+            f"Difference of the mean angle to screws that preload each other, no wedge; {rest}",
+            note),
+        Kpi(f"difference_motors_{band}", worst[MOTORS], "%",
+            f"Difference of the mean angle to motors whose screws touch nothing; {rest}", note),
+        Kpi(f"normal_force_{band}", touching, "N",
+            "Largest normal force: 0 while the steps stay within the clearance.", note),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return each step's figures, and how little the wedge matters."""
+    own = [
+        kpi
+        for band in _BANDS
+        for amplitude in options.amplitudes
+        for kpi in _one(
+            recordings[f"{BRAKE}-{band}-{_tag(amplitude)}"], amplitude, f"_{band}_{_tag(amplitude)}"
+        )
+    ]
+    return (*own, *(kpi for band in _BANDS for kpi in _over(recordings, band, options)))
+
+
+def named(options: Options) -> dict[str, str]:
+    """Return the unit of every key figure."""
+    each = {
+        f"{name}_{band}_{_tag(amplitude)}": unit
+        for band in _BANDS
+        for amplitude in options.amplitudes
+        for name, unit in _EACH.items()
+    }
+    return each | {f"{name}_{band}": unit for band in _BANDS for name, unit in _OVER.items()}
+
+
+_DEFAULTS = Options(
+    amplitudes=(0.25, 0.5, 1.0), f_low=12.0, f_high=60.0, delta=42e-6, duration=0.4, settle=0.05
+)
+
+EXPERIMENT = Experiment(
+    name="position-step",
+    assembly="wedge-brake",
+    summary="steps of both motors within the clearance, low and high bandwidth, beside no wedge",
+    options=Options,
+    defaults=_DEFAULTS,
+    cases=cases,
+    judge=judge,
+    kpis=named(_DEFAULTS),
+    figures=("overlaid-traces",),
+    finish=finish,
+    following=following,
+    named=named,
+)

@@ -1,0 +1,147 @@
+"""Run-down: a motor coasts to rest, alone, with a known inertia added, and with a known torque.
+
+From a run-down alone follow friction and damping per inertia only. What is known beside it sets
+the scale: an inertia on the shaft, or the torque of a current.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.rig_case import (
+    Stimuli,
+    check_current,
+    parameters_of,
+    shaft_case,
+    torque_constant_of,
+)
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Duration, Inertia
+
+LABELS = ("free", "added", "braked")
+_HALF = 0.5  # of the first speed, down to which decelerations are taken
+_UNITS = {f"stopping_time_{label}": "s" for label in LABELS}
+_UNITS |= {"speed": "rad/s", "inertia_by_added": "kg*m**2", "inertia_by_torque": "kg*m**2",
+           "inertia_true": "kg*m**2"}  # fmt: skip
+
+
+class Options(ParameterSet):
+    """Spin-up by a current, then coasting."""
+
+    i_spin: Current
+    """current of the spin-up"""
+    t_spin: Duration
+    """time of the spin-up; with the added inertia as much longer as it is more"""
+    J_added: Inertia
+    """inertia put on the shaft in the second run"""
+    i_brake: Current
+    """current against the motion in the third run; less than friction holds at rest"""
+    duration: Duration
+    """time recorded from the end of the spin-up"""
+    record: Duration
+    """recording interval"""
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return the three runs of a single motor on its dummy shaft."""
+    for name in ("i_spin", "i_brake"):
+        check_current(name, getattr(options, name), par)
+    rig = {"rig.mode_1": "current", "rig.load": "dummy", "rig.clamp": "open"}
+    J = par.rig.J_dummy
+    ratio = 1.0 + options.J_added / (par.motor_1.J_M + J)
+    kinds = (("free", J, 1.0, 0.0), ("added", J + options.J_added, ratio, 0.0),
+             ("braked", J, 1.0, -options.i_brake))  # fmt: skip
+    return tuple(
+        shaft_case(
+            label, par, _spun(options, i_after), options.duration, rig | {"rig.J_dummy": J_dummy},
+            settle=longer * options.t_spin, keep=0.0, record=options.record,
+        )
+        for label, J_dummy, longer, i_after in kinds
+    )  # fmt: skip
+
+
+def _spun(options: Options, i_after: float) -> Stimuli:
+    """Return the current of the spin-up, and of what follows."""
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        return {"i_1_set": np.where(t < -1e-9, options.i_spin, i_after)}
+
+    return stimulus
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return how long the shaft turns, and its inertia by what was known beside the run-down."""
+    par = parameters_of(recordings["free"])
+    rate = {label: _deceleration(recordings, label) for label in LABELS}
+    J = par.motor_1.J_M + par.rig.J_dummy
+    by_added = _over(options.J_added * rate["added"], rate["free"] - rate["added"])
+    torque = torque_constant_of(par) * options.i_brake
+    by_torque = _over(torque, rate["braked"] - rate["free"])
+    values = {
+        f"stopping_time_{label}": (_stop(recordings[label]), "Time from the end of the spin-up "
+                                   "until the shaft rests.") for label in LABELS
+    }  # fmt: skip
+    values |= {
+        "speed": (_first(recordings["free"]), "Speed at the end of the spin-up."),
+        "inertia_by_added": (by_added, "Inertia of shaft and motor, by the mean decelerations "
+                             "over equal speeds with and without the added one."),
+        "inertia_by_torque": (by_torque, "The same by the known current's torque."),
+        "inertia_true": (J, "What was put in."),
+    }  # fmt: skip
+    return tuple(_kpi(name, *values[name]) for name in _UNITS)
+
+
+def _speed(run: xr.Dataset) -> Array:
+    return np.asarray(np.abs(run.sel(time=slice(-1e-9, None))["omega_1"].values))
+
+
+def _first(run: xr.Dataset) -> float:
+    return float(_speed(run)[0])
+
+
+def _deceleration(recordings: Recordings, label: str) -> float:
+    """Return the mean deceleration [rad/s^2] between two speeds that all runs pass."""
+    high = min(_first(recordings[one]) for one in LABELS)
+    speed = _speed(recordings[label])
+    t = recordings[label]["time"].sel(time=slice(-1e-9, None)).values
+    if not high > 0.0 or speed.min() > _HALF * high:
+        return math.nan
+    ends = np.interp([-high, -_HALF * high], -speed, t)
+    return float((1.0 - _HALF) * high / (ends[1] - ends[0]))
+
+
+def _stop(run: xr.Dataset) -> float:
+    rest = np.flatnonzero(_speed(run) == 0.0)
+    t = run["time"].sel(time=slice(-1e-9, None)).values
+    return float(t[rest[0]]) if rest.size else math.nan
+
+
+def _over(above: float, below: float) -> float:
+    return above / below if below > 0 else math.nan
+
+
+def _kpi(name: str, value: float, text: str) -> Kpi:
+    failed = "the shaft does not turn long enough, or does not come to rest"
+    return Kpi(name, value, _UNITS[name], text, "" if math.isfinite(value) else failed)
+
+
+EXPERIMENT = Experiment(
+    name="run-down",
+    assembly="wedge-brake",
+    summary="a motor coasts to rest: alone, with an added inertia, against a known torque",
+    options=Options,
+    defaults=Options(
+        i_spin=4.0, t_spin=0.1, J_added=1e-4, i_brake=0.5, duration=0.5, record=2e-4
+    ),
+    cases=cases,
+    judge=judge,
+    kpis=_UNITS,
+    figures=("time-traces", "energy-balance"),
+)

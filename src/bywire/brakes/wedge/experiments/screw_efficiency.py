@@ -1,0 +1,180 @@
+"""Screw efficiency: a motor in current control against one in position control, a sensor between.
+
+Two such motors cannot back-drive each other at full current: of the torque of one, 0.65 x 0.46
+arrive at the other. So the one in position control moves, and the other follows or is pushed back.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.rig_case import (
+    check_current,
+    mean_between,
+    parameters_of,
+    screw_case,
+    shaft_case,
+    slope_of,
+    torque_constant_of,
+)
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Duration, Unit
+from bywire.core.signals import Signal
+
+SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
+
+_SETTLED = 0.3  # of the time in motion: what comes before is left out of the means
+_SPEED = 0.05  # by which mean speeds may differ from what is demanded
+_UNITS = {
+    "eta_f": "1",
+    "eta_f_raw": "1",
+    "eta_f_reverse": "1",
+    "eta_f_true": "1",
+    "eta_b": "1",
+    "eta_b_raw": "1",
+    "eta_b_reverse": "1",
+    "eta_b_true": "1",
+    "force": "N",
+    "force_reverse": "N",
+    "bearing_torque": "N*m",
+}
+
+
+class Options(ParameterSet):
+    """Currents and slow motion; at a speed where the friction no longer falls with it."""
+
+    i_drive: Current
+    """current of motor 1 while it drives and motor 2 gives way"""
+    i_back: Current
+    """current of motor 1 while motor 2 pushes it back; small, see the experiment's text"""
+    omega_slow: SlowSpeed
+    """speed of the motion"""
+    settle: Duration
+    """time in which the force builds up, before the motion"""
+    duration: Duration
+    """time in motion"""
+
+
+class Found(NamedTuple):
+    """What a run in motion reads, friction counted against the motion."""
+
+    F: Annotated[float, Signal("N", "force", 1000.0)]
+    T_1: Annotated[float, Signal("N*m", "torque of motor 1 by its current", 1.0)]
+    T_2: Annotated[float, Signal("N*m", "torque of motor 2 by its current", 1.0)]
+    steady: Annotated[float, Signal("1", "1 in steady motion under compression, else NaN")]
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return the motion without load, with motor 1 driving, and with motor 1 driven back."""
+    for name in ("i_drive", "i_back"):
+        check_current(name, getattr(options, name), par)
+    modes = {"rig.mode_1": "current", "rig.mode_2": "position"}
+    alone = {"rig.mode_1": "position", "rig.load": "dummy", "rig.clamp": "open"}
+    slow = options.omega_slow
+    timing = {"settle": options.settle, "keep": options.settle}
+
+    def turning(t: Array) -> dict[str, Array]:
+        return {"theta_1_set": slow * np.maximum(t, 0.0)}
+
+    return (
+        shaft_case("no_load", par, turning, options.duration, alone, **timing),
+        screw_case(
+            "driving", par, _pushed(options.i_drive, slow, options), options.duration, modes,
+            **timing,
+        ),
+        screw_case(
+            "driven_back", par, _pushed(options.i_back, -slow, options), options.duration, modes,
+            **timing,
+        ),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the efficiencies in both directions, raw and with the bearing torque taken off."""
+    no_load = recordings["no_load"]
+    par = parameters_of(no_load)
+    k = slope_of(par)
+    T_b = torque_constant_of(par) * _mean(no_load, "i_1", options)
+    there = _read(recordings["driving"], options.omega_slow, options)
+    back = _read(recordings["driven_back"], -options.omega_slow, options)
+    values: dict[str, tuple[float, str]] = {
+        "eta_f": (there.steady * _ratio(k * there.F, there.T_1 - T_b),
+                  "Torque by the force over motor torque less bearing torque, motor 1 driving."),
+        "eta_f_raw": (there.steady * _ratio(k * there.F, there.T_1),
+                      "Torque by the force over motor torque, motor 1 driving."),
+        "eta_f_reverse": (back.steady * _ratio(k * back.F, -back.T_2 - T_b),
+                          "The same with the bearing torque taken off, motor 2 driving."),
+        "eta_f_true": (par.screw.eta_f, "What was put in."),
+        "eta_b": (there.steady * _ratio(-there.T_2 + T_b, k * there.F),
+                  "Holding torque and bearing torque over torque by the force, motor 2 driven."),
+        "eta_b_raw": (there.steady * _ratio(-there.T_2, k * there.F),
+                      "Holding torque over torque by the force, motor 2 driven."),
+        "eta_b_reverse": (back.steady * _ratio(back.T_1 + T_b, k * back.F),
+                          "The same with the bearing torque added, motor 1 driven."),
+        "eta_b_true": (par.screw.eta_b, "What was put in."),
+        "force": (there.F, "Mean force while motor 1 drives."),
+        "force_reverse": (back.F, "Mean force while motor 1 is driven back."),
+        "bearing_torque": (T_b, "Motor torque without load at the same speed."),
+    }  # fmt: skip
+    return tuple(_kpi(name, *values[name]) for name in _UNITS)
+
+
+def _pushed(i: float, speed: float, options: Options) -> Any:
+    """Return motor 1 pushing and, from time zero on, motor 2 moving."""
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        rising = np.clip((t + options.settle) / (0.5 * options.settle), 0.0, 1.0)
+        return {"i_1_set": i * rising, "theta_2_set": speed * np.maximum(t, 0.0)}
+
+    return stimulus
+
+
+def _read(run: xr.Dataset, speed: float, options: Options) -> Found:
+    K = torque_constant_of(parameters_of(run))
+    T_1, T_2 = (K * _mean(run, name, options) for name in ("i_1", "i_2"))
+    steady = all(abs(_speed(run, name, options) / speed - 1.0) < _SPEED for name in ("q_1", "q_2"))
+    F = _mean(run, "y_F", options)
+    return Found(F, T_1, T_2, 1.0 if steady and F > 0 else math.nan)
+
+
+def _speed(run: xr.Dataset, name: str, options: Options) -> float:
+    """Return the mean speed [rad/s] by an encoder."""
+    window = run.sel(time=slice(_SETTLED * options.duration, None))
+    t, q = window["time"].values, window[name].values
+    return float((q[-1] - q[0]) / (t[-1] - t[0])) if t.size > 1 else math.nan
+
+
+def _mean(run: xr.Dataset, name: str, options: Options) -> float:
+    return mean_between(run, name, _SETTLED * options.duration, options.duration)
+
+
+def _ratio(above: float, below: float) -> float:
+    return above / below if below > 0 else math.nan
+
+
+def _kpi(name: str, value: float, text: str) -> Kpi:
+    failed = "no steady motion under compression: a motor cannot do its part"
+    note = "" if math.isfinite(value) else failed
+    return Kpi(name, value, _UNITS[name], text, note)
+
+
+EXPERIMENT = Experiment(
+    name="screw-efficiency",
+    assembly="wedge-brake",
+    summary="efficiency of the roller screw, from motor currents and the force between two screws",
+    options=Options,
+    defaults=Options(i_drive=12.0, i_back=3.0, omega_slow=10.0, settle=0.4, duration=1.0),
+    cases=cases,
+    judge=judge,
+    kpis=_UNITS,
+    figures=("time-traces", "energy-balance"),
+)

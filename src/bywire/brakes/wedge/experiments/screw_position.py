@@ -1,0 +1,49 @@
+"""Screw position: position steps of a single motor that turns a preloaded roller screw."""
+
+from __future__ import annotations
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge import position_steps
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.position_steps import Options
+from bywire.brakes.wedge.rigs import shaft_rig_plant
+from bywire.brakes.wedge.rigs.rig_case import parameters_of
+from bywire.core.signals import zeros
+
+_LOOPS = ("low", "high")
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return one run per bandwidth and amplitude."""
+    return position_steps.cases(par, options, {"rig.load": "screw", "rig.clamp": "open"})
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the figures of all steps, and the error within which friction holds the shaft."""
+    bands = []
+    for loop in _LOOPS:
+        par = parameters_of(recordings[f"{loop}_small"])
+        rest = zeros(shaft_rig_plant.State)
+        s = shaft_rig_plant.side(rest, rest, zeros(shaft_rig_plant.Memory), par)
+        held = max(abs(bound) for bound in shaft_rig_plant.friction(s, par))
+        band = (held + par.motor_1.T_cog) / position_steps.stiffness(par)
+        bands.append(
+            Kpi(f"dead_band_{loop}", band, "rad",
+                "Angle error that friction and cogging at rest can hold, by their laws.")
+        )  # fmt: skip
+    return (*position_steps.judge(recordings, options), *bands)
+
+
+EXPERIMENT = Experiment(
+    name="screw-position",
+    assembly="wedge-brake",
+    summary="position steps of a single motor with a preloaded roller screw, two bandwidths",
+    options=Options,
+    defaults=position_steps.DEFAULTS,
+    cases=cases,
+    judge=judge,
+    kpis=position_steps.UNITS | {f"dead_band_{loop}": "rad" for loop in _LOOPS},
+    figures=("time-traces", "energy-balance"),
+)

@@ -1,0 +1,99 @@
+"""Slow rotation: a single motor turns once forward and once back, slowly; its current shows all.
+
+Cogging depends on the angle alone, dry friction on the direction: turning both ways tells them
+apart.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.rig_case import parameters_of, shaft_case, torque_constant_of
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from bywire.plant.axial_bearing import AngularSpeed
+
+_STARTED = 0.05  # of a stroke, after which the motion counts as steady
+_UNITS = {
+    "torque_forward": "N*m",
+    "torque_backward": "N*m",
+    "friction_torque": "N*m",
+    "ripple": "N*m",
+    "cogging_true": "N*m",
+}
+
+
+class Options(ParameterSet):
+    """One revolution each way; fast enough not to stick, slow beside the position loop."""
+
+    omega_slow: AngularSpeed
+    """speed of the motion"""
+    settle: Duration
+    """time at rest before it"""
+    record: Duration
+    """recording interval"""
+
+
+def stroke(options: Options) -> float:
+    """Return the time of one revolution [s]."""
+    return 2.0 * math.pi / options.omega_slow
+
+
+def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return the one run, on a dummy shaft."""
+    T = stroke(options)
+
+    def there_and_back(t: Array) -> dict[str, Array]:
+        return {"theta_1_set": options.omega_slow * np.clip(np.minimum(t, 2.0 * T - t), 0.0, T)}
+
+    rig = {"rig.mode_1": "position", "rig.load": "dummy", "rig.clamp": "open"}
+    return (
+        shaft_case("run", par, there_and_back, 2.0 * T, rig, settle=options.settle,
+                   record=options.record),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return mean torques both ways, the friction between them, and the ripple around them."""
+    run, T = recordings["run"], stroke(options)
+    par = parameters_of(run)
+    K = torque_constant_of(par)
+    ways = [
+        K * run["i_1"].sel(time=slice((k + _STARTED) * T, (k + 1.0 - _STARTED) * T)).values
+        for k in (0, 1)
+    ]
+    forward, backward = (float(way.mean()) if way.size else math.nan for way in ways)
+    ripple = float(np.mean([way.std() for way in ways])) if all(w.size for w in ways) else math.nan
+    values = {
+        "torque_forward": (forward, "Mean torque by the current, forward."),
+        "torque_backward": (backward, "The same backward."),
+        "friction_torque": (0.5 * (forward - backward), "Half of their difference."),
+        "ripple": (math.sqrt(2.0) * ripple, "Amplitude of a sine of the torque's deviation from "
+                   "its mean."),
+        "cogging_true": (par.motor_1.T_cog, "Amplitude of the cogging torque that was put in."),
+    }  # fmt: skip
+    return tuple(_kpi(name, *values[name]) for name in _UNITS)
+
+
+def _kpi(name: str, value: float, text: str) -> Kpi:
+    note = "" if math.isfinite(value) else "no row in the time in which the torque is taken"
+    return Kpi(name, value, _UNITS[name], text, note)
+
+
+EXPERIMENT = Experiment(
+    name="slow-rotation",
+    assembly="wedge-brake",
+    summary="one revolution forward and back, slowly: cogging torque and dry friction",
+    options=Options,
+    defaults=Options(omega_slow=0.5, settle=0.05, record=1e-3),
+    cases=cases,
+    judge=judge,
+    kpis=_UNITS,
+    figures=("time-traces", "energy-balance"),
+)

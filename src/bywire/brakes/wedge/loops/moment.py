@@ -1,0 +1,94 @@
+"""Moment loop of the wedge brake, around position and current loops."""
+
+from __future__ import annotations
+
+import math
+from typing import cast
+
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.brakes.wedge.control import Stimulus
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.laws import moment_control
+from bywire.brakes.wedge.loops.causes import CAUSES, DRIVE_LIMITS
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.start import force_for, memory_at, state_at, travel_for
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+from bywire.plant import roller_screw
+
+
+def point(par: ParameterSet, value: float) -> Point:
+    """Return the brake that holds a moment [N m].
+
+    Screws and references stand where the wedge is in balance: the actuation force presses both
+    contacts of the heart, and the currents carry it.
+
+    Raises
+    ------
+    ParameterError
+        When the moment is not positive, beyond the wedge's travel or the drives' current, or
+        when the disc stands.
+
+    Notes
+    -----
+    The wedge stands on the side to which the disc turns; the moment counts in that direction.
+    """
+    own = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
+    _require_braking(value, own)
+    x = travel_for(force_for(value, own), own)
+    _require_reachable(value, x, own)
+    turning = math.copysign(1.0, own.flywheel.Omega_0)
+    x *= turning
+    memory = memory_at(x, own)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
+    state = state_at(x, own)._replace(y_M=turning * value)
+    return Point(WedgeBrake(), own, state, memory, zeros(Stimulus)._replace(M_set=value))
+
+
+def _require_braking(value: float, par: WedgeParameters) -> None:
+    if not value > 0.0:
+        raise ParameterError(
+            f"moment = {value:g} N*m is no operating point: it must be > 0 N*m, counted against "
+            "the disc's rotation whatever its direction"
+        )
+    if par.flywheel.Omega_0 == 0.0:
+        raise ParameterError(
+            "flywheel.Omega_0 = 0 rad/s: a standing disc has no braking moment to control; set it "
+            "to the speed at which the loop works"
+        )
+
+
+def _require_reachable(value: float, x: float, par: WedgeParameters) -> None:
+    if not x < par.wedge.x_stop:
+        raise ParameterError(
+            f"moment = {value:g} N*m needs {x * 1e3:.3g} mm of wedge travel: it must be below "
+            f"wedge.x_stop = {par.wedge.x_stop * 1e3:g} mm; ask for less"
+        )
+    force = abs(wedge.slope(par.wedge) - par.wedge.mu_B) * force_for(value, par)
+    i = 0.5 * force * roller_screw.slope(par.screw) / par.motor_1.K_ref
+    if i > par.drive.i_max:
+        raise ParameterError(
+            f"moment = {value:g} N*m needs {i:.3g} A in each motor even without friction: "
+            f"drive.i_max = {par.drive.i_max:g} A"
+        )
+
+
+LOOP = Loop(
+    name="moment",
+    assembly="wedge-brake",
+    summary="moment control, 1 kHz around 5 kHz",
+    at=Quantity("moment", "N*m", 200.0),
+    inputs=("M_set",),
+    output="y_M",
+    cut="rate",
+    point=point,
+    causes=CAUSES,
+    band=(0.5, 100.0),
+    amplitudes=(0.5, 20.0),
+    # The law knows f_c over slope_hat alone: one of them is enough.
+    tunables={"control.moment.f_c": (0.3, 60.0)},
+    sustained=CAUSES["run-out, disc slowing"],
+    proof="moment-pulses",
+    saturations=DRIVE_LIMITS,
+)

@@ -1,0 +1,206 @@
+"""Inertia and friction from run-downs of a motor (Roberts 2003, sections "Motor", "Bearings").
+
+A run-down alone tells friction and damping per inertia only: with all of them twice as large the
+shaft stops just the same. What is known beside it sets the scale: an inertia that is added, or the
+torque of a current.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from bywire.brakes.wedge.experiments import run_down
+from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
+from bywire.brakes.wedge.methods.drive_train.run_downs import (
+    INERTIA,
+    NAMES,
+    Reading,
+    RunDown,
+    by_source,
+    fitted,
+    left_over,
+    read_run,
+    scale_is_told,
+)
+from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.core.units import shown
+from bywire.identification.estimate import Estimate
+from bywire.identification.lack_of_fit import lack_of_fit
+from bywire.identification.method import Check, Curve, Effort, Identified, Method
+from bywire.identification.records import joined, split
+from bywire.plant.axial_bearing import AngularSpeed
+
+_RATIOS = {"bearing.C_0": "rad/s**2", "bearing.T_nu": "rad/s**2", "motor_1.D_M": "1/s"}
+_AGREE = 3.0  # standard deviations
+
+
+class Options(ParameterSet):
+    """Which part of a run-down counts, how it is filtered, and the synthetic noise."""
+
+    slowest: AngularSpeed
+    """speed down to which a run-down counts; slower, cogging and Stribeck effect rule it"""
+    margin: Duration
+    """time left out at either end of that part"""
+    window: Duration
+    """time over which the torque balance is averaged"""
+    cutoff: Frequency
+    """low-pass before the angle is differentiated"""
+    sigma_i: Annotated[float, Unit("A", 0.02), Field(ge=0)]
+    """noise of the measured current in synthetic measurements"""
+    sigma_q: Annotated[float, Unit("rad", 1e-4), Field(ge=0)]
+    """noise of the angle in synthetic measurements, beside whole counts"""
+
+
+def identify(
+    data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
+) -> Identified:
+    r"""Return inertia and friction, or their ratios where nothing known sets the scale.
+
+    .. math::
+        (J_M + J_{dummy} + J_{added}) \dot\omega
+        = K_T i - D_M \omega - \mathrm{sgn}(\omega)\,T_{BEARING}(\omega)
+
+    Parameters
+    ----------
+    data
+        One or several records: ``q_1`` [rad], ``i_1`` [A] as measured (a drive whose demand is
+        zero lets through what the falling back-EMF drives), and ``J_added`` [kg m^2], the known
+        inertia on the shaft beside the dummy's.
+
+    Raises
+    ------
+    ParameterError
+        When a record does not coast.
+
+    References
+    ----------
+    Roberts et al. (2003), sections "Motor", "Rollerscrew and bearings".
+    """
+    reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
+    runs = [read_run(label or "run", one, par, reading) for label, one in split(data).items()]
+    names = NAMES if scale_is_told(runs) else NAMES[1:]
+    best = fitted(runs, names)
+    told = INERTIA in best.names
+    if not told and INERTIA in names:
+        best = fitted(runs, NAMES[1:])
+    sources = by_source(runs) if told else {}
+    return Identified(
+        estimates={"inertia and friction" if told else "friction at the given inertia": best},
+        parameters=best.parameters() if told else {},
+        figures=_ratios(best, par)
+        | {f"inertia_by_{k}": (value, "kg*m**2") for k, (value, _) in sources.items()},
+        checks=(_fits(runs, best), *_agreement(sources)),
+        curves=(_curve(runs, best),),
+        notes=() if told else (_untold(par),),
+    )
+
+
+def _untold(par: WedgeParameters) -> str:
+    return (
+        "the inertia is not told: a run-down alone tells friction and damping per inertia only. "
+        "Those ratios are right; the torques hold for motor_1.J_M = "
+        f"{shown(par.motor_1.J_M, 'kg*m**2')} as given. Add a record with a known inertia on the "
+        "shaft (J_added), or with a known current while it coasts"
+    )
+
+
+def _agreement(sources: dict[str, tuple[float, float]]) -> tuple[Check, ...]:
+    if len(sources) < 2:
+        return ()
+    (a, da), (b, db) = sources.values()
+    note = "inertia by the added one less that by the current: is the torque constant right"
+    value = abs(a - b) / float(np.hypot(da, db))
+    return (Check("inertias_agree", value, limit=_AGREE, note=note),)
+
+
+def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
+    """Return whether a cubic over the speed of its own for every record would fit better."""
+    left = left_over(runs, best)
+    rows, columns, weights = sum(map(len, left)), [], []
+    begin = 0
+    for run, e in zip(runs, left, strict=True):
+        speed = run.motion.means(run.motion.data["omega"].values)
+        own = np.zeros((rows, 4))
+        own[begin : begin + e.size] = np.vander(speed / np.abs(speed).max(), 4)
+        columns.append(own)
+        weights.append(np.full(e.size, 1.0 / max(float(np.std(e)), 1e-300)))
+        begin += e.size
+    return lack_of_fit(
+        "torque_left_over", np.concatenate(left), np.concatenate(weights), np.hstack(columns),
+        len(best.values), "whether friction over speed has another shape than the laws",
+    )  # fmt: skip
+
+
+def _ratios(best: Estimate, par: WedgeParameters) -> dict[str, tuple[float, str]]:
+    """Return friction and damping per inertia of motor and dummy shaft."""
+    values = best.parameters()
+    J = values.get(INERTIA, par.motor_1.J_M) + par.rig.J_dummy
+    return {
+        f"{name}_per_inertia": (values[name] / J, unit)
+        for name, unit in _RATIOS.items() if name in values
+    }  # fmt: skip
+
+
+def _curve(runs: Sequence[RunDown], best: Estimate) -> Curve:
+    """Return the decelerating torque over the speed, measured and modeled."""
+    values = best.parameters()
+    speeds, table = [], []
+    for run, e in zip(runs, left_over(runs, best), strict=True):
+        J = values.get(INERTIA, run.par.motor_1.J_M) + run.par.rig.J_dummy
+        moved = run.motion.data
+        torque = run.motion.means(J * moved["alpha"].values)
+        speeds.append(run.motion.means(moved["omega"].values))
+        table.append(np.array((-torque, -torque + e)))
+    x, filled = at_own_places(speeds, table)
+    attrs = {"units": "N*m", "long_name": "decelerating torque"}
+    dims = ("record", "window")
+    return Curve(
+        "torque-over-speed",
+        "Inertia times deceleration over speed while coasting, with the estimated inertia.",
+        xr.Dataset(
+            {"measured": (dims, filled[0], attrs), "modeled": (dims, filled[1], attrs)},
+            {"record": [run.label for run in runs],
+             "omega": (dims, x, {"units": "rad/s", "long_name": "motor speed"})},
+        ),
+        "omega",
+    )  # fmt: skip
+
+
+def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
+    """Return the three run-downs, simulated, with the sensor's noise, from any angle."""
+    experiment = run_down.EXPERIMENT
+    random = np.random.default_rng(seed)
+    sensors = {"q_1": Sensor("q_1", options.sigma_q), "i_1": Sensor("i_1", options.sigma_i)}
+    records = {}
+    for case in experiment.cases(par, experiment.defaults, None):
+        one = sensed(turned(case, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
+        more = case.par.rig.J_dummy - par.rig.J_dummy  # type: ignore[attr-defined]
+        attrs = {"units": "kg*m**2", "long_name": "added inertia"}
+        records[case.label] = one.assign(J_added=("time", np.full(one.sizes["time"], more), attrs))
+    return joined(records)
+
+
+METHOD = Method(
+    name="run-down",
+    assembly="wedge-brake",
+    summary="inertia, bearing friction and damping from coasting, scaled by an inertia or a torque",
+    experiment="run-down",
+    signals={"i_1": "A", "q_1": "rad", "J_added": "kg*m**2"},
+    options=Options,
+    defaults=Options(
+        slowest=20.0, margin=0.035, window=0.01, cutoff=100.0, sigma_i=0.02, sigma_q=1e-4
+    ),
+    identify=identify,
+    synthetic=synthetic,
+    simulated=("sigma_i", "sigma_q"),
+    unknowns=NAMES,
+    several=True,
+)

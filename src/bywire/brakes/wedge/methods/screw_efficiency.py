@@ -1,0 +1,221 @@
+"""Roller-screw efficiency, driving and driven back, from a sweep of the load (Roberts 2003).
+
+Current and speed of both motors and the force between them give two torque balances. What grows
+with the force in proportion is the screw's loss, what is there without force or grows with its
+square the bearings'.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+
+from bywire.brakes.wedge.experiments import load_sweep
+from bywire.brakes.wedge.methods.drive_train.own_places import at_own_places
+from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
+    SIGNALS,
+    SIMULATED,
+    RigOptions,
+    drive_sensors,
+)
+from bywire.brakes.wedge.methods.drive_train.screw_strokes import Stroke, fits, strokes
+from bywire.brakes.wedge.methods.drive_train.steady_motion import (
+    Motions,
+    motions,
+    steady_dynamics,
+    window_residuals,
+)
+from bywire.brakes.wedge.methods.simulated_record import sensed, turned
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
+from bywire.core.errors import ParameterError
+from bywire.core.units import shown
+from bywire.identification.differentiation import differentiated
+from bywire.identification.equation import Equation
+from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.unknown import parameters_of
+from bywire.identification.wrong_sign import wrong_sign
+from bywire.plant import axial_bearing, roller_screw, servo_motor
+from bywire.plant.axial_bearing import AngularSpeed
+
+_NAMES = ("screw.eta_f", "screw.eta_b", "bearing.C_0", "bearing.C_2")
+_SPREAD = 1.5  # by which forces have to differ for friction with and without load to part
+_ADVICE = "turn the screw both ways, slowly, under several forces, as 'bywire run load-sweep' does"
+
+
+class Options(RigOptions):
+    """Which strokes count, and the synthetic noise."""
+
+    slowest: AngularSpeed
+    """speed that a stroke keeps"""
+
+
+def identify(
+    data: xr.Dataset, par: WedgeParameters, options: Options, effort: Effort
+) -> Identified:
+    r"""Return efficiencies and bearing friction.
+
+    .. math::
+        J \dot\omega = K_T i + T_{COG} - D \omega + F \frac{L}{2\pi}
+        - \mathrm{sgn}(\omega)\,(T_{BEARING}(F, \omega) + T_{SCREW}(F))
+
+    Parameters
+    ----------
+    data
+        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N], compression positive. Known are
+        torque constants, inertias, the lead, and how the bearings' friction changes with speed.
+
+    Raises
+    ------
+    ParameterError
+        When the screw does not move enough, the force does not change, or a sign is wrong.
+
+    References
+    ----------
+    Roberts et al. (2003), sections "Rollerscrew and bearings", "Roller-screw efficiency".
+    """
+    # Cogging is faster than the low-pass, and averages out over a window.
+    own = par.replace({"rig.load": "screw", "motor_1.T_cog": 0.0})
+    unknowns = parameters_of(own, _NAMES)
+    equation = Equation(DrivenShaft(), "omega", "alpha", options.slowest)
+    shafts = [_moved(data, own, side, options) for side in ("1", "2")]
+    for side, shaft in zip(("1", "2"), shafts, strict=True):
+        if not shaft.windows:
+            raise ParameterError(
+                f"motor {side} never turns faster than {options.slowest:g} rad/s for long: "
+                f"{_ADVICE}"
+            )
+    _require_loads(shafts)
+    _require_losses(shafts, own)
+    parts = [window_residuals(equation, own, unknowns, shaft) for shaft in shafts]
+    best = steady_dynamics(parts, unknowns, _ADVICE)
+    values = best.parameters()
+    found = own.replace(values)
+    full = np.array([found.leaves()[name] for name in _NAMES])
+    made = [
+        stroke for part, shaft, side in zip(parts, shafts, (1, 2), strict=True)
+        for stroke in strokes(shaft, part.evaluate(full)[0], found, side)
+    ]  # fmt: skip
+    return Identified(
+        estimates={"screw and bearings": best},
+        parameters=values,
+        figures=_figures(found, made),
+        checks=(fits(made, best),),
+        curves=(_curve(made),),
+        notes=(
+            "a part of the bearings' friction that grows in proportion to the force (C_1) shows "
+            f"as loss of the screw: taken as {shown(par.bearing.C_1, 'N*m/N')}",
+            "the growth of the bearings' friction with speed is taken from the parameter set",
+        ),
+    )
+
+
+def _moved(data: xr.Dataset, par: WedgeParameters, side: str, options: Options) -> Motions:
+    """Return one shaft's motions, in terms of motor 1.
+
+    What differs between the motors goes into the current, so that one equation holds for both.
+    """
+    motor = par.motor_1 if side == "1" else par.motor_2
+    force = -data["y_F"] if side == "1" else data["y_F"]
+    seen = xr.Dataset({"theta": data[f"q_{side}"], "i": data[f"i_{side}"], "F": force})
+    moved = differentiated(seen, "theta", ("omega", "alpha"), options.cutoff)
+    torque = servo_motor.torque_constant(motor) * moved["i"]
+    torque = torque + (par.motor_1.J_M - motor.J_M) * moved["alpha"]
+    torque = torque + (par.motor_1.D_M - motor.D_M) * moved["omega"]
+    moved["i"] = torque / servo_motor.torque_constant(par.motor_1)
+    return motions(moved, "omega", options.slowest, options.margin, options.window)
+
+
+def _require_loads(shafts: list[Motions]) -> None:
+    """Refuse strokes under one force only, where all friction looks alike."""
+    forces: dict[bool, list[float]] = {True: [], False: []}
+    for shaft in shafts:
+        F = shaft.means(shaft.data["F"].values)
+        drives = F * shaft.means(shaft.data["omega"].values) < 0.0
+        for kind, found in forces.items():
+            found += np.abs(F[drives == kind]).tolist()
+    for kind, name in ((True, "eta_f"), (False, "eta_b")):
+        seen = forces[kind]
+        if not seen or max(seen) < _SPREAD * min(seen):
+            word = "driving" if kind else "driven back"
+            raise ParameterError(
+                f"the data does not tell screw.{name} from bearing.C_0: "
+                + (f"{word}, the force stays near {max(seen):.3g} N" if seen
+                   else f"the screw is never {word}")
+                + f"; {_ADVICE}"
+            )  # fmt: skip
+
+
+def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
+    """Refuse a screw that gains power: both when it drives and when it is driven it loses some."""
+    k, K_T = roller_screw.slope(par.screw), servo_motor.torque_constant(par.motor_1)
+    for side, shaft in zip(("1", "2"), shafts, strict=True):
+        omega, F, i = (shaft.means(shaft.data[n].values) for n in ("omega", "F", "i"))
+        loss = np.sign(omega) * (K_T * i + k * F)
+        for kind, word in ((True, "driving"), (False, "driven back")):
+            least = float(np.median(loss[(F * omega < 0.0) == kind]))
+            if least < 0.0:
+                raise wrong_sign(
+                    f"i_{side}", "y_F", f"turning as q_{side} does, {word}, the screw would gain "
+                    f"{-least:.3g} N*m; or q_{side} is the wrong one"
+                )  # fmt: skip
+
+
+def _figures(par: WedgeParameters, made: list[Stroke]) -> dict[str, tuple[float, str]]:
+    """Return the whole drive's efficiency at the largest load, bearings included."""
+    k = roller_screw.slope(par.screw)
+    top = max((s for s in made if s.drives), key=lambda s: s.F, default=None)
+    speed = float(np.median([abs(s.omega) for s in made]))
+    bearing = axial_bearing.friction(axial_bearing.Input(0.0, speed), par.bearing)
+    found = {"bearing_torque_without_load": (float(bearing), "N*m")}
+    if top is not None:
+        found["eta_with_bearings"] = (k * top.F / (top.torque - top.error), "1")
+        found["eta_with_bearings_at"] = (top.F, "N")
+    return found
+
+
+def _curve(made: list[Stroke]) -> Curve:
+    """Return motor torque over force, both ways."""
+    ways = [[s for s in made if s.drives is drives] for drives in (True, False)]
+    F, table = at_own_places(
+        [np.array([s.F for s in way]) for way in ways],
+        [np.array([(s.torque, s.torque + s.error) for s in way]).T for way in ways],
+    )
+    dims = ("direction", "stroke")
+    attrs = {"units": "N*m", "long_name": "motor torque along the motion"}
+    return Curve(
+        "torque-over-force",
+        "Motor torque in steady motion over the force between the screws, by stroke.",
+        xr.Dataset(
+            {"measured": (dims, table[0], attrs), "modeled": (dims, table[1], attrs)},
+            {"direction": ["driving", "driven back"],
+             "F": (dims, F, {"units": "N", "long_name": "force"})},
+        ),
+        "F",
+    )  # fmt: skip
+
+
+def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
+    """Return the load sweep, simulated, with the sensors' noise."""
+    experiment = load_sweep.EXPERIMENT
+    case = experiment.cases(par, experiment.defaults, None)[0]
+    random = np.random.default_rng(seed)
+    begun = turned(case, random.uniform(0.0, 2.0 * np.pi))
+    return sensed(begun, drive_sensors(options), random)
+
+
+METHOD = Method(
+    name="screw-efficiency",
+    assembly="wedge-brake",
+    summary="roller screw's efficiency driving and driven back, bearing friction apart",
+    experiment="load-sweep",
+    signals=SIGNALS,
+    options=Options,
+    defaults=Options(
+        cutoff=120.0, slowest=5.0, margin=0.05, window=0.05, sigma_i=0.02, sigma_F=5.0
+    ),
+    identify=identify,
+    synthetic=synthetic,
+    simulated=SIMULATED,
+    unknowns=_NAMES,
+)

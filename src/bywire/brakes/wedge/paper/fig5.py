@@ -1,0 +1,93 @@
+"""Fig. 5: position frequency response of the low-bandwidth controller."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bywire.brakes.wedge.paper import facts, frequency
+from bywire.brakes.wedge.paper import frequency_facts as stated
+from bywire.brakes.wedge.paper.runs import parameters
+from bywire.brakes.wedge.paper.tolerances import ALIKE, AT_LIMIT, SAME_GAIN, SAME_PHASE
+from bywire.reproduction.item import Item, compared, found
+from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import Runs
+
+_LOW = "low"
+
+
+def part(runs: Runs) -> Part:
+    """Return the responses by amplitude, and what friction takes off them."""
+    runs.report("Fig. 5: sweep", 0.0)
+    shares = [
+        float(frequency.of(frequency.screw(), _LOW, size)["share_sat_current"].max())
+        for size in frequency.AMPLITUDES[_LOW]
+    ]
+    gain, phase = frequency.without_friction(_LOW)
+    preload, nearest = frequency.nearest_preload()
+    items = [
+        compared("fig5.limit", stated.NO_LIMIT, 100.0 * max(shares), AT_LIMIT.size,
+                 "largest share over frequencies and amplitudes"),
+        *friction(_LOW, "fig5"),
+        *_low_frequency(),
+        compared("fig5.linear.gain", stated.SAME_GAIN, gain, SAME_GAIN.size, "1 to 100 Hz"),
+        compared("fig5.linear.phase", stated.SAME_PHASE, phase, SAME_PHASE.size, "1 to 100 Hz"),
+        compared("fig5.wedge", facts.LITTLE, frequency.apart(_LOW), ALIKE.size,
+                 "largest distance of both responses, amplitudes of 0.5 and 1 rad"),
+        found("fig5.wedge.preload", "N", preload,
+              f"preload of the screw alone that comes closest to the wedge, of 25, 50, 75, 100 N; "
+              f"ours is {parameters().rig.F_0:g} N"),
+        found("fig5.wedge.nearest", "%", nearest, "largest distance with that preload"),
+    ]  # fmt: skip
+    text = (
+        "A controller of 12 Hz on the preloaded screw, at 0.5, 1 and 2 rad: all three, and the "
+        "bandwidth, are our choice. 0.25 rad sticks at all frequencies."
+    )
+    exhibits = (
+        Exhibit("fig5", frequency.figure(_LOW),
+                "Fig. 5: position frequency response, low bandwidth controller."),
+        Exhibit("fig5-wedge", frequency.beside(_LOW),
+                "The assembled wedge beside the screw, low bandwidth controller."),
+    )  # fmt: skip
+    return Part("Figure 5: position response, low bandwidth", text, tuple(items), exhibits,
+                {"frequency-response-screw": frequency.screw()})  # fmt: skip
+
+
+def friction(controller: str, figure: str) -> list[Item]:
+    """Return what friction takes off the response at the lowest frequency."""
+    items: list[Item] = []
+    found_ = frequency.screw()
+    f = found_["frequency"].values
+    linear = frequency.linear(controller, f)
+    sizes = frequency.AMPLITUDES[controller]
+    away = 100.0 * float(np.abs(frequency.value(found_, controller, sizes[0])[0] - linear[0]))
+    items.append(
+        compared(f"{figure}.friction", stated.FRICTION_SEEN, away, ">=",
+                 f"amplitude {sizes[0]:g} rad")
+    )  # fmt: skip
+    for size in sizes:
+        value = frequency.value(found_, controller, size)
+        lost = frequency.decibels(value / linear)
+        late = np.degrees(np.angle(value / linear))
+        items.append(
+            found(f"{figure}.friction.{size:g}", "dB", float(lost[0]),
+                  f"gain at 1 Hz less that of the linear loop, amplitude {size:g} rad; phase "
+                  f"{late[0]:.2g} degree")
+        )  # fmt: skip
+    return items
+
+
+def _low_frequency() -> list[Item]:
+    """Return whether friction shows at low frequency in particular, and where it shows most."""
+    found_ = frequency.screw()
+    f = found_["frequency"].values
+    lost = np.array([
+        frequency.decibels(frequency.linear(_LOW, f) / frequency.value(found_, _LOW, size))
+        for size in frequency.AMPLITUDES[_LOW]
+    ])  # fmt: skip
+    return [
+        compared("fig5.friction.low_frequency", stated.FRICTION_LOW,
+                 float((lost[:, 0] / lost[:, -1]).min()), ">=", "smallest ratio of all amplitudes"),
+        found("fig5.friction.most", "Hz", float(f[lost[-1].argmax()]),
+              f"where the gain loses most at 2 rad, {lost[-1].max():.3g} dB; {lost[-1][0]:.2g} dB "
+              "at 1 Hz: around its own bandwidth the loop is least stiff"),
+    ]  # fmt: skip

@@ -1,0 +1,107 @@
+"""Holding: without power, on a standing disc, and with motors that work together."""
+
+from __future__ import annotations
+
+import xarray as xr
+
+from bywire.brakes.wedge.case import parameters_of
+from bywire.brakes.wedge.paper import facts
+from bywire.brakes.wedge.paper.runs import (
+    MAIN,
+    WITHOUT_RUNOUT,
+    parameters,
+    settled,
+    stacked,
+    standby,
+    tan_alpha,
+)
+from bywire.brakes.wedge.paper.tolerances import KEPT, STANDING
+from bywire.brakes.wedge.series import with_friction
+from bywire.reproduction.item import Fact, Item, compared, found
+from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import Runs, kpis
+
+AWAY = 0.2
+"""friction coefficient far from the neutral point"""
+LOADED = {"M_high": 500.0, "t_hold": 2.0}
+
+
+def part(runs: Runs) -> Part:
+    """Return what holds the brake, and at which power."""
+    off = runs.bench("power-off-hold", MAIN)
+    items = [*_power_off(runs), *_standing(runs), *_together(runs)]
+    text = (
+        "Without power the brake near its neutral point keeps its moment: dry friction of "
+        "bearings, screws and wedge holds what little the wedge asks for, and nothing creeps. Far "
+        "below the neutral point the wedge pushes the motors back until friction holds it."
+    )
+    run = off.recordings["run"]
+    exhibit = Exhibit(
+        "power-off-hold", stacked(run), "Power off at 500 Nm: what is left is the run-out's ripple."
+    )
+    return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
+
+
+def _power_off(runs: Runs) -> list[Item]:
+    neutral = {**with_friction(parameters(), tan_alpha(), known=True), **WITHOUT_RUNOUT}
+    kept = kpis(runs.bench("power-off-hold", MAIN, neutral))
+    own = kpis(runs.bench("power-off-hold", MAIN))
+    low = {**with_friction(parameters(), AWAY, known=True), **WITHOUT_RUNOUT}
+    far = kpis(runs.bench("power-off-hold", MAIN, low))
+    still = Fact(0.0, "m", "physical bound: what dry friction holds does not creep",
+                 "physical bound")  # fmt: skip
+    return [
+        compared("hold.neutral", facts.REMAINS, _share(kept), KEPT.size,
+                 "moment 2 s after power off in % of that before; run-out off, friction on"),
+        compared("hold.drift", still, own["drift"], "<=",
+                 "change of the wedge's travel in 2 s after all stuck; run-out on"),
+        found("hold.relaxation", "m", own["relaxation"],
+              "change of the wedge's travel from power off until all stick"),
+        found("hold.preload", "N", own["preload_end"], "preload that is left"),
+        found("hold.far", "%", _share(far),
+              f"as hold.neutral at mu_B = {AWAY:g}: back-driven until friction holds"),
+    ]  # fmt: skip
+
+
+def _share(values: dict[str, float]) -> float:
+    return 100.0 * values["moment_end"] / values["moment_start"]
+
+
+def _standing(runs: Runs) -> list[Item]:
+    """Return what carries the wedge on a standing disc, for both readings of it."""
+    result = runs.bench("disc-stop", MAIN)
+    values = kpis(result)
+    shares = {name: _self_reinforcement(run) for name, run in result.recordings.items()}
+    return [
+        compared("hold.standing", facts.ONLY_TURNING, shares["drop"], STANDING.size,
+                 "(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
+                 "in the paper"),
+        found("hold.standing.stick", "1", shares["stick"],
+              "the same where the standing pad sticks to the disc, our other reading"),
+        found("hold.force_held", "N", values["force_held_drop"],
+              f"normal force on the standing disc; {values['force_before_stop_drop']:.4g} N before "
+              "the stop"),
+    ]  # fmt: skip
+
+
+def _self_reinforcement(run: xr.Dataset) -> float:
+    """Return the share of the wedge's reaction that the motors need not give, disc at rest."""
+    still = parameters_of(run).flywheel.Omega_still
+    standing = run.where((abs(run["Omega"]) <= still) & (run["M_set"] > 0.0), drop=True)
+    last = standing.isel(time=-1)
+    reaction = tan_alpha() * float(last["F_N"])
+    return (reaction - float(last["F_M"])) / reaction
+
+
+def _together(runs: Runs) -> list[Item]:
+    away = with_friction(parameters(), AWAY, known=True)
+    above = {}
+    for law in ("preload", "scheduled"):
+        overrides = {**away, "control.offset.law": law}
+        run = runs.bench("moment-pulses", MAIN, overrides, LOADED).recordings["run"]
+        above[law] = settled(run, "P_in", LOADED["t_hold"]) - standby()
+    return [
+        compared("hold.together", facts.TOGETHER, above["scheduled"] / above["preload"], "<=",
+                 f"500 Nm at mu_B = {AWAY:g}: {above['scheduled']:.3g} W together, "
+                 f"{above['preload']:.3g} W preloaded"),
+    ]  # fmt: skip

@@ -1,0 +1,116 @@
+"""Section "Initial tests": current loop, screw efficiency, drive-train stiffness."""
+
+from __future__ import annotations
+
+from bywire.brakes.wedge.paper import facts
+from bywire.brakes.wedge.paper.runs import MAIN, parameters
+from bywire.brakes.wedge.paper.tolerances import RECOVERED
+from bywire.report.time_traces import time_traces
+from bywire.reproduction.item import Fact, Item, compared, found
+from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import Runs, kpis
+
+MICRON = 1e6
+"""[N/m] in one N/um"""
+
+
+def current_loop(runs: Runs) -> Part:
+    """Return how fast the current loop is, over windings and gains."""
+    result = runs.bench("current-loop", MAIN)
+    values = kpis(result)
+    bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
+    own, position = values["bandwidth_parallel_usual"], parameters().control.position.f_n
+    items = [
+        compared("current_loop.bandwidth", facts.FAST_CURRENT, own / position, ">=",
+                 f"{own:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
+                 "both are ours"),
+        found("current_loop.slowest", "Hz", min(bandwidths),
+              "over stators in parallel, alone and in series, and half to twice the gains"),
+        found("current_loop.fastest", "Hz", max(bandwidths), "over the same"),
+    ]  # fmt: skip
+    text = (
+        "As in the paper, steps with the shaft clamped for several windings and gains. The data "
+        "of the drive are the manufacturer's and not printed."
+    )
+    return Part("Motor current loop", text, tuple(items))
+
+
+def efficiency(runs: Runs) -> Part:
+    """Return the screw's efficiency as the rig measures it."""
+    result = runs.bench("screw-efficiency", MAIN)
+    values = {name: 100.0 * value for name, value in kpis(result).items()}
+    put_in = Fact(values["eta_f_true"], "%", facts.MEASURABLE, "reading")
+    allowed = RECOVERED.around(put_in.value)
+    bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
+    items = [
+        compared("efficiency.driving", facts.ETA, values["eta_f"], None,
+                 "as the rig measures it", tuned="an input"),
+        compared("efficiency.recovered", put_in, values["eta_f"], allowed,
+                 f"with the bearing's torque without load, {bearing}, taken off"),
+        compared("efficiency.raw", put_in, values["eta_f_raw"], allowed,
+                 "motor torque and force alone"),
+        found("efficiency.back_driven", "%", values["eta_b"],
+              f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in"),
+        found("efficiency.back_driven.raw", "%", values["eta_b_raw"],
+              "motor torque and force alone"),
+        found("efficiency.both", "%", values["eta_f_true"] * values["eta_b_true"] / 100.0,
+              "of one motor's torque arrive at the other: at full current neither moves the other"),
+    ]  # fmt: skip
+    text = (
+        "One motor in current control against the other in position control, a force sensor "
+        "between their screws, in slow motion."
+    )
+    exhibit = Exhibit(
+        "screw-efficiency", time_traces(result.recordings["driving"]),
+        "Screw efficiency: motor 1 drives with constant current while motor 2 gives way.",
+    )  # fmt: skip
+    return Part("Roller-screw efficiency", text, tuple(items), (exhibit,))
+
+
+def stiffness(runs: Runs) -> Part:
+    """Return stiffnesses and free-play as the two stages of the test measure them."""
+    result = runs.bench("stiffness", MAIN)
+    values = kpis(result)
+    items = [
+        _recovered("stiffness.K_S", facts.SETS_STIFFNESS, values, "K_S", "N/um", MICRON),
+        _recovered("stiffness.K_W", facts.SETS_STIFFNESS, values, "K_W", "N/um", MICRON),
+        _recovered("stiffness.free_play", facts.MEASURES_PLAY, values, "free_play", "um", 1e-6),
+        *_directions(values),
+    ]
+    text = (
+        "The motors are driven against each other: first with a force sensor between the screws, "
+        "which also tells the force per current, then in the brake heart, where tension flows "
+        "through the wedge. What the test finds is compared with what was put into the model."
+    )
+    exhibits = tuple(
+        Exhibit(f"stiffness-{label}", time_traces(result.recordings[label]), caption)
+        for label, caption in (
+            ("sensor", "Stiffness, first stage: a force sensor between the screws."),
+            ("heart", "Stiffness, second stage: the screws in the brake heart."),
+        )
+    )
+    return Part("Drive-train stiffness", text, tuple(items), exhibits)
+
+
+def _recovered(
+    name: str, where: str, values: dict[str, float], key: str, unit: str, size: float
+) -> Item:
+    """Return a quantity as measured beside what was put in, in a unit of its own."""
+    put_in = Fact(values[f"{key}_true"] / size, unit, where, "reading")
+    return compared(name, put_in, values[key] / size, RECOVERED.around(put_in.value))
+
+
+def _directions(values: dict[str, float]) -> list[Item]:
+    """Return how compression and tension compare."""
+    K_F = parameters().rig.sensor.K_F
+    line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
+    same = Fact(line / MICRON, "N/um", facts.SAME_COMPRESSION, "reading")
+    compression = values["K_heart_compression"]
+    return [
+        compared("stiffness.compression", same, compression / MICRON,
+                 RECOVERED.around(same.value), "tip to tip, the force by the motors' current"),
+        compared("stiffness.tension", facts.SOFTER_TENSION,
+                 values["K_heart_tension"] / compression, "<=", "tension over compression"),
+        found("stiffness.force_per_current", "N/A", values["force_per_current"],
+              "the calibration that the second stage needs, for rising current"),
+    ]  # fmt: skip

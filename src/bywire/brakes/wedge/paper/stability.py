@@ -1,0 +1,187 @@
+"""Introduction: brake factor, neutral point, and stability above it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from bywire.brakes.wedge.case import swing
+from bywire.brakes.wedge.figures.brake_factor import WedgeForces, brake_factor
+from bywire.brakes.wedge.paper import facts
+from bywire.brakes.wedge.paper.poles import poles
+from bywire.brakes.wedge.paper.runs import IDEAL, MAIN, parameters, stacked, tan_alpha
+from bywire.brakes.wedge.paper.tolerances import FEW, FORCE, FORMULA, GRID
+from bywire.brakes.wedge.series import tag, with_friction
+from bywire.reproduction.item import Fact, Item, compared, found
+from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.reproduction.runs import Runs, kpis
+
+COEFFICIENTS = (0.2, 0.35, 0.6)
+"""below, near and above the neutral point: brake factors that are judged"""
+TRIED = (0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.55, 0.6)
+"""coefficients at which the actuation force is computed"""
+LOWEST, HIGHEST = 0.32, 0.62
+"""coefficients between which the lowest that runs away is sought"""
+GROWN = 1.05
+"""moment over that at power-off from which the brake has run away"""
+VARIANTS = (
+    ("", "fixed", "kept"), (".frictionless", "fixed", "none"), (".known", "known", "kept"),
+)  # fmt: skip
+"""ids' endings, whether the controller knows mu_B, and the brake's friction"""
+FREE = {"control.offset.delta_preload": 0.0}
+HOLD = (0.1, 0.5)
+"""times [s] between which changes of contact are counted"""
+
+
+def part(runs: Runs) -> Part:
+    """Return the statements on brake factor, neutral point and instability."""
+    items = [*_static(runs), *poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
+    text = (
+        "The paper derives the brake factor and the neutral point without friction. Without "
+        "friction the model obeys both. With it the neutral point is a band: what friction holds "
+        "does not run away, and the more load the less of it."
+    )
+    run = runs.bench("moment-pulses", MAIN, _at(0.6, {})).recordings["run"]
+    exhibit = Exhibit(
+        "unstable-region", stacked(run),
+        "Fig. 7's test in the unstable region, at mu_B = 0.6: the motors pull the wedge back.",
+    )  # fmt: skip
+    return Part("Neutral point and stability", text, tuple(items), (_figure(runs), exhibit))
+
+
+def _at(mu_B: float, changes: dict[str, Any]) -> dict[str, Any]:
+    """Return overrides that set the pads' friction and let the controller know it."""
+    return {**with_friction(parameters(), mu_B, known=True), **changes}
+
+
+def _static(runs: Runs) -> list[Item]:
+    """Return brake factor and actuation force at rest, without friction."""
+    values = kpis(runs.bench("static-force", MAIN, None, _sweep()))
+    items = []
+    for mu_B in COEFFICIENTS:
+        stated = values[f"C_star_closed_{tag(mu_B)}"]
+        where = (
+            "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), read as its value at our "
+            "wedge angle"
+        )
+        items.append(
+            compared(f"stability.C.{tag(mu_B)}", Fact(stated, "1", where, "reading"),
+                     values[f"C_star_{tag(mu_B)}"], FORMULA.around(stated),
+                     f"mu_B = {mu_B:g}, simulated without friction, "
+                     f"F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 Nm; with friction "
+                     f"{values[f'C_star_rising_{tag(mu_B)}']:.3g} rising, "
+                     f"{values[f'C_star_falling_{tag(mu_B)}']:.3g} falling"),
+        )  # fmt: skip
+    neutral = "coefficient without actuation force, with friction, while the moment"
+    return [
+        *items,
+        compared("stability.F_M.neutral", facts.NEUTRAL_FORCE, values[f"F_M_{tag(tan_alpha())}"],
+                 FORCE.size, "simulated at mu_B = tan(alpha) without friction, at 500 Nm"),
+        found("stability.neutral.falling", "1", values["neutral_mu_falling"], f"{neutral} falls"),
+        found("stability.neutral.rising", "1", values["neutral_mu_rising"], f"{neutral} rises"),
+    ]  # fmt: skip
+
+
+def _sweep() -> dict[str, Any]:
+    """Return the coefficients of the static test, the neutral point among them."""
+    return {"mu_B": tuple(sorted((*TRIED, tan_alpha())))}
+
+
+def _figure(runs: Runs) -> Exhibit:
+    values = kpis(runs.bench("static-force", MAIN, None, _sweep()))
+    tried = _sweep()["mu_B"]
+    # Per normal force, which is M/(2 mu_B r_B) at the moment of the test.
+    pressed = [500.0 / (2.0 * mu_B * parameters().caliper.r_B) for mu_B in tried]
+    ratios = {
+        name: [values[f"{name}_{tag(m)}"] / F for m, F in zip(tried, pressed, strict=True)]
+        for name in ("F_M", "F_M_rising", "F_M_falling")
+    }
+    return Exhibit(
+        "brake-factor", brake_factor(WedgeForces(tried, *ratios.values()), tan_alpha()),
+        "Actuation force and brake factor at 500 Nm over the pads' friction coefficient.",
+    )  # fmt: skip
+
+
+def _runaway(runs: Runs) -> list[Item]:
+    """Return the lowest friction coefficient that pulls the wedge in without power."""
+    where = "section 'Introduction': unstable above the ideal point, mu_B = tan(alpha)"
+    stated = Fact(tan_alpha(), "1", where)
+    note = "lowest mu_B tried at which the moment grows by itself when the power goes off at"
+    high = facts.PULSE.value
+    return [
+        compared("stability.runaway", stated, _lowest(runs, IDEAL, 500.0), GRID.size,
+                 f"{note} 500 Nm; without friction"),
+        compared("stability.runaway.friction", stated, _lowest(runs, {"flywheel.runout": 0.0},
+                 500.0), GRID.size, f"{note} 500 Nm; with friction"),
+        found("stability.runaway.friction.950", "1",
+              _lowest(runs, {"flywheel.runout": 0.0}, high),
+              f"{note} {high:g} Nm; with friction"),
+    ]  # fmt: skip
+
+
+def _lowest(runs: Runs, changes: dict[str, Any], M_hold: float) -> float:
+    """Return the lowest coefficient of a grid at which the moment grows, by bisection.
+
+    NaN where it grows at the lowest already, or not even at the highest.
+    """
+
+    def grows(k: int) -> bool:
+        overrides = _at(round(LOWEST + k * GRID.size, 3), changes)
+        values = kpis(runs.bench("power-off-hold", MAIN, overrides, {"M_hold": M_hold}))
+        met_stop = values["end_stop_force"] > 0.0
+        return met_stop or values["moment_end"] > GROWN * values["moment_start"]
+
+    low, high = 0, round((HIGHEST - LOWEST) / GRID.size)
+    if grows(low) or not grows(high):
+        return math.nan
+    while high - low > 1:
+        middle = (low + high) // 2
+        low, high = (low, middle) if grows(middle) else (middle, high)
+    return round(LOWEST + high * GRID.size, 3)
+
+
+def _closed_loop(runs: Runs) -> list[Item]:
+    """Return whether the closed loop is stable at all coefficients, and how it overshoots."""
+    items: list[Item] = []
+    for suffix, slope, friction in VARIANTS:
+        values = kpis(
+            runs.bench("friction-sweep", MAIN, None, {"slope": slope, "friction": friction})
+        )
+        told = "knows" if slope == "known" else "does not know"
+        note = f"200 Nm, friction {friction}; the controller {told} mu_B"
+        items += [
+            compared(f"stability.unstable{suffix}", facts.STABLE, values["unstable"], "<=",
+                     f"coefficients without a settled hold; {note}"),
+            found(f"stability.overshoot{suffix}", "%", values["overshoot_max"],
+                  f"largest over all coefficients; {note}"),
+            found(f"stability.hold_power{suffix}", "W", values["hold_power_max"],
+                  f"largest over all coefficients, standby included; {note}"),
+        ]  # fmt: skip
+    return items
+
+
+def _free_play(runs: Runs) -> list[Item]:
+    """Return how often contacts change at the neutral point, with preload and with free-play."""
+    shaking = {"flywheel.runout": parameters().flywheel.runout}
+    held = {}
+    for name, preload in (("preload", {}), ("free_play", FREE)):
+        overrides = _at(tan_alpha(), {**IDEAL, **shaking, **preload})
+        held[name] = runs.bench("moment-pulses", MAIN, overrides).recordings["run"]
+    changes = {
+        name: int(np.count_nonzero(np.diff(run["contacts"].sel(time=slice(*HOLD)).values)))
+        for name, run in held.items()
+    }
+    note = "changes of contact seen at the rows of 0.4 s of a hold at tan(alpha), without friction"
+    return [
+        compared("stability.contact_changes", facts.NO_PLAY, float(changes["preload"]), FEW.size,
+                 f"{note}, preload of the parameter set"),
+        found("stability.contact_changes.free_play", "1", float(changes["free_play"]),
+              f"{note}, no preload"),
+        *(
+            found(f"stability.ripple.{name}", "N*m", swing(run, "M_B", *HOLD),
+                  "peak to peak of the moment meanwhile")
+            for name, run in held.items()
+        ),
+    ]  # fmt: skip

@@ -1,0 +1,68 @@
+"""Parameters of the wedge brake: one group per element, the controllers' apart."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
+from bywire.brakes.wedge.laws import moment_control, screw_offset
+from bywire.brakes.wedge.rigs import rig_parameters
+from bywire.control import position_pd
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from bywire.plant import (
+    axial_bearing,
+    current_drive,
+    drive_supply,
+    end_stop,
+    flywheel,
+    moment_sensor,
+    roller_screw,
+    servo_motor,
+    shaft_encoder,
+)
+
+
+class CommandParameters(ParameterSet):
+    """What the stimulus commands.
+
+    ``moment`` closes moment and position loops; ``position`` gives each motor's position loop its
+    reference; ``current`` gives each drive its current demand.
+    """
+
+    mode: Literal["moment", "position", "current"]
+    """what the stimulus commands"""
+
+
+class ControlParameters(ParameterSet):
+    """The real-time computer: sample times and controllers."""
+
+    T_fast: Duration
+    """sample time of position control"""
+    T_slow: Duration
+    """sample time of moment control"""
+    position: position_pd.Parameters
+    offset: screw_offset.Parameters
+    moment: moment_control.Parameters
+
+
+class WedgeParameters(ParameterSet):
+    """The whole wedge brake: two motors that may differ, equal drives, screws and bearings."""
+
+    supply: drive_supply.Parameters
+    drive: current_drive.Parameters
+    motor_1: servo_motor.Parameters
+    motor_2: servo_motor.Parameters
+    screw: roller_screw.Parameters
+    bearing: axial_bearing.Parameters
+    heart: brake_heart.Parameters
+    wedge: wedge.Parameters
+    wedge_friction: wedge_friction.Parameters
+    stop: end_stop.Parameters
+    caliper: wedge_caliper.Parameters
+    flywheel: flywheel.Parameters
+    moment_sensor: moment_sensor.Parameters
+    encoder: shaft_encoder.Parameters
+    control: ControlParameters
+    command: CommandParameters
+    rig: rig_parameters.Parameters

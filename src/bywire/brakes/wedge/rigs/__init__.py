@@ -1,0 +1,1 @@
+"""Test rigs of the drive train."""

@@ -1,0 +1,121 @@
+"""What the rigs' experiments share: runs from rest, data sheets, readings of a recording."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.experiment import Case
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
+from bywire.core.errors import ParameterError
+from bywire.core.signals import zeros
+from bywire.plant import roller_screw
+
+Array = NDArray[np.float64]
+Stimuli = Callable[[Array], Mapping[str, Array]]
+
+
+def shaft_case(
+    label: str,
+    par: WedgeParameters,
+    stimulus: Stimuli,
+    duration: float,
+    changes: Mapping[str, Any],
+    **timing: float,
+) -> Case:
+    """Return a run of the single motor's rig, from rest at the angle zero.
+
+    Parameters
+    ----------
+    changes
+        Parameters that the experiment sets, the rig's modes among them.
+    timing
+        ``settle``, ``keep`` and ``record`` of the case [s].
+    """
+    return _case(label, ShaftRig(), par.replace(changes), stimulus, duration, timing)
+
+
+def screw_case(
+    label: str,
+    par: WedgeParameters,
+    stimulus: Stimuli,
+    duration: float,
+    changes: Mapping[str, Any],
+    **timing: float,
+) -> Case:
+    """Return a run of the two motors' rig, from rest without force; see :func:`shaft_case`."""
+    return _case(label, ScrewRig(), par.replace(changes), stimulus, duration, timing)
+
+
+def _case(
+    label: str,
+    model: ShaftRig | ScrewRig,
+    par: WedgeParameters,
+    stimulus: Stimuli,
+    duration: float,
+    timing: Mapping[str, float],
+) -> Case:
+    state, memory = zeros(model.State), zeros(model.Memory)
+    return Case(label, model, par, state, memory, stimulus, duration, **timing)
+
+
+def check_current(name: str, i: float, par: WedgeParameters) -> None:
+    """Refuse a current that the drives do not give.
+
+    Parameters
+    ----------
+    name
+        The option that asks for it.
+    i
+        Its value [A].
+
+    Raises
+    ------
+    ParameterError
+        Where it is above the drives' limit.
+    """
+    limit = par.drive.i_max
+    if i > limit:
+        raise ParameterError(
+            f"options.{name} = {i:g} A is not admissible: the drives give {limit:g} A at most "
+            "(drive.i_max); ask for less"
+        )
+
+
+def parameters_of(recording: xr.Dataset) -> WedgeParameters:
+    """Return the parameters that a recording was made with: the data sheets of its test."""
+    return WedgeParameters.model_validate_json(recording.attrs["parameters"])
+
+
+def slope_of(par: WedgeParameters) -> float:
+    """Return the travel per angle [m/rad], which the screw's lead tells."""
+    return roller_screw.slope(par.screw)
+
+
+def torque_constant_of(par: WedgeParameters) -> float:
+    """Return the torque constant [N m/A] that the rig's control believes."""
+    return par.control.position.K_hat
+
+
+def share_at(run: xr.Dataset, name: str, limit: float) -> float:
+    """Return the share of the time after zero in which a signal's magnitude is at a limit [%]."""
+    after = np.abs(run[name].sel(time=slice(-1e-9, None)).values)
+    return 100.0 * float(np.mean(after >= limit * (1.0 - 1e-9)))
+
+
+def peak(run: xr.Dataset, name: str) -> float:
+    """Return the largest magnitude of a signal after time zero."""
+    return float(np.abs(run[name].sel(time=slice(-1e-9, None)).values).max())
+
+
+def mean_between(run: xr.Dataset, name: str, begin: float, end: float) -> float:
+    """Return the mean of a signal between two times [s]; NaN where nothing was recorded."""
+    values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
+    return float(values.mean()) if values.size else math.nan

@@ -1,0 +1,1 @@
+"""Parameter sets with the source of every value."""

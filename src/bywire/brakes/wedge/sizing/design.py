@@ -1,0 +1,183 @@
+"""One drive train of the wedge brake: the moment demand at equal response, case by case of mu_B.
+
+A design is a slope of the wedge and a lead of the screws. Everything that follows from them is
+derived here, and the speeds of the reference are set so that every design answers equally fast.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.running import as_run
+from bywire.brakes.wedge.case import case_from_parked, steps
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sizing.answer import Answer, Demand
+from bywire.brakes.wedge.start import force_for, travel_for
+from bywire.plant import roller_screw
+from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation.run import Run
+
+Array = NDArray[np.float64]
+
+SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
+"""parameters of the moment control that set how fast the reference moves"""
+SIGNALS = (
+    "y_M", "P_in", "P_meas", "i_1_ref", "i_2_ref", "F_end", "omega_1", "omega_2",
+    "E_copper", "E_shaft",
+)  # fmt: skip
+_FASTEST = 8.0  # closing speeds are looked for up to so many times the least
+_ROUNDS, _TRIED = 2, 8  # rounds, and speeds tried in each between too slow and fast enough
+_SETTLE, _RECORD, _STEP = 0.05, 2e-4, 20e-6
+_LAST = 0.8  # of the demand: what follows is its end
+_TINY = 1e-9
+
+
+def closing_speed(par: WedgeParameters) -> float:
+    """Return the speed [m/s] at which the pads close at the rate limit of the reference."""
+    travel = roller_screw.slope(par.screw) * wedge.slope(par.wedge)
+    return par.control.moment.rate_max * travel
+
+
+def redesigned(par: WedgeParameters, tan_alpha: float, lead: float) -> WedgeParameters:
+    """Return the brake with another wedge slope and screw lead [m].
+
+    The pads move as before for the same time: the speeds of the reference and the travel of the
+    end stops change with the ratio of pad to shaft travel, and the controller knows the design.
+    """
+    travel = roller_screw.slope(par.screw) * wedge.slope(par.wedge)
+    k = lead / (2.0 * math.pi)
+    ratio = travel / (k * tan_alpha)
+    control = par.control.moment
+    changes = {
+        "wedge.alpha": math.atan(tan_alpha),
+        "wedge.x_stop": par.wedge.x_stop * wedge.slope(par.wedge) / tan_alpha,
+        "screw.lead": lead,
+        "control.offset.k_hat": par.control.offset.k_hat * k / roller_screw.slope(par.screw),
+        "control.moment.slope_hat": control.slope_hat / ratio,
+    }
+    speeds = {f"control.moment.{name}": getattr(control, name) * ratio for name in SPEEDS}
+    return par.replace(changes | speeds)
+
+
+def answer(par: WedgeParameters, demand: Demand) -> Answer:
+    """Return what a brake does at the smallest closing speed that is fast enough.
+
+    The speeds of the reference have a common factor. With ``demand.enforced`` it is the smallest
+    one at which the slowest case meets the demanded time, within 1 %; where none does, the one
+    that comes closest. Else it is 1.
+    """
+    own = par.replace({"command.mode": "moment"})
+    if not demand.enforced:
+        return _judged(own, demand, 1.0)
+    # The pads cannot be slower than their travel in the time demanded.
+    F_N = 0.9 * max(force_for(demand.moment, own.replace({"wedge.mu_B": m})) for m in demand.mu_B)
+    least = travel_for(F_N, own) * wedge.slope(own.wedge) / demand.t_90
+    factors = least / closing_speed(own) * np.geomspace(1.0, _FASTEST, _TRIED)
+    low = high = slow_time = fast_time = math.nan
+    for _ in range(_ROUNDS):
+        times = _slowest(own, demand, factors)
+        fast = np.flatnonzero(times <= demand.t_90)
+        k = int(fast[0]) if fast.size else int(np.argmin(times))
+        if k == 0 or not fast.size:
+            return _judged(own, demand, float(factors[k]))
+        low, high = float(factors[k - 1]), float(factors[k])
+        slow_time, fast_time = float(times[k - 1]), float(times[k])
+        factors = np.geomspace(low, high, _TRIED)
+    share = 1.0
+    if math.isfinite(slow_time):
+        share = (slow_time - demand.t_90) / (slow_time - fast_time)
+    return _judged(own, demand, low * (high / low) ** share)
+
+
+def _run(par: WedgeParameters, demand: Demand, phase: float, duration: float) -> Run:
+    """Return the stop with the disc at an angle [rad] when the settling begins."""
+    levels = {0.0: demand.moment, demand.t_hold: 0.0}
+    case = case_from_parked(
+        par, lambda t: {"M_set": steps(t, levels)}, duration, settle=_SETTLE, record=_RECORD
+    )
+    return as_run(replace(case, state=case.state._replace(phi=phase)), _STEP)
+
+
+def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping[str, Array]:
+    """Return the parameters of all cases: every friction coefficient with every factor."""
+    mu, factor = (
+        grid.ravel() for grid in np.meshgrid(np.asarray(demand.mu_B), factors, indexing="ij")
+    )
+    control = par.control.moment
+    found = {"wedge.mu_B": mu}
+    found |= {f"control.moment.{name}": getattr(control, name) * factor for name in SPEEDS}
+    if demand.known:
+        found["control.moment.slope_hat"] = control.slope_hat * mu / par.wedge.mu_B
+    return found
+
+
+def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
+    """Return the time to 90 % of the slowest case [s] for every factor; infinite for none.
+
+    Only the smallest and the largest friction coefficient are looked at here.
+    """
+    demand = replace(demand, mu_B=(min(demand.mu_B), max(demand.mu_B)))
+    cases, slowest = _variations(par, demand, factors), np.zeros(factors.size)
+    for phase in demand.phases:
+        run = _run(par, demand, phase, demand.t_hold)
+        found = simulate_ensemble(run, cases, ("y_M",), threads=1)
+        times = _times(found.time, found["y_M"], 0.9 * demand.moment)
+        times = np.where(np.isnan(times), math.inf, times)
+        slowest = np.maximum(slowest, times.reshape(len(demand.mu_B), -1).max(axis=0))
+    return slowest
+
+
+def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
+    cases = _variations(par, demand, np.array([factor]))
+    whole = demand.t_hold + demand.t_release
+    found = [
+        simulate_ensemble(_run(par, demand, phase, whole), cases, SIGNALS, threads=1)
+        for phase in demand.phases
+    ]
+    time = found[0].time - _SETTLE
+    after, held = time >= -_TINY, time < demand.t_hold - _TINY
+    counted = after if demand.whole else after & held
+
+    def largest(rows: NDArray[np.bool_], *names: str) -> Array:
+        sizes = [np.abs(one[name][:, rows]).max(axis=1) for one in found for name in names]
+        return np.asarray(np.max(sizes, axis=0))
+
+    def gained(name: str) -> Array:
+        rows = [one[name][:, after] for one in found]
+        return np.asarray(np.max([row[:, -1] - row[:, 0] for row in rows], axis=0))
+
+    times = [_times(one.time, one["y_M"], 0.9 * demand.moment) for one in found]
+    at_end = held & (time >= _LAST * demand.t_hold)
+    return Answer(
+        closing_speed=factor * closing_speed(par),
+        t_90=np.max(times, axis=0),
+        filtered=largest(counted, "P_meas"),
+        instantaneous=largest(counted, "P_in"),
+        release=largest(~held, "P_meas"),
+        current=largest(after, "i_1_ref", "i_2_ref"),
+        speed=largest(after, "omega_1", "omega_2"),
+        copper=gained("E_copper"),
+        friction=gained("E_shaft"),
+        held=np.min([one["y_M"][:, at_end].mean(axis=1) for one in found], axis=0),
+        left=np.max([np.abs(one["y_M"][:, -1]) for one in found], axis=0),
+        stop=largest(after, "F_end"),
+        unsettled=sum(int(one.unsettled.sum()) for one in found),
+    )
+
+
+def _times(time: Array, y: Array, level: float) -> Array:
+    """Return when each row first exceeds a level [s after the demand], interpolated, or NaN."""
+    found = np.full(y.shape[0], math.nan)
+    for n, row in enumerate(y):
+        above = np.flatnonzero(row > level)
+        if above.size and above[0] > 0:
+            k = int(above[0])
+            share = (level - row[k - 1]) / (row[k] - row[k - 1])
+            found[n] = time[k - 1] + share * (time[k] - time[k - 1]) - _SETTLE
+    return found

@@ -1,0 +1,113 @@
+"""What limits a drive train: constraints at their limit, and what its neighbors fail at or cost."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sizing.map import HELD, LATE, LEFT
+from bywire.brakes.wedge.sizing.options import Options
+
+_AT = 0.99  # share of a limit from which on it counts as reached
+
+
+def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
+    """Return the constraints that a design is at.
+
+    Parameters
+    ----------
+    at
+        The design: variables over ``mu_B`` and scalars.
+    par
+        The given brake.
+    options
+        The study's.
+    """
+    found = []
+    if options.response == "enforced" and float(at["lateness"]) >= _AT:
+        found.append(
+            f"time: {float(at['t_90'].max()) * 1e3:.4g} ms of the {options.t_90 * 1e3:.4g} ms "
+            f"demanded, slowest at mu_B = {_where(at['t_90']):g}"
+        )
+    limits = {"control.position.i_max": par.control.position.i_max, "drive.i_max": par.drive.i_max}
+    name, i_max = min(limits.items(), key=lambda one: one[1])
+    if float(at["current"].max()) >= _AT * i_max:
+        reached = at["mu_B"].values[at["current"].values >= _AT * i_max]
+        found.append(f"current: at the limit {name} = {i_max:g} A with mu_B = {_listed(reached)}")
+    held = at["held"].min() / options.moment
+    if float(held) < HELD / _AT:
+        found.append(
+            f"hold: {100.0 * float(held):.3g} % of the demand is held, least at "
+            f"mu_B = {_where(-at['held']):g}"
+        )
+    if float(at["left"].max()) > _AT * LEFT * options.moment:
+        found.append(f"release: {float(at['left'].max()):.3g} N·m are left at its end")
+    powers = at[options.power]
+    near = at["mu_B"].values[powers.values >= _AT * float(powers.max())]
+    found.append(f"power: {float(powers.max()):.3g} W at mu_B = {_listed(near)}")
+    return found
+
+
+def failures(at: xr.Dataset, options: Options) -> list[str]:
+    """Return why a design is infeasible; empty where it is not."""
+    found = []
+    slowest = float(at["t_90"].max(skipna=False))
+    if math.isnan(slowest):
+        found.append("never reaches 90 % of the demand")
+    elif options.response == "enforced" and float(at["lateness"]) > LATE:
+        found.append(f"late, {slowest * 1e3:.4g} ms at mu_B = {_where(at['t_90']):g}")
+    if float(at["held"].min()) < HELD * options.moment:
+        found.append("does not hold the demand")
+    if float(at["left"].max()) > LEFT * options.moment:
+        found.append("does not release")
+    if float(at["stop"].max()) > 0.0:
+        found.append("presses on an end stop")
+    return found
+
+
+def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> list[str]:
+    """Return what happens one step away from the best design, on the finest grid that has it.
+
+    Parameters
+    ----------
+    grids
+        Maps of designs, coarse to fine.
+    best
+        One design of the last grid that holds it.
+    options
+        The study's.
+    """
+    tan_alpha, lead = float(best["tan_alpha"]), float(best["lead"])
+    power, texts = float(best[f"worst_{options.power}"]), []
+    grid = [g for g in grids if tan_alpha in g["tan_alpha"].values and lead in g["lead"].values][-1]
+    i, j = (int(np.flatnonzero(grid[name].values == value)[0])
+            for name, value in (("tan_alpha", tan_alpha), ("lead", lead)))  # fmt: skip
+    steps = {"flatter wedge": (-1, 0), "steeper wedge": (1, 0),
+             "shorter lead": (0, -1), "longer lead": (0, 1)}  # fmt: skip
+    for label, (di, dj) in steps.items():
+        k, m = i + di, j + dj
+        if not (0 <= k < grid.sizes["tan_alpha"] and 0 <= m < grid.sizes["lead"]):
+            continue
+        one = grid.isel(tan_alpha=k, lead=m)
+        value = (f"tan(alpha) = {float(one['tan_alpha']):.4g}" if di
+                 else f"lead = {1e3 * float(one['lead']):.4g} mm")  # fmt: skip
+        reasons = failures(one, options)
+        more = 100.0 * (float(one[options.power].max()) / power - 1.0)
+        outcome = f"{more:+.2g} % power, at mu_B = {_where(one[options.power]):g}"
+        if reasons:
+            outcome = f"infeasible: {'; '.join(reasons)}"
+        texts.append(f"{label}, {value}: {outcome}")
+    return texts
+
+
+def _where(values: xr.DataArray) -> float:
+    return float(values["mu_B"].values[np.argmax(values.values)])
+
+
+def _listed(values: NDArray[np.float64]) -> str:
+    return ", ".join(f"{float(one):g}" for one in values)

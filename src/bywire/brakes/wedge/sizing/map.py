@@ -1,0 +1,110 @@
+"""Many drive trains of the wedge brake beside each other, as a dataset."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.study import variable
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sizing.answer import Answer, Demand
+from bywire.brakes.wedge.sizing.design import answer, redesigned
+
+Array = NDArray[np.float64]
+
+LATE = 1.02
+"""share of the demanded time up to which a design answers equally fast"""
+HELD = 0.95
+"""share of the demand that counts as held"""
+LEFT = 0.05
+"""share of the demand below which the brake counts as released"""
+_NEVER = 10.0  # what stands for the lateness of a moment that is never reached
+
+_PER_CASE = {
+    "t_90": ("s", "time to 90 % of the demand"),
+    "filtered": ("W", "largest power, filtered"),
+    "instantaneous": ("W", "largest power"),
+    "release": ("W", "largest power of the release, filtered"),
+    "current": ("A", "largest current demand"),
+    "speed": ("rad/s", "largest motor speed"),
+    "copper": ("J", "copper loss"),
+    "friction": ("J", "friction of bearings and screws"),
+    "held": ("N*m", "mean moment at the end of the stop"),
+    "left": ("N*m", "moment left at the end"),
+    "stop": ("N", "force on the end stops"),
+}
+
+
+def mapped(
+    par: WedgeParameters,
+    demand: Demand,
+    slopes: Array,
+    leads: Array,
+    progress: Callable[[float], None] = lambda share: None,
+) -> xr.Dataset:
+    """Return what all designs on a grid do; on all cores, stopped by an interrupt.
+
+    Parameters
+    ----------
+    par
+        The given brake.
+    slopes, leads
+        Slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,).
+    progress
+        Called with the finished share, 0 to 1.
+
+    Returns
+    -------
+    xarray.Dataset
+        Dimensions ``tan_alpha``, ``lead`` and ``mu_B``. Per case the fields of `Answer`; per
+        design ``closing_speed``, ``lateness`` (slowest time over the demanded one), ``infeasible``
+        (0 or 1), and ``worst_filtered`` and ``worst_instantaneous``, NaN where infeasible, with
+        ``mu_B_filtered`` and ``mu_B_instantaneous``, where each occurs.
+    """
+    designs = [(float(a), float(b)) for a in slopes for b in leads]
+    answers: list[Answer] = []
+    pool = ThreadPoolExecutor(os.cpu_count() or 1)
+    try:
+        for k, one in enumerate(pool.map(lambda d: answer(redesigned(par, *d), demand), designs)):
+            answers.append(one)
+            progress((k + 1) / len(designs))
+    finally:  # an interrupt waits for what runs, and starts nothing more
+        pool.shutdown(cancel_futures=True)
+    shape = (len(slopes), len(leads), len(demand.mu_B))
+    return _dataset(answers, demand, shape).assign_coords(
+        tan_alpha=variable(slopes, ("tan_alpha",), "1", "slope of the wedge"),
+        lead=variable(leads, ("lead",), "m", "lead of the screws"),
+        mu_B=variable(np.asarray(demand.mu_B), ("mu_B",), "1", "friction coefficient of the pads"),
+    )
+
+
+def _dataset(answers: Sequence[Answer], demand: Demand, shape: tuple[int, int, int]) -> xr.Dataset:
+    plane, cube = ("tan_alpha", "lead"), ("tan_alpha", "lead", "mu_B")
+    cases = {
+        name: np.array([getattr(one, name) for one in answers]).reshape(shape)
+        for name in _PER_CASE
+    }
+    found = xr.Dataset({name: variable(cases[name], cube, *_PER_CASE[name]) for name in cases})
+    slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
+    lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
+    in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
+    holds = cases["held"].min(axis=2) >= HELD * demand.moment
+    released = cases["left"].max(axis=2) <= LEFT * demand.moment
+    feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
+    speeds = np.array([one.closing_speed for one in answers]).reshape(shape[:2])
+    found["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
+    found["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
+    found["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
+    for name in ("filtered", "instantaneous"):
+        worst = np.where(feasible, cases[name].max(axis=2), np.nan)
+        mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]
+        label = f"largest {name} power, worst mu_B"
+        found[f"worst_{name}"] = variable(worst, plane, "W", label)
+        found[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
+    found.attrs["unsettled_substeps"] = sum(one.unsettled for one in answers)
+    return found

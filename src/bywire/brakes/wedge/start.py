@@ -1,0 +1,60 @@
+"""States at rest of the wedge brake: parked, preloaded, without current."""
+
+from __future__ import annotations
+
+from bywire.brakes.wedge.control import Memory
+from bywire.brakes.wedge.elements import wedge, wedge_caliper
+from bywire.brakes.wedge.laws import screw_offset
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.plant import State
+from bywire.core.signals import zeros
+from bywire.plant import roller_screw
+
+Par = WedgeParameters
+
+
+def travel_for(F_N: float, par: Par) -> float:
+    """Return the wedge travel [m] at a normal force [N], run-out left out."""
+    return (par.caliper.clearance + wedge_caliper.travel(F_N, par.caliper)) / wedge.slope(par.wedge)
+
+
+def force_for(moment: float, par: Par) -> float:
+    """Return the normal force [N] that gives a braking moment [N m]."""
+    return moment / wedge_caliper.moment(1.0, par.wedge.mu_B, 1.0, par.caliper)
+
+
+def contact_angle(par: Par) -> float:
+    """Return the motor angle [rad] at which the pads touch."""
+    return travel_for(0.0, par) / roller_screw.slope(par.screw)
+
+
+def state_at(x: float, par: Par) -> State:
+    """Return the state at rest with the wedge at a travel [m], both screws offset from it."""
+    k = roller_screw.slope(par.screw)
+    apart = par.control.offset.delta_preload / k
+    return zeros(State)._replace(
+        theta_1=x / k - apart,
+        theta_2=x / k + apart,
+        x=x,
+        Omega=par.flywheel.Omega_0,
+        y_P=par.supply.P_standby,
+    )
+
+
+def memory_at(x: float, par: Par) -> Memory:
+    """Return the controllers' memory in which the references stand at that state."""
+    k = roller_screw.slope(par.screw)
+    delta = par.control.offset.delta_preload
+    both = screw_offset.output(x / k, delta, par.control.offset)
+    shafts = state_at(x, par)
+    return zeros(Memory)._replace(
+        on=1.0,
+        direction=-1.0 if par.flywheel.Omega_0 < 0 else 1.0,
+        theta_c=contact_angle(par),
+        theta_ref=x / k,
+        delta=delta,
+        theta_1_ref=both.theta_1,
+        theta_2_ref=both.theta_2,
+        last_1=shafts.theta_1,
+        last_2=shafts.theta_2,
+    )

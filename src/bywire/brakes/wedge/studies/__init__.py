@@ -1,0 +1,1 @@
+"""Sizing studies, one file each."""

@@ -1,0 +1,202 @@
+"""Drive train of the wedge brake: peak power over wedge slope and screw lead at equal response."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
+from bywire.bench.kpis.kpi import Kpi
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sizing.answer import Answer, Demand
+from bywire.brakes.wedge.sizing.design import answer
+from bywire.brakes.wedge.sizing.limits import active, around
+from bywire.brakes.wedge.sizing.map import mapped
+from bywire.brakes.wedge.sizing.options import ASSUMPTIONS, DEFAULTS, Options
+
+Array = NDArray[np.float64]
+
+NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
+NEAR = 1.05
+"""designs within this factor of the smallest power count as equally good"""
+_ROUNDS = 2  # of the optimum's refinement; each halves the spacing
+_TINY = 1e-6  # of the spacing
+_BORDER = 0.02  # between 0, feasible, and 1: drawn close to the last feasible designs
+
+
+class Best(NamedTuple):
+    """A design, and its largest power [W] at the worst friction coefficient."""
+
+    tan_alpha: float
+    lead: float
+    power: float
+    at: xr.Dataset
+
+
+def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found:
+    """Return the map of peak power, its optimum on a finer grid around it, and the given design.
+
+    Raises
+    ------
+    InputError
+        When a design does not exist.
+    """
+    demand = Demand(
+        options.moment, options.t_90, options.t_hold, options.t_release, options.mu_B,
+        options.believed == "known", options.response == "enforced",
+        options.counted == "whole-pulse",
+    )  # fmt: skip
+    par = par.replace({"control.moment.omega_gap": options.omega_gap})
+    given = answer(par, demand)  # first and alone: it also builds the kernels
+    slopes = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
+    leads = np.linspace(options.lead_min, options.lead_max, options.leads)
+    data = mapped(par, demand, slopes, leads, partial(progress, "designs"))
+    warnings = _warnings(data)
+    if data["infeasible"].values.all():
+        warnings += (NONE_FEASIBLE,)
+        return Found(data, _given(given, options), ASSUMPTIONS, {}, (), warnings)
+    coarse = smallest(data, options.power)
+    grids, best = [data], coarse
+    for n in range(1, _ROUNDS + 1):
+        near = (_around(slopes, best.tan_alpha, n), _around(leads, best.lead, n))
+        grids.append(mapped(par, demand, *near, partial(progress, f"optimum, round {n}")))
+        best = min(best, smallest(grids[-1], options.power), key=lambda one: one.power)
+    here = Mark("given drive train", par.screw.lead, wedge.slope(par.wedge))
+    marks = (Mark("optimum", best.lead, best.tan_alpha), here)
+    maps = {
+        kind: Map(
+            f"worst_{kind}", "lead", "tan_alpha",
+            f"Largest {kind} power of the stop at the worst friction coefficient.",
+            marks if kind == options.power else (here,), {"infeasible": ("infeasible", _BORDER)},
+        )
+        for kind in (options.power, _other(options.power))
+    }  # fmt: skip
+    kpis = (*_optimum(best, grids, options), *_given(given, options))
+    limits = (*active(best.at, par, options), *around(grids, best.at, options))
+    return Found(
+        data, kpis, ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
+    )
+
+
+def smallest(data: xr.Dataset, power: str) -> Best:
+    """Return the feasible design of least power; there must be one."""
+    worst = data[f"worst_{power}"].values
+    i, j = np.unravel_index(int(np.nanargmin(worst)), worst.shape)
+    at = data.isel(tan_alpha=int(i), lead=int(j))
+    return Best(float(at["tan_alpha"]), float(at["lead"]), float(worst[i, j]), at)
+
+
+def _around(nodes: Array, middle: float, halvings: int) -> Array:
+    """Return five finer nodes around a value, or those of them within the range."""
+    step = (nodes[1] - nodes[0]) / 2**halvings
+    near = middle + step * np.arange(-2.0, 3.0)
+    inside = (near >= nodes[0] - _TINY * step) & (near <= nodes[-1] + _TINY * step)
+    return np.asarray(near[inside])
+
+
+def _other(power: str) -> str:
+    return "instantaneous" if power == "filtered" else "filtered"
+
+
+def _optimum(best: Best, grids: Sequence[xr.Dataset], options: Options) -> tuple[Kpi, ...]:
+    other = smallest(grids[0], _other(options.power))
+    slopes, leads = [best.tan_alpha], [best.lead]
+    for data in grids:
+        good = np.argwhere(data[f"worst_{options.power}"].values <= NEAR * best.power)
+        slopes += [float(one) for one in data["tan_alpha"].values[good[:, 0]]]
+        leads += [float(one) for one in data["lead"].values[good[:, 1]]]
+    share = f"of designs within {100 * (NEAR - 1):.0f} % of the smallest power"
+    return (
+        Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Slope of the wedge of least power."),
+        Kpi("optimum_lead", best.lead, "m", "Lead of the screws of least power."),
+        Kpi("optimum_power", best.power, "W",
+            f"Largest {options.power} power of the stop, worst friction coefficient."),
+        Kpi("optimum_mu_B", float(best.at[f"mu_B_{options.power}"]), "1",
+            "Friction coefficient that needs this power."),
+        Kpi("optimum_release", float(best.at["release"].max()), "W",
+            "Largest power of its release, filtered."),
+        Kpi("optimum_t_90", float(best.at["t_90"].max()), "s",
+            "Time to 90 % of the demand reached, slowest friction coefficient."),
+        Kpi("optimum_closing_speed", float(best.at["closing_speed"]), "m/s",
+            "Largest speed at which its reference closes the pads."),
+        Kpi("optimum_current", float(best.at["current"].max()), "A", "Largest current demand."),
+        Kpi("flat_tan_alpha_min", min(slopes), "1", f"Smallest slope {share}."),
+        Kpi("flat_tan_alpha_max", max(slopes), "1", f"Largest slope {share}."),
+        Kpi("flat_lead_min", min(leads), "m", f"Smallest lead {share}."),
+        Kpi("flat_lead_max", max(leads), "m", f"Largest lead {share}."),
+        Kpi("other_tan_alpha", other.tan_alpha, "1",
+            f"Slope on the map of least {_other(options.power)} power."),
+        Kpi("other_lead", other.lead, "m",
+            f"Lead on the map of least {_other(options.power)} power."),
+        Kpi("other_power", other.power, "W",
+            f"Largest {_other(options.power)} power there, worst friction coefficient."),
+    )  # fmt: skip
+
+
+def _given(given: Answer, options: Options) -> tuple[Kpi, ...]:
+    sizes = getattr(given, options.power)
+    k, t_90 = int(np.argmax(sizes)), float(given.t_90.max())
+    note = "" if math.isfinite(t_90) else "a case never gets there"
+    return (
+        Kpi("given_power", float(sizes[k]), "W",
+            f"Largest {options.power} power of the given drive train, worst coefficient."),
+        Kpi("given_mu_B", float(options.mu_B[k]), "1",
+            "Friction coefficient that needs this power."),
+        Kpi("given_release", float(given.release.max()), "W",
+            "Largest power of its release, filtered."),
+        Kpi("given_t_90", t_90, "s",
+            "Time to 90 % of the demand reached by it, slowest coefficient.", note),
+        Kpi("given_closing_speed", given.closing_speed, "m/s",
+            "Largest speed at which its reference closes the pads."),
+    )  # fmt: skip
+
+
+def _cuts(data: xr.Dataset, best: Best) -> tuple[Cut, ...]:
+    """Return what changes along the lead at the map's slope nearest to the optimum."""
+    row = data.sel(tan_alpha=best.tan_alpha, method="nearest")
+    worst = row[["release", "t_90", "current", "speed", "copper"]].max(dim="mu_B", keep_attrs=True)
+    names = ("worst_filtered", "mu_B_filtered", "worst_instantaneous")
+    shown = xr.merge([worst, row[list(names)]], compat="override")
+    title = (
+        f"tan(alpha) = {float(row['tan_alpha']):.3g}, worst friction coefficient; current, speed "
+        "and copper loss of the whole pulse"
+    )
+    return (Cut(title, shown, ("lead", *names, *(str(name) for name in worst))),)
+
+
+def _warnings(data: xr.Dataset) -> tuple[str, ...]:
+    count = data.attrs["unsettled_substeps"]
+    return (f"{count} substeps hit the cap of the contact iteration",) if count else ()
+
+
+def _edges(best: Best, options: Options) -> tuple[str, ...]:
+    """Return whether the optimum lies at the edge of the designs compared."""
+    return tuple(
+        f"the optimum lies at the edge of the designs, {name} = {edge:g}: widen the range"
+        for name, value in (("tan_alpha", best.tan_alpha), ("lead", best.lead))
+        for edge in (getattr(options, f"{name}_min"), getattr(options, f"{name}_max"))
+        if math.isclose(value, edge)
+    )
+
+
+STUDY = Study(
+    name="drive-train",
+    assembly="wedge-brake",
+    summary="peak power of a large stop over wedge slope and screw lead, at equal response",
+    options=Options,
+    defaults=DEFAULTS,
+    compute=compute,
+    ruled={
+        "wedge.mu_B": "the study takes several; set its option mu_B, e.g. --set mu_B=0.3,0.5",
+        "control.moment.omega_gap": "set the study's option omega_gap",
+        "command.mode": "the study demands moments",
+        "rig": "it belongs to the rigs",
+    },
+)

@@ -1,0 +1,209 @@
+"""Stability of the wedge brake over friction coefficient and slope, with and without control."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study, variable
+from bywire.bench.kpis.kpi import Kpi
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.brakes.wedge.sizing.options import Count, Slope
+from bywire.brakes.wedge.stability import brake, controlled, moment_borders, motion, neutral
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Unit
+
+Array = NDArray[np.float64]
+Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]
+Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
+
+ASSUMPTIONS = (
+    "Exact linear models of the brake, dry friction removed: what friction holds does not run "
+    "away, so that the real brake is stable in a wider range.",
+    "Without control: both motors at constant currents, or locked; the wedge is preloaded between "
+    "the screws and carries the normal force given. Where the actuation force exceeds the preload, "
+    "one screw loses the wedge, and the other moves or holds it alone.",
+    "With control: moment loop around position and current loops, as they are sampled, at the "
+    "moment given; its controllers know the wedge's slope.",
+    "The end stops of the wedge stand where the pads have traveled as far as before.",
+)
+HIGHEST = 5.0
+"""friction coefficient up to which the moment loop's border is sought"""
+_SEARCHED = 40
+_FAST = 5.0  # growth [1/s] from which rates are compared with the closed form
+
+
+class Options(ParameterSet):
+    """The designs to compare, and where they are linearized."""
+
+    mu_B_min: Coefficient
+    """smallest friction coefficient of the pads"""
+    mu_B_max: Coefficient
+    """largest friction coefficient of the pads"""
+    coefficients: Count
+    """number of friction coefficients"""
+    tan_alpha_min: Slope
+    """smallest slope of the wedge"""
+    tan_alpha_max: Slope
+    """largest slope of the wedge"""
+    slopes: Count
+    """number of slopes"""
+    force: Force
+    """normal force at which the wedge without control is looked at"""
+    moment: SomeMoment
+    """moment at which the moment loop is looked at"""
+    believed: Literal["known", "as-given"]
+    """whether the moment controller knows mu_B, or believes in that of the parameter set"""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Options:
+        for low, high in (("mu_B_min", "mu_B_max"), ("tan_alpha_min", "tan_alpha_max")):
+            a, b = getattr(self, low), getattr(self, high)
+            if not a < b:
+                raise ValueError(f"{low} = {a:g} must be below {high} = {b:g}")
+        return self
+
+
+DEFAULTS = Options(
+    mu_B_min=0.1, mu_B_max=0.8, coefficients=21,
+    tan_alpha_min=0.2, tan_alpha_max=0.6, slopes=13,
+    force=1e3, moment=200.0, believed="as-given",
+)  # fmt: skip
+"""around the catalog's wedge and the pads of Roberts et al. (2003)"""
+
+
+def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found:
+    """Return growth rates, borders and disk margins over the map.
+
+    Raises
+    ------
+    InputError
+        When the wedge without control has no operating point.
+    """
+    mu = np.linspace(options.mu_B_min, options.mu_B_max, options.coefficients)
+    tan = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
+    rows, borders = [], []
+    known = options.believed == "known"
+    for k, slope in enumerate(map(float, tan)):
+        cases = [brake(par, float(one), slope, known) for one in mu]
+        rows.append([
+            (*motion(own, options.force), *controlled(own, options.moment)) for own in cases
+        ])  # fmt: skip
+        borders.append(neutral(cases[0], options.force))
+        progress("stability", (k + 1) / tan.size)
+    data = _dataset(mu, tan, np.array(rows), np.array(borders))
+    given = Mark("given wedge", par.wedge.mu_B, wedge.slope(par.wedge))
+    kpis = (*_uncontrolled(par, data, options), *_controlled(par, data, options))
+    return Found(data, kpis, ASSUMPTIONS, _maps(data, given), (_cut(data, given),))
+
+
+def _dataset(mu: Array, tan: Array, values: Array, borders: Array) -> xr.Dataset:
+    labels = (
+        ("growth_open", "1/s", "growth rate, motors at constant currents"),
+        ("frequency_open", "Hz", "frequency of that motion"),
+        ("growth_rigid", "1/s", "growth rate by the closed form of a rigid heart"),
+        ("growth_locked", "1/s", "growth rate, motors locked"),
+        ("disk_moment", "1", "disk margin of the moment loop"),
+        ("unstable_moment", "1", "whether the moment loop is unstable"),
+    )
+    dims = ("tan_alpha", "mu_B")
+    found: dict[str, Any] = {
+        name: variable(values[:, :, k], dims, unit, label)
+        for k, (name, unit, label) in enumerate(labels)
+    }
+    found["border_open"] = variable(
+        borders, ("tan_alpha",), "1", "friction coefficient of the neutral point"
+    )
+    found["beyond_open"] = variable(
+        mu[None, :] - borders[:, None], dims, "1", "friction coefficient beyond the neutral point"
+    )
+    axes = {
+        "tan_alpha": variable(tan, ("tan_alpha",), "1", "slope of the wedge, tan(alpha)"),
+        "mu_B": variable(mu, ("mu_B",), "1", "friction coefficient of the pads"),
+    }
+    return xr.Dataset(found, axes)
+
+
+def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
+    low = max(float(data["mu_B"][0]), float(data["tan_alpha"][0]))
+    high = min(float(data["mu_B"][-1]), float(data["tan_alpha"][-1]))
+    closed = {"tan(alpha) = mu_B": ((low, high), (low, high))} if low < high else {}
+    return {
+        "uncontrolled": Map(
+            "growth_open", "mu_B", "tan_alpha",
+            "Largest growth rate of the wedge without control, motors at constant currents; dashed "
+            "the closed form of the neutral point. The hatched border is computed; colors are "
+            "interpolated between designs, and the rate jumps there.",
+            (given,), {"unstable without control": ("beyond_open", 0.0)}, closed,
+        ),
+        "moment-loop": Map(
+            "disk_moment", "mu_B", "tan_alpha",
+            "Disk margin of the closed moment loop; dashed the neutral point of the wedge.",
+            (given,), {"unstable in the moment loop": ("unstable_moment", 0.5)}, closed,
+        ),
+    }  # fmt: skip
+
+
+def _cut(data: xr.Dataset, given: Mark) -> Cut:
+    row = data.sel(tan_alpha=given.y, method="nearest")
+    names = ("growth_open", "frequency_open", "growth_rigid", "growth_locked", "disk_moment")
+    title = f"tan(alpha) = {float(row['tan_alpha']):.3g}, the slope nearest to the given wedge's"
+    return Cut(title, row[list(names)], ("mu_B", *names))
+
+
+def _uncontrolled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
+    growth, rigid = data["growth_open"].values, data["growth_rigid"].values
+    fast = rigid > _FAST
+    apart = np.abs(data["border_open"].values - data["tan_alpha"].values)
+    error = float(np.max(np.abs(growth[fast] / rigid[fast] - 1.0))) if fast.any() else math.nan
+    return (
+        Kpi("neutral_mu_B", neutral(par, options.force), "1",
+            "Friction coefficient from which the given wedge runs away without control."),
+        Kpi("neutral_deviation", float(apart.max()), "1",
+            "Largest distance of the neutral point from its closed form tan(alpha)."),
+        Kpi("growth_max", float(growth.max()), "1/s",
+            "Largest growth rate without control."),
+        Kpi("rigid_error", 100.0 * error, "%",
+            f"Largest deviation of rates above {_FAST:g} 1/s from the closed form."),
+        Kpi("locked_growth_max", float(data["growth_locked"].max()), "1/s",
+            "Largest growth rate with locked motors; below 0 where they hold the wedge."),
+    )  # fmt: skip
+
+
+def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
+    disk, unstable = data["disk_moment"].values, data["unstable_moment"].values
+    least, where = math.nan, "no design is stable"
+    if np.isfinite(disk).any():
+        i, j = np.unravel_index(int(np.nanargmin(disk)), disk.shape)
+        least = float(disk[i, j])
+        where = (f"at mu_B = {float(data['mu_B'][j]):.3g}, "
+                 f"tan(alpha) = {float(data['tan_alpha'][i]):.3g}")  # fmt: skip
+    between = (options.mu_B_min, HIGHEST)
+    found = [b.value for b in moment_borders(par, options.moment, between, _SEARCHED)
+             if not b.above]  # fmt: skip
+    note = "" if found else f"stable up to {HIGHEST:g}"
+    return (
+        Kpi("moment_disk_min", least, "1", "Least disk margin of the moment loop.", where),
+        Kpi("moment_unstable", float(np.nansum(unstable)), "1",
+            "Designs whose moment loop is unstable."),
+        Kpi("moment_mu_B", found[0] if found else math.nan, "1",
+            "Friction coefficient from which the given wedge's moment loop is unstable, its "
+            "controller as given.", note),
+    )  # fmt: skip
+
+
+STUDY = Study(
+    name="stability",
+    assembly="wedge-brake",
+    summary="stability over friction coefficient and wedge slope, with and without control",
+    options=Options,
+    defaults=DEFAULTS,
+    compute=compute,
+)

@@ -1,0 +1,102 @@
+"""Relations of the wedge brake that are linear in parameters that drift: friction, clearance."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.errors import ParameterError
+from bywire.identification.replaying.relation import Relation, Rows
+
+Array = NDArray[np.float64]
+
+_PRESSED = 0.1  # of the largest force: below it, the relation tells little
+_STEADY = 0.02  # of the largest force per sensor's time constant: faster, its lag would show
+_SMOOTHED = 10.0  # of that time constant: noise is no change of the force
+
+
+def _steady(data: xr.Dataset, force: str, par: WedgeParameters) -> NDArray[np.bool_]:
+    """Return where a force presses, and changes so slowly that the moment sensor follows."""
+    t, F = data["time"].values, np.abs(data[force].values)
+    top = float(np.nanmax(F))
+    lag = 1.0 / (2.0 * np.pi * par.moment_sensor.f_M)
+    width = max(round(_SMOOTHED * lag / float(t[1] - t[0])), 1)
+    smooth = np.convolve(np.pad(F, (width // 2, width - 1 - width // 2), mode="edge"),
+                         np.ones(width) / width, mode="valid")  # fmt: skip
+    calm = np.abs(np.gradient(smooth, t)) * lag < _STEADY * top
+    return np.asarray((_PRESSED * top < F) & calm & np.isfinite(F))
+
+
+def _lagged(F: Array, data: xr.Dataset, par: WedgeParameters) -> Array:
+    from scipy import signal
+
+    t = data["time"].values
+    keep = float(np.exp(-2.0 * np.pi * par.moment_sensor.f_M * (t[1] - t[0])))
+    there = np.isfinite(F)
+    filled = np.interp(t, t[there], F[there]) if there.any() else F
+    # Of a force that runs straight from sample to sample.
+    slope = (1.0 - keep) / -np.log(keep)
+    numerator = [1.0 - slope, slope - keep]
+    late, _ = signal.lfilter(numerator, [1.0, -keep], filled, zi=[slope * filled[0]])
+    return np.where(there, late, np.nan)
+
+
+def _rows(y: Array, phi: Array, used: NDArray[np.bool_]) -> Rows:
+    return Rows(np.where(used[:, None], phi, np.nan), np.where(used, y, np.nan))
+
+
+def _from_normal_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
+    """Return M = mu_B 2 r_B F_N, both pads (2003, section "Wedge and calliper").
+
+    The force goes through the moment sensor's lag, so that both are late alike.
+    """
+    used = _steady(data, "F_N", par)
+    phi = 2.0 * par.caliper.r_B * _lagged(np.abs(data["F_N"].values), data, par)
+    return _rows(np.abs(data["y_M"].values), phi[:, None], used)
+
+
+def _from_actuation_force(data: xr.Dataset, par: WedgeParameters) -> Rows:
+    """Return M tan(alpha) = mu_B (M + 2 r_B F_M): the wedge at rest, F_N eliminated."""
+    used = _steady(data, "y_M", par)
+    M, sense = np.abs(data["y_M"].values), np.sign(data["y_M"].values)
+    phi = M + 2.0 * par.caliper.r_B * sense * data["F_M"].values
+    return _rows(M * wedge.slope(par.wedge), phi[:, None], used)
+
+
+def _from_travel(data: xr.Dataset, par: WedgeParameters) -> Rows:
+    """Return |x| tan(alpha) = c + F_N / K_cal: the caliper as a spring, in contact."""
+    if par.caliper.law != "linear":
+        raise ParameterError(
+            "caliper.clearance is tracked with caliper.law = 'linear', and the parameters have "
+            f"{par.caliper.law!r}"
+        )
+    used = _steady(data, "F_N", par)
+    y = np.abs(data["x"].values) * wedge.slope(par.wedge)
+    return _rows(y, np.column_stack((np.ones(y.size), data["F_N"].values)), used)
+
+
+RELATIONS: tuple[Relation, ...] = (
+    Relation(
+        "pad friction from the normal force", "wedge-brake",
+        ("wedge.mu_B",), ("1",), {"y_M": "N*m", "F_N": "N"}, _from_normal_force,
+        lambda par: np.array([par.wedge.mu_B]), "braking moment from the normal force",
+    ),
+    Relation(
+        "pad friction from the actuation force", "wedge-brake",
+        ("wedge.mu_B",), ("1",), {"y_M": "N*m", "F_M": "N"}, _from_actuation_force,
+        lambda par: np.array([par.wedge.mu_B]),
+        "wedge at rest without friction of its own, which biases by up to that friction over the "
+        "normal force, one way while applying and the other while releasing",
+    ),
+    Relation(
+        "clearance from the travel", "wedge-brake",
+        ("caliper.clearance", "1/caliper.K_cal"), ("m", "m/N"),
+        {"x": "m", "F_N": "N"}, _from_travel,
+        lambda par: np.array([par.caliper.clearance, 1.0 / par.caliper.K_cal]),
+        "caliper as a spring; the disc's run-out counts as noise",
+    ),
+)  # fmt: skip
+"""relations by preference: the first whose signals are measured is taken"""

@@ -1,1 +1,0 @@
-"""Cited parameter sets, one file per source."""

@@ -1,0 +1,237 @@
+"""Brakes: how one declares itself, and how the ones that are there are found.
+
+A brake is a package or a single file with one declaration::
+
+    BRAKE = Brake("servo-axis", "a motor that turns a lever against a spring", __name__)
+
+Installed brakes are found by entry points of the group ``bywire.brakes``, others by `load_system`.
+Ours are found the same way as anybody's. Bench files never load a brake: they are untrusted.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+import traceback
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.metadata import entry_points
+from pathlib import Path
+from types import ModuleType
+
+from bywire.core.errors import FileError, ModelError
+
+GROUP = "bywire.brakes"
+"""entry points whose values name modules with a ``BRAKE``"""
+
+
+class BrakeWarning(UserWarning):
+    """An installed brake that is left out."""
+
+
+@dataclass(frozen=True)
+class Brake:
+    """What makes a package or a file a brake.
+
+    Parameters
+    ----------
+    name
+        What listings call it.
+    summary
+        One line for listings.
+    module
+        Its ``__name__``: where its models, parameter sets, experiments, loops and the rest stand.
+        Of a package, every kind has a module or a folder of its own; see ``bywire.core.registry``.
+    """
+
+    name: str
+    summary: str
+    module: str
+
+    @property
+    def file(self) -> str:
+        """Where it is declared."""
+        return importlib.import_module(self.module).__file__ or self.module
+
+
+_loaded: dict[str, Brake] = {}
+
+
+def brakes() -> Mapping[str, Brake]:
+    """Return every brake by name: the installed ones, then those loaded from files."""
+    return {**_installed(), **_loaded}
+
+
+@cache
+def _installed() -> Mapping[str, Brake]:
+    found: dict[str, Brake] = {}
+    for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):
+        try:
+            brake = _declared(importlib.import_module(point.module), point.value)
+            _require_new(brake, found)
+        except Exception as error:
+            reason = str(error) if isinstance(error, ModelError) else _place(error, "")
+            warnings.warn(
+                f"the installed brake {point.name!r} ({point.value}) is left out: {reason}",
+                BrakeWarning, stacklevel=2,
+            )  # fmt: skip
+        else:
+            found[brake.name] = brake
+    return found
+
+
+def load_system(path: str | Path) -> Brake:
+    """Load a brake from a file or a package, and have it known by its names from then on.
+
+    Its code is run: load only what you trust.
+
+    Parameters
+    ----------
+    path
+        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``.
+
+    Raises
+    ------
+    FileError
+        When there is no such file or folder.
+    ModelError
+        When it fails on import, declares no brake, or one whose name is taken.
+    """
+    from bywire.core.registry import forget
+
+    place = Path(path).expanduser().resolve()
+    source = place / "__init__.py" if place.is_dir() else place
+    if not source.is_file() or source.suffix != ".py":
+        raise FileError(
+            f"{path} is no brake: give a Python file, or a folder with an __init__.py, that "
+            "declares BRAKE = bywire.Brake(...)"
+        )
+    known = next((b for b in _loaded.values() if Path(b.file).resolve() == source), None)
+    if known is not None:
+        return known
+    brake = _declared(_imported(place, source), str(path))
+    _require_new(brake, brakes())
+    _loaded[brake.name] = brake
+    forget()
+    return brake
+
+
+def _imported(place: Path, source: Path) -> ModuleType:
+    name = place.name if place.is_dir() else place.stem
+    if not name.isidentifier():
+        raise ModelError(f"{place}: its name must be one that Python can import, like servo_axis")
+    there = sys.modules.get(name)
+    if there is None and importlib.util.find_spec(name) is not None:
+        there = ModuleType(name)
+    if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
+        raise ModelError(
+            f"{place}: a module {name!r} exists already beside it: give the file another name"
+        )
+    spec = importlib.util.spec_from_file_location(
+        name, source, submodule_search_locations=[str(place)] if place.is_dir() else None
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException as error:
+        for loaded in [each for each in sys.modules if each == name or each.startswith(f"{name}.")]:
+            del sys.modules[loaded]
+        if not isinstance(error, (Exception, SystemExit)):
+            raise
+        raise ModelError(f"{_place(error, str(source))}; mend it and load it again") from error
+    return module
+
+
+def _declared(module: ModuleType, where: str) -> Brake:
+    brake = getattr(module, "BRAKE", None)
+    if not isinstance(brake, Brake):
+        has = "no BRAKE" if brake is None else f"a BRAKE that is a {type(brake).__name__}"
+        raise ModelError(
+            f"{where} declares {has}: write BRAKE = bywire.Brake(name, summary, __name__) in "
+            f"{module.__file__}"
+        )
+    if brake.module != module.__name__:
+        raise ModelError(
+            f"{module.__file__}: BRAKE is declared for the module {brake.module!r}: write "
+            f"Brake({brake.name!r}, ..., __name__)"
+        )
+    return brake
+
+
+def _require_new(brake: Brake, known: Mapping[str, Brake]) -> None:
+    if brake.name in known:
+        raise ModelError(
+            f"{brake.file} declares a brake {brake.name!r}, and so does {known[brake.name].file}: "
+            "give it another name"
+        )
+
+
+def _place(error: BaseException, inside: str) -> str:
+    """Return an error with the innermost line of the user's files at which it happened."""
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    if isinstance(error, SyntaxError) and error.filename:
+        return f"{error.filename}, line {error.lineno}: {type(error).__name__}: {error.msg}"
+    folder = str(Path(inside).parent) if inside else ""
+    lines = [
+        (frame.filename, frame.lineno)
+        for frame in traceback.extract_tb(error.__traceback__)
+        if frame.filename.startswith(folder) and not frame.filename.startswith("<")
+    ]
+    return f"{lines[-1][0]}, line {lines[-1][1]}: {text}" if lines else f"{inside}: {text}"
+
+
+def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
+    """Yield the modules in which a brake may keep a kind of thing: itself, and those of the names.
+
+    Parameters
+    ----------
+    names
+        Modules or folders of its package, for instance ``("loops",)``.
+
+    Raises
+    ------
+    ModelError
+        When one of them fails on import.
+    """
+    package = importlib.import_module(brake.module)
+    yield package
+    if not hasattr(package, "__path__"):
+        return
+    for name in names:
+        for place in package.__path__:
+            if (Path(place) / name).is_dir() or (Path(place) / f"{name}.py").is_file():
+                yield from modules_below(f"{brake.module}.{name}")
+                break
+
+
+def modules_below(name: str) -> Iterator[ModuleType]:
+    """Yield a module, and of a package the modules in its folder, in alphabetical order.
+
+    Raises
+    ------
+    ModelError
+        When one fails on import.
+    """
+    import pkgutil
+
+    module = _attempted(name)
+    yield module
+    for found in pkgutil.iter_modules(getattr(module, "__path__", ())):
+        yield _attempted(f"{name}.{found.name}")
+
+
+def _attempted(name: str) -> ModuleType:
+    try:
+        return importlib.import_module(name)
+    except ModelError:
+        raise
+    except Exception as error:
+        if name.partition(".")[0] == "bywire":
+            raise
+        raise ModelError(_place(error, "")) from error

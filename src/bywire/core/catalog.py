@@ -1,0 +1,74 @@
+"""Parameter sets by name, every value with its source."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from bywire.core.errors import ModelError
+from bywire.core.parameters import ParameterSet
+from bywire.core.provenance import Cited
+from bywire.core.registry import Kind, instances
+
+
+@dataclass(frozen=True)
+class CitedSet:
+    """A named parameter set.
+
+    Parameters
+    ----------
+    name
+        What bench files and the command line call it.
+    assembly
+        Name of the assembly that it is for.
+    source
+        Full citation.
+    summary
+        One line for listings.
+    parameter_class
+        Class that validates the values.
+    values
+        Every value by dotted name, with its provenance.
+    """
+
+    name: str
+    assembly: str
+    source: str
+    summary: str
+    parameter_class: type[ParameterSet]
+    values: Mapping[str, Cited]
+
+    def parameters(self) -> ParameterSet:
+        """Return the validated parameter set."""
+        return self.parameter_class.create({k: c.value for k, c in self.values.items()})
+
+
+PARAMETER_SETS = Kind("parameter set", ("sets",), instances(CitedSet))
+"""every parameter set of every brake"""
+
+
+def main_set(assembly: str) -> str:
+    """Return the name of the first parameter set that there is for an assembly.
+
+    Raises
+    ------
+    ModelError
+        When there is none.
+    """
+    for name, cited in PARAMETER_SETS.all().items():
+        if cited.assembly == assembly:
+            return name
+    raise ModelError(
+        f"there is no parameter set for a {assembly}: declare a bywire.CitedSet of that assembly"
+    )
+
+
+def parameters(name: str) -> ParameterSet:
+    """Return the parameters of a set, validated.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    return PARAMETER_SETS.find(name).parameters()

@@ -1,0 +1,157 @@
+"""The registry: everything that has a name, of whatever kind, and where it is found.
+
+The room that knows a kind of thing declares the `Kind`; a file declares a thing. The general ones
+stand in a package of that room, those of a brake in the module or folder of its package that the
+kind names (``experiments``, ``loops``, ...), or in the brake's single file. So a new file is all
+that a new thing takes.
+"""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
+from typing import Any, Generic, Protocol, TypeVar
+
+from bywire.core.brake import brakes, modules_below, modules_of
+from bywire.core.errors import ModelError, unknown_name
+
+
+class Named(Protocol):
+    """Anything with a name."""
+
+    @property
+    def name(self) -> str:
+        """What users call it."""
+        ...
+
+
+T = TypeVar("T", bound=Named)
+Thing = TypeVar("Thing")
+
+
+@dataclass(frozen=True)
+class Kind(Generic[T]):
+    """A kind of thing.
+
+    Parameters
+    ----------
+    name
+        What messages call it, for instance ``"experiment"``.
+    folders
+        Modules or folders of a brake's package in which such things stand.
+    read
+        ``read(module)``: those that a module declares.
+    home
+        Dotted name of the package of general ones; empty where all belong to a brake.
+    """
+
+    name: str
+    folders: tuple[str, ...]
+    read: Callable[[ModuleType], Iterable[T]]
+    home: str = ""
+
+    def all(self) -> Mapping[str, T]:
+        """Return every thing of this kind by its name: the general ones, then brake by brake."""
+        return {thing.name: thing for thing, _ in _all(self)}
+
+    def find(self, name: str) -> T:
+        """Return the thing of a name.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        guess = self._guess(name)
+        return guess if guess is not None else pick(self.all(), name, self.name)
+
+    def _guess(self, name: str) -> T | None:
+        """Return the thing of a name if the file of that name declares it: loads no other."""
+        stem = name.replace("-", "_")
+        if not stem.isidentifier():
+            return None
+        homes = [f"{brake.module}.{folder}" for brake in brakes().values()
+                 for folder in self.folders]  # fmt: skip
+        for home in (self.home, *homes):
+            try:
+                spec = importlib.util.find_spec(f"{home}.{stem}") if home else None
+            except (ImportError, ValueError, AttributeError):
+                continue  # no such folder
+            if spec is not None:
+                for module in modules_below(f"{home}.{stem}"):
+                    for thing in self.read(module):
+                        if thing.name == name:
+                            return thing
+        return None
+
+    def of(self, module: str) -> Mapping[str, T]:
+        """Return the things that the brake of a module brings."""
+        return {thing.name: thing for thing, owner in _all(self) if owner == module}
+
+    def owner(self, name: str) -> str:
+        """Return the module of the brake that brings a thing; empty for a general one."""
+        return next((owner for thing, owner in _all(self) if thing.name == name), "")
+
+
+def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
+    """Return a reader of the objects of a type that a module holds, alone or in a tuple."""
+
+    def read(module: ModuleType) -> Iterator[Thing]:
+        for name, value in vars(module).items():
+            if not name.startswith("_"):
+                for each in value if type(value) is tuple else (value,):
+                    if isinstance(each, kind):
+                        yield each
+
+    return read
+
+
+@cache
+def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
+    """Return every thing of a kind with the module of its brake.
+
+    Raises
+    ------
+    ModelError
+        When two things of different places have one name.
+    """
+    found: dict[str, tuple[Any, str, str]] = {}
+
+    def add(module: ModuleType, owner: str) -> None:
+        for thing in kind.read(module):
+            known = found.setdefault(thing.name, (thing, owner, module.__file__ or ""))
+            if known[0] is not thing:
+                raise ModelError(
+                    f"{module.__file__} declares the {kind.name} {thing.name!r}, and so does "
+                    f"{known[2]}: give it another name"
+                )
+
+    if kind.home:
+        for module in modules_below(kind.home):
+            add(module, "")
+    for brake in brakes().values():
+        for module in modules_of(brake, kind.folders):
+            add(module, brake.module)
+    return tuple((thing, owner) for thing, owner, _ in found.values())
+
+
+def forget() -> None:
+    """Have everything looked up anew, after a brake was loaded."""
+    _all.cache_clear()
+
+
+def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:
+    """Return the thing of a name.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names; ``kind`` says what they are names of.
+    """
+    if name not in known:
+        raise unknown_name(kind, name, known)
+    return known[name]
