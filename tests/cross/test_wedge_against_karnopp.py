@@ -21,9 +21,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brakes.wedge.wedge_runs import IDEAL, TAN_ALPHA, brake, drive
 from bywire.simulation.compiler import find_compiler
 from cross.wedge_scenarios import COMPARED, SCENARIOS, Scenario, package, reference, rms, simulated
-from wedge.wedge_runs import IDEAL, TAN_ALPHA, brake, drive
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

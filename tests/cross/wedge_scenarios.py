@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakes.wedge.wedge_runs import IDEAL, brake, drive
 from bywire.simulation.run import Trajectory
 from reference import karnopp_wedge
-from wedge.wedge_runs import IDEAL, brake, drive
 
 Array = NDArray[np.float64]
 

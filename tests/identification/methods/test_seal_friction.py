@@ -13,7 +13,7 @@ from bywire.identification.methods.seal_friction import METHOD
 from bywire.identification.records import joined, split
 from bywire.identification.trust import trust
 
-MEASURED = Path(__file__).parents[3] / "shared" / "data" / "seal_friction"
+MEASURED = Path(__file__).parents[4] / "shared" / "data" / "seal_friction"
 MAP = """time = { column = "1", unit = "ms" }
 [signals.x]
 column = "5"

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from wedge_runs import TAN_ALPHA
 
 import bywire
+from brakes.wedge.wedge_runs import TAN_ALPHA
 from bywire.bench.recording import record
 from bywire.bench.running import as_run
 from bywire.brakes.wedge import control as wedge_control

@@ -7,8 +7,8 @@ import math
 import control
 import numpy as np
 import pytest
-from small_linear_models import model_of
 
+from analysis.small_linear_models import model_of
 from bywire.analysis.linear.minimal import Realization, minimal
 from bywire.analysis.linear.transfer import transfer
 from bywire.analysis.loop import LOOPS

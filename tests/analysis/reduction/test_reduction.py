@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 import pytest
-from small_linear_models import model_of
 
+from analysis.small_linear_models import model_of
 from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.transfer import transfer
