@@ -15,14 +15,16 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire import assemblies, control, plant
+from bywire import control, plant
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.stimuli.registry import STIMULI
+from bywire.brakes.wedge import elements, laws
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.field_notes import field_notes
+from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.core.signals import merged_signals, places_of
@@ -119,16 +121,12 @@ def modules(package: Any) -> Iterator[Any]:
 
 def models() -> Iterator[Any]:
     """Yield every complete model among the assemblies."""
-    for module in modules(assemblies):
-        for value in vars(module).values():
-            own = isinstance(value, type) and value.__module__ == module.__name__
-            if own and hasattr(value, "Memory") and hasattr(value, "balance"):
-                yield value
+    yield from ASSEMBLIES.all().values()
 
 
 def element_tuples() -> Iterator[tuple[str, type]]:
     """Yield the signal tuples of all elements and control laws, with their element."""
-    for package in (plant, control):
+    for package in (plant, control, elements, laws):
         for module in modules(package):
             for value in vars(module).values():
                 own = isinstance(value, type) and value.__module__ == module.__name__

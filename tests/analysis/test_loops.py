@@ -15,7 +15,7 @@ from bywire.analysis.robustness import margins, over, worst
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, StepError, UnknownNameError
 
-LOOPS = sorted(LOOPS.all())
+NAMES = sorted(LOOPS.all())
 
 
 def of(name: str):
@@ -23,7 +23,7 @@ def of(name: str):
     return loop, parameters(main_set(loop.assembly))
 
 
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", NAMES)
 def test_nonlinear_response_is_the_linear_one_without_its_causes(name: str) -> None:
     loop, par = of(name)
     low, high = loop.band
@@ -83,7 +83,7 @@ def test_agreement_tells_limits_from_causes() -> None:
 
 
 @pytest.mark.filterwarnings("ignore:stability_margins. Falling back")
-@pytest.mark.parametrize("name", LOOPS)
+@pytest.mark.parametrize("name", NAMES)
 def test_margins_are_those_of_the_library(name: str) -> None:
     loop, par = of(name)
     found = margins(loop, par, loop.at.default)

@@ -26,7 +26,7 @@ def quick(monkeypatch):
             calls.append(progress)
             return source.name
 
-    monkeypatch.setattr("bywire.reproduction.registry.find_source", lambda name: Quick)
+    monkeypatch.setattr(type(SOURCES), "find", lambda kind, name: Quick)
     monkeypatch.setattr("bywire.reproduction.results.as_json", lambda found: {"source": found})
     return calls
 
@@ -63,9 +63,9 @@ def test_results_are_shown_even_when_they_cannot_be_written(bywire, tmp_path, qu
 
 
 def test_interrupt_is_130(bywire, monkeypatch):
-    def stopped(name):
+    def stopped(kind, name):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bywire.reproduction.registry.find_source", stopped)
+    monkeypatch.setattr(type(SOURCES), "find", stopped)
     status, out, err = bywire("reproduce", "dardanelli2010", "--json")
     assert (status, out, err) == (130, "", "bywire: interrupted\n")

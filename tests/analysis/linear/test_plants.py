@@ -37,7 +37,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.plant import roller_screw
 from bywire.simulation.run import simulate
 
-PLANTS = sorted(PLANTS.all())
+NAMES = sorted(PLANTS.all())
 
 
 def of(name: str):
@@ -45,7 +45,7 @@ def of(name: str):
     return plant, parameters(main_set(plant.assembly))
 
 
-@pytest.mark.parametrize("name", PLANTS)
+@pytest.mark.parametrize("name", NAMES)
 def test_every_way_to_give_an_operating_point(name: str) -> None:
     plant, par = of(name)
     for quantity in plant.at:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.brakes.wedge.watch import watch_wedge
+from bywire.brakes.wedge.watch import watch
 from bywire.core.errors import InputError
 
 
@@ -140,9 +140,9 @@ def test_what_begins_before_the_recording_is_not_dated():
     result = run("moment-release", {"wedge.mu_B": 0.2}, {"M_hold": 2000.0})
     (text,) = [w for w in result.warnings if "end stop" in w]
     assert text.startswith("the wedge reached its end stop before the recording starts, x = 2")
-    known = bywire.parameters("roberts2003").flat() | {"command.mode": "moment"}
+    par = bywire.parameters("roberts2003").replace({"command.mode": "moment"})
     later = result.recordings["run"].assign(F_end=lambda r: r["F_end"].where(r["time"] > -0.05, 0))
-    assert "end stop at t = -0.049 s" in watch_wedge(later, known)[0]
+    assert "end stop at t = -0.049 s" in watch(later, par)[0]
 
 
 def test_preload_has_no_negative_zero():
