@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.operating_point import settled_start
 
 SET = "dardanelli2010"

@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
+from bywire.core.leaf import Leaf
+from bywire.core.parameters import ParameterSet, leaf_fields
 from contracts.elements import modules, parameter_classes
 from contracts.sampling import Case, combinations, is_table
 

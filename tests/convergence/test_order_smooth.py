@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.bench.bench import Bench
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.simulation.run import Run, simulate
 from convergence.observed_order import assert_order
 from systems import oscillator

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bywire.bench.bench import Bench
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.simulation.run import Run, simulate
 from cross.motorcycle_reference import run_reference
 

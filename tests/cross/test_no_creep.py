@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.bench.experiment import fixed
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run, fixed
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current

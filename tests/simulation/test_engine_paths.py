@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.core.signals import signals_of
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate

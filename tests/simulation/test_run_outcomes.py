@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from bywire.bench.bench import Bench
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.core import ops
 from bywire.core.errors import ParameterError, SolverError, UnknownNameError
 from bywire.core.model import Task

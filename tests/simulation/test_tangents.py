@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.core.errors import UnknownNameError
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities

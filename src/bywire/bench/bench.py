@@ -7,10 +7,9 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment
+from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment, as_run
 from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.requirements import check
-from bywire.bench.running import as_run
 from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
 from bywire.bench.stimulus_file import with_nodes
 from bywire.bench.values import parsed

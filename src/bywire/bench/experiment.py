@@ -17,6 +17,7 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
+from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 
 Recordings = Mapping[str, xr.Dataset]
@@ -156,6 +157,42 @@ class Experiment:
         left_out = () if self.without is None else self.without(options)
         kpis = self.kpis if self.named is None else self.named(options)
         return {name: unit for name, unit in kpis.items() if name not in left_out}
+
+
+def as_run(
+    case: Case, step: float, interval: float | None = None, seed: tuple[int, ...] = (0,)
+) -> Run:
+    """Return the engine's description of a case.
+
+    The run begins at -settle on the recording's axis, the settling time rounded up as
+    `Case.aligned` says. Signals of the stimulus named ``noise_*`` are standard normal, each
+    drawn from a generator of its own, so that a longer run begins with the same samples.
+    """
+    own = case.aligned(step, interval)
+    fields = own.model.Stimulus._fields
+    noises = [k for k, name in enumerate(fields) if name.startswith("noise_")]
+
+    def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
+        given = own.stimulus(t - own.settle)
+        rows = np.zeros((t.size, len(fields)))
+        for k, name in enumerate(fields):
+            if name in given:
+                rows[:, k] = given[name]
+        children = np.random.SeedSequence(seed).spawn(len(noises))
+        for k, child in zip(noises, children, strict=True):
+            rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
+        return rows
+
+    return Run(
+        model=own.model,
+        par=own.par,
+        state=own.state,
+        memory=own.memory,
+        stimulus=stimulus,
+        duration=own.settle + own.duration,
+        step=step,
+        record=own.record,
+    )
 
 
 def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]]:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import xarray as xr
 
+from bywire.bench.bench import Bench
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError, unknown_name
-
-if TYPE_CHECKING:
-    from bywire.bench.bench import Bench
 
 
 @dataclass(frozen=True)

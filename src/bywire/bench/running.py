@@ -1,17 +1,16 @@
-"""Benches and their cases as runs of the engine."""
+"""Benches run: recordings, key figures and verdicts."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case
+from bywire.bench.bench import Bench
+from bywire.bench.experiment import Case, as_run
 from bywire.bench.extent import check_extent
 from bywire.bench.recording import record
 from bywire.bench.requirements import judge
@@ -20,10 +19,7 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.simulation.engine import prepare
-from bywire.simulation.run import Run, simulate
-
-if TYPE_CHECKING:
-    from bywire.bench.bench import Bench
+from bywire.simulation.run import simulate
 
 Progress = Callable[[str, float], None]
 
@@ -99,39 +95,3 @@ def _described(stimulus: Stimulus | None) -> dict[str, Any]:
     if stimulus is None:
         return {}
     return {"kind": stimulus.kind, **stimulus.parameters.model_dump(mode="json")}
-
-
-def as_run(
-    case: Case, step: float, interval: float | None = None, seed: tuple[int, ...] = (0,)
-) -> Run:
-    """Return the engine's description of a case.
-
-    The run begins at -settle on the recording's axis, the settling time rounded up as
-    `Case.aligned` says. Signals of the stimulus named ``noise_*`` are standard normal, each
-    drawn from a generator of its own, so that a longer run begins with the same samples.
-    """
-    own = case.aligned(step, interval)
-    fields = own.model.Stimulus._fields
-    noises = [k for k, name in enumerate(fields) if name.startswith("noise_")]
-
-    def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
-        given = own.stimulus(t - own.settle)
-        rows = np.zeros((t.size, len(fields)))
-        for k, name in enumerate(fields):
-            if name in given:
-                rows[:, k] = given[name]
-        children = np.random.SeedSequence(seed).spawn(len(noises))
-        for k, child in zip(noises, children, strict=True):
-            rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
-        return rows
-
-    return Run(
-        model=own.model,
-        par=own.par,
-        state=own.state,
-        memory=own.memory,
-        stimulus=stimulus,
-        duration=own.settle + own.duration,
-        step=step,
-        record=own.record,
-    )

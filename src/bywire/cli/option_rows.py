@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 from bywire.core.field_notes import field_notes
-from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
+from bywire.core.leaf import Leaf
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import display_unit
 
 if TYPE_CHECKING:

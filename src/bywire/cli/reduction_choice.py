@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.transfer import transfer
 from bywire.analysis.reduction.error import ReductionError
 from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
 from bywire.bench.values import number
@@ -101,7 +100,7 @@ def transfers(model: LinearModel) -> list[dict[str, Any]]:
     found = []
     for output in model.outputs:
         for input in model.inputs:
-            one = transfer(model, input, output)
+            one = model.transfer(input, output)
             found.append({
                 "input": input, "output": output, "unit": one.unit, "factor": one.factor,
                 "zeros": pairs(one.zeros), "poles": pairs(one.poles),

@@ -100,8 +100,6 @@ def load_system(path: str | Path) -> Brake:
     ModelError
         When it fails on import, declares no brake, or one whose name is taken.
     """
-    from bywire.core.registry import forget
-
     place = Path(path).expanduser().resolve()
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
@@ -115,7 +113,6 @@ def load_system(path: str | Path) -> Brake:
     brake = _declared(_imported(place, source), str(path))
     _require_new(brake, brakes())
     _loaded[brake.name] = brake
-    forget()
     return brake
 
 

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 import typing
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cache, cached_property
 from types import MappingProxyType
 from typing import Any, Self, TypeVar, cast
@@ -20,41 +19,12 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.refusals import refusals
-from bywire.core.units import Written, convert
+from bywire.core.units import Written
 
 T = TypeVar("T", bound="ParameterSet")
-
-
-@dataclass(frozen=True)
-class Leaf:
-    """What is known about one number of a parameter set."""
-
-    name: str
-    unit: Unit
-    low: float
-    high: float
-    low_open: bool
-    high_open: bool
-
-    @property
-    def range_text(self) -> str:
-        """Admissible range as a user reads it, for instance ``> 0 ohm``."""
-        return self.range_in(self.unit.symbol)
-
-    def range_in(self, symbol: str) -> str:
-        """Return the admissible range in a unit of the same dimension."""
-        unit = "" if symbol == "1" else f" {symbol}"
-        low, high = self.low, self.high
-        parts = []
-        if not math.isinf(low):
-            low = convert(low, self.unit.symbol, symbol)
-            parts.append(f"{'>' if self.low_open else '>='} {low:g}{unit}")
-        if not math.isinf(high):
-            high = convert(high, self.unit.symbol, symbol)
-            parts.append(f"{'<' if self.high_open else '<='} {high:g}{unit}")
-        return " and ".join(parts) or f"any finite number{unit and ' in' + unit}"
 
 
 class ParameterSet(BaseModel):

@@ -8,12 +8,11 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING, Any
 
 from bywire.core.errors import quoted
+from bywire.core.leaf import Leaf
 from bywire.core.units import split
 
 if TYPE_CHECKING:
     from pydantic import ValidationError
-
-    from bywire.core.parameters import Leaf
 
 _BOOL, _TEXT = "it must be true or false", "it must be a text"
 _PLAIN_WORDS = {"bool_parsing": _BOOL, "bool_type": _BOOL, "string_type": _TEXT}

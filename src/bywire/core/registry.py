@@ -16,7 +16,7 @@ from functools import cache
 from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
-from bywire.core.brake import brakes, modules_below, modules_of
+from bywire.core.brake import Brake, brakes, modules_below, modules_of
 from bywire.core.errors import ModelError, unknown_name
 
 
@@ -90,7 +90,8 @@ class Kind(Generic[T]):
 
     def of(self, module: str) -> Mapping[str, T]:
         """Return the things that the brake of a module brings."""
-        return {thing.name: thing for thing, owner in _all(self) if owner == module}
+        owner = next((brake for brake in brakes().values() if brake.module == module), None)
+        return {thing.name: thing for thing, _ in _declared(self, owner)} if owner else {}
 
     def owner(self, name: str) -> str:
         """Return the module of the brake that brings a thing; empty for a general one."""
@@ -110,7 +111,6 @@ def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
     return read
 
 
-@cache
 def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
     """Return every thing of a kind with the module of its brake.
 
@@ -119,29 +119,34 @@ def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
     ModelError
         When two things of different places have one name.
     """
-    found: dict[str, tuple[Any, str, str]] = {}
+    return _gathered(kind, tuple(brakes().values()))
 
-    def add(module: ModuleType, owner: str) -> None:
-        for thing in kind.read(module):
-            known = found.setdefault(thing.name, (thing, owner, module.__file__ or ""))
-            if known[0] is not thing:
+
+@cache
+def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str], ...]:
+    places: dict[str, tuple[Any, str, str]] = {}
+    for owner in (None, *known):
+        for thing, file in _declared(kind, owner):
+            module = owner.module if owner is not None else ""
+            first, _, place = places.setdefault(thing.name, (thing, module, file))
+            if first is not thing:
                 raise ModelError(
-                    f"{module.__file__} declares the {kind.name} {thing.name!r}, and so does "
-                    f"{known[2]}: give it another name"
+                    f"{file} declares the {kind.name} {thing.name!r}, and so does {place}: give "
+                    "it another name"
                 )
-
-    if kind.home:
-        for module in modules_below(kind.home):
-            add(module, "")
-    for brake in brakes().values():
-        for module in modules_of(brake, kind.folders):
-            add(module, brake.module)
-    return tuple((thing, owner) for thing, owner, _ in found.values())
+    return tuple((thing, module) for thing, module, _ in places.values())
 
 
-def forget() -> None:
-    """Have everything looked up anew, after a brake was loaded."""
-    _all.cache_clear()
+@cache
+def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, str], ...]:
+    """Return the general things of a kind, or those of a brake, each with its file."""
+    if owner is not None:
+        modules = modules_of(owner, kind.folders)
+    else:
+        modules = modules_below(kind.home) if kind.home else iter(())
+    return tuple(
+        (thing, module.__file__ or "") for module in modules for thing in kind.read(module)
+    )
 
 
 def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:

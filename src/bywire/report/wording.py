@@ -6,7 +6,7 @@ import math
 import re
 import unicodedata
 
-from bywire.core.parameters import Leaf
+from bywire.core.leaf import Leaf
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 

@@ -2,13 +2,46 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Sequence
+from typing import Protocol
 
 from bywire.simulation.operation import Node, Operation
+from bywire.simulation.signs import Interval
 
-if TYPE_CHECKING:
-    from bywire.simulation.graph import Graph
+
+class Graph(Protocol):
+    """What a rule asks of the graph that it simplifies, and adds to it."""
+
+    @property
+    def nodes(self) -> Sequence[Operation]:
+        """Operation of every node."""
+        ...
+
+    @property
+    def intervals(self) -> Sequence[Interval]:
+        """Where the value of every node lies."""
+        ...
+
+    @property
+    def fixed(self) -> Sequence[bool]:
+        """Whether a node follows from leaves alone that change rarely."""
+        ...
+
+    def value(self, node: Node) -> float | None:
+        """Return the number that a node is, None where it is none."""
+        ...
+
+    def constant(self, value: float) -> Node:
+        """Return the node of a number."""
+        ...
+
+    def apply(self, op: str, *args: Node) -> Node:
+        """Return the node of an operation, simplified."""
+        ...
+
+    def intern(self, operation: Operation) -> Node:
+        """Return the node of an operation as it stands."""
+        ...
 
 
 def _assign(graph: Graph, a: Node) -> Node:

@@ -7,7 +7,7 @@ import pytest
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.linear.brake import linear_model, theoretical
 from bywire.brakes.motorcycle.model import MotorcycleBrake

@@ -13,7 +13,7 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.measured_bandwidth import complex_values, fall
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.linear.current_loop import current_loop
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop, cancelling_pi

@@ -10,7 +10,6 @@ import pytest
 from analysis.small_linear_models import model_of
 from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.transfer import transfer
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.reduction.error import reduction_error
 from bywire.analysis.reduction.reduce import reduce
@@ -131,8 +130,8 @@ def test_poles_of_quasi_static_models_converge(corrected: bool, order: int) -> N
 def test_quasi_static_states_of_a_sampled_model() -> None:
     model = fast(1e-2).sampled(0.05)
     less = residualized(model, ("x0", "x1"))
-    gain = transfer(less).static_gain
-    assert gain == pytest.approx(transfer(model).static_gain, rel=1e-10)
+    gain = less.transfer().static_gain
+    assert gain == pytest.approx(model.transfer().static_gain, rel=1e-10)
     with pytest.raises(ParameterError, match="continuous"):
         residualized(model, ("x0", "x1"), corrected=True)
 

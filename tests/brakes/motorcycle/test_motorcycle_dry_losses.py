@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.bench import as_run
+from bywire.bench.experiment import as_run
 from bywire.bench.recording import energy_residual, record
 from bywire.brakes.motorcycle.case import Signals, case_from_rest
 from bywire.core.catalog import PARAMETER_SETS

@@ -11,8 +11,7 @@ import pytest
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.bench.experiment import Case
-from bywire.bench.running import as_run
+from bywire.bench.experiment import Case, as_run
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.model import WedgeBrake

@@ -19,8 +19,8 @@ from bywire.analysis.response.frequency_response import frequency_response
 from bywire.analysis.response.measured_bandwidth import fall
 from bywire.analysis.response.window import common_interval, nyquist
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import as_run
 from bywire.bench.kpis.registry import evaluate
-from bywire.bench.running import as_run
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
 from bywire.simulation.ensemble import simulate_ensemble

@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.linear.minimal import Realization
+from bywire.analysis.linear.transfer import Transfer
 from bywire.core.errors import ParameterError, unknown_name
 
 Array = NDArray[np.float64]
@@ -79,8 +81,8 @@ class LinearModel:
     def transfer_function(self, input: str = "", output: str = "") -> Any:
         """Return one path as ``control.TransferFunction`` with named signals.
 
-        What cancels exactly is left out. `bywire.analysis.linear.transfer.transfer` has its
-        zeros, poles and gain, without the rounding of polynomials.
+        What cancels exactly is left out. `transfer` has its zeros, poles and gain, without the
+        rounding of polynomials.
 
         Parameters
         ----------
@@ -94,9 +96,32 @@ class LinearModel:
         ParameterError
             When polynomials cannot hold the model to 0.1 %.
         """
-        from bywire.analysis.linear.transfer import transfer
+        return self.transfer(input, output).transfer_function()
 
-        return transfer(self, input, output).transfer_function()
+    def transfer(self, input: str = "", output: str = "") -> Transfer:
+        """Return the transfer function of one path, exact cancellations removed.
+
+        Parameters
+        ----------
+        input, output
+            Names of the signals; the first ones where empty.
+
+        Raises
+        ------
+        UnknownNameError
+            When a name is unknown.
+        """
+        j = _index("input", input, self.inputs)
+        i = _index("output", output, self.outputs)
+        kept = replace(self, B=self.B[:, j : j + 1], C=self.C[i : i + 1]).effective()
+        path = Realization(
+            self.A[np.ix_(kept, kept)], self.B[kept, j], self.C[i, kept], float(self.D[i, j])
+        )
+        return Transfer.of_path(
+            path, f"{self.name}: {self.outputs[i]} by {self.inputs[j]}",
+            (self.inputs[j], self.input_units[j]), (self.outputs[i], self.output_units[i]),
+            self.period,
+        )  # fmt: skip
 
     def poles(self) -> NDArray[np.complex128]:
         """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
@@ -245,3 +270,9 @@ class LinearModel:
             forward = forward | coupled[:, forward].any(axis=1)
             backward = backward | coupled[backward].any(axis=0)
         return np.flatnonzero(forward & backward).tolist()
+
+
+def _index(kind: str, name: str, known: tuple[str, ...]) -> int:
+    if name and name not in known:
+        raise unknown_name(kind, name, known)
+    return known.index(name) if name else 0

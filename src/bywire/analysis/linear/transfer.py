@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.minimal import Realization, minimal, zeros
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -126,48 +125,31 @@ class Transfer:
                 found /= s - self.poles[-1 - k]
         return found
 
+    @classmethod
+    def of_path(
+        cls, path: Realization, name: str, input: tuple[str, str], output: tuple[str, str],
+        period: float,
+    ) -> Transfer:  # fmt: skip
+        """Return the transfer function of a path, exact cancellations removed.
 
-def transfer(model: LinearModel, input: str = "", output: str = "") -> Transfer:
-    """Return the transfer function of one path of a model, exact cancellations removed.
-
-    Parameters
-    ----------
-    model
-        Continuous or sampled.
-    input, output
-        Names of the signals; the first ones where empty.
-
-    Raises
-    ------
-    UnknownNameError
-        When a name is unknown.
-    """
-    j = _index("input", input, model.inputs)
-    i = _index("output", output, model.outputs)
-    kept = _on_path(model, i, j)
-    path = Realization(
-        model.A[np.ix_(kept, kept)], model.B[kept, j], model.C[i, kept], float(model.D[i, j])
-    )
-    own = minimal(path)
-    found, factor = zeros(own)
-    poles = np.linalg.eigvals(own.A) if len(own.A) and factor else np.zeros(0)
-    return Transfer(
-        f"{model.name}: {model.outputs[i]} by {model.inputs[j]}",
-        model.inputs[j], model.outputs[i], model.input_units[j], model.output_units[i],
-        _sorted(found), _sorted(poles), factor, model.period,
-    )  # fmt: skip
-
-
-def _index(kind: str, name: str, known: tuple[str, ...]) -> int:
-    if name and name not in known:
-        raise unknown_name(kind, name, known)
-    return known.index(name) if name else 0
-
-
-def _on_path(model: LinearModel, i: int, j: int) -> list[int]:
-    """Return the states between one input and one output, by the pattern of the matrices."""
-    one = replace(model, B=model.B[:, j : j + 1], C=model.C[i : i + 1])
-    return one.effective()
+        Parameters
+        ----------
+        path
+            From the input to the output, continuous or sampled.
+        name
+            What figures and messages call it.
+        input, output
+            Name and SI unit of each.
+        period
+            Sample time [s]; 0 for a continuous one.
+        """
+        own = minimal(path)
+        found, factor = zeros(own)
+        poles = np.linalg.eigvals(own.A) if len(own.A) and factor else np.zeros(0)
+        return cls(
+            name, input[0], output[0], input[1], output[1], _sorted(found), _sorted(poles),
+            factor, period,
+        )  # fmt: skip
 
 
 def _sorted(found: Any) -> Complex:

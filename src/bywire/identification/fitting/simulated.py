@@ -9,7 +9,7 @@ import pandas as pd
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.core.signals import Signal, signals_of
 from bywire.identification.fitting.asked import Asked
 from bywire.identification.fitting.options import Options

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from bywire.bench.experiment import Case
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.parameters import Leaf, ParameterSet, leaf_fields
+from bywire.core.leaf import Leaf
+from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.units import shown, split
 from bywire.identification.fitting.asked import Asked

@@ -10,8 +10,8 @@ import pytest
 
 import bywire
 from brakes.wedge.wedge_runs import TAN_ALPHA
+from bywire.bench.experiment import as_run
 from bywire.bench.recording import record
-from bywire.bench.running import as_run
 from bywire.brakes.wedge import control as wedge_control
 from bywire.brakes.wedge.control import Memory, Readings, Stimulus
 from bywire.brakes.wedge.model import WedgeBrake

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import optimize
 
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.benchmark.result import Result, at_least
 from bywire.benchmark.suite import Part
 from bywire.benchmark.timing import timed

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from bywire.bench.experiment import as_run
 from bywire.bench.kpis.hysteresis import Loop, loop_area
 from bywire.bench.kpis.smoothing import smoothed
-from bywire.bench.running import as_run
 from bywire.brakes.motorcycle.experiments import friction_ramp
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.simulation.ensemble import simulate_ensemble

@@ -11,7 +11,7 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.experiments import friction_ramp
 from bywire.brakes.motorcycle.methods.stick_slip.loss import Noise, SlipLoss
 from bywire.brakes.motorcycle.methods.stick_slip.ramp_replay import replayed

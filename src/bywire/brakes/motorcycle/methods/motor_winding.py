@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current

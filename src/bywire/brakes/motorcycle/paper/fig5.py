@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from bywire.analysis.loop_width import closed_above
 from bywire.analysis.response.harmonics import amplitudes
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import as_run
 from bywire.bench.kpis import hysteresis
 from bywire.bench.kpis.smoothing import smoothed
 from bywire.bench.result import Result
-from bywire.bench.running import as_run
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, parameters
 from bywire.brakes.motorcycle.paper.tolerances import LEVEL, LOOP

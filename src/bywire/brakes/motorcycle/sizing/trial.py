@@ -6,10 +6,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case
+from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record
-from bywire.bench.running import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters

@@ -9,7 +9,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS
 from bywire.benchmark.result import Result, at_least, at_most, vector_doubles
 from bywire.benchmark.suite import Part

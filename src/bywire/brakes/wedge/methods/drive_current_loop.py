@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig

@@ -11,8 +11,7 @@ import pandas as pd
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case
-from bywire.bench.running import as_run
+from bywire.bench.experiment import Case, as_run
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.signals import signals_of

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.running import as_run
+from bywire.bench.experiment import as_run
 from bywire.brakes.wedge.case import case_from_parked, steps
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters

@@ -13,8 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.linear.rational import Rational
-from bywire.bench.experiment import Case
-from bywire.bench.running import as_run
+from bywire.bench.experiment import Case, as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.linear.brake import two_pole, with_slow_pair
 from bywire.brakes.motorcycle.operating_point import settled_start
