@@ -1,0 +1,128 @@
+"""How many operations every kernel of ours takes: the price of how its model is written.
+
+A model written another way must not cost more. Counted in the graph from which C is emitted, after
+all that is shared or folded: per pass of a substep, recorded row and tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import pytest
+
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
+from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.model import Model
+from bywire.core.parameters import choice_fields
+from bywire.simulation.expressions import needed
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
+from bywire.simulation.program import build_program
+from bywire.simulation.stages import build_stages
+
+CURVE = {"caliper.p_table": (0.0, 1e5, 5e5, 20e5), "caliper.V_table": (0.0, 1e-8, 3e-8, 8e-8)}
+BENT = {"caliper.n_table": (0.0, 1e-4, 3e-4), "caliper.F_table": (0.0, 2e3, 9e3)}
+AIR = {"fluid.air": "entrained", "fluid.V_air": 2e-8}
+ALL = {"gear.law": "directional", "caliper.law": "compressible", "port.law": "dead-stroke", **AIR}
+
+Counts = tuple[int, int, int, tuple[int, ...]]
+"""fast pass, exact pass, recorded row, ticks"""
+MOTORCYCLE: list[tuple[dict[str, Any], Counts]] = [
+    ({}, (276, 597, 135, (131,))),
+    ({"gear.law": "directional"}, (315, 639, 150, (131,))),
+    ({"caliper.law": "compressible"}, (286, 600, 150, (131,))),
+    ({"caliper.law": "table", **CURVE}, (294, 609, 217, (131,))),
+    ({**AIR}, (276, 606, 163, (131,))),
+    ({"port.law": "dead-stroke"}, (310, 616, 135, (131,))),
+    ({"pressure_sensor.place": "mid-pipeline"}, (279, 600, 135, (131,))),
+    ({"adc.law": "ideal"}, (276, 597, 135, (117,))),
+    ({"ecu.schedule.law": "regions"}, (276, 597, 135, (179,))),
+    ({"ecu.filter.place": "before-dither"}, (276, 597, 135, (131,))),
+    ({"ecu.dither.waveform": "off"}, (276, 597, 135, (116,))),
+    ({"ecu.dither.waveform": "square"}, (276, 597, 135, (131,))),
+    ({"ecu.dither.waveform": "triangle"}, (276, 597, 135, (136,))),
+    ({"drive.mode": "pedal"}, (276, 597, 135, (160,))),
+    ({"drive.mode": "current"}, (276, 597, 135, (100,))),
+    ({"drive.mode": "current-direct"}, (276, 597, 135, (43,))),
+    ({"drive.mode": "voltage-source"}, (269, 581, 162, (11,))),
+    ({"drive.mode": "current-source"}, (241, 556, 167, (11,))),
+    (ALL, (364, 672, 192, (131,))),
+    ({**ALL, "drive.mode": "voltage-source"}, (357, 656, 219, (11,))),
+    ({**ALL, "drive.mode": "current-source"}, (329, 631, 224, (11,))),
+]
+WEDGE: list[tuple[dict[str, Any], Counts]] = [
+    ({}, (2165, 3415, 449, (109, 98))),
+    ({"screw.law": "drive"}, (2133, 3401, 449, (109, 98))),
+    ({"wedge_friction.stopped_disc": "stick"}, (2174, 3421, 449, (109, 98))),
+    ({"caliper.law": "table", **BENT}, (2245, 3466, 471, (109, 98))),
+    ({"flywheel.law": "driven"}, (2169, 3419, 449, (109, 98))),
+    ({"encoder.law": "ideal"}, (2165, 3415, 449, (98, 86))),
+    ({"control.offset.law": "scheduled"}, (2165, 3415, 449, (109, 111))),
+    ({"command.mode": "position"}, (2165, 3415, 449, (70,))),
+    ({"command.mode": "current"}, (2165, 3415, 449, (3,))),
+]
+RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [
+    (ScrewRig, {}, (802, 830, 92, (67,))),
+    (ScrewRig, {"rig.mode_1": "current"}, (802, 830, 92, (54,))),
+    (ScrewRig, {"rig.mode_2": "current"}, (802, 830, 92, (54,))),
+    (ScrewRig, {"screw.law": "drive"}, (791, 821, 92, (67,))),
+    (ShaftRig, {}, (313, 273, 43, (43,))),
+    (ShaftRig, {"rig.load": "dummy"}, (292, 254, 47, (43,))),
+    (ShaftRig, {"rig.clamp": "closed"}, (315, 275, 43, (43,))),
+    (ShaftRig, {"rig.mode_1": "current"}, (313, 273, 42, (22,))),
+    (ShaftRig, {"screw.law": "drive"}, (302, 261, 43, (43,))),
+    (DrivenShaft, {}, (107, 111, 0, (0,))),
+    (DrivenShaft, {"rig.load": "dummy"}, (108, 112, 0, (0,))),
+    (DrivenShaft, {"screw.law": "drive"}, (98, 103, 0, (0,))),
+]
+CASES = [
+    *((MotorcycleBrake, "dardanelli2010", changes, counts) for changes, counts in MOTORCYCLE),
+    *((WedgeBrake, "roberts2003", changes, counts) for changes, counts in WEDGE),
+    *((model, "roberts2003", changes, counts) for model, changes, counts in RIGS),
+]
+
+
+def counted(model: Model, par: Any) -> Counts:
+    stages = build_stages(build_program(model, par))
+
+    def operations(roots: Iterable[Node]) -> int:
+        return _operations(stages.graph, list(roots))
+
+    return (
+        operations(node for nodes in stages.fast.values() for node in nodes),
+        operations(node for nodes in stages.exact.values() for node in nodes),
+        operations(stages.output),
+        tuple(operations(tick) for tick in stages.ticks),
+    )
+
+
+def _operations(graph: Graph, roots: list[Node]) -> int:
+    return sum(1 for _ in needed(graph, roots, lambda _: False))
+
+
+def _label(case: Any) -> str:
+    model, _, changes, _ = case
+    return f"{model.name} {' '.join(str(v) for v in changes.values() if isinstance(v, str))}"
+
+
+@pytest.mark.parametrize(("model", "source", "changes", "counts"), CASES, ids=map(_label, CASES))
+def test_kernels_take_as_many_operations_as_ever(
+    model: type[Model], source: str, changes: dict[str, Any], counts: Counts
+) -> None:
+    par = PARAMETER_SETS.find(source).parameters().replace(changes)
+    assert counted(model(), par) == counts
+
+
+@pytest.mark.parametrize(
+    ("source", "rows"), [("dardanelli2010", MOTORCYCLE), ("roberts2003", [*WEDGE])]
+)
+def test_every_choice_is_counted(source: str, rows: list[tuple[dict[str, Any], Counts]]) -> None:
+    par = PARAMETER_SETS.find(source).parameters()
+    changed = {name for changes, _ in rows for name in changes}
+    changed |= {name for _, changes, _ in RIGS for name in changes}
+    assert set(choice_fields(type(par))) <= changed
