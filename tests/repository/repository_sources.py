@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -23,6 +23,14 @@ def label(path: Path) -> str:
 def tree(path: Path) -> ast.Module:
     """Return the syntax tree of a module."""
     return ast.parse(path.read_text(encoding="utf-8"), str(path))
+
+
+def offenders(
+    gate: Callable[[ast.Module], list[str]], modules: Iterable[Path] = MODULES
+) -> dict[str, list[str]]:
+    """Return what a gate objects to, by file."""
+    objections = {label(path): gate(tree(path)) for path in modules}
+    return {name: listed for name, listed in objections.items() if listed}
 
 
 def imports(module: ast.AST, *, typing_too: bool = True) -> Iterator[str]:
@@ -47,9 +55,15 @@ def importers(library: str, *, typing_too: bool = True) -> set[str]:
     return {
         path.relative_to(PACKAGE).as_posix()
         for path in MODULES
-        for name in imports(tree(path), typing_too=typing_too)
+        for name in imported(path, typing_too=typing_too)
         if name == library or name.startswith(f"{library}.")
     }
+
+
+@cache
+def imported(path: Path, *, typing_too: bool) -> frozenset[str]:
+    """Return the full names of the modules that a file imports."""
+    return frozenset(imports(tree(path), typing_too=typing_too))
 
 
 @cache
