@@ -1,1 +1,1 @@
-"""What every element of ``bywire.plant`` and ``bywire.control`` must keep, whoever wrote it."""
+"""What every element, parameter set and model must keep: users of ``bywire.contracts``."""

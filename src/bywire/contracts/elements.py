@@ -1,24 +1,21 @@
-"""Find every element and read the meaning of its functions off their annotations."""
+"""Every element and control law, and the meaning of its functions, read off their annotations."""
 
 from __future__ import annotations
 
-import importlib
 import inspect
-import pkgutil
+import sys
 import typing
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from bywire import control, plant
-from bywire.brakes.wedge import elements, laws
+from bywire.core.brake import Brake
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.registry import Kind
 from bywire.core.signals import Signal
-
-PACKAGES = (plant, control, elements, laws)
 
 
 @dataclass(frozen=True)
@@ -31,27 +28,67 @@ class Number:
     high: float = float("inf")
 
 
-def modules(packages: Iterable[ModuleType] = PACKAGES) -> list[ModuleType]:
-    """Return the modules of all elements."""
-    return [
-        importlib.import_module(f"{package.__name__}.{found.name}")
-        for package in packages
-        for found in pkgutil.iter_modules(package.__path__)
-    ]
+@dataclass(frozen=True)
+class Element:
+    """A file of equations: a physical element, or a control law.
+
+    Parameters
+    ----------
+    name
+        Dotted name of its module, for instance ``"plant.dc_motor"``.
+    module
+        Its functions, ``Parameters`` and signal tuples.
+    """
+
+    name: str
+    module: ModuleType
+
+    @property
+    def functions(self) -> dict[str, Callable[..., Any]]:
+        """Its public functions."""
+        return functions(self.module)
 
 
-def all_functions() -> dict[str, Callable[..., Any]]:
-    """Return the public functions of all elements, by name as ``plant.caliper.mass``."""
-    return {
-        f"{label(module)}.{name}": function
-        for module in modules()
-        for name, function in functions(module).items()
-    }
+def _declared(module: ModuleType) -> Iterator[Element]:
+    """Yield the element that a module is; packages and the files of whole brakes are none."""
+    if not hasattr(module, "__path__") and not hasattr(module, "BRAKE") and functions(module):
+        yield Element(module.__name__.removeprefix("bywire."), module)
 
 
-def label(module: ModuleType) -> str:
-    """Return the name of an element as a test shows it."""
-    return module.__name__.removeprefix("bywire.")
+ELEMENTS = Kind("element", ("elements",), _declared, "bywire.plant")
+"""every physical element: the general ones, and those of the brakes"""
+LAWS = Kind("control law", ("laws",), _declared, "bywire.control")
+"""every control law: the general ones, and those of the brakes"""
+
+
+def every_element() -> dict[str, Element]:
+    """Return all elements and control laws by name."""
+    return {**ELEMENTS.all(), **LAWS.all()}
+
+
+def elements_of(brake: Brake) -> dict[str, Element]:
+    """Return the elements and laws of a brake's package, and those that its modules import."""
+    known = every_element()
+    bring = {**ELEMENTS.of(brake.module), **LAWS.of(brake.module)}
+    files = {each.module.__name__: name for name, each in known.items()}
+    waiting = [m for name, m in list(sys.modules.items()) if _belongs(name, brake.module)]
+    used: set[str] = set()
+    while waiting:
+        for value in list(vars(waiting.pop()).values()):
+            home = value.__name__ if isinstance(value, ModuleType) else _home(value)
+            if home in files and home not in used:
+                used.add(home)
+                waiting.append(known[files[home]].module)
+    return bring | {files[home]: known[files[home]] for home in sorted(used)}
+
+
+def _belongs(module: str, package: str) -> bool:
+    return module == package or module.startswith(f"{package}.")
+
+
+def _home(value: Any) -> str:
+    home = getattr(value, "__module__", "")
+    return home if isinstance(home, str) else ""
 
 
 def functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
@@ -74,7 +111,7 @@ def parameter_classes(module: ModuleType) -> list[type[ParameterSet]]:
     ]
 
 
-def annotations(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
+def signature_of(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
     """Return the annotations of the arguments, by name, and that of the result."""
     hints = typing.get_type_hints(function, include_extras=True)
     names = list(inspect.signature(function).parameters)
@@ -86,12 +123,12 @@ def annotations(function: Callable[..., Any]) -> tuple[dict[str, Any], Any]:
 
 def merged(members: Iterable[Callable[..., Any]]) -> dict[str, Any]:
     """Return the arguments of several functions of an element: one name, one meaning."""
-    found: dict[str, Any] = {}
+    known: dict[str, Any] = {}
     for function in members:
-        for name, annotation in annotations(function)[0].items():
-            if found.setdefault(name, annotation) != annotation:
+        for name, annotation in signature_of(function)[0].items():
+            if known.setdefault(name, annotation) != annotation:
                 raise TypeError(f"{function.__module__}: argument {name} has two meanings")
-    return found
+    return known
 
 
 def is_parameters(annotation: Any) -> bool:

@@ -6,15 +6,15 @@ import inspect
 import itertools
 import math
 import typing
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
+from bywire.contracts.elements import Number, flat, is_parameters, is_signals, numbers
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet, leaf_fields
-from contracts.elements import Number, flat, is_parameters, is_signals, numbers
 
 NODES = 4  # of every table
 ATTEMPTS = 2000
@@ -40,19 +40,21 @@ def combinations(annotations: Mapping[str, Any]) -> Iterator[Choices]:
 
 
 def _options(cls: type[ParameterSet], prefix: str) -> dict[str, tuple[Any, ...]]:
-    found: dict[str, tuple[Any, ...]] = {}
+    options: dict[str, tuple[Any, ...]] = {}
     leaves = leaf_fields(cls)
     for name, info in cls.model_fields.items():
         if is_parameters(info.annotation):
-            found |= _options(typing.cast(Any, info.annotation), f"{prefix}{name}.")
+            options |= _options(typing.cast(Any, info.annotation), f"{prefix}{name}.")
         elif typing.get_origin(info.annotation) is typing.Literal:
-            found[prefix + name] = typing.get_args(info.annotation)
+            options[prefix + name] = typing.get_args(info.annotation)
+        elif info.annotation is bool:
+            options[prefix + name] = (False, True)
         elif name not in leaves:
             raise TypeError(f"{cls.__module__}.{cls.__name__}.{name}: neither quantity nor choice")
-    return found
+    return options
 
 
-class Case:
+class Sampler:
     """Some arguments with one combination of choices; samples of it share one structure."""
 
     def __init__(self, annotations: Mapping[str, Any], choices: Choices, seed: int = 2010) -> None:
@@ -122,28 +124,29 @@ def is_table(cls: type[ParameterSet], name: str) -> bool:
 
 def flattened(arguments: Arguments) -> dict[str, float]:
     """Return all numbers of some arguments by dotted name."""
-    found: dict[str, float] = {}
+    numbers_in: dict[str, float] = {}
     for name, value in arguments.items():
         if isinstance(value, ParameterSet):
-            found |= {f"{name}.{k}": v for k, v in value.leaves().items()}
+            numbers_in |= {f"{name}.{k}": v for k, v in value.leaves().items()}
         elif isinstance(value, tuple):
-            found |= {f"{name}.{k}": v for k, v in value._asdict().items()}
+            numbers_in |= {f"{name}.{k}": v for k, v in typing.cast(Any, value)._asdict().items()}
         else:
-            found[name] = value
-    return found
+            numbers_in[name] = value
+    return numbers_in
 
 
 def carrying(arguments: Arguments, values: Mapping[str, Any]) -> Arguments:
     """Return arguments of the same structure that carry other objects as their numbers."""
-    made: Arguments = {}
+    renewed: Arguments = {}
     for name, value in arguments.items():
         if isinstance(value, ParameterSet):
-            made[name] = value.with_leaves({k: values[f"{name}.{k}"] for k in value.leaves()})
+            renewed[name] = value.with_leaves({k: values[f"{name}.{k}"] for k in value.leaves()})
         elif isinstance(value, tuple):
-            made[name] = type(value)(*(values[f"{name}.{k}"] for k in value._fields))
+            fields = typing.cast(Any, value)._fields
+            renewed[name] = type(value)(*(values[f"{name}.{k}"] for k in fields))
         else:
-            made[name] = values[name]
-    return made
+            renewed[name] = values[name]
+    return renewed
 
 
 def symbolic(arguments: Arguments) -> tuple[ca.SX, Arguments]:
@@ -153,7 +156,7 @@ def symbolic(arguments: Arguments) -> tuple[ca.SX, Arguments]:
     return column, carrying(arguments, dict(zip(names, ca.vertsplit(column), strict=True)))
 
 
-def evaluate(function: Callable[..., Any], structure: Arguments, rows: Sequence[Any]) -> np.ndarray:
+def evaluate(function: Callable[..., Any], structure: Arguments, rows: Any) -> np.ndarray:
     """Return the results of one call, one row each; ``rows`` holds floats or arrays."""
     numbers_in = dict(zip(flattened(structure), rows, strict=True))
     results = flat(call(function, carrying(structure, numbers_in)))

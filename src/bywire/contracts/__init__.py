@@ -1,0 +1,1 @@
+"""What every element, law, parameter set and model must keep, whoever wrote it."""

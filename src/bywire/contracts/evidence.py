@@ -1,0 +1,130 @@
+"""What a contract finds: whether it holds, by which measure, and where to look."""
+
+from __future__ import annotations
+
+import inspect
+import math
+import re
+import traceback
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+
+class NotCheckedError(Exception):
+    """A contract that cannot be put to the test; its text says why."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A line of a file; line 0 is the file as a whole."""
+
+    file: str
+    line: int
+
+    def __str__(self) -> str:
+        return f"{self.file}:{self.line}" if self.line else self.file
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a contract found.
+
+    Parameters
+    ----------
+    holds
+        Whether the contract is kept.
+    text
+        What was found, and with which choices or of which signal.
+    figure, limit
+        Measure and the largest that is admissible; None where the contract has none.
+    place
+        Line to look at, where it is another than that of the subject.
+    """
+
+    holds: bool
+    text: str
+    figure: float | None = None
+    limit: float | None = None
+    place: Place | None = None
+
+
+def measured(figure: float, limit: float, text: str, place: Place | None = None) -> Evidence:
+    """Return evidence that holds where a figure is at most its limit; nan never is."""
+    return Evidence(bool(figure <= limit), text, float(figure), limit, place)
+
+
+def worst(found: Iterable[Evidence]) -> Evidence:
+    """Return the first evidence that does not hold, else that which is nearest to its limit."""
+    nearest: Evidence | None = None
+    for each in found:
+        if not each.holds:
+            return each
+        if nearest is None or _share(each) > _share(nearest):
+            nearest = each
+    return nearest or Evidence(True, "there is nothing to check")
+
+
+def _share(evidence: Evidence) -> float:
+    if evidence.figure is None or evidence.limit is None:
+        return -1.0
+    return evidence.figure / evidence.limit if evidence.limit else math.inf
+
+
+Contract = Callable[[Any], Evidence | Iterator[Evidence]]
+"""one thing that a subject (function, module, class, model) must keep"""
+
+
+def examine(contract: Contract, subject: Any) -> Evidence:
+    """Return what a contract finds; an error in the subject's equations breaks it.
+
+    Raises
+    ------
+    NotCheckedError
+        When it cannot be put to the test.
+    """
+    try:
+        found = contract(subject)
+        return found if isinstance(found, Evidence) else worst(found)
+    except NotCheckedError:
+        raise
+    except Exception as error:  # whatever a user's equations raise
+        text = " ".join(str(error).split())
+        file = place_of(subject).file
+        return Evidence(False, f"{type(error).__name__}: {text}", place=_raised_at(error, file))
+
+
+def place_of(subject: Any) -> Place:
+    """Return where a function, a class or a module stands."""
+    if isinstance(subject, ModuleType):
+        return Place(subject.__file__ or subject.__name__, 0)
+    subject = inspect.unwrap(subject) if callable(subject) else type(subject)
+    try:
+        return Place(inspect.getsourcefile(subject) or "?", inspect.getsourcelines(subject)[1])
+    except (OSError, TypeError):
+        return Place(getattr(subject, "__module__", "?"), 0)
+
+
+def field_place(cls: type[Any], name: str) -> Place:
+    """Return the line on which a class declares a field, else that of the class."""
+    at = place_of(cls)
+    try:
+        lines, first = inspect.getsourcelines(cls)
+    except (OSError, TypeError):
+        return at
+    wanted = re.compile(rf"\s+{re.escape(name)}\s*:")
+    found = (Place(at.file, first + k) for k, line in enumerate(lines) if wanted.match(line))
+    return next(found, at)
+
+
+def _raised_at(error: Exception, file: str) -> Place | None:
+    """Return the innermost line of the subject's folder at which an error came up."""
+    folder = Path(file).parent
+    lines = [
+        Place(frame.filename, frame.lineno or 0)
+        for frame in traceback.extract_tb(error.__traceback__)
+        if Path(frame.filename).parent == folder
+    ]
+    return lines[-1] if lines else None
