@@ -16,10 +16,10 @@ from typing import TYPE_CHECKING, Any
 __version__ = "0.1.0"
 
 if TYPE_CHECKING:
+    from bywire.api.margins import margins
+    from bywire.api.run import BenchResult, run
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
-    from bywire.bench.result import Result
-    from bywire.bench.running import run
     from bywire.core.catalog import parameters
     from bywire.core.errors import BywireError
     from bywire.data.alignment import resample
@@ -34,7 +34,7 @@ _HOMES = {
     "Bench": "bench.bench",
     "BywireError": "core.errors",
     "Ensemble": "simulation.ensemble",
-    "Result": "bench.result",
+    "BenchResult": "api.run",
     "Run": "simulation.run",
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
@@ -43,7 +43,8 @@ _HOMES = {
     "read_measurement": "data.measurement",
     "read_recording": "data.netcdf",
     "resample": "data.alignment",
-    "run": "bench.running",
+    "margins": "api.margins",
+    "run": "api.run",
     "simulate": "simulation.run",
     "simulate_ensemble": "simulation.ensemble",
     "simulate_with_sensitivities": "simulation.sensitivity",
@@ -53,13 +54,14 @@ _HOMES = {
 
 __all__ = [
     "Bench",
+    "BenchResult",
     "BywireError",
     "Ensemble",
-    "Result",
     "Run",
     "Sensitivity",
     "Trajectory",
     "load",
+    "margins",
     "parameters",
     "read_measurement",
     "read_recording",

@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from bywire.core.errors import FileError
 from bywire.report.bode import Response, bode
-from bywire.report.inline_figure import inline_figures
-from bywire.report.page import (
+from bywire.report.document import (
     Banner,
     Details,
     FigureBlock,
@@ -23,9 +22,9 @@ from bywire.report.page import (
     Paragraph,
     Section,
     TableBlock,
-    page_html,
-    write_page,
 )
+from bywire.report.inline_figure import inline_figures
+from bywire.report.page import page_html, write_page
 from bywire.report.step_response import step_response
 from bywire.report.tables import text_table
 from bywire.report.time_traces import time_traces

@@ -13,8 +13,8 @@ import numpy as np
 
 from bywire.analysis.agreement import EVERYTHING, GAIN, NOTHING, PHASE, Agreement, agreement
 from bywire.analysis.response.frequency_response import require_stable
+from bywire.api.loop_case import LoopCase, loop_case, spread
 from bywire.cli import output
-from bywire.cli.loop_choice import Chosen, choose, spread, subject
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import ParameterError
@@ -44,7 +44,7 @@ def execute(
     """
     if out is not None:
         require_folder(out)
-    chosen = choose(loop, parameters, at, changes)
+    chosen = loop_case(loop, parameters, at, changes)
     own = chosen.loop
     point = own.point(chosen.par, chosen.value)
     unit = signals_of(point.model.Stimulus)[own.inputs[0]].unit
@@ -71,7 +71,7 @@ def execute(
     return 0 if found.holds else 1
 
 
-def _amplitudes(chosen: Chosen, text: str, unit: str) -> tuple[float, float]:
+def _amplitudes(chosen: LoopCase, text: str, unit: str) -> tuple[float, float]:
     """Return the small and the large amplitude [SI]."""
     if not text:
         return chosen.loop.amplitudes[0], chosen.loop.amplitudes[-1]
@@ -85,14 +85,14 @@ def _amplitudes(chosen: Chosen, text: str, unit: str) -> tuple[float, float]:
 
 
 def _written(
-    chosen: Chosen, amplitudes: tuple[str, str], found: Agreement, out: Path
+    chosen: LoopCase, amplitudes: tuple[str, str], found: Agreement, out: Path
 ) -> list[Path]:
     from bywire.report.agreement_report import write_agreement
 
-    return write_agreement(out, subject(chosen), amplitudes, found)
+    return write_agreement(out, chosen.subject, amplitudes, found)
 
 
-def _as_object(chosen: Chosen, sizes: tuple[float, float], found: Agreement) -> dict[str, Any]:
+def _as_object(chosen: LoopCase, sizes: tuple[float, float], found: Agreement) -> dict[str, Any]:
     names = {NOTHING: "nothing", EVERYTHING: "everything"}
     return {
         "loop": chosen.loop.name,
@@ -118,11 +118,11 @@ def _finite(values: Any) -> list[float | None]:
     return [float(one) if math.isfinite(one) else None for one in values]
 
 
-def _text(chosen: Chosen, amplitudes: tuple[str, str], found: Agreement) -> str:
+def _text(chosen: LoopCase, amplitudes: tuple[str, str], found: Agreement) -> str:
     from bywire.report.agreement_report import LEGEND, agreement_table, verdict
     from bywire.report.table_text import table_text
 
-    own = subject(chosen)
+    own = chosen.subject
     small, large = amplitudes
     head = f"closed loop {own.name} of {own.parameters} at {own.point}: nonlinear less linear"
     sizes = f"small amplitude {small}, large amplitude {large}"

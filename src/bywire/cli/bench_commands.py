@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes, execute
+from bywire.cli.show import show
 
 
 def list_command(
@@ -31,7 +32,9 @@ def run(
     json: JsonFlag = False,
 ) -> None:
     """Run a bench file or an experiment; exit status 1 when a requirement is not met."""
-    raise typer.Exit(execute("run_command", bench, changes(set_), out, json))
+    from bywire.api.run import run as run_bench
+
+    show(lambda progress: run_bench(bench, changes(set_), progress=progress), out, json)
 
 
 def reproduce(

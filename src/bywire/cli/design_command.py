@@ -9,6 +9,7 @@ from pathlib import Path
 from bywire.analysis.design.designer import design
 from bywire.analysis.design.linear_case import cases_of
 from bywire.analysis.design.verification import Verification, verify
+from bywire.api.loop_case import loop_case, over_range
 from bywire.cli import output
 from bywire.cli.design_ending import exit_status, reported, written
 from bywire.cli.design_inputs import (
@@ -19,7 +20,6 @@ from bywire.cli.design_inputs import (
     tunables_of,
 )
 from bywire.cli.design_text import as_object, as_parts
-from bywire.cli.loop_choice import choose, over_range
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.cli.verification_text import as_lines
@@ -42,7 +42,7 @@ def execute(
         from bywire.cli import schedule_design
 
         return schedule_design.execute(loop, parameters, at, changes, wanted, out, as_json)
-    chosen = choose(loop, parameters, at, changes)
+    chosen = loop_case(loop, parameters, at, changes)
     requirements = requirements_of(wanted)
     tunables = left_to_choose(loop, tunables_of(chosen), changes)
     ranges = dict(over_range(text, chosen)[::2] for text in wanted.over)

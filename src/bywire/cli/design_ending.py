@@ -13,8 +13,8 @@ from bywire.analysis.design.bench_text import bench_text
 from bywire.analysis.design.outcome import Status
 from bywire.analysis.design.requirement import Requirement
 from bywire.analysis.design.verification import Verification
+from bywire.api.loop_case import LoopCase
 from bywire.cli import output
-from bywire.cli.loop_choice import Chosen, subject
 from bywire.core.errors import FileError
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ _STEPS, _SETTLED = 5.0, 1.2  # what is drawn of a step: periods of the bandwidth
 
 
 def written(
-    chosen: Chosen,
+    chosen: LoopCase,
     changes: Mapping[str, str],
     gains: Mapping[str, float],
     outcome: tuple[Status, Verification | None],
@@ -61,7 +61,7 @@ def written(
 
 
 def reported(
-    chosen: Chosen,
+    chosen: LoopCase,
     requirements: Sequence[Requirement],
     outcome: tuple[Status, Verification | None],
     designs: Mapping[str, Mapping[str, float]],
@@ -94,10 +94,10 @@ def reported(
     state = status if status != "met" or tried is None or tried.met else "not met"
     where = "on the linear model" if tried is None else "on the nonlinear bench"
     told = Outcome(f"requirements {state} {where}", status == state == "met")
-    return write_design(out, subject(chosen), requirements, told, curves, parts)
+    return write_design(out, chosen.subject, requirements, told, curves, parts)
 
 
-def _curve(chosen: Chosen, label: str, gains: Mapping[str, float]) -> DesignCurve:
+def _curve(chosen: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:
     from bywire.analysis.design.loop_figures import LoopFigures
     from bywire.analysis.loop_curves import loop_curve
     from bywire.analysis.robustness import margins

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from bywire.analysis.design.requirement import Requirement, read
 from bywire.analysis.design.trial import Trial
+from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
-from bywire.cli.loop_choice import Chosen, spread
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
@@ -53,7 +53,7 @@ def left_to_choose(
     return left
 
 
-def tunables_of(chosen: Chosen) -> Spans:
+def tunables_of(chosen: LoopCase) -> Spans:
     """Return the loop's tunables; with its schedule on, those of the operating point's region."""
     schedule = chosen.loop.schedule
     if schedule is None or not schedule.is_on(chosen.par):
@@ -61,7 +61,7 @@ def tunables_of(chosen: Chosen) -> Spans:
     return schedule.regions[schedule.region(chosen.par, chosen.value)]
 
 
-def trial_of(chosen: Chosen, changes: Mapping[str, str], wanted: Wanted) -> Trial | None:
+def trial_of(chosen: LoopCase, changes: Mapping[str, str], wanted: Wanted) -> Trial | None:
     """Return what the design is tried on; None where the bench is left out."""
     if wanted.linear_only:
         return None

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from bywire.analysis.design.outcome import Design
 from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.analysis.design.verification import Verification
-from bywire.cli.loop_choice import Chosen
+from bywire.api.loop_case import LoopCase
 from bywire.cli.verification_text import (
     figure_text,
     finite,
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def as_object(
-    chosen: Chosen,
+    chosen: LoopCase,
     requirements: Sequence[Requirement],
     found: Design,
     tried: Verification | None,
@@ -64,7 +64,7 @@ def as_object(
 
 
 def as_parts(
-    chosen: Chosen,
+    chosen: LoopCase,
     requirements: Sequence[Requirement],
     found: Design,
     tried: Verification | None,
@@ -120,12 +120,12 @@ def kept_lines(found: Design) -> list[str]:
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 
-def unit_of(chosen: Chosen, name: str) -> str:
+def unit_of(chosen: LoopCase, name: str) -> str:
     """Return the unit of a gain."""
     return leaf_fields(type(chosen.par))[name].unit.symbol
 
 
-def gain_text(chosen: Chosen, name: str, value: float) -> str:
+def gain_text(chosen: LoopCase, name: str, value: float) -> str:
     """Return a gain with its unit."""
     from bywire.report.wording import amount
 

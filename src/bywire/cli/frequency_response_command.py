@@ -13,8 +13,8 @@ import xarray as xr
 
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.large_signal import Variant, widths, with_widths
+from bywire.api.loop_case import LoopCase, loop_case, spread
 from bywire.cli import output
-from bywire.cli.loop_choice import Chosen, choose, spread, subject
 from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.cli.response_variants import cases_over, measured, sustained
@@ -33,7 +33,7 @@ from bywire.core.signals import signals_of
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
-    from bywire.report.page import Block
+    from bywire.report.document import Block
     from bywire.report.tables import Table
 
 _POINTS = 20
@@ -57,7 +57,7 @@ def execute(
         raise unknown_name("excitation", excitation, _EXCITATIONS)
     if out is not None:
         require_folder(out)
-    chosen = choose(loop, parameters, at, changes)
+    chosen = loop_case(loop, parameters, at, changes)
     own = chosen.loop
     unit = _input_unit(chosen)
     wanted = (
@@ -103,7 +103,7 @@ def execute(
         output.message(f"written: {path}")
 
 
-def _input_unit(chosen: Chosen) -> str:
+def _input_unit(chosen: LoopCase) -> str:
     point = chosen.loop.point(chosen.par, chosen.value)
     return signals_of(point.model.Stimulus)[chosen.loop.inputs[0]].unit
 
@@ -117,8 +117,8 @@ def _figures(
 ) -> tuple[list[Block], list[Path]]:
     """Return what a page says of bandwidths, and the file of their figure over a range."""
     from bywire.report.bandwidth_range import bandwidth_range
+    from bywire.report.document import FigureBlock, TableBlock
     from bywire.report.files import save_figure
-    from bywire.report.page import FigureBlock, TableBlock
 
     note = f"{NOTE[0].upper()}{NOTE[1:]}.{_first(variants, range_, ' Of the first case: ', '.')}"
     blocks: list[Block] = [TableBlock(figures_table(found, unit), note)]
@@ -140,7 +140,7 @@ def _first(
 
 
 def _written(
-    chosen: Chosen,
+    chosen: LoopCase,
     found: xr.Dataset,
     linear: Any,
     notes: list[str],
@@ -167,11 +167,13 @@ def _written(
     return [
         write_recording(found, out / f"{name}.nc"),
         save_figure(figure, out / f"{name}.png"),
-        write_response(out, subject(chosen), figure, table, notes, method, more),
+        write_response(out, chosen.subject, figure, table, notes, method, more),
     ]
 
 
-def _as_object(chosen: Chosen, found: xr.Dataset, linear: Any, files: list[Path]) -> dict[str, Any]:
+def _as_object(
+    chosen: LoopCase, found: xr.Dataset, linear: Any, files: list[Path]
+) -> dict[str, Any]:
     def listed(name: str) -> list[list[float | None]]:
         rows = found[name].values[0].tolist()
         return [[v if math.isfinite(v) else None for v in row] for row in rows]
@@ -195,7 +197,7 @@ def _as_object(chosen: Chosen, found: xr.Dataset, linear: Any, files: list[Path]
     }
 
 
-def _text(chosen: Chosen, found: xr.Dataset, linear: Any, unit: str) -> str:
+def _text(chosen: LoopCase, found: xr.Dataset, linear: Any, unit: str) -> str:
     from bywire.report.table_text import table_text
 
     head = f"{_head(chosen)}: gain and phase by amplitude\n"
@@ -221,7 +223,7 @@ def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
     return text_table(heading, rows)
 
 
-def _head(chosen: Chosen) -> str:
+def _head(chosen: LoopCase) -> str:
     at = chosen.loop.at
     point = f"{at.name} = {amount(chosen.value, at.unit)}"
     return f"closed loop {chosen.loop.name} of {chosen.name} at {point}"

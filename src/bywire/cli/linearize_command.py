@@ -11,9 +11,9 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import Locus, locus
 from bywire.analysis.periodic.averaged_map import PeriodicModel
+from bywire.api.loop_case import LoopCase, loop_case, over_range
 from bywire.cli import output, periodic_choice, reduction_choice
 from bywire.cli.locus_object import locus_object
-from bywire.cli.loop_choice import Chosen, choose, over_range, subject
 from bywire.cli.output_folder import require_folder
 from bywire.report.wording import amount
 
@@ -32,7 +32,7 @@ def execute(
     """Print the exact linear model of a closed loop, or its poles and where it turns unstable."""
     if out is not None:
         require_folder(out)
-    chosen = choose(loop, parameters, at, changes)
+    chosen = loop_case(loop, parameters, at, changes)
     model = chosen.loop.closed(chosen.par, chosen.value)
     found = _locus(chosen, range_) if range_ else None
     less = reduction_choice.reduced(model, reduce, chosen.loop.band[1]) if reduce else None
@@ -59,13 +59,13 @@ def execute(
         output.message(f"written: {path}")
 
 
-def _locus(chosen: Chosen, range_: str) -> Locus:
+def _locus(chosen: LoopCase, range_: str) -> Locus:
     name, unit, values = over_range(range_, chosen, "--locus")
     return locus(chosen.loop, chosen.par, chosen.value, name, unit, sorted(values))
 
 
 def _written(
-    chosen: Chosen,
+    chosen: LoopCase,
     model: LinearModel,
     found: Locus | None,
     shaken: PeriodicModel | None,
@@ -85,10 +85,10 @@ def _written(
         models += [loop.closed(*case) for case in cases]
     widest = max((own_bandwidth(one) for one in models if one.is_stable), default=float("nan"))
     told = None if shaken is None else (shaken, periodic_choice.head(shaken))
-    return [path, *write_model(out, subject(chosen), model, found, widest, told)]
+    return [path, *write_model(out, chosen.subject, model, found, widest, told)]
 
 
-def as_object(chosen: Chosen, model: LinearModel) -> dict[str, Any]:
+def as_object(chosen: LoopCase, model: LinearModel) -> dict[str, Any]:
     """Return the JSON object of a model: matrices with names and units, poles."""
     found = rates(model)
     return {
@@ -107,7 +107,7 @@ def as_object(chosen: Chosen, model: LinearModel) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _text(chosen: Chosen, model: LinearModel, found: Locus | None) -> str:
+def _text(chosen: LoopCase, model: LinearModel, found: Locus | None) -> str:
     from bywire.report.linearize_report import locus_texts
     from bywire.report.rate_table import left_out, rate_table
     from bywire.report.table_text import table_text

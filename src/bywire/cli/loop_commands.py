@@ -17,6 +17,7 @@ from bywire.cli.options import (
     changes,
     execute,
 )
+from bywire.cli.show import show
 
 LoopOrPlant = Annotated[
     str, typer.Argument(help="Loop or plant, see 'bywire list'.", show_default=False)
@@ -105,4 +106,6 @@ def margins_command(
     json: JsonFlag = False,
 ) -> None:
     """Show margins and bandwidth of a loop as it is sampled, and the worst case over a range."""
-    execute("margins_command", loop, parameters, at, changes(set_), over, out, json)
+    from bywire.api.margins import margins
+
+    show(lambda _: margins(loop, parameters, at, changes(set_), over), out, json)

@@ -127,8 +127,8 @@ def _require_one_source(method: Method, wanted: Wanted) -> None:
 
 
 def _chosen(method: Method, wanted: Wanted) -> Chosen:
+    from bywire.api.parameter_choice import set_for
     from bywire.bench.values import parsed
-    from bywire.cli.parameter_choice import set_for
 
     idle = [name for name in wanted.options if name.split(".")[0] in method.simulated]
     if wanted.measurements and idle:

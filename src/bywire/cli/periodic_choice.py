@@ -10,13 +10,13 @@ import numpy as np
 
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.periodic.averaged_map import PeriodicModel, dithered_loop
-from bywire.cli.loop_choice import Chosen
+from bywire.api.loop_case import LoopCase
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.report.wording import amount
 
 
-def dithered(chosen: Chosen) -> PeriodicModel:
+def dithered(chosen: LoopCase) -> PeriodicModel:
     """Return the loop's linear model about its periodic motion.
 
     Raises

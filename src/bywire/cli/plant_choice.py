@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, get_args
 from bywire.analysis.linear.linearize import Friction
 from bywire.analysis.linear.plant import PLANTS, Plant, PlantPoint
 from bywire.analysis.loop import Quantity
+from bywire.api.parameter_choice import parameters_for
 from bywire.bench.values import number
-from bywire.cli.parameter_choice import parameters_for
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.parameters import ParameterSet
 

@@ -10,11 +10,11 @@ from typing import Any
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Locus, locus_of
+from bywire.api.loop_case import range_of
 from bywire.cli import output
 from bywire.cli.locus_object import locus_object
-from bywire.cli.loop_choice import range_of
 from bywire.cli.output_folder import require_folder
-from bywire.cli.plant_choice import ChosenPlant, choose, subject
+from bywire.cli.plant_choice import ChosenPlant, subject
 from bywire.report.wording import amount
 
 

@@ -11,14 +11,14 @@ from bywire.analysis.response.broadband import Broadband, broadband_response
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response, require_stable
 from bywire.analysis.response.large_signal import Variant, variants_over
-from bywire.cli.loop_choice import Chosen, over_range
+from bywire.api.loop_case import LoopCase, over_range
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.core.units import shown
 from bywire.report.wording import amount
 
 
-def sustained(chosen: Chosen, changes: Mapping[str, str]) -> tuple[Variant, str]:
+def sustained(chosen: LoopCase, changes: Mapping[str, str]) -> tuple[Variant, str]:
     """Return the loop such that it can be shaken for as long as it takes, and what that changed.
 
     What the user set stays.
@@ -36,7 +36,9 @@ def sustained(chosen: Chosen, changes: Mapping[str, str]) -> tuple[Variant, str]
     return Variant(loop, par, chosen.value), note if texts else ""
 
 
-def cases_over(base: Variant, chosen: Chosen, range_: str) -> tuple[list[Variant], tuple[str, str]]:
+def cases_over(
+    base: Variant, chosen: LoopCase, range_: str
+) -> tuple[list[Variant], tuple[str, str]]:
     """Return the cases of a range, or the one without, and name and unit of what varies.
 
     Raises

@@ -16,10 +16,10 @@ from bywire.analysis.design.schedule_designer import (
 from bywire.analysis.design.schedule_verification import verify_schedule
 from bywire.analysis.design.verification import Verification
 from bywire.analysis.loop import LOOPS
+from bywire.api.loop_case import loop_case, over_range, spread
 from bywire.cli import output
 from bywire.cli.design_ending import exit_status, reported, written
 from bywire.cli.design_inputs import Wanted, requirements_of, trial_of
-from bywire.cli.loop_choice import choose, over_range, spread
 from bywire.cli.progress import progress_bar
 from bywire.cli.schedule_text import as_object, as_parts
 from bywire.cli.verification_text import as_lines
@@ -39,7 +39,7 @@ def execute(
     own = LOOPS.find(loop)
     schedule = scheduled(own)
     changes = {**changes, **schedule.changes}
-    chosen = choose(loop, parameters, "", changes)
+    chosen = loop_case(loop, parameters, "", changes)
     given = spread(at, own.at.unit, own.at.name) if at else []
     points = points_by_region(own, chosen.par, given)
     chosen = replace(chosen, value=points[schedule.main][0])

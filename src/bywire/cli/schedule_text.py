@@ -10,8 +10,8 @@ from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.analysis.design.schedule_designer import scheduled
 from bywire.analysis.design.schedule_outcome import Across, ScheduleDesign
 from bywire.analysis.design.verification import Verification
+from bywire.api.loop_case import LoopCase
 from bywire.cli.design_text import gain_text, kept_lines, unit_of
-from bywire.cli.loop_choice import Chosen
 from bywire.cli.verification_text import (
     figure_text,
     finite,
@@ -29,7 +29,7 @@ _SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin",
 
 
 def as_object(
-    chosen: Chosen,
+    chosen: LoopCase,
     requirements: Sequence[Requirement],
     found: ScheduleDesign,
     tried: Verification | None,
@@ -75,7 +75,7 @@ def _case(one: Across, name: str) -> dict[str, Any]:
 
 
 def as_parts(
-    chosen: Chosen,
+    chosen: LoopCase,
     found: ScheduleDesign,
     tried: Verification | None,
     retuned: Sequence[Across],
@@ -118,7 +118,7 @@ def as_parts(
     return parts
 
 
-def _frozen(chosen: Chosen, across: Sequence[Across]) -> list[Part]:
+def _frozen(chosen: LoopCase, across: Sequence[Across]) -> list[Part]:
     from bywire.report.tables import text_table
 
     at = chosen.loop.at
@@ -138,7 +138,9 @@ def _frozen(chosen: Chosen, across: Sequence[Across]) -> list[Part]:
     ]
 
 
-def _gains(chosen: Chosen, found: ScheduleDesign, gains: Mapping[str, float], title: str) -> Table:
+def _gains(
+    chosen: LoopCase, found: ScheduleDesign, gains: Mapping[str, float], title: str
+) -> Table:
     """Return a table of gains, a column for each region."""
     from bywire.report.tables import text_table
 

@@ -10,7 +10,7 @@ from bywire.analysis.design.bench_figures import BenchFigures
 from bywire.analysis.design.candidate import Candidate
 from bywire.analysis.design.requirement import FIGURES
 from bywire.analysis.design.verification import Verification
-from bywire.cli.loop_choice import Chosen
+from bywire.api.loop_case import LoopCase
 
 if TYPE_CHECKING:
     from bywire.report.tables import Table
@@ -21,7 +21,7 @@ _PAIRS = 6
 
 
 def verification_parts(
-    chosen: Chosen, nominal: Mapping[str, float], tried: Verification
+    chosen: LoopCase, nominal: Mapping[str, float], tried: Verification
 ) -> list[Part]:
     """Return tables and sentences on the linear design, and on the retuned gains, on the bench.
 
@@ -84,7 +84,7 @@ def figure_text(name: str, value: float) -> str:
 
 
 def _figure_rows(
-    chosen: Chosen, where: str, found: list[BenchFigures | None]
+    chosen: LoopCase, where: str, found: list[BenchFigures | None]
 ) -> list[list[str]]:
     """Return rows of one trial: what the sines and the step show, a column for each design."""
     from bywire.report.wording import amount
@@ -109,7 +109,7 @@ def _figure_rows(
     return rows
 
 
-def verification_object(chosen: Chosen, tried: Verification) -> dict[str, Any]:
+def verification_object(chosen: LoopCase, tried: Verification) -> dict[str, Any]:
     """Return the same as plain data; null for what is infinite or not defined."""
     conflict = tried.conflict()
     return {
@@ -161,7 +161,7 @@ def finite(values: Mapping[str, float]) -> dict[str, float | None]:
     return {name: number(value) for name, value in values.items()}
 
 
-def _input_unit(chosen: Chosen) -> str:
+def _input_unit(chosen: LoopCase) -> str:
     from bywire.core.signals import signals_of
 
     model = chosen.loop.point(chosen.par, chosen.value).model

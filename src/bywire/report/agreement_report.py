@@ -7,9 +7,10 @@ from pathlib import Path
 
 from bywire.analysis.agreement import EVERYTHING, GAIN, LIMITS, NOTHING, PHASE, Agreement
 from bywire.report.differences import differences
+from bywire.report.document import Banner, FigureBlock, Paragraph, Section, TableBlock
 from bywire.report.files import save_figure
-from bywire.report.page import Banner, FigureBlock, Paragraph, Section, TableBlock, write_page
-from bywire.report.subject import Subject, made
+from bywire.report.page import write_page
+from bywire.report.subject import Subject
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 
@@ -89,7 +90,7 @@ def write_agreement(
     sections = [
         Section("Differences", [FigureBlock(figure, caption), TableBlock(agreement_table(found)),
                                 Paragraph(LEGEND)]),
-        made(subject, f"Small amplitude {small}, large amplitude {large}."),
+        subject.made(f"Small amplitude {small}, large amplitude {large}."),
     ]  # fmt: skip
     page = write_page(
         out / "report.html", f"Agreement of loop {subject.name}", subject.line, sections,

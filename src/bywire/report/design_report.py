@@ -8,9 +8,10 @@ from pathlib import Path
 
 from bywire.analysis.design.requirement import Requirement
 from bywire.report.design_curves import DesignCurve, loop_gains, sensitivities, steps
+from bywire.report.document import Banner, FigureBlock, Flat, Listing, Section, TableBlock
 from bywire.report.files import save_figure
-from bywire.report.page import Banner, FigureBlock, Flat, Listing, Section, TableBlock, write_page
-from bywire.report.subject import Subject, made
+from bywire.report.page import write_page
+from bywire.report.subject import Subject
 from bywire.report.tables import Table
 
 
@@ -70,7 +71,7 @@ def write_design(
         Section("Requirements", [Listing([one.text for one in requirements])]),
         Section("Result", _blocks(parts)),
         Section("Figures", [FigureBlock(figure, text) for _, figure, text in drawn]),
-        made(subject, "Parameters as they were before the design."),
+        subject.made("Parameters as they were before the design."),
     ]
     banner = Banner(outcome.text, "good" if outcome.met else "bad")
     title = f"Design of loop {subject.name}"

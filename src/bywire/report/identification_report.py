@@ -12,10 +12,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Identified, Method
 from bywire.report.correlation_matrix import correlation_matrix
-from bywire.report.estimate_tables import check_table, estimate_table, figure_table
-from bywire.report.files import save_figure
-from bywire.report.method_curve import method_curve
-from bywire.report.page import (
+from bywire.report.document import (
     Banner,
     Block,
     Details,
@@ -24,11 +21,14 @@ from bywire.report.page import (
     Paragraph,
     Section,
     TableBlock,
-    write_page,
 )
+from bywire.report.estimate_tables import check_table, estimate_table, figure_table
+from bywire.report.files import save_figure
+from bywire.report.method_curve import method_curve
+from bywire.report.page import write_page
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.residual_figure import residual_figure
-from bywire.report.subject import Subject, made
+from bywire.report.subject import Subject
 from bywire.report.tables import parameter_table
 
 
@@ -189,7 +189,7 @@ def _made(one: Identification) -> Section:
     )
     if one.subject is None:
         return Section("How it was made", [Paragraph(one.method.summary), chosen])
-    section = made(one.subject, f"Method {one.method.name}: {one.method.summary}.")
+    section = one.subject.made(f"Method {one.method.name}: {one.method.summary}.")
     return Section(section.title, [*section.blocks, chosen])
 
 

@@ -14,8 +14,7 @@ from bywire.analysis.locus import Locus
 from bywire.analysis.margins import bandwidth
 from bywire.analysis.periodic.averaged_map import PeriodicModel
 from bywire.report.bode import Response, bode
-from bywire.report.files import save_figure
-from bywire.report.page import (
+from bywire.report.document import (
     Banner,
     Block,
     FigureBlock,
@@ -23,12 +22,13 @@ from bywire.report.page import (
     Paragraph,
     Section,
     TableBlock,
-    write_page,
 )
+from bywire.report.files import save_figure
+from bywire.report.page import write_page
 from bywire.report.pole_map import pole_map
 from bywire.report.rate_table import left_out, rate_table
 from bywire.report.root_locus import border_text, root_locus
-from bywire.report.subject import Subject, made
+from bywire.report.subject import Subject
 from bywire.report.wording import unit_text
 
 _LOWEST = 1e-2  # lower end of what is searched for the bandwidth, Hz
@@ -100,7 +100,7 @@ def write_model(
     sections = [
         Section("Poles", blocks),
         Section("Figures", [FigureBlock(figure, text) for _, figure, text in drawn]),
-        made(subject, f"Exact linear model, sampled with {model.period * 1e3:g} ms: plant, filters "
+        subject.made(f"Exact linear model, sampled with {model.period * 1e3:g} ms: plant, filters "
              "and controllers, dry friction left out."),
     ]  # fmt: skip
     banner = Banner("stable", "good") if model.is_stable else Banner("unstable", "bad")

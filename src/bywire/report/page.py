@@ -3,80 +3,28 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 from html import escape
 from importlib.resources import files
 from itertools import count
 from pathlib import Path
-from typing import Literal
-
-from matplotlib.figure import Figure
 
 from bywire import __version__
+from bywire.report.document import (
+    Banner,
+    Block,
+    Details,
+    Document,
+    FigureBlock,
+    Listing,
+    Paragraph,
+    Section,
+    flat_blocks,
+)
 from bywire.report.files import write_bytes
 from bywire.report.inline_figure import inline_figures
 from bywire.report.table_html import table_html
-from bywire.report.tables import Table
 from bywire.report.wording import clean
-
-
-@dataclass(frozen=True)
-class Paragraph:
-    """Plain text."""
-
-    text: str
-
-
-@dataclass(frozen=True)
-class Listing:
-    """Plain texts, each with a bullet."""
-
-    texts: Sequence[str]
-
-
-@dataclass(frozen=True)
-class FigureBlock:
-    """A figure with its caption; the page numbers it."""
-
-    figure: Figure
-    caption: str
-
-
-@dataclass(frozen=True)
-class TableBlock:
-    """A table, with a caption that the page numbers."""
-
-    table: Table
-    caption: str = ""
-
-
-@dataclass(frozen=True)
-class Details:
-    """Blocks that stay folded until the reader opens them."""
-
-    title: str
-    blocks: Sequence[Flat]
-
-
-Flat = Paragraph | Listing | FigureBlock | TableBlock
-Block = Flat | Details
-
-
-@dataclass(frozen=True)
-class Section:
-    """A heading and what stands under it."""
-
-    title: str
-    blocks: Sequence[Block]
-
-
-@dataclass(frozen=True)
-class Banner:
-    """The outcome in one line at the top: ``good``, ``bad`` or neither."""
-
-    text: str
-    verdict: Literal["good", "bad", "none"] = "none"
 
 
 def write_page(
@@ -114,9 +62,7 @@ def page_html(
     title: str, summary: str, sections: Sequence[Section], *, banner: Banner | None = None
 ) -> str:
     """Return a report as one HTML page; see :func:`write_page`."""
-    blocks = [block for section in sections for block in _flat(section.blocks)]
-    shown = [(b.figure, b.caption) for b in blocks if isinstance(b, FigureBlock)]
-    numbered = _Numbered(iter(inline_figures(shown)))
+    numbered = _numbered(sections)
     style = files("bywire.report").joinpath("page.css").read_text(encoding="utf-8")
     parts = [
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{_POLICY}\n'
@@ -132,11 +78,30 @@ def page_html(
     return "\n".join(part for part in parts if part)
 
 
+def fragment_html(document: Document, notes: Sequence[str] = ()) -> str:
+    """Return a document as a piece of HTML for a notebook: banner, notes, sections."""
+    numbered = _numbered(document.page)
+    heed = [Section("Heed", [Listing(notes)])] if notes else []
+    sections = [*heed, *document.page]
+    parts = [
+        f"<h3>{_text(document.title)}</h3>\n<p>{_text(document.summary)}</p>",
+        _banner(document.banner) if document.banner is not None else "",
+        *(_section(section, k, numbered) for k, section in enumerate(sections, 1)),
+    ]
+    return "<div class=\"bywire\">\n" + "\n".join(part for part in parts if part) + "\n</div>"
+
+
 # The browser itself then refuses scripts and anything from elsewhere.
 _POLICY = (
     '<meta http-equiv="Content-Security-Policy" '
     "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
 )
+
+
+def _numbered(sections: Sequence[Section]) -> _Numbered:
+    blocks = [block for section in sections for block in flat_blocks(section.blocks)]
+    shown = [(b.figure, b.caption) for b in blocks if isinstance(b, FigureBlock)]
+    return _Numbered(iter(inline_figures(shown)))
 
 
 class _Numbered:
@@ -146,14 +111,6 @@ class _Numbered:
         self.figures = figures
         self.figure_numbers = count(1)
         self.table_numbers = count(1)
-
-
-def _flat(blocks: Iterable[Block]) -> Iterator[Flat]:
-    for block in blocks:
-        if isinstance(block, Details):
-            yield from block.blocks
-        else:
-            yield block
 
 
 def _text(text: str) -> str:
@@ -184,7 +141,8 @@ def _block(block: Block, numbered: _Numbered) -> str:
         return f"<p>{_text(block.text)}</p>"
     if isinstance(block, Listing):
         entries = "\n".join(f"<li>{_text(text)}</li>" for text in block.texts)
-        return f"<ul>\n{entries}\n</ul>"
+        title = f"<p>{_text(block.title)}</p>\n" if block.title else ""
+        return f"{title}<ul>\n{entries}\n</ul>"
     if isinstance(block, Details):
         body = "\n".join(_block(inner, numbered) for inner in block.blocks)
         return f"<details>\n<summary>{_text(block.title)}</summary>\n{body}\n</details>"

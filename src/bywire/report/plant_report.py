@@ -8,14 +8,14 @@ from pathlib import Path
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Locus
+from bywire.report.document import Block, FigureBlock, Listing, Paragraph, Section, TableBlock
 from bywire.report.files import save_figure
 from bywire.report.linearize_report import locus_texts
-from bywire.report.page import Block, FigureBlock, Listing, Paragraph, Section, TableBlock
 from bywire.report.page import write_page as write
 from bywire.report.plant_figures import plant_figures
 from bywire.report.rate_table import left_out, rate_table
 from bywire.report.root_locus import root_locus
-from bywire.report.subject import Subject, made
+from bywire.report.subject import Subject
 
 
 def write_plant(
@@ -55,7 +55,7 @@ def write_plant(
     sections = [
         Section("Poles", [*([Listing(notes)] if notes else []), *poles]),
         Section("Figures", figures or [Paragraph("No output answers the first input.")]),
-        made(subject, "Exact linear model of the plant, sources in place of its controllers."),
+        subject.made("Exact linear model of the plant, sources in place of its controllers."),
     ]
     page = out / "report.html"
     return [*files, write(page, f"Linear model of {subject.name}", subject.line, sections)]
@@ -75,7 +75,7 @@ def write_plant_locus(out: Path, subject: Subject, found: Locus) -> list[Path]:
     sections = [
         Section(f"Stability over {found.name}", [Listing(locus_texts(found))]),
         Section("Figures", [FigureBlock(figure, caption)]),
-        made(subject, "Exact linear model of the plant, sources in place of its controllers."),
+        subject.made("Exact linear model of the plant, sources in place of its controllers."),
     ]
     title = f"Root locus of {subject.name}"
     return [file, write(out / "report.html", title, subject.line, sections)]

@@ -13,10 +13,11 @@ from bywire.bench.bench import Bench
 from bywire.bench.kpis.kpi import Kpi
 from bywire.identification.replaying.bench_replay import Replayed
 from bywire.identification.replaying.fit import SegmentFit, undefined
+from bywire.report.document import Banner, FigureBlock, Listing, Section, TableBlock
 from bywire.report.files import save_figure
-from bywire.report.page import Banner, FigureBlock, Listing, Section, TableBlock, write_page
+from bywire.report.page import write_page
 from bywire.report.replay_figure import replay_figure
-from bywire.report.subject import Subject, made
+from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean, duration
 
@@ -122,7 +123,7 @@ def write_replay(out: Path, one: Replay) -> list[Path]:
         ]),
         *([Section("Tracked parameters", [FigureBlock(f, c) for f, c in one.tracked.values()])]
           if one.tracked else []),
-        made(subject, f"Measurement: {one.source}.",
+        subject.made(f"Measurement: {one.source}.",
              *(f"{note[:1].upper()}{note[1:]}." for note in one.said)),
     ]  # fmt: skip
     files = [save_figure(figure, out / f"{name}.png") for name, figure in figures.items()]

@@ -7,8 +7,9 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from bywire.report.page import Block, FigureBlock, Listing, Section, TableBlock, write_page
-from bywire.report.subject import Subject, made
+from bywire.report.document import Block, FigureBlock, Listing, Section, TableBlock
+from bywire.report.page import write_page
+from bywire.report.subject import Subject
 from bywire.report.tables import Table
 
 
@@ -51,7 +52,7 @@ def write_response(
         Section("Response", [*heed, FigureBlock(figure, caption)]),
         *([Section("Bandwidth by amplitude", more)] if more else []),
         Section("Numbers", [TableBlock(table, "Gain and phase by frequency and amplitude.")]),
-        made(subject, method),
+        subject.made(method),
     ]
     return write_page(
         out / "report.html", f"Frequency response of loop {subject.name}", subject.line, sections

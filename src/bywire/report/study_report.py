@@ -9,16 +9,10 @@ from matplotlib.figure import Figure
 
 from bywire.analysis.study import Cut, Found, Study
 from bywire.core.parameters import ParameterSet
-from bywire.report.page import (
-    Details,
-    FigureBlock,
-    Listing,
-    Section,
-    TableBlock,
-    write_page,
-)
+from bywire.report.document import Details, FigureBlock, Listing, Section, TableBlock
+from bywire.report.page import write_page
 from bywire.report.parameter_rows import parameter_rows
-from bywire.report.subject import Subject, made
+from bywire.report.subject import Subject
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
 
@@ -65,7 +59,7 @@ def write_study(
             "Assumptions",
             [Listing(found.assumptions), Details("Options of the study", [chosen])],
         ),
-        made(subject),
+        subject.made(),
     ]
     return write_page(out / "report.html", f"Study {study.name}", subject.line, sections)
 

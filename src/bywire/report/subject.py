@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import ParameterSet
-from bywire.report.page import Details, Paragraph, Section, TableBlock
+from bywire.report.document import Details, Paragraph, Section, TableBlock
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.tables import parameter_table
 
@@ -37,22 +37,21 @@ class Subject:
         at = f" at {self.point}" if self.point else ""
         return f"{self.summary}{at}; parameter set {self.parameters}"
 
+    def made(self, *notes: str) -> Section:
+        """Return the section on how a report was made: notes, source and all parameters.
 
-def made(subject: Subject, *notes: str) -> Section:
-    """Return the section on how a report was made: notes, source and all parameters.
-
-    Raises
-    ------
-    UnknownNameError
-        When the parameter set is unknown.
-    """
-    cited = PARAMETER_SETS.find(subject.parameters)
-    rows = parameter_rows(subject.par, cited.values)
-    return Section(
-        "How it was made",
-        [
-            *map(Paragraph, notes),
-            Paragraph(f"Source of the parameters: {cited.source}."),
-            Details("All parameters", [TableBlock(parameter_table(rows))]),
-        ],
-    )
+        Raises
+        ------
+        UnknownNameError
+            When the parameter set is unknown.
+        """
+        cited = PARAMETER_SETS.find(self.parameters)
+        rows = parameter_rows(self.par, cited.values)
+        return Section(
+            "How it was made",
+            [
+                *map(Paragraph, notes),
+                Paragraph(f"Source of the parameters: {cited.source}."),
+                Details("All parameters", [TableBlock(parameter_table(rows))]),
+            ],
+        )

@@ -13,10 +13,23 @@ Verdict = Literal["good", "bad", "none"]
 
 @dataclass(frozen=True)
 class Cell:
-    """Text of a cell and whether it tells of something good or bad."""
+    """Text of a cell, whether it tells of something good or bad, and the value behind it.
+
+    Parameters
+    ----------
+    value
+        Number, in the unit that the text says, or whatever else a table of data wants; the text
+        where there is none.
+    """
 
     text: str
     verdict: Verdict = "none"
+    value: object = None
+
+    @property
+    def content(self) -> object:
+        """What a table of data holds."""
+        return self.text if self.value is None else self.value
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from bywire.report.page import (
+from bywire.report.document import (
     Banner,
     Block,
     Details,
@@ -14,8 +14,8 @@ from bywire.report.page import (
     Paragraph,
     Section,
     TableBlock,
-    write_page,
 )
+from bywire.report.page import write_page
 from bywire.report.tables import ReproductionRow, Table, reproduction_table, text_table
 from bywire.report.wording import amount
 from bywire.reproduction.in_short import in_short

@@ -1,16 +1,17 @@
-"""What the commands on loops have in common: loop, parameters, operating point, ranges."""
+"""What the use cases of loops have in common: loop, parameters, operating point, ranges."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.analysis.loop import LOOPS, Loop, Quantity
+from bywire.api.parameter_choice import parameters_for
 from bywire.bench.values import number
-from bywire.cli.parameter_choice import parameters_for
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -21,17 +22,52 @@ _MOST = 10_000
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """A loop with the parameters and the operating point that a user asked for."""
+class LoopCase:
+    """A loop with the parameters and the operating point that a user asked for.
+
+    Parameters
+    ----------
+    loop
+        The loop.
+    name, par
+        Name of the parameter set, and the values in use.
+    value
+        Operating point [SI unit of ``loop.at``].
+    """
 
     loop: Loop
     name: str
     par: ParameterSet
     value: float
 
+    @property
+    def point(self) -> str:
+        """The operating point as text, for instance ``"pressure = 20 bar"``."""
+        from bywire.report.wording import amount
 
-def choose(name: str, parameters: str, at: str, changes: Mapping[str, str]) -> Chosen:
-    """Return what the command line asks for.
+        return f"{self.loop.at.name} = {amount(self.value, self.loop.at.unit)}"
+
+    @property
+    def subject(self) -> Subject:
+        """What a report says of loop and operating point."""
+        from bywire.report.subject import Subject
+
+        return Subject(self.loop.name, self.loop.summary, self.name, self.par, self.point)
+
+    @property
+    def heading(self) -> dict[str, Any]:
+        """The fields with which every JSON object of a loop begins."""
+        return {
+            "loop": self.loop.name,
+            "parameters": self.name,
+            "operating_point": {self.loop.at.name: self.value, "unit": self.loop.at.unit},
+        }
+
+
+def loop_case(
+    name: str, parameters: str = "", at: str = "", changes: Mapping[str, Any] = MappingProxyType({})
+) -> LoopCase:
+    """Return a loop with its parameters and its operating point.
 
     Parameters
     ----------
@@ -52,19 +88,7 @@ def choose(name: str, parameters: str, at: str, changes: Mapping[str, str]) -> C
     loop = LOOPS.find(name)
     own, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
-    return Chosen(loop, own, par, value)
-
-
-def subject(chosen: Chosen) -> Subject:
-    """Return what a report says of a loop and its operating point."""
-    from bywire.report.subject import Subject
-    from bywire.report.wording import amount
-
-    at = chosen.loop.at
-    return Subject(
-        chosen.loop.name, chosen.loop.summary, chosen.name, chosen.par,
-        f"{at.name} = {amount(chosen.value, at.unit)}",
-    )  # fmt: skip
+    return LoopCase(loop, own, par, value)
 
 
 def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> list[float]:
@@ -93,10 +117,10 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
     if not low < high:
         raise ParameterError(f"{name} = {text!r}: the first value must be below the second")
     between = np.geomspace if logarithmic else np.linspace
-    return [float(one) for one in between(low, high, int(parts[2]))]
+    return [float(value) for value in between(low, high, int(parts[2]))]
 
 
-def over_range(text: str, chosen: Chosen, option: str = "--over") -> tuple[str, str, list[float]]:
+def over_range(text: str, chosen: LoopCase, option: str = "--over") -> tuple[str, str, list[float]]:
     """Return name, unit and values of a range for a loop, see `range_of`."""
     return range_of(text, chosen.loop.at, chosen.par, option)
 

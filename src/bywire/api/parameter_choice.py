@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
@@ -33,7 +34,7 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
 
 
 def parameters_for(
-    subject: str, assembly: str, name: str, changes: Mapping[str, str]
+    subject: str, assembly: str, name: str, changes: Mapping[str, Any]
 ) -> tuple[str, ParameterSet]:
     """Return name and values of a parameter set, changed.
 

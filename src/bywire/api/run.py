@@ -1,0 +1,229 @@
+"""A bench, run and judged: recordings, key figures, verdicts, books of energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from bywire.bench import bench_file, running
+from bywire.bench.bench import Bench
+from bywire.bench.energy_ledger import Ledger, actuator_ledger, disc_ledger
+from bywire.bench.result import Result
+from bywire.bench.running import Progress
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Details,
+    Document,
+    FigureBlock,
+    Paragraph,
+    Section,
+    TableBlock,
+)
+from bywire.report.parameter_rows import parameter_rows
+from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.wording import amount
+
+if TYPE_CHECKING:
+    from bywire.report.bench_figures import Shown
+
+RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
+"""attributes of a recording that say how it was made"""
+
+
+@dataclass(frozen=True)
+class BenchResult(Result, Answer):
+    """What a bench gave, with recordings as xarray and key figures with their verdicts."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether every requirement is met."""
+        return self.status != "failed"
+
+    @property
+    def rows(self) -> list[KpiRow]:
+        """The key figures beside their requirements."""
+        verdicts = {v.kpi: v for v in self.verdicts}
+        return [
+            KpiRow(
+                kpi.name, kpi.value, kpi.unit,
+                f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
+                verdicts[kpi.name].limit if kpi.name in verdicts else "",
+                verdicts[kpi.name].met if kpi.name in verdicts else None,
+            )
+            for kpi in self.kpis
+        ]  # fmt: skip
+
+    def ledgers(self) -> dict[str, Ledger]:
+        """Return the books of every run from time zero on, those with the disc apart, by label."""
+        found = {}
+        for label, recording in self.recordings.items():
+            if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
+                continue
+            after = recording.sel(time=slice(-1e-9, None))
+            if after.sizes["time"] < 2:
+                continue
+            found[label] = actuator_ledger(after)
+            with_disc = disc_ledger(after)
+            if with_disc is not None:
+                found[f"{label}, with disc"] = with_disc
+        return found
+
+    def document(self) -> Document:
+        """Return key figures, verdicts, figures, energy, and how it was made."""
+        bench = self.bench
+        table = TableBlock(kpi_table(self.rows))
+        notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
+        return Document(
+            bench.name or bench.experiment,
+            f"{bench.definition.summary}; parameter set {bench.parameters}",
+            sections=lambda: [
+                Section("Key figures", [*notes, table]),
+                Section("Figures", self._figures()),
+                *self._energy(),
+                self._made(),
+            ],
+            brief=[table] if self.kpis else [],
+            data=self._data(),
+            banner=self._banner(),
+            attachments=[
+                Attachment(f"{label}.nc", partial(_recorded, recording))
+                for label, recording in self.recordings.items()
+            ],
+            record="result.json",
+            remarks=[
+                f"requirement not met: {v.kpi} is {amount(v.value, v.unit)}, wanted {v.limit}"
+                + (f" ({v.note})" if v.note else "")
+                for v in self.verdicts if not v.met
+            ],
+            is_paged=self.status != "interrupted",
+        )  # fmt: skip
+
+    def _figures(self) -> list[FigureBlock]:
+        if self.status == "interrupted":
+            return []
+        from bywire.report.bench_figures import bench_figures
+
+        shown: list[Shown] = bench_figures(self)
+        return [FigureBlock(each.figure, each.caption, each.name) for each in shown]
+
+    def _energy(self) -> list[Section]:
+        """Return the books of every run that keeps any."""
+        blocks: list[Block] = []
+        for label, books in self.ledgers().items():
+            blocks += [Paragraph(f"{label}, from time zero on:"), TableBlock(energy_table(books))]
+        return [Section("Energy", blocks)] if blocks else []
+
+    def _made(self) -> Section:
+        bench, cited = self.bench, PARAMETER_SETS.find(self.bench.parameters)
+        attrs = next(iter(self.recordings.values())).attrs if self.recordings else {}
+        kept = "; ".join(f"{key} {attrs[key]}" for key in RECORDED if key in attrs)
+        options = parameter_table(parameter_rows(bench.chosen_options))
+        parameters = parameter_table(parameter_rows(bench.par, cited.values))
+        return Section(
+            "How it was made",
+            [
+                Paragraph(f"Source of the parameters: {cited.source}."),
+                Paragraph(f"{kept}."),
+                Details("Options of the experiment", [TableBlock(options)]),
+                Details("All parameters", [TableBlock(parameters)]),
+            ],
+        )
+
+    def _banner(self) -> Banner:
+        if not self.verdicts:
+            return Banner("done")
+        met = sum(v.met for v in self.verdicts)
+        text = f"{met} of {len(self.verdicts)} requirements met"
+        return Banner(text, "good" if self.status == "passed" else "bad")
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "bench": self.bench.name or self.bench.experiment,
+            "status": self.status,
+            "kpis": {
+                kpi.name: {"value": kpi.value, "unit": kpi.unit, "note": kpi.note}
+                for kpi in self.kpis
+            },
+            "requirements": [
+                {"kpi": v.kpi, "limit": v.limit, "value": v.value, "unit": v.unit, "met": v.met}
+                for v in self.verdicts
+            ],
+            "energy": {
+                label: {
+                    "unit": "J",
+                    "sources": {posting.name: posting.energy for posting in books.sources},
+                    "sinks": {posting.name: posting.energy for posting in books.sinks},
+                    "closing_error": books.closing_error,
+                }
+                for label, books in self.ledgers().items()
+            },
+            "warnings": self.warnings,
+        }
+
+
+def run(
+    bench: Bench | str | Path,
+    overrides: Mapping[str, str] = MappingProxyType({}),
+    *,
+    progress: Progress | None = None,
+    engine: str = "auto",
+) -> BenchResult:
+    """Make all runs of a bench, and judge them.
+
+    Parameters
+    ----------
+    bench
+        What is tested: a `Bench`, the path of a bench file, or the name of an experiment, which
+        is then run with its defaults and the main parameter set of its brake.
+    overrides
+        Changes of a bench file or experiment, as ``--set`` takes them.
+    progress
+        Called with the run's label and its finished share, 0 to 1.
+    engine
+        ``auto``, ``compiled`` or ``virtual-machine``.
+
+    Raises
+    ------
+    InputError
+        When the experiment cannot be set up.
+    RunError
+        When a run fails.
+    """
+    if not isinstance(bench, Bench):
+        bench = bench_file.read(bench, overrides)
+    elif overrides:
+        bench = bench.with_overrides(overrides)
+    result = running.run(bench, progress, engine)
+    return BenchResult(
+        result.bench, result.recordings, result.kpis, result.verdicts, result.status
+    )
+
+
+def energy_table(books: Ledger) -> Table:
+    """Return a ledger as a table: place, energy, share of what was turned over."""
+    total = books.turnover
+
+    def row(side: str, label: str, energy: float) -> tuple[str, str, str, str]:
+        share = f"{100.0 * energy / total:.3g} %" if total > 0 else "-"
+        return side, label, amount(energy, "J"), share
+
+    rows = [row("from", posting.label, posting.energy) for posting in books.sources]
+    rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
+    rows.append(row("", "closing error", books.closing_error))
+    return text_table(["", "place", "energy", "share of what was given"], rows)
+
+
+def _recorded(recording: xr.Dataset, path: Path) -> Path:
+    from bywire.data.netcdf import write_recording
+
+    return write_recording(recording, path)

@@ -1,0 +1,120 @@
+"""What a use case returns: a result that shows itself in terminals, notebooks, files and tables."""
+
+from __future__ import annotations
+
+import json
+import math
+from abc import ABC, abstractmethod
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bywire.report.document import Document, FigureBlock, TableBlock
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+class Answer(ABC):
+    """A typed result with one document behind all that is shown of it."""
+
+    @abstractmethod
+    def document(self) -> Document:
+        """Return what the result has to say, written once."""
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know before the figures are believed; none by default."""
+        return []
+
+    @property
+    def holds(self) -> bool:
+        """Whether all that was required, or checked, holds; commands exit with 1 where not."""
+        return True
+
+    def as_object(self) -> dict[str, Any]:
+        """Return the JSON object: what the command prints with ``--json``, but for the files."""
+        shown: dict[str, Any] = finite(dict(self.document().data))
+        return shown
+
+    def tables(self) -> dict[str, pd.DataFrame]:
+        """Return the tables of the page as pandas frames, by caption or section."""
+        import pandas as pd
+
+        found: dict[str, pd.DataFrame] = {}
+        for section in self.document().page:
+            for block in section.blocks:
+                if isinstance(block, TableBlock):
+                    name = block.caption.rstrip(".") or section.title
+                    headings = [column.heading for column in block.table.columns]
+                    rows = [[cell.content for cell in row] for row in block.table.rows]
+                    found.setdefault(name, pd.DataFrame(rows, columns=headings))
+        return found
+
+    def write(self, folder: str | Path) -> list[Path]:
+        """Write recordings, figures and one self-contained page; each file whole or not at all.
+
+        Raises
+        ------
+        FileError
+            When the folder cannot be made or written to.
+        """
+        return write_document(self.document(), Path(folder))
+
+    def __str__(self) -> str:
+        from bywire.report.terminal import terminal_text
+
+        return terminal_text(self.document())
+
+    def _repr_html_(self) -> str:
+        from bywire.report.page import fragment_html
+
+        return fragment_html(self.document(), [f"Warning: {text}." for text in self.warnings])
+
+
+def write_document(document: Document, folder: Path) -> list[Path]:
+    """Write a document's files of data, its figures, its page and its record.
+
+    Raises
+    ------
+    FileError
+        When a file cannot be written.
+    """
+    files = [each.write(folder / each.name) for each in document.attachments]
+    if document.is_paged:
+        from bywire.report.files import save_figure
+        from bywire.report.page import write_page
+
+        files += [
+            save_figure(block.figure, folder / f"{block.name}.png")
+            for block in document.flat() if isinstance(block, FigureBlock) and block.name
+        ]  # fmt: skip
+        files.append(
+            write_page(
+                folder / document.page_name, document.title, document.summary, document.page,
+                banner=document.banner,
+            )
+        )  # fmt: skip
+    if document.record:
+        from bywire.report.files import write_bytes
+
+        target = folder / document.record
+        shown = with_files(document, [*files, target])
+        files.append(write_bytes(target, (json.dumps(shown, indent=2) + "\n").encode()))
+    return files
+
+
+def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
+    """Return the JSON object of a document with the files that were written."""
+    shown: dict[str, Any] = finite(dict(document.data))
+    return {**shown, "files": [str(path) for path in files]}
+
+
+def finite(value: Any) -> Any:
+    """Return plain data with null for what is infinite or not defined: JSON has no such numbers."""
+    if isinstance(value, dict):
+        return {key: finite(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [finite(each) for each in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

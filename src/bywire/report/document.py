@@ -1,0 +1,174 @@
+"""A result, written once: the blocks that terminal, JSON object, HTML page and files are made of.
+
+A `Document` loads no plotting: its figures are drawn when a page or a file wants them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from bywire.report.tables import Table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Paragraph:
+    """Plain text; a terminal wraps it where it is longer than a line."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Plain texts, each with a bullet, below a line of their own if there is one."""
+
+    texts: Sequence[str]
+    title: str = ""
+
+
+@dataclass(frozen=True)
+class FigureBlock:
+    """A figure with its caption; the page numbers it.
+
+    Parameters
+    ----------
+    source
+        The figure, or what draws it.
+    caption
+        What it shows.
+    name
+        Its file in an output folder, without the ending; no file where it is empty.
+    """
+
+    source: Figure | Callable[[], Figure]
+    caption: str
+    name: str = ""
+
+    @cached_property
+    def figure(self) -> Figure:
+        """The figure, drawn on first use."""
+        return self.source() if callable(self.source) else self.source
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table, with a caption that the page numbers.
+
+    Parameters
+    ----------
+    width
+        Characters per line that a terminal may give it.
+    """
+
+    table: Table
+    caption: str = ""
+    width: int = 100
+
+
+@dataclass(frozen=True)
+class Details:
+    """Blocks that stay folded until the reader opens them."""
+
+    title: str
+    blocks: Sequence[Flat]
+
+
+Flat = Paragraph | Listing | FigureBlock | TableBlock
+Block = Flat | Details
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading and what stands under it."""
+
+    title: str
+    blocks: Sequence[Block]
+
+
+@dataclass(frozen=True)
+class Banner:
+    """The outcome in one line at the top: ``good``, ``bad`` or neither."""
+
+    text: str
+    verdict: Literal["good", "bad", "none"] = "none"
+
+
+@dataclass(frozen=True)
+class Attachment:
+    """A file of data beside the page.
+
+    Parameters
+    ----------
+    name
+        File name in the output folder.
+    write
+        ``write(path)``: writes it whole or not at all and returns the path.
+    """
+
+    name: str
+    write: Callable[[Path], Path]
+
+
+@dataclass(frozen=True)
+class Document:
+    """What a result has to say.
+
+    Parameters
+    ----------
+    title, summary
+        Heading of the page, and one line below it.
+    sections
+        The page; or what makes it, where that costs drawing.
+    brief
+        What a terminal shows, a text or block each: mostly blocks that the page has as well.
+    data
+        The JSON object, but for the files; NaN and infinite numbers become null.
+    banner
+        Outcome, above the contents of the page.
+    attachments
+        Files of data.
+    record
+        File of the output folder that keeps the JSON object; none where it is empty.
+    remarks
+        Lines for standard error after the result, such as requirements that are not met.
+    is_paged
+        Whether an output folder gets a page and figures; not where an interrupt left too little.
+    page_name
+        File of the page.
+    """
+
+    title: str
+    summary: str
+    sections: Sequence[Section] | Callable[[], Sequence[Section]]
+    brief: Sequence[str | Flat]
+    data: Mapping[str, Any]
+    banner: Banner | None = None
+    attachments: Sequence[Attachment] = ()
+    record: str = ""
+    remarks: Sequence[str] = ()
+    is_paged: bool = True
+    page_name: str = "report.html"
+
+    @cached_property
+    def page(self) -> Sequence[Section]:
+        """The sections, made on first use."""
+        return self.sections() if callable(self.sections) else self.sections
+
+    def flat(self) -> Iterator[Flat]:
+        """Yield the blocks of all sections, folded ones among them."""
+        return flat_blocks(block for section in self.page for block in section.blocks)
+
+
+def flat_blocks(blocks: Iterator[Block] | Sequence[Block]) -> Iterator[Flat]:
+    """Yield blocks, those of folded parts in their place."""
+    for block in blocks:
+        if isinstance(block, Details):
+            yield from block.blocks
+        else:
+            yield block

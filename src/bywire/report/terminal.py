@@ -1,0 +1,29 @@
+"""A document as plain text for terminals and logs."""
+
+from __future__ import annotations
+
+import textwrap
+
+from bywire.report.document import Document, FigureBlock, Flat, Listing, Paragraph
+from bywire.report.table_text import table_text
+
+WIDTH = 100
+"""characters of a line of prose"""
+
+
+def terminal_text(document: Document) -> str:
+    """Return what a terminal shows of a document; figures are left out."""
+    texts = [_text(block) for block in document.brief if not isinstance(block, FigureBlock)]
+    return "\n".join(text for text in texts if text is not None)
+
+
+def _text(block: str | Flat) -> str:
+    if isinstance(block, str):
+        return block
+    if isinstance(block, Paragraph):
+        return textwrap.fill(block.text, WIDTH)
+    if isinstance(block, Listing):
+        lines = [f"- {text}" for text in block.texts]
+        return "\n".join([block.title, *lines] if block.title else lines)
+    assert not isinstance(block, FigureBlock)
+    return table_text(block.table, block.width)
