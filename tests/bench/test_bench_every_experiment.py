@@ -14,7 +14,6 @@ from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.bench_figures import bench_figures
-from bywire.report.bench_results import as_json
 
 NAMES = sorted(EXPERIMENTS.all())
 PAIRS = [
@@ -29,7 +28,7 @@ STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1
 
 
 @pytest.fixture(scope="module")
-def results(tmp_path_factory) -> dict[str, bywire.Result]:
+def results(tmp_path_factory) -> dict[str, bywire.BenchResult]:
     """Run every experiment once, from a bench file of two lines."""
     folder = tmp_path_factory.mktemp("benches")
     found = {}
@@ -74,7 +73,7 @@ def test_every_figure_it_names_exists(results, name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_results_are_json(results, name):
-    text = json.dumps(as_json(results[name], []), allow_nan=False)
+    text = json.dumps(results[name].as_object(), allow_nan=False)
     assert set(json.loads(text)["kpis"]) <= set(EXPERIMENTS.all()[name].kpis)
 
 

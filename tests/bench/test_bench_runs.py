@@ -17,7 +17,7 @@ STEP = {"kind": "step", "start": 0, "end": "1 A", "t_step": "10 ms"}
 SHORT = {"duration": "0.2 s", "settle": "0.1 s"}
 
 
-def braking(settle: float, **changes) -> bywire.Result:
+def braking(settle: float, **changes) -> bywire.BenchResult:
     """Return a short braking that settles for a time [s]."""
     options = {"duration": "0.3 s", "settle": settle}
     return bywire.run(bywire.Bench("hard-braking", SET, options=options, **changes))

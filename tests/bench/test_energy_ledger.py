@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bywire.api.run import energy_table, run
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import actuator_ledger, disc_ledger
-from bywire.bench.running import run
-from bywire.report.bench_results import as_json, energy_table
 
 T = np.linspace(0.0, 1.0, 5)
 
@@ -33,7 +32,7 @@ def braking():
 def test_books_of_both_brakes_close(braking):
     hydraulic = run(Bench("hard-braking", "dardanelli2010", options={"duration": 0.2}))
     for result in (braking, hydraulic):
-        for label, books in as_json(result, [])["energy"].items():
+        for label, books in result.as_object()["energy"].items():
             given, taken = (sum(books[side].values()) for side in ("sources", "sinks"))
             assert given - taken == pytest.approx(books["closing_error"], abs=1e-12)
             assert abs(books["closing_error"]) < 1e-6 * given, label

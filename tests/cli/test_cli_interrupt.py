@@ -127,7 +127,7 @@ def test_interrupt_while_the_results_are_written(bywire, bench, tmp_path, monkey
     def stopped(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("bywire.report.bench_report.save_figure", stopped)
+    monkeypatch.setattr("bywire.report.files.save_figure", stopped)
     text = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'
     outcome = bywire("run", bench(text), "--out", tmp_path / "out")
     assert (outcome.status, outcome.lines) == (130, ["bywire: interrupted"])

@@ -127,13 +127,13 @@ def test_end_stop_is_a_warning_and_the_run_is_done(bywire, bench, tmp_path):
 def test_warnings_of_a_library_come_as_messages(bywire, bench, monkeypatch):
     import warnings
 
-    from bywire.bench.running import run
+    from bywire.api.run import run
 
-    def noisy(*arguments):
+    def noisy(*arguments, **settings):
         warnings.warn("seeded", RuntimeWarning, stacklevel=1)
-        return run(*arguments)
+        return run(*arguments, **settings)
 
-    monkeypatch.setattr("bywire.cli.run_command.run", noisy)
+    monkeypatch.setattr("bywire.api.run.run", noisy)
     outcome = bywire("run", bench(), "--json")
     assert (outcome.status, outcome.lines) == (0, ["bywire: warning: seeded"])
 

@@ -75,10 +75,10 @@ def test_wrong_usage_is_2(bywire, arguments, text):
 
 
 def test_a_defect_is_3_and_never_a_verdict(bywire, bench, monkeypatch):
-    def broken(*_):
+    def broken(*_, **__):
         raise ZeroDivisionError("seeded")
 
-    monkeypatch.setattr("bywire.cli.run_command.run", broken)
+    monkeypatch.setattr("bywire.api.run.run", broken)
     status, out, err = bywire("run", bench(), "--json")
     assert (status, out) == (3, "")
     assert "seeded" in err

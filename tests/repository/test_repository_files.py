@@ -158,7 +158,7 @@ def test_every_locked_package_has_hashes():
 
 
 def test_version_is_one():
-    text = (PACKAGE / "__init__.py").read_text(encoding="utf-8")
+    text = (PACKAGE / "core" / "version.py").read_text(encoding="utf-8")
     assert f'__version__ = "{PROJECT["project"]["version"]}"' in text
 
 

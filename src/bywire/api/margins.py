@@ -13,7 +13,7 @@ from bywire.analysis import robustness
 from bywire.analysis.loop_curves import Family, loop_curve, varied
 from bywire.analysis.robustness import LoopMargins, worst
 from bywire.api.loop_case import LoopCase, loop_case, over_range
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Banner,
     Document,
@@ -138,6 +138,7 @@ class Margins(Answer):
         return Banner("stable over the whole range" if self.name else "stable", "good")
 
 
+@use_case
 def margins(
     loop: str,
     parameters: str = "",

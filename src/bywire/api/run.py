@@ -17,7 +17,7 @@ from bywire.bench.energy_ledger import Ledger, actuator_ledger, disc_ledger
 from bywire.bench.result import Result
 from bywire.bench.running import Progress
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.report.answer import Answer
+from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Attachment,
     Banner,
@@ -171,6 +171,7 @@ class BenchResult(Result, Answer):
         }
 
 
+@use_case
 def run(
     bench: Bench | str | Path,
     overrides: Mapping[str, str] = MappingProxyType({}),

@@ -11,9 +11,9 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from bywire import __version__
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.version import __version__
 from bywire.simulation.run import Run, Trajectory
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import xarray as xr
@@ -16,7 +15,6 @@ from bywire.bench.recording import record
 from bywire.bench.requirements import judge
 from bywire.bench.result import Result
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.errors import ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
@@ -43,8 +41,6 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     RunError
         When a run fails.
     """
-    if isinstance(bench, (str, Path)):
-        raise ParameterError(f"bywire.run takes a Bench: bywire.load({str(bench)!r}) makes one")
     definition, options = bench.definition, bench.chosen_options
     recordings: dict[str, xr.Dataset] = {}
     if definition.static is not None:

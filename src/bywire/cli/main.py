@@ -57,7 +57,7 @@ def _root(
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
 ) -> None:
     if version:
-        from bywire import __version__
+        from bywire.core.version import __version__
 
         result(__version__)
         raise typer.Exit

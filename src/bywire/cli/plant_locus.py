@@ -14,7 +14,7 @@ from bywire.api.loop_case import range_of
 from bywire.cli import output
 from bywire.cli.locus_object import locus_object
 from bywire.cli.output_folder import require_folder
-from bywire.cli.plant_choice import ChosenPlant, subject
+from bywire.cli.plant_choice import ChosenPlant, choose, subject
 from bywire.report.wording import amount
 
 

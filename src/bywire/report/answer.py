@@ -4,14 +4,21 @@ from __future__ import annotations
 
 import json
 import math
+import warnings
 from abc import ABC, abstractmethod
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from bywire.report.document import Document, FigureBlock, TableBlock
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+class AnswerWarning(UserWarning):
+    """What the user of a result should know before its figures are believed."""
 
 
 class Answer(ABC):
@@ -69,6 +76,26 @@ class Answer(ABC):
         from bywire.report.page import fragment_html
 
         return fragment_html(self.document(), [f"Warning: {text}." for text in self.warnings])
+
+
+Asked = ParamSpec("Asked")
+Given = TypeVar("Given", bound=Answer)
+
+
+def use_case(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
+    """Have a function warn of what its answer warns of, so that nothing coarse passes in silence.
+
+    Commands catch these warnings and print them once.
+    """
+
+    @wraps(function)
+    def warned(*args: Asked.args, **kwargs: Asked.kwargs) -> Given:
+        answer = function(*args, **kwargs)
+        for text in answer.warnings:
+            warnings.warn(text, AnswerWarning, stacklevel=2)
+        return answer
+
+    return warned
 
 
 def write_document(document: Document, folder: Path) -> list[Path]:

@@ -9,7 +9,7 @@ from importlib.resources import files
 from itertools import count
 from pathlib import Path
 
-from bywire import __version__
+from bywire.core.version import __version__
 from bywire.report.document import (
     Banner,
     Block,

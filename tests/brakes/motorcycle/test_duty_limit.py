@@ -10,7 +10,7 @@ from bywire.control import current_pi
 OPTIONS = {"duration": "0.6 s", "settle": "0.2 s"}
 
 
-def braking(**overrides: float) -> bywire.Result:
+def braking(**overrides: float) -> bywire.BenchResult:
     names = {name.replace("__", "."): value for name, value in overrides.items()}
     return bywire.run(bywire.Bench("hard-braking", "dardanelli2010", names, OPTIONS))
 
