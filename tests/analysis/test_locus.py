@@ -13,7 +13,7 @@ from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import locus, locus_of
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_curves import loop_curve
-from bywire.analysis.robustness import margins
+from bywire.analysis.margins import figures_at
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 
@@ -23,7 +23,7 @@ def test_a_loop_turns_unstable_at_its_gain_margin_and_swings_at_the_phase_crosso
     loop = LOOPS.find("moment")
     par = parameters(main_set(loop.assembly))
     f_c = par.leaves()["control.moment.f_c"]
-    curve = loop_curve(loop, par, 200.0, margins(loop, par, 200.0))
+    curve = loop_curve(loop, figures_at(loop, par, 200.0))
     values = np.linspace(0.5, 10.0, 20) * f_c
     found = locus(loop, par, 200.0, "control.moment.f_c", "Hz", values.tolist())
     (border,) = found.borders

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.loop_curves import Family, LoopCurve, disk, loop_curve, varied
-from bywire.analysis.robustness import UNSTABLE, margins
+from bywire.analysis.loop_curves import Family, LoopCurve, disk, loop_curve
+from bywire.analysis.margins import UNSTABLE, figures_at
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 
@@ -18,7 +18,7 @@ from bywire.core.errors import ParameterError
 def curve_of(name: str, changes: dict[str, float] | None = None) -> LoopCurve:
     loop = LOOPS.find(name)
     par = parameters(main_set(loop.assembly)).replace(changes or {})
-    return loop_curve(loop, par, loop.at.default, margins(loop, par, loop.at.default), 4000)
+    return loop_curve(loop, figures_at(loop, par, loop.at.default), 4000)
 
 
 @pytest.mark.parametrize("name", ["current", "moment", "position", "pressure"])
@@ -67,6 +67,6 @@ def test_unstable_is_worse_than_any_margin() -> None:
 def test_the_operating_point_varies_as_a_parameter_does() -> None:
     loop = LOOPS.find("pressure")
     par = parameters(main_set(loop.assembly))
-    assert varied(loop, par, 20e5, "pressure", [5e5, 30e5]) == [(par, 5e5), (par, 30e5)]
-    ((own, value),) = varied(loop, par, 20e5, "ecu.pressure.k_p", [1e-5])
+    assert loop.varied(par, 20e5, "pressure", [5e5, 30e5]) == [(par, 5e5), (par, 30e5)]
+    ((own, value),) = loop.varied(par, 20e5, "ecu.pressure.k_p", [1e-5])
     assert (own.leaves()["ecu.pressure.k_p"], value) == (1e-5, 20e5)

@@ -11,7 +11,7 @@ import pytest
 
 from bywire.analysis.agreement import agreement
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.robustness import margins, over, worst
+from bywire.analysis.margins import margins, over, worst
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, StepError, UnknownNameError
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.analysis.margins import bandwidth, margin
+from bywire.analysis.crossings import bandwidth, margin
 
 Array = NDArray[np.float64]
 

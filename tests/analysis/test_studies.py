@@ -10,7 +10,6 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.analysis.study import STUDIES, Map, Mark
 from bywire.brakes.motorcycle.sizing import demand as actuator_demand
 from bywire.brakes.motorcycle.sizing.trial import sine_figures
 from bywire.brakes.motorcycle.studies import actuator_sizing
@@ -21,6 +20,7 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
 from bywire.plant import seal_friction
 from bywire.report.contour import contour, levels_between
+from bywire.synthesis.study import STUDIES, Map, Mark
 
 WEDGE = PARAMETER_SETS.find("roberts2003").parameters().replace({"control.moment.omega_gap": 60.0})
 MOTORCYCLE = PARAMETER_SETS.find("dardanelli2010").parameters()

@@ -9,7 +9,6 @@ from command_line import Outcome, refused
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.study import STUDIES
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.cli.described_systems import (
     described_drive,
@@ -19,6 +18,7 @@ from bywire.cli.described_systems import (
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
 from bywire.identification.method import METHODS
+from bywire.synthesis.study import STUDIES
 
 Bywire = Callable[..., Outcome]
 

@@ -14,7 +14,7 @@ from bywire.analysis.agreement import Agreement
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Border, Locus
 from bywire.analysis.loop_curves import Family, LoopCurve
-from bywire.analysis.robustness import UNSTABLE, LoopMargins
+from bywire.analysis.margins import UNSTABLE, LoopMargins
 from bywire.api.margins import margins_table, worst_texts
 from bywire.core.errors import ParameterError
 from bywire.report.agreement_report import agreement_table, verdict

@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
-from bywire.analysis.loop_curves import varied
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 
@@ -103,8 +102,8 @@ def locus(
     """
 
     def model(at: float) -> LinearModel:
-        ((own, point),) = varied(loop, par, value, name, [at])
-        return loop.closed(own, point)
+        (case,) = loop.varied(par, value, name, [at])
+        return loop.closed(*case)
 
     return locus_of(model, name, unit, values)
 

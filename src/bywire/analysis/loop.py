@@ -15,6 +15,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.open_loop import open_loop
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
+from bywire.core.errors import unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
@@ -149,6 +150,41 @@ class Loop:
     single: bool = True
     analog: bool = False
     locked: tuple[str, ...] = ()
+
+    def require_number(self, par: ParameterSet, name: str) -> None:
+        """Refuse a name that is neither the operating quantity nor a parameter.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        if name != self.at.name and name not in par.leaves():
+            raise unknown_name("parameter", name, [self.at.name, *par.leaves()])
+
+    def varied(
+        self, par: ParameterSet, value: float, name: str, values: Sequence[float]
+    ) -> list[tuple[ParameterSet, float]]:
+        """Return parameters and operating point for each value of a parameter, or of the point.
+
+        Parameters
+        ----------
+        par, value
+            What is kept.
+        name
+            Dotted name of a parameter, or that of the operating quantity.
+        values
+            Its values [SI].
+
+        Raises
+        ------
+        UnknownNameError
+            When there is no such number.
+        """
+        self.require_number(par, name)
+        if name == self.at.name:
+            return [(par, at) for at in values]
+        return [(par.replace({name: number}), value) for number in values]
 
     def smooth(self, par: ParameterSet, leave: str = "") -> ParameterSet:
         """Return parameters without anything that makes the loop nonlinear, except one cause."""

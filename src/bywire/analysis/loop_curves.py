@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from bywire.analysis.crossings import NEARLY_ZERO, real_crossings
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
-from bywire.analysis.robustness import LoopMargins
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import LoopMargins, margins_of
 from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 _BELOW = 30.0  # by so much a chart begins below the band of the loop
-_NYQUIST = 0.998  # of half the sampling frequency, where the phase has no direction
 _POINTS = 1500
 
 
@@ -58,8 +54,8 @@ class LoopCurve:
     @property
     def phase(self) -> Array:
         """Phase [degree] without jumps, between -360 and 0 at the lowest frequency; shape (n,)."""
-        found = np.degrees(np.unwrap(np.angle(self.L)))
-        return np.asarray(found - 360.0 * math.ceil((found[0] - 1.0) / 360.0))
+        phase = np.degrees(np.unwrap(np.angle(self.L)))
+        return np.asarray(phase - 360.0 * math.ceil((phase[0] - NEARLY_ZERO) / 360.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,47 +127,22 @@ def disk(margin: float) -> Disk:
     return Disk(-(1.0 + a * a) / (1.0 - a * a), 2.0 * a / (1.0 - a * a))
 
 
-def loop_curve(
-    loop: Loop, par: ParameterSet, value: float, margins: LoopMargins, points: int = _POINTS
-) -> LoopCurve:
+def loop_curve(loop: Loop, figures: LoopFigures, points: int = _POINTS) -> LoopCurve:
     """Return the loop gain at an operating point, up to half its sampling frequency.
 
     Parameters
     ----------
-    loop, par, value
-        The loop and its operating point.
-    margins
-        Margins there.
+    loop
+        The loop, whose band a chart shows.
+    figures
+        Its figures there, see `margins.figures_at`.
     points
         Number of frequencies n.
-
-    Raises
-    ------
-    InputError
-        When the operating point does not exist.
     """
-    gain = loop.gain(par, value)
-    highest = min(gain.nyquist, loop.closed(par, value).nyquist)
-    f = np.geomspace(loop.band[0] / _BELOW, _NYQUIST * highest, points)
-    L = gain.response(f)[:, 0, 0]
-    return LoopCurve(f, L, margins, _phase_crossover(gain, f, L, margins.gain))
-
-
-def varied(
-    loop: Loop, par: ParameterSet, value: float, name: str, values: Sequence[float]
-) -> list[tuple[ParameterSet, float]]:
-    """Return parameters and operating point for each value of one of them.
-
-    Parameters
-    ----------
-    name
-        Dotted name of a parameter, or that of the loop's operating quantity.
-    values
-        Its values, SI.
-    """
-    if name == loop.at.name:
-        return [(par, one) for one in values]
-    return [(par.replace({name: one}), value) for one in values]
+    margins = margins_of(figures)
+    shown = replace(figures, points=points, lowest=loop.band[0] / _BELOW)
+    crossover = _phase_crossover(figures.gain, shown.frequencies, shown.L, margins.gain)
+    return LoopCurve(shown.frequencies, shown.L, margins, crossover)
 
 
 def _phase_crossover(gain: LinearModel, f: Array, L: Complex, margin: float) -> float:
@@ -182,9 +153,8 @@ def _phase_crossover(gain: LinearModel, f: Array, L: Complex, margin: float) -> 
     def imaginary(at: float) -> float:
         return float(gain.response(np.array([at]))[0, 0, 0].imag)
 
-    crossings = np.flatnonzero(np.diff(np.signbit(L.imag)) & (L.real[:-1] < 0))
-    found = [float(brentq(imaginary, f[k], f[k + 1])) for k in crossings]
+    crossovers = [float(brentq(imaginary, f[k], f[k + 1])) for k in real_crossings(L)]
     if gain.period:
-        found.append(gain.nyquist)  # where the response is real, beyond the grid
-    sizes = np.abs(gain.response(np.array(found))[:, 0, 0])
-    return found[int(np.argmin(np.abs(sizes * margin - 1.0)))]
+        crossovers.append(gain.nyquist)  # where the response is real, beyond the grid
+    sizes = np.abs(gain.response(np.array(crossovers))[:, 0, 0])
+    return crossovers[int(np.argmin(np.abs(sizes * margin - 1.0)))]

@@ -1,101 +1,135 @@
-"""Bandwidth, crossover and phase margin of frequency responses."""
+"""Margins of a loop at an operating point, over a range of a parameter, and the worst of them."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.optimize import brentq
 
-Array = NDArray[np.float64]
-Response = Callable[[Array], NDArray[np.complex128]]
+from bywire.analysis.crossings import margin_of
+from bywire.analysis.loop import Loop
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
 
-_NEARLY_ZERO = 1.0  # phase [degree] at the lower end that still counts as 0: a loop of finite gain
-_POINTS = 4000  # of the grid that brackets the crossings, per call
+SENSES = {
+    "gain": 1, "phase": 1, "delay": 1, "disk": 1, "bandwidth": 1,
+    "sensitivity": -1, "complementary": -1,
+}  # fmt: skip
+"""figures of `LoopMargins`: 1 where more is better, -1 where less is"""
+_POINTS = 2000
 
 
 @dataclass(frozen=True)
-class Margin:
-    """Stability margin of an open loop.
+class LoopMargins:
+    """Margins of a sampled loop as it is, with its delays and filters; NaN where it is unstable.
 
     Parameters
     ----------
-    crossover
-        Highest frequency at which the loop gain is 1 [Hz]; NaN where it never is.
-    phase
-        Smallest phase margin of all frequencies at which the loop gain is 1 [degree]; NaN likewise.
-    at
-        Frequency at which that is read [Hz]; NaN likewise.
+    gain
+        Smallest factor above 1 by which the loop gain may grow; inf where none makes it unstable.
+    phase, crossover
+        Smallest phase margin of all gain crossovers [degree], and the highest of these [Hz].
+    delay
+        Additional dead time that the loop can take [s].
+    disk
+        Disk-based margin (symmetric, skew 0): S - T of this size stays away from -1 in gain and
+        phase at once; 0 to 2.
+    sensitivity, complementary
+        Largest magnitudes of S = 1/(1 + L) and T = L/(1 + L).
+    bandwidth
+        Frequency at which the closed loop has fallen to -3 dB of its gain at rest [Hz].
+    stable
+        Whether the closed loop is stable.
+    phase_at
+        Gain crossover at which the phase margin is read [Hz].
     """
 
-    crossover: float
+    gain: float
     phase: float
-    at: float = math.nan
+    crossover: float
+    delay: float
+    disk: float
+    sensitivity: float
+    complementary: float
+    bandwidth: float
+    stable: bool
+    phase_at: float = math.nan
 
 
-def bandwidth(response: Response, band: tuple[float, float], drop: float = math.sqrt(0.5)) -> float:
-    """Return the lowest frequency [Hz] at which a response has fallen to a share of its start.
+UNSTABLE = LoopMargins(
+    gain=math.nan, phase=math.nan, crossover=math.nan, delay=math.nan, disk=math.nan,
+    sensitivity=math.nan, complementary=math.nan, bandwidth=math.nan, stable=False,
+)  # fmt: skip
+"""what an unstable loop has: no margins"""
+
+
+def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
+    """Return the figures of a loop at an operating point, dry friction removed.
+
+    Raises
+    ------
+    InputError
+        When the operating point does not exist.
+    """
+    return LoopFigures(loop.gain(par, value), loop.closed(par, value), _POINTS, exact=True)
+
+
+def margins_of(figures: LoopFigures) -> LoopMargins:
+    """Return the margins of a loop by its figures."""
+    if not figures.is_stable:
+        return UNSTABLE
+    margin = margin_of(figures.crossings)
+    return LoopMargins(
+        gain=figures.gain_margin,
+        phase=margin.phase,
+        crossover=margin.crossover,
+        delay=_or_nan(figures.delay_margin),
+        disk=figures.disk_margin,
+        sensitivity=figures.sensitivity_peak,
+        complementary=figures.complementary_peak,
+        bandwidth=_or_nan(figures.fall),
+        stable=True,
+        phase_at=margin.at,
+    )
+
+
+def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
+    """Return the margins of a loop at an operating point, see `figures_at`."""
+    return margins_of(figures_at(loop, par, value))
+
+
+def over(
+    loop: Loop, par: ParameterSet, value: float, name: str, values: Sequence[float]
+) -> list[LoopMargins]:
+    """Return the margins for several values of a parameter, or of the operating point.
 
     Parameters
     ----------
-    response
-        ``response(frequencies [Hz]) -> complex``.
-    band
-        Frequencies to look at [Hz]; the response at the lower one counts as 1.
-    drop
-        The share: -3 dB by default.
-
-    Returns
-    -------
-    float
-        NaN where the response stays above it.
+    name, values
+        See `Loop.varied`.
     """
-    level = drop * float(np.abs(response(np.array([band[0]])))[0])
-
-    def excess(f: float) -> float:
-        return float(np.abs(response(np.array([f])))[0]) - level
-
-    grid = np.geomspace(*band, _POINTS)
-    below = np.flatnonzero(np.abs(response(grid)) < level)
-    if below.size == 0:
-        return math.nan
-    return float(brentq(excess, grid[below[0] - 1], grid[below[0]]))
+    return [margins(loop, *case) for case in loop.varied(par, value, name, values)]
 
 
-def margin(loop: Response, band: tuple[float, float]) -> Margin:
-    """Return crossover and phase margin of an open loop (negative feedback not counted).
+def worst(
+    margins: Sequence[LoopMargins], values: Sequence[float]
+) -> Mapping[str, tuple[float, float]]:
+    """Return the worst of each margin, and the value at which it occurs.
 
-    The phase is followed without jumps from the band's lower end, where it counts as the value
-    between -360 and 0 degree: a loop with integral action begins near -90. Of several frequencies
-    at which the gain is 1, falling or rising, the one nearest to -1 has the phase margin.
-
-    Parameters
-    ----------
-    loop
-        ``loop(frequencies [Hz]) -> complex``.
-    band
-        Frequencies to look at [Hz].
+    Nothing is worse than an unstable loop, whose margins are NaN.
     """
-    grid = np.geomspace(*band, _POINTS)
-    values = loop(grid)
-    above = np.abs(values) >= 1.0
-    passes = np.flatnonzero(above[:-1] != above[1:])
-    falls = [int(k) for k in passes if above[k]]
-    if not falls:
-        return Margin(math.nan, math.nan)
+    if not margins:
+        raise ParameterError("no margins to choose from: give at least one value")
+    result: dict[str, tuple[float, float]] = {}
+    for field, sense in SENSES.items():
+        sizes = [sense * getattr(row, field) if row.stable else -math.inf for row in margins]
+        k = int(np.nanargmin(sizes)) if not all(map(math.isnan, sizes)) else 0
+        result[field] = (getattr(margins[k], field), float(values[k]))
+    return result
 
-    def excess(f: float) -> float:
-        return float(np.abs(loop(np.array([f])))[0]) - 1.0
 
-    found = {}
-    for k in map(int, passes):
-        f = float(brentq(excess, grid[k], grid[k + 1]))
-        path = np.append(values[: k + 1], loop(np.array([f])))
-        phase = np.degrees(np.unwrap(np.angle(path)))
-        turns = 360.0 * math.ceil((phase[0] - _NEARLY_ZERO) / 360.0)
-        found[k] = f, 180.0 + float(phase[-1] - turns)
-    at, smallest = min(found.values(), key=lambda one: abs((one[1] + 180.0) % 360.0 - 180.0))
-    return Margin(found[falls[-1]][0], smallest, at)
+def _or_nan(figure: float) -> float:
+    return figure if math.isfinite(figure) else math.nan

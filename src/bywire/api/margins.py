@@ -9,9 +9,8 @@ from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-from bywire.analysis import robustness
-from bywire.analysis.loop_curves import Family, loop_curve, varied
-from bywire.analysis.robustness import LoopMargins, worst
+from bywire.analysis.loop_curves import Family, loop_curve
+from bywire.analysis.margins import LoopMargins, figures_at, margins_of, worst
 from bywire.api.loop_case import LoopCase, loop_case, over_range
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
@@ -81,11 +80,8 @@ class Margins(Answer):
         """The loop gains with their margins, for figures."""
         case, cases = self.case, [(self.case.par, self.case.value)]
         if self.name:
-            cases = varied(case.loop, case.par, case.value, self.name, self.values)
-        curves = [
-            loop_curve(case.loop, *each, margins)
-            for each, margins in zip(cases, self.margins, strict=True)
-        ]
+            cases = case.loop.varied(case.par, case.value, self.name, self.values)
+        curves = [loop_curve(case.loop, figures_at(case.loop, *each)) for each in cases]
         return Family(tuple(curves), self.name, self.unit, self.values or (math.nan,))
 
     def document(self) -> Document:
@@ -175,10 +171,11 @@ def margins(
     """
     case = loop_case(loop, parameters, at, overrides)
     if not over:
-        return Margins(case, (robustness.margins(case.loop, case.par, case.value),))
+        return Margins(case, (margins_of(figures_at(case.loop, case.par, case.value)),))
     name, unit, values = over_range(over, case)
-    found = robustness.over(case.loop, case.par, case.value, name, values)
-    return Margins(case, tuple(found), name, unit, tuple(values))
+    cases = case.loop.varied(case.par, case.value, name, values)
+    each = tuple(margins_of(figures_at(case.loop, *point)) for point in cases)
+    return Margins(case, each, name, unit, tuple(values))
 
 
 def margins_table(

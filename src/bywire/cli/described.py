@@ -7,7 +7,6 @@ from typing import Any
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.study import STUDIES, Study
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
@@ -35,6 +34,7 @@ from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.identification.fitting.asked import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method
+from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
 

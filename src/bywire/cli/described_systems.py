@@ -11,7 +11,6 @@ import numpy as np
 
 from bywire.analysis.linear.plant import PLANTS, Plant
 from bywire.analysis.loop import LOOPS, Loop
-from bywire.analysis.study import STUDIES
 from bywire.bench.experiment import EXPERIMENTS, Case, Experiment
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.model import ASSEMBLIES
@@ -19,6 +18,7 @@ from bywire.core.quantities import display_unit
 from bywire.core.signals import merged_signals, places_of, signals_of
 from bywire.identification.method import METHODS
 from bywire.report.wording import unit_text
+from bywire.synthesis.study import STUDIES
 
 Object = dict[str, Any]
 

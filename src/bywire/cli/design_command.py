@@ -6,9 +6,6 @@ import json
 from collections.abc import Mapping
 from pathlib import Path
 
-from bywire.analysis.design.designer import design
-from bywire.analysis.design.linear_case import cases_of
-from bywire.analysis.design.verification import Verification, verify
 from bywire.api.loop_case import loop_case, over_range
 from bywire.cli import output
 from bywire.cli.design_ending import exit_status, reported, written
@@ -24,6 +21,9 @@ from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.cli.verification_text import as_lines
 from bywire.core.units import shown
+from bywire.synthesis.designer import design
+from bywire.synthesis.linear_case import cases_of
+from bywire.synthesis.verification import Verification, verify
 
 
 def execute(

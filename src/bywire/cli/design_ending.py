@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.design.bench_text import bench_text
-from bywire.analysis.design.outcome import Status
-from bywire.analysis.design.requirement import Requirement
-from bywire.analysis.design.verification import Verification
 from bywire.api.loop_case import LoopCase
 from bywire.cli import output
 from bywire.core.errors import FileError
+from bywire.synthesis.bench_text import bench_text
+from bywire.synthesis.outcome import Status
+from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.verification import Verification
 
 if TYPE_CHECKING:
     from bywire.cli.verification_text import Part
@@ -98,22 +98,18 @@ def reported(
 
 
 def _curve(chosen: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:
-    from bywire.analysis.design.loop_figures import LoopFigures
     from bywire.analysis.loop_curves import loop_curve
-    from bywire.analysis.robustness import margins
+    from bywire.analysis.margins import figures_at
     from bywire.report.design_curves import DesignCurve
 
-    loop, par, value = chosen.loop, chosen.par.replace(gains), chosen.value
-    closed = loop.closed(par, value)
-    found = margins(loop, par, value)
+    figures = figures_at(chosen.loop, chosen.par.replace(gains), chosen.value)
     step: NDArray[np.float64] = np.zeros(1)
     span = 0.0
-    if found.stable:
-        figures = LoopFigures(loop.gain(par, value), closed)
+    if figures.is_stable:
         step, settling = figures.step, figures.settling_time
         span = max(_STEPS / figures.bandwidth, _SETTLED * settling if settling < np.inf else 0.0)
-    time = np.arange(step.size, dtype=float) * closed.period
-    return DesignCurve(label, loop_curve(loop, par, value, found), time, step, span)
+    time = np.arange(step.size, dtype=float) * figures.closed.period
+    return DesignCurve(label, loop_curve(chosen.loop, figures), time, step, span)
 
 
 def exit_status(status: Status, tried: Verification | None) -> int:

@@ -6,13 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bywire.analysis.design.requirement import Requirement, read
-from bywire.analysis.design.trial import Trial
 from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
+from bywire.synthesis.requirement import Requirement, read
+from bywire.synthesis.trial import Trial
 
 Spans = Mapping[str, tuple[float, float]]
 

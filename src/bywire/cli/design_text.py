@@ -6,9 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bywire.analysis.design.outcome import Design
-from bywire.analysis.design.requirement import FIGURES, Requirement
-from bywire.analysis.design.verification import Verification
 from bywire.api.loop_case import LoopCase
 from bywire.cli.verification_text import (
     figure_text,
@@ -18,6 +15,9 @@ from bywire.cli.verification_text import (
     verification_parts,
 )
 from bywire.core.parameters import leaf_fields
+from bywire.synthesis.outcome import Design
+from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.verification import Verification
 
 if TYPE_CHECKING:
     from bywire.cli.verification_text import Part

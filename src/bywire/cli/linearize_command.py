@@ -71,7 +71,6 @@ def _written(
     shaken: PeriodicModel | None,
     out: Path,
 ) -> list[Path]:
-    from bywire.analysis.loop_curves import varied
     from bywire.report.files import write_bytes
     from bywire.report.linearize_report import own_bandwidth, write_model
 
@@ -81,7 +80,7 @@ def _written(
     models = [model]
     if found is not None:
         ends = (float(found.values[0]), float(found.values[-1]))
-        cases = varied(loop, chosen.par, chosen.value, found.name, ends)
+        cases = loop.varied(chosen.par, chosen.value, found.name, ends)
         models += [loop.closed(*case) for case in cases]
     widest = max((own_bandwidth(one) for one in models if one.is_stable), default=float("nan"))
     told = None if shaken is None else (shaken, periodic_choice.head(shaken))

@@ -8,7 +8,6 @@ from textwrap import wrap
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.study import STUDIES
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
@@ -16,6 +15,7 @@ from bywire.cli.output import result
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.identification.fitting.asked import BENCH_METHODS
 from bywire.identification.method import METHODS, Method
+from bywire.synthesis.study import STUDIES
 
 _WIDTH = 100  # characters of a line
 _NAME = 26  # columns of a name

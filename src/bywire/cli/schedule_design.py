@@ -7,14 +7,6 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from bywire.analysis.design.schedule_designer import (
-    design_schedule,
-    frozen,
-    points_by_region,
-    scheduled,
-)
-from bywire.analysis.design.schedule_verification import verify_schedule
-from bywire.analysis.design.verification import Verification
 from bywire.analysis.loop import LOOPS
 from bywire.api.loop_case import loop_case, over_range, spread
 from bywire.cli import output
@@ -24,6 +16,14 @@ from bywire.cli.progress import progress_bar
 from bywire.cli.schedule_text import as_object, as_parts
 from bywire.cli.verification_text import as_lines
 from bywire.core.units import shown
+from bywire.synthesis.schedule_designer import (
+    design_schedule,
+    frozen,
+    points_by_region,
+    scheduled,
+)
+from bywire.synthesis.schedule_verification import verify_schedule
+from bywire.synthesis.verification import Verification
 
 
 def execute(

@@ -6,10 +6,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from bywire.analysis.design.requirement import FIGURES, Requirement
-from bywire.analysis.design.schedule_designer import scheduled
-from bywire.analysis.design.schedule_outcome import Across, ScheduleDesign
-from bywire.analysis.design.verification import Verification
 from bywire.api.loop_case import LoopCase
 from bywire.cli.design_text import gain_text, kept_lines, unit_of
 from bywire.cli.verification_text import (
@@ -20,6 +16,10 @@ from bywire.cli.verification_text import (
     verification_parts,
 )
 from bywire.core.units import shown
+from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.schedule_designer import scheduled
+from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
+from bywire.synthesis.verification import Verification
 
 if TYPE_CHECKING:
     from bywire.cli.verification_text import Part

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.study import STUDIES, Found, Study
 from bywire.api.parameter_choice import set_for
 from bywire.bench.values import parsed
 from bywire.cli import output
@@ -19,6 +18,7 @@ from bywire.cli.output_folder import require_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.synthesis.study import STUDIES, Found, Study
 
 
 def execute(

@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from bywire.analysis.design.bench_figures import BenchFigures
-from bywire.analysis.design.candidate import Candidate
-from bywire.analysis.design.requirement import FIGURES
-from bywire.analysis.design.verification import Verification
 from bywire.api.loop_case import LoopCase
+from bywire.synthesis.bench_figures import BenchFigures
+from bywire.synthesis.candidate import Candidate
+from bywire.synthesis.requirement import FIGURES
+from bywire.synthesis.verification import Verification
 
 if TYPE_CHECKING:
     from bywire.report.tables import Table

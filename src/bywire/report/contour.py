@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from bywire.analysis.study import Map
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import FloatArray
 from bywire.report.wording import in_display_unit
+from bywire.synthesis.study import Map
 
 _Extend = Literal["neither", "min", "max", "both"]
 _STEPS = (1.0, 1.2, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)  # of a decade

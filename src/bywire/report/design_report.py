@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from bywire.analysis.design.requirement import Requirement
 from bywire.report.design_curves import DesignCurve, loop_gains, sensitivities, steps
 from bywire.report.document import Banner, FigureBlock, Flat, Listing, Section, TableBlock
 from bywire.report.files import save_figure
 from bywire.report.page import write_page
 from bywire.report.subject import Subject
 from bywire.report.tables import Table
+from bywire.synthesis.requirement import Requirement
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from bywire.analysis.crossings import bandwidth
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.analysis.locus import Locus
-from bywire.analysis.margins import bandwidth
 from bywire.analysis.periodic.averaged_map import PeriodicModel
 from bywire.report.bode import Response, bode
 from bywire.report.document import (

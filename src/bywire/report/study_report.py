@@ -7,7 +7,6 @@ from pathlib import Path
 
 from matplotlib.figure import Figure
 
-from bywire.analysis.study import Cut, Found, Study
 from bywire.core.parameters import ParameterSet
 from bywire.report.document import Details, FigureBlock, Listing, Section, TableBlock
 from bywire.report.page import write_page
@@ -15,6 +14,7 @@ from bywire.report.parameter_rows import parameter_rows
 from bywire.report.subject import Subject
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
+from bywire.synthesis.study import Cut, Found, Study
 
 
 def write_study(

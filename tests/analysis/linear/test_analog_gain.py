@@ -7,10 +7,10 @@ import math
 import numpy as np
 import pytest
 
-from bywire.analysis.design.loop_figures import LoopFigures
 from bywire.analysis.linear.analog_gain import analog_gain
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.robustness import margins
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import margins
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from bywire.analysis.crossings import margin
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.open_loop import open_loop
-from bywire.analysis.margins import margin
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.model import WedgeBrake

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from scipy.signal import cont2discrete
 
+from bywire.analysis.crossings import fall
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.response.measured_bandwidth import complex_values, fall
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.linear.current_loop import current_loop

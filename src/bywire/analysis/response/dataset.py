@@ -9,14 +9,12 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
 from bywire.simulation.variations import Variations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -125,6 +123,11 @@ def _unwrapped(phase: Array) -> Array:
     return found
 
 
+def complex_values(response: xr.Dataset) -> Complex:
+    """Return gain and phase of a response as complex numbers, NaN where the output sticks."""
+    return np.asarray(response["gain"].values * np.exp(1j * np.radians(response["phase"].values)))
+
+
 def response_data(response: xr.Dataset, variant: int = 0, amplitude: int = 0) -> Any:
     """Return one variant and amplitude as ``control.FrequencyResponseData``.
 
@@ -132,7 +135,7 @@ def response_data(response: xr.Dataset, variant: int = 0, amplitude: int = 0) ->
     """
     import control
 
-    one = response.isel(variant=variant, amplitude=amplitude)
-    known = np.isfinite(one["gain"].values)
-    values = one["gain"].values * np.exp(1j * np.radians(one["phase"].values))
-    return control.frd(values[known], 2.0 * math.pi * one["frequency"].values[known])
+    part = response.isel(variant=variant, amplitude=amplitude)
+    values = complex_values(part)
+    known = np.isfinite(values)
+    return control.frd(values[known], 2.0 * math.pi * part["frequency"].values[known])

@@ -17,16 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from bywire.analysis.design.describing_function import phase_margin
+from bywire.analysis.crossings import fall, measured_margin
 from bywire.analysis.loop import Loop, Point
-from bywire.analysis.response.measured_bandwidth import complex_values, fall
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.analysis.response.dataset import complex_values
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 
 @dataclass(frozen=True)
@@ -73,14 +70,10 @@ def variants_over(base: Variant, name: str, values: Sequence[float]) -> list[Var
     ParameterError
         When there is no value, or one is not admissible.
     """
-    loop, par, value = base.loop, base.par, base.value
     if not values:
         raise ParameterError(f"{name}: give at least one value")
-    if name == loop.at.name:
-        return [Variant(loop, par, one, one) for one in values]
-    if name not in par.leaves():
-        raise unknown_name("parameter", name, [loop.at.name, *par.leaves()])
-    return [Variant(loop, par.replace({name: one}), value, one) for one in values]
+    cases = base.loop.varied(base.par, base.value, name, values)
+    return [Variant(base.loop, *case, at) for case, at in zip(cases, values, strict=True)]
 
 
 @dataclass(frozen=True)
@@ -117,8 +110,8 @@ def width(variant: Variant, one: xr.Dataset) -> Width:
     bandwidth, known = fall(one["gain"].values, f, start), np.isfinite(values)
     if not variant.loop.single or not known.any():
         return Width(bandwidth, math.nan, math.nan)
-    margin, crossover = phase_margin(variant.gain(values[known], f[known]), f[known])
-    return Width(bandwidth, crossover, margin)
+    margin = measured_margin(f[known], variant.gain(values[known], f[known]))
+    return Width(bandwidth, margin.crossover, margin.phase)
 
 
 def widths(variants: Sequence[Variant], found: xr.Dataset) -> list[list[Width]]:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.analysis.locus import Border, locus
+from bywire.analysis.loop_figures import LoopFigures
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.linear import full, mechanical, rigid_rate
 from bywire.brakes.wedge.loops.moment import LOOP
@@ -17,7 +18,6 @@ from bywire.core.errors import InputError
 
 _POINTS = 200  # frequencies of a disk margin
 _LOWEST = 0.05  # Hz
-_NYQUIST = 0.998  # of half the sampling frequency
 _SPAN = 1.5  # a border is looked for between the neutral point over and times this
 _EXACT = 1e-9
 _FREE = 1e-12  # of the largest coupling: less is rounding
@@ -131,14 +131,13 @@ def controlled(par: WedgeParameters, moment: float) -> Controlled:
     All NaN where the brake cannot be held at the moment.
     """
     try:
-        closed, gain = LOOP.closed(par, moment), LOOP.gain(par, moment)
+        gain, closed = LOOP.gain(par, moment), LOOP.closed(par, moment)
     except InputError:
         return Controlled(math.nan, math.nan)
     if not closed.is_stable:
         return Controlled(math.nan, 1.0)
-    f = np.geomspace(_LOWEST, _NYQUIST * gain.nyquist, _POINTS)
-    L = gain.response(f)[:, 0, 0]
-    return Controlled(2.0 / float(np.max(np.abs((1.0 - L) / (1.0 + L)))), 0.0)
+    figures = LoopFigures(gain, closed, _POINTS, lowest=_LOWEST)
+    return Controlled(figures.disk_margin, 0.0)
 
 
 def moment_borders(

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.analysis.study import STUDIES
 from bywire.brakes.wedge.sizing.limits import active, around, failures
 from bywire.brakes.wedge.sizing.options import DEFAULTS
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
+from bywire.synthesis.study import STUDIES
 
 MU = (0.25, 0.45)
 

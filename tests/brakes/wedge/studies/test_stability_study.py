@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.robustness import margins
+from bywire.analysis.margins import margins
 from bywire.brakes.wedge.stability import brake, controlled, motion, neutral
 from bywire.brakes.wedge.studies.stability import DEFAULTS, compute
 from bywire.core.catalog import parameters

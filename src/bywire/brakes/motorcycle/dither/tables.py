@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.study import Cut, variable
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate
 from bywire.brakes.motorcycle.dither.map import Grid
 from bywire.brakes.motorcycle.dither.reach import breakaway_torques, reach
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control.dither import breakaway_current
+from bywire.synthesis.study import Cut, variable
 
 Par = MotorcycleParameters
 

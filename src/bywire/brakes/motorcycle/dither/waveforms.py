@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.study import Cut, variable
 from bywire.brakes.motorcycle.dither.choice import candidates
 from bywire.brakes.motorcycle.dither.map import Grid
 from bywire.brakes.motorcycle.dither.reach import attenuation, reach, waveform
 from bywire.brakes.motorcycle.dither.trial import tried
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.synthesis.study import Cut, variable
 
 Par = MotorcycleParameters
 

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.crossings import Margin, margin
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.linear.rational import Rational
-from bywire.analysis.margins import Margin, margin
 from bywire.brakes.motorcycle.linear import control_laws
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.analysis.margins import bandwidth
+from bywire.analysis.crossings import bandwidth
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.current_loop import Rotor, current_loop
 from bywire.brakes.motorcycle.paper import facts

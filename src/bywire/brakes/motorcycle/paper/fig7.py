@@ -7,8 +7,8 @@ import math
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.margins import bandwidth
-from bywire.analysis.response.measured_bandwidth import complex_values, fall
+from bywire.analysis.crossings import bandwidth, fall
+from bywire.analysis.response.dataset import complex_values
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.pressure_loop import BAND, PressureLoop, cancelling_pi
 from bywire.brakes.motorcycle.paper import facts

@@ -6,11 +6,10 @@ from typing import Literal
 
 import numpy as np
 
-from bywire.analysis.design.bench_figures import bench_figures
 from bywire.analysis.loop import LOOPS
+from bywire.analysis.margins import margins
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.robustness import margins
 from bywire.bench.bench import Bench
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, Runs, parameters
@@ -18,6 +17,7 @@ from bywire.brakes.motorcycle.paper.tolerances import STEADY
 from bywire.report.bode import Response, bode
 from bywire.reproduction.item import Item, compared
 from bywire.reproduction.reproduction import Exhibit, Part
+from bywire.synthesis.bench_figures import bench_figures
 
 RETUNED = "dardanelli2010-retuned"
 SETS = {MAIN: "", RETUNED: "@retuned"}

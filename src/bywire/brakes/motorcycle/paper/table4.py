@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
+from bywire.analysis.crossings import fall
 from bywire.analysis.linear.rational import Rational
-from bywire.analysis.response.measured_bandwidth import complex_values, fall
+from bywire.analysis.response.dataset import complex_values
 from bywire.brakes.motorcycle.linear.brake import theoretical
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper import identified as dardanelli2010_identified

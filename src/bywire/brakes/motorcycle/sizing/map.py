@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.study import variable
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing.demand import Course, Motion, breakaway_current, geared, motion
+from bywire.synthesis.study import variable
 
 Array = NDArray[np.float64]
 Par = MotorcycleParameters

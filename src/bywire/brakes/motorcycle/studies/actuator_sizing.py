@@ -9,7 +9,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing import trial as actuator_trial
@@ -25,6 +24,7 @@ from bywire.brakes.motorcycle.sizing.map import SIZES, mapped, sizes_of
 from bywire.brakes.motorcycle.sizing.options import ASSUMPTIONS, Options
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import ParameterError
+from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study
 
 Array = NDArray[np.float64]
 Par = MotorcycleParameters

@@ -8,7 +8,6 @@ from typing import cast
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.study import Found, Map, Mark, Progress, Study
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate, best_of, candidates
 from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
@@ -22,6 +21,7 @@ from bywire.brakes.motorcycle.dither.waveforms import compared
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, ParameterError, RunError
+from bywire.synthesis.study import Found, Map, Mark, Progress, Study
 
 Par = MotorcycleParameters
 

@@ -7,8 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.analysis.crossings import bandwidth
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.margins import bandwidth
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.brakes.wedge.paper import facts, frequency

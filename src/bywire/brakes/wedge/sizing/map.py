@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.study import variable
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.sizing.design import answer, redesigned
+from bywire.synthesis.study import variable
 
 Array = NDArray[np.float64]
 

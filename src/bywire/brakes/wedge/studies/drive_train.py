@@ -11,7 +11,6 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -20,6 +19,7 @@ from bywire.brakes.wedge.sizing.design import answer
 from bywire.brakes.wedge.sizing.limits import active, around
 from bywire.brakes.wedge.sizing.map import mapped
 from bywire.brakes.wedge.sizing.options import ASSUMPTIONS, DEFAULTS, Options
+from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from bywire.analysis.study import Cut, Found, Map, Mark, Progress, Study, variable
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
@@ -19,6 +18,7 @@ from bywire.brakes.wedge.sizing.options import Count, Slope
 from bywire.brakes.wedge.stability import brake, controlled, moment_borders, motion, neutral
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
+from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study, variable
 
 Array = NDArray[np.float64]
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]

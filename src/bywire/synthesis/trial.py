@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from bywire.analysis.design.bench_figures import BenchFigures, bench_figures, has_step
-from bywire.analysis.design.linear_case import NOMINAL, LinearCase
 from bywire.analysis.loop import Loop
 from bywire.bench.bench import Bench
 from bywire.core.parameters import ParameterSet
+from bywire.synthesis.bench_figures import BenchFigures, bench_figures, has_step
+from bywire.synthesis.linear_case import NOMINAL, LinearCase
 
 
 @dataclass(frozen=True)

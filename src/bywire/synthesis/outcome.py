@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from bywire.analysis.design.requirement import Requirement
+from bywire.synthesis.requirement import Requirement
 
 Status = Literal["met", "infeasible", "interrupted"]
 MISSED = -1e-3

@@ -8,18 +8,18 @@ from typing import Any
 
 import numpy as np
 
-from bywire.analysis.design.designer import design
-from bywire.analysis.design.linear_case import LinearCase, cases_of
-from bywire.analysis.design.loop_figures import LoopFigures
-from bywire.analysis.design.optimizer import Progress
-from bywire.analysis.design.outcome import Design
-from bywire.analysis.design.requirement import FIGURES, Requirement
-from bywire.analysis.design.schedule_outcome import Across, ScheduleDesign
 from bywire.analysis.loop import Loop
+from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.units import shown
+from bywire.synthesis.designer import design
+from bywire.synthesis.linear_case import LinearCase, cases_of, room
+from bywire.synthesis.optimizer import Progress
+from bywire.synthesis.outcome import Design
+from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
 
 _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15
@@ -190,11 +190,11 @@ def _across(
     return Across(case.label, case.at or 0.0, region, row, slack_of(found, requirements))
 
 
-def slack_of(found: LoopFigures, requirements: Sequence[Requirement]) -> float:
+def slack_of(figures: LoopFigures, requirements: Sequence[Requirement]) -> float:
     """Return the room of the requirement that is worst off; negative infinity where unstable."""
-    if not found.is_stable:
+    if not figures.is_stable:
         return -math.inf
-    return float(min(found.room(one) for one in requirements))
+    return float(min(room(figures, requirement) for requirement in requirements))
 
 
 def _ranges(

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from bywire.analysis.design.linear_case import LinearCase
-from bywire.analysis.design.requirement import Requirement
+from bywire.synthesis.linear_case import LinearCase, room, slack
+from bywire.synthesis.requirement import Requirement
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -81,7 +81,7 @@ class Problem:
     def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
         """Return the slack of every requirement for some cases, shape (cases, requirements).
 
-        ``plain``: a bandwidth by its frequency, see `LoopFigures.room`.
+        ``plain``: a bandwidth by its frequency, see `linear_case.room`.
         """
         return np.array([self._of(z, k)[int(plain)] for k in cases])
 
@@ -93,13 +93,13 @@ class Problem:
     def _of(self, z: Array, k: int) -> tuple[Array, Array]:
         key = (np.round(z, 12).tobytes(), k)
         if key not in self._known:
-            found = self.cases[k].figures(self.gains(z))
-            if found.is_stable:
-                both = [[found.slack(one) for one in self.requirements],
-                        [found.room(one) for one in self.requirements]]  # fmt: skip
+            figures = self.cases[k].figures(self.gains(z))
+            if figures.is_stable:
+                both = [[slack(figures, wanted) for wanted in self.requirements],
+                        [room(figures, wanted) for wanted in self.requirements]]  # fmt: skip
                 slacks, rooms = np.clip(both, _LEAST, _LARGEST)
             else:
-                worse = UNSTABLE - 10.0 * (found.growth - 1.0)
+                worse = UNSTABLE - 10.0 * (figures.growth - 1.0)
                 slacks = rooms = np.full(len(self.requirements), worse)
             self._known[key] = slacks, rooms
         return self._known[key]

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 
-from bywire.analysis.design.bench_figures import BenchFigures
-from bywire.analysis.design.requirement import Requirement, read
+from bywire.synthesis.bench_figures import BenchFigures
+from bywire.synthesis.requirement import Requirement, read
 
 DISK = 0.5
 """disk margin that is kept: gain by a factor of 1.67, phase by 28 degree"""

@@ -6,13 +6,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from bywire.analysis.design.loop_figures import LoopFigures
+import numpy as np
+
+from bywire.analysis.crossings import DROP
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
-from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.core.errors import InputError, ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
+from bywire.synthesis.requirement import Requirement
 
 NOMINAL = "nominal"
 """label of the model at the operating point itself"""
@@ -45,6 +49,25 @@ class LinearCase:
             return LoopFigures(*self.build(gains), points)
 
 
+def room(figures: LoopFigures, requirement: Requirement) -> float:
+    """Return the distance of a figure from its limit, as a share of it."""
+    return requirement.slack(float(getattr(figures, requirement.figure)))
+
+
+def slack(figures: LoopFigures, requirement: Requirement) -> float:
+    """Return how far a requirement is met, as a share of its limit: what a search climbs.
+
+    For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
+    the frequency itself jumps where a dip touches that level.
+    """
+    if requirement.figure != "bandwidth" or requirement.sense < 0:
+        return room(figures, requirement)
+    below = figures.T[figures.frequencies < requirement.limit]
+    at = figures.closed.response(np.array([requirement.limit]))[:, 0, 0]
+    size = float(np.min(np.abs(np.append(below, at))))
+    return size / (DROP * figures.rest) - 1.0
+
+
 def cases_of(
     loop: Loop, par: ParameterSet, value: float, over: Mapping[str, Sequence[float]]
 ) -> tuple[LinearCase, ...]:
@@ -67,8 +90,7 @@ def cases_of(
     for name in over:
         if name in loop.tunables or _scheduled(loop, name):
             raise ParameterError(f"{name} is what the design chooses: it cannot also be a range")
-        if name != loop.at.name and name not in par.leaves():
-            raise unknown_name("parameter", name, [loop.at.name, *par.leaves()])
+        loop.require_number(par, name)
     combinations = list(product(*over.values())) if over else []
     if len(combinations) > _MOST:
         raise ParameterError(

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from bywire.analysis.design.linear_case import LinearCase
-from bywire.analysis.design.outcome import MISSED, Design, Status
+from bywire.synthesis.linear_case import LinearCase
+from bywire.synthesis.outcome import MISSED, Design, Status
 
 
 @dataclass(frozen=True)

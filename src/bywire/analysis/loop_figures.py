@@ -1,4 +1,4 @@
-"""Figures of one linear sampled loop that requirements speak about."""
+"""Figures of a linear control loop: crossover, margins, peaks of S and T, bandwidth, step."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bywire.analysis.design.requirement import Requirement
+from bywire.analysis.crossings import (
+    DROP,
+    Crossing,
+    disk_margin,
+    fall,
+    gain_crossings,
+    real_crossings,
+)
 from bywire.analysis.linear.linear_model import LinearModel
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 _LOWEST = 1e-2  # lower end of the frequencies looked at, Hz
+_NYQUIST = 0.998  # of half the sampling frequency, where the phase has no direction
 _REST = 1e-6  # where a response counts as that at rest, Hz
 _BAND = 0.02  # of the step: half the settling band
 _MOST = 2**15  # samples of a step response: 33 s of a loop of 1 kHz
@@ -26,7 +31,7 @@ _SETTLED = 1e-4  # share of the slowest mode that may be left where a step respo
 
 @dataclass(frozen=True, eq=False)
 class LoopFigures:
-    """Figures of a loop, each computed when it is asked for.
+    """Figures of a linear loop, each computed when it is asked for.
 
     Between the points of a logarithmic grid of frequencies the responses are interpolated:
     400 points are good for 0.1 % of a frequency, 4000 for 0.001 %.
@@ -39,17 +44,28 @@ class LoopFigures:
         From set point to output, of the same sample time.
     points
         Points of the grid.
+    exact
+        Whether crossovers and bandwidth are solved for between the points: too dear for a search.
+    lowest
+        Lower end of the grid [Hz].
     """
 
     gain: LinearModel
     closed: LinearModel
     points: int = 400
+    exact: bool = False
+    lowest: float = _LOWEST
 
     @cached_property
     def frequencies(self) -> Array:
         """The grid [Hz], up to half the sampling frequency."""
-        highest = 0.998 * min(self.gain.nyquist, self.closed.nyquist)
-        return np.geomspace(_LOWEST, highest, self.points)
+        highest = _NYQUIST * min(self.gain.nyquist, self.closed.nyquist)
+        return np.geomspace(self.lowest, highest, self.points)
+
+    @cached_property
+    def L(self) -> Complex:
+        """Loop gain on the grid, shape (points,)."""
+        return self._gain_at(self.frequencies)
 
     @cached_property
     def growth(self) -> float:
@@ -69,76 +85,63 @@ class LoopFigures:
 
         The end of the grid where it stays above.
         """
-        f, size, level = self.frequencies, np.abs(self._T), self._level
-        if size[0] < level:  # a slow integrator: it falls below the grid
-            f = np.geomspace(_REST, _LOWEST, self.points)
-            size = np.abs(self.closed.response(f)[:, 0, 0])
-            size[-1] = min(size[-1], math.nextafter(level, 0.0))
-        below = np.flatnonzero(size < level)
-        if below.size == 0:
-            return float(f[-1])
-        return _between(f, np.log(size / level), int(below[0]) - 1)
-
-    def room(self, one: Requirement) -> float:
-        """Return the distance of a figure from its limit, as a share of it."""
-        return one.slack(float(getattr(self, one.figure)))
-
-    def slack(self, one: Requirement) -> float:
-        """Return how far a requirement is met, as a share of its limit: what a search climbs.
-
-        For a bandwidth it is the room of the closed loop's magnitude above -3 dB up to the limit:
-        the frequency itself jumps where a dip touches that level.
-        """
-        if one.figure != "bandwidth" or one.sense < 0:
-            return self.room(one)
-        f = np.append(self.frequencies[self.frequencies < one.limit], one.limit)
-        size = np.append(self._T[: f.size - 1], self.closed.response(f[-1:])[:, 0, 0])
-        return float(np.min(np.abs(size))) / self._level - 1.0
+        return min(self.fall, float(self.frequencies[-1]))
 
     @cached_property
+    def rest(self) -> float:
+        """Magnitude of the closed loop at rest."""
+        return float(abs(self._closed_at(np.array([_REST]))[0]))
+
+    @cached_property
+    def T(self) -> Complex:
+        """Closed loop on the grid, shape (points,)."""
+        return self._closed_at(self.frequencies)
+
+    @property
     def crossover(self) -> float:
         """Highest frequency at which the loop gain falls to 1 [Hz]; 0 where it never does."""
-        falls = np.flatnonzero((self._size[:-1] >= 0.0) & (self._size[1:] < 0.0))
-        return _between(self.frequencies, self._size, int(falls[-1])) if falls.size else 0.0
+        return max((at.frequency for at in self.crossings if at.falls), default=0.0)
 
-    @cached_property
+    @property
     def phase_margin(self) -> float:
         """Smallest phase margin of all gain crossovers [degree]; 180 where there is none."""
-        return min((abs(margin) for _, margin in self._crossings), default=180.0)
+        return min((at.distance for at in self.crossings), default=180.0)
 
-    @cached_property
+    @property
     def delay_margin(self) -> float:
-        """Additional dead time that the loop can take [s]."""
-        return min((margin % 360.0 / 360.0 / f for f, margin in self._crossings), default=math.inf)
+        """Additional dead time that the loop can take [s]; inf where there is no crossover."""
+        # What is missing to -1 in the direction of a delay, which turns clockwise.
+        return min((at.margin % 360.0 / 360.0 / at.frequency for at in self.crossings),
+                   default=math.inf)  # fmt: skip
 
     @cached_property
     def gain_margin(self) -> float:
         """Factor above 1 by which the loop gain may grow; inf where any may."""
-        L = self._L
+        L = self.L
         sizes = []
-        for k in np.flatnonzero(np.diff(np.signbit(L.imag)) & (L.real[:-1] < 0)):
+        for k in real_crossings(L):
             share = L.imag[k] / (L.imag[k] - L.imag[k + 1])
             sizes.append(abs(L.real[k] + share * (L.real[k + 1] - L.real[k])))
         # Half the sampling frequency, where L is real, lies beyond the grid.
         if self.gain.period:
-            last = float(self.gain.response(np.array([self.gain.nyquist]))[0, 0, 0].real)
+            last = float(self._gain_at(np.array([self.gain.nyquist]))[0].real)
             sizes.append(max(-last, 0.0))
         return min((1.0 / float(size) for size in sizes if 0.0 < size < 1.0), default=math.inf)
 
     @property
     def disk_margin(self) -> float:
         """Symmetric disk margin, 0 to 2."""
-        return 2.0 / float(np.max(np.abs((1.0 - self._L) / (1.0 + self._L))))
+        return disk_margin(self.L)
 
     @property
     def sensitivity_peak(self) -> float:
         """Largest magnitude of 1/(1 + L)."""
-        return float(np.max(1.0 / np.abs(1.0 + self._L)))
+        return float(np.max(1.0 / np.abs(1.0 + self.L)))
 
     @property
     def complementary_peak(self) -> float:
         """Largest magnitude of L/(1 + L)."""
-        return float(np.max(np.abs(self._L / (1.0 + self._L))))
+        return float(np.max(np.abs(self.L / (1.0 + self.L))))
 
     @cached_property
     def noise_gain(self) -> float:
@@ -149,7 +152,7 @@ class LoopFigures:
         if not self.gain.period:
             return math.nan
         f = (np.arange(_NOISE_POINTS) + 0.5) / _NOISE_POINTS * self.gain.nyquist
-        L = self.gain.response(f)[:, 0, 0]
+        L = self._gain_at(f)
         return float(np.sqrt(np.mean(np.abs(L / (1.0 + L)) ** 2)))
 
     @cached_property
@@ -202,38 +205,24 @@ class LoopFigures:
         return 100.0 * abs(1.0 - float(self.closed.C[0, kept] @ state + self.closed.D[0, 0]))
 
     @cached_property
-    def _level(self) -> float:
-        """-3 dB below the closed loop's gain at rest."""
-        rest = self.closed.response(np.array([_REST]))[0, 0, 0]
-        return math.sqrt(0.5) * float(abs(rest))
+    def crossings(self) -> list[Crossing]:
+        """Where the loop gain is 1."""
+        return gain_crossings(self.frequencies, self.L, self._gain_at if self.exact else None)
 
     @cached_property
-    def _L(self) -> Complex:
-        return np.asarray(self.gain.response(self.frequencies)[:, 0, 0])
+    def fall(self) -> float:
+        """Bandwidth [Hz]; infinite where the closed loop stays above -3 dB."""
+        solved = self._closed_at if self.exact else None
+        at = fall(np.abs(self.T), self.frequencies, self.rest, solved)
+        if at == 0.0:  # a slow integrator: it falls below the grid
+            f = np.geomspace(_REST, self.lowest, self.points)
+            size = np.abs(self._closed_at(f))
+            size[-1] = min(size[-1], math.nextafter(DROP * self.rest, 0.0))
+            at = fall(size, f, self.rest, solved)
+        return at
 
-    @cached_property
-    def _T(self) -> Complex:
-        return np.asarray(self.closed.response(self.frequencies)[:, 0, 0])
+    def _gain_at(self, frequencies: Array) -> Complex:
+        return np.asarray(self.gain.response(frequencies)[:, 0, 0])
 
-    @cached_property
-    def _size(self) -> Array:
-        return np.log(np.abs(self._L))
-
-    @cached_property
-    def _crossings(self) -> list[tuple[float, float]]:
-        """Frequency [Hz] and phase margin [degree, -180 to 180] of every gain crossover."""
-        phase = np.unwrap(np.angle(-self._L))
-        found = []
-        for k in np.flatnonzero(np.diff(np.signbit(self._size))):
-            share = self._size[k] / (self._size[k] - self._size[k + 1])
-            margin = math.degrees(phase[k] + share * (phase[k + 1] - phase[k]))
-            f = _between(self.frequencies, self._size, int(k))
-            found.append((f, (margin + 180.0) % 360.0 - 180.0))
-        return found
-
-
-def _between(frequencies: Array, values: Array, k: int) -> float:
-    """Return the frequency at which logarithms pass zero between points k and k + 1."""
-    share = values[k] / (values[k] - values[k + 1])
-    low, high = frequencies[k], frequencies[k + 1]
-    return float(low * (high / low) ** share)
+    def _closed_at(self, frequencies: Array) -> Complex:
+        return np.asarray(self.closed.response(frequencies)[:, 0, 0])

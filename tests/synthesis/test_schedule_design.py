@@ -7,22 +7,22 @@ from dataclasses import asdict
 import numpy as np
 import pytest
 
-from bywire.analysis.design.bench_figures import BenchFigures, bench_figures
-from bywire.analysis.design.candidate import judged
-from bywire.analysis.design.corners import MOST, corners_of
-from bywire.analysis.design.linear_case import cases_of
-from bywire.analysis.design.optimizer import Problem
-from bywire.analysis.design.requirement import read
-from bywire.analysis.design.schedule_designer import design_schedule, points_by_region
-from bywire.analysis.design.schedule_outcome import ScheduleDesign
-from bywire.analysis.design.schedule_verification import verify_schedule
-from bywire.analysis.design.trial import Trial
-from bywire.analysis.design.verification import verify
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.robustness import margins
+from bywire.analysis.margins import margins
 from bywire.bench.bench import Bench
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
+from bywire.synthesis.bench_figures import BenchFigures, bench_figures
+from bywire.synthesis.candidate import judged
+from bywire.synthesis.corners import MOST, corners_of
+from bywire.synthesis.linear_case import cases_of
+from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.requirement import read
+from bywire.synthesis.schedule_designer import design_schedule, points_by_region
+from bywire.synthesis.schedule_outcome import ScheduleDesign
+from bywire.synthesis.schedule_verification import verify_schedule
+from bywire.synthesis.trial import Trial
+from bywire.synthesis.verification import verify
 
 ON = {"ecu.schedule.law": "regions"}
 LOW_K_P = "ecu.schedule.low.k_p"

@@ -2,30 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bywire.analysis.design.confirmation import confirmed, confirmed_by_figures
-from bywire.analysis.design.floors import linear_floors
-from bywire.analysis.design.linear_case import LinearCase
-from bywire.analysis.design.optimizer import (
-    Problem,
-    Progress,
-    Search,
-    starts_of,
-)
-from bywire.analysis.design.outcome import MISSED, Binding, Conflict, Design, Status
-from bywire.analysis.design.requirement import FIGURES, Requirement
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.floors import linear_floors
+from bywire.synthesis.linear_case import LinearCase, room, slack
+from bywire.synthesis.optimizer import KEPT_MISSED, UNSTABLE, Problem, Search, starts_of
+from bywire.synthesis.outcome import MISSED, Binding, Conflict, Design, Status
+from bywire.synthesis.requirement import FIGURES, Requirement
 
 _FINE = 4000  # points of the grid for what is reported
 _BINDS = 0.01  # slacks this close to the worst one bind
 _ROUNDS, _PAIRED = 8, 3
+_CONFIRMED, _ALIKE = 40, 1e-3  # points looked at anew, and how far apart
+_CONFIRMED_FIGURES, _APART = 150, 1e-2  # the same where a figure itself is searched
+_HELD = -1e-3  # slack of what is kept that rounding may leave
 
 
 def design(
@@ -74,7 +69,7 @@ def design(
     try:
         _over_all(search, [first], seed, progress)
         if search.best is not None:
-            search.best = confirmed(search, _FINE)
+            search.best = _confirmed(search)
         if search.slack < MISSED:
             status = "infeasible"
             search = _by_figures(search, progress)
@@ -130,6 +125,74 @@ def _by_figures(search: Search, progress: Progress | None) -> Search:
     return own
 
 
+def _confirmed(search: Search) -> Array:
+    """Return the best point on a finer grid of frequencies, all models counted.
+
+    A coarse grid may step over a narrow dip of the closed loop to -3 dB: the best points lie
+    where figures jump.
+    """
+    problem = search.problem
+
+    def fine_slack(z: Array) -> float:
+        every = [case.figures(problem.gains(z), _FINE) for case in problem.cases]
+        return min(
+            min(slack(figures, wanted) for wanted in problem.requirements)
+            if figures.is_stable else UNSTABLE
+            for figures in every
+        )  # fmt: skip
+
+    best = _looked_anew(search, fine_slack, -np.inf, 1e-4, (_CONFIRMED, _ALIKE))
+    return np.asarray(search.best if best is None else best)
+
+
+def _confirmed_by_figures(
+    search: Search, wanted: Requirement, kept: Requirement
+) -> Array | None:
+    """Return the point whose figure is best on a finer grid while another requirement holds.
+
+    None where no point seen holds it.
+    """
+    problem = search.problem
+
+    def fine_room(z: Array) -> float:
+        every = [problem.cases[k].figures(problem.gains(z), _FINE) for k in search.cases]
+        if not all(figures.is_stable for figures in every):
+            return -np.inf
+        if min(room(figures, kept) for figures in every) < _HELD:
+            return -np.inf
+        return min(room(figures, wanted) for figures in every)
+
+    return _looked_anew(search, fine_room, KEPT_MISSED, 1e-3, (_CONFIRMED_FIGURES, _APART))
+
+
+def _looked_anew(
+    search: Search,
+    judge: Callable[[Array], float],
+    least: float,
+    gain: float,
+    limits: tuple[int, float],
+) -> Array | None:
+    """Return the point seen that a finer judgment prefers, the coarsely best looked at first.
+
+    Ends where the coarse slack is not above ``least`` or promises no ``gain`` any more. Of points
+    nearer to each other than the second of the limits, one is looked at, and the first of them is
+    how many at most.
+    """
+    most, apart = limits
+    best, place = -np.inf, None
+    judged: list[Array] = []
+    for coarse, z in sorted(search.seen, key=lambda point: -point[0]):
+        if coarse <= max(best + gain, least) or len(judged) >= most:
+            break
+        if any(float(np.max(np.abs(z - other))) < apart for other in judged):
+            continue
+        judged.append(z)
+        fine = judge(z)
+        if fine > best:
+            best, place = fine, z
+    return place
+
+
 def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...]:
     """Return what every binding requirement allows of each other one."""
     problem = search.problem
@@ -146,7 +209,7 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
             seen = own.recall()
             own.run([search.best if seen is None else seen], progress)
             wanted, kept = problem.requirements[a], problem.requirements[b]
-            best = confirmed_by_figures(own, wanted, kept, _FINE)
+            best = _confirmed_by_figures(own, wanted, kept)
             if best is not None:
                 gains = problem.gains(best)
                 value = _extreme(problem, gains, wanted, search.cases)
@@ -172,7 +235,7 @@ def _judged(
     }
     stable = all(one.is_stable for one in found.values())
     bindings = [
-        Binding(one, label, rows[label][one.figure], found[label].room(one))
+        Binding(one, label, rows[label][one.figure], room(found[label], one))
         for label in rows for one in problem.requirements
     ]  # fmt: skip
     bindings.sort(key=lambda one: one.slack)

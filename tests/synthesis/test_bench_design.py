@@ -9,24 +9,24 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bywire.analysis.design.bench_figures import BenchFigures, Small, bench_figures
-from bywire.analysis.design.bench_text import bench_text
-from bywire.analysis.design.bench_tuning import Tuning
-from bywire.analysis.design.candidate import Candidate, bench_slacks, linear_slacks
-from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
-from bywire.analysis.design.linear_case import cases_of
-from bywire.analysis.design.optimizer import Problem
-from bywire.analysis.design.requirement import read
-from bywire.analysis.design.trial import Trial
-from bywire.analysis.design.verification import verify
+from bywire.analysis.crossings import measured_margin
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.margins import margins
+from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.robustness import margins
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
 from bywire.core.catalog import main_set, parameters
+from bywire.synthesis.bench_figures import BenchFigures, Small, bench_figures, loop_gain
+from bywire.synthesis.bench_text import bench_text
+from bywire.synthesis.bench_tuning import Tuning
+from bywire.synthesis.candidate import Candidate, bench_slacks, linear_slacks
+from bywire.synthesis.linear_case import cases_of
+from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.requirement import read
+from bywire.synthesis.trial import Trial
+from bywire.synthesis.verification import verify
 
 PAPER = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
          "steady-state error <= 0 %")  # fmt: skip
@@ -51,15 +51,16 @@ def test_the_loop_gain_behind_a_measured_response() -> None:
     own = loop.smooth(par)
     sweep = Sweep(loop.inputs, loop.output, (3.0, 5.0, 7.0, 9.0), (1e4,), tolerance=1e-4)
     measured = frequency_response(loop.point(own, 20e5).run(), sweep)
-    closed, f = response_of(measured.isel(variant=0, amplitude=0))
+    closed = complex_values(measured.isel(variant=0, amplitude=0))
+    f = measured["frequency"].values
     gain = loop_gain(loop, own, 20e5, closed, f)
     assert gain is not None
     linear = loop.gain(par, 20e5).response(f)[:, 0, 0]
     np.testing.assert_allclose(np.abs(gain / linear), 1.0, atol=5e-3)
     np.testing.assert_allclose(np.degrees(np.angle(gain / linear)), 0.0, atol=0.5)
     known = margins(loop, par, 20e5)
-    assert phase_margin(gain, f)[0] == pytest.approx(known.phase, abs=1.0)
-    assert math.isinf(phase_margin(gain[:2], f[:2])[1])
+    assert measured_margin(f, gain).phase == pytest.approx(known.phase, abs=1.0)
+    assert math.isinf(measured_margin(f[:2], gain[:2]).crossover)
 
 
 def test_the_dithered_loop_is_slower_and_other_gains_mend_it() -> None:

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from bywire.analysis.design.bench_tuning import GENERATIONS, Tuning
-from bywire.analysis.design.linear_case import LinearCase
-from bywire.analysis.design.optimizer import Progress
-from bywire.analysis.design.requirement import Requirement
-from bywire.analysis.design.schedule_designer import scheduled, slack_of
-from bywire.analysis.design.schedule_outcome import ScheduleDesign
-from bywire.analysis.design.trial import Trial
-from bywire.analysis.design.verification import Verification, verify
+from bywire.synthesis.bench_tuning import GENERATIONS, Tuning
+from bywire.synthesis.linear_case import LinearCase
+from bywire.synthesis.optimizer import Progress
+from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.schedule_designer import scheduled, slack_of
+from bywire.synthesis.schedule_outcome import ScheduleDesign
+from bywire.synthesis.trial import Trial
+from bywire.synthesis.verification import Verification, verify
 
 Spans = Mapping[str, tuple[float, float]]
 

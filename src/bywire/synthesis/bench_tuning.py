@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, differential_evolution
 from scipy.stats import qmc
 
-from bywire.analysis.design.bench_figures import BenchFigures
-from bywire.analysis.design.candidate import Candidate, judged, linear_slacks
-from bywire.analysis.design.linear_case import NOMINAL
-from bywire.analysis.design.optimizer import Problem, Progress
+from bywire.synthesis.bench_figures import BenchFigures
+from bywire.synthesis.candidate import Candidate, judged, linear_slacks
+from bywire.synthesis.linear_case import NOMINAL
+from bywire.synthesis.optimizer import Problem, Progress
 
 Array = NDArray[np.float64]
 Measure = Callable[[Mapping[str, Sequence[float]]], Sequence[Mapping[str, BenchFigures]]]

@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.analysis.design.designer import Design, design
-from bywire.analysis.design.linear_case import NOMINAL, LinearCase, cases_of
-from bywire.analysis.design.loop_figures import LoopFigures
-from bywire.analysis.design.requirement import FIGURES, read
 from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.robustness import margins
+from bywire.analysis.loop_figures import LoopFigures
+from bywire.analysis.margins import margins
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.simulation.run import simulate
+from bywire.synthesis.designer import Design, design
+from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of
+from bywire.synthesis.requirement import FIGURES, read
 
 MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))
 PI = {"ecu.pressure.k_p": (1e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3)}

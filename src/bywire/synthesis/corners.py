@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
-from bywire.analysis.design.candidate import judged
-from bywire.analysis.design.linear_case import NOMINAL, LinearCase
-from bywire.analysis.design.optimizer import Problem
-from bywire.analysis.design.trial import Trial, measured
+from bywire.synthesis.candidate import judged
+from bywire.synthesis.linear_case import NOMINAL, LinearCase
+from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.trial import Trial, measured
 
 MOST = 8
 """corners that are tried, at most"""

@@ -1,6 +1,16 @@
-"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
+r"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
 
 Many sets of gains run side by side, in the lanes of one ensemble.
+
+Controller and sensor are linear between their limits. What the closed loop G, measured with a sine
+of one amplitude, leaves for the rest P (actuator, friction, dither) follows from the loop's laws
+C_r (set point) and C_y (output, sensor included):
+
+.. math:: G = \frac{C_r P}{1 + C_y P}, \quad L = C_y P = \frac{C_y G}{C_r - C_y G}
+
+P is the describing function at that amplitude of the set point, so the margin is one of small and
+middle-sized motion, not a proof of stability in the large. Scheduled gains count as those at the
+operating point: within a blend that is exact for small sines only.
 """
 
 from __future__ import annotations
@@ -12,17 +22,17 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.design.describing_function import loop_gain, phase_margin, response_of
+from bywire.analysis.crossings import Margin, fall, measured_margin
 from bywire.analysis.loop import Loop
-from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.response.measured_bandwidth import fall
 from bywire.analysis.response.window import common_interval, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.registry import evaluate
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
 
@@ -48,8 +58,8 @@ class Small:
     least
         Smallest gain up to the target; 0 where it sticks.
     phase_margin, crossover
-        Of the describing function [degree, Hz], see `describing_function.phase_margin`; NaN where
-        laws are not known.
+        Of the describing function [degree, Hz], see `crossings.measured_margin`; NaN where laws
+        are not known.
     peak
         Largest gain.
     settled
@@ -159,24 +169,50 @@ def has_step(bench: Bench) -> bool:
 
 
 def _small(
-    loop: Loop, par: ParameterSet, value: float, one: xr.Dataset, target: float
+    loop: Loop, par: ParameterSet, value: float, response: xr.Dataset, target: float
 ) -> Small:
-    closed, f = response_of(one)
-    margin, crossover = math.nan, math.nan
-    gain = loop_gain(loop, par, value, closed, f) if f.size else None
+    """Return the figures of the response to one amplitude."""
+    closed, f = complex_values(response), response["frequency"].values
+    moves = np.isfinite(closed)
+    margin, gain = Margin(math.nan, math.nan), None
+    if moves.any():
+        gain = loop_gain(loop, par, value, closed[moves], f[moves])
     if gain is not None:
-        margin, crossover = phase_margin(gain, f)
-    size, every = np.nan_to_num(one["gain"].values), one["frequency"].values
-    before = np.append(size[every < target], np.interp(target, every, size))
+        margin = measured_margin(f[moves], gain)
+    size = np.nan_to_num(response["gain"].values)
+    before = np.append(size[f < target], np.interp(target, f, size))
     return Small(
-        amplitude=float(one["amplitude"]),
-        bandwidth=min(fall(size, every), float(every[-1])),
+        amplitude=float(response["amplitude"]),
+        bandwidth=min(fall(size, f), float(f[-1])),
         least=float(before.min()),
-        phase_margin=margin,
-        crossover=crossover,
+        phase_margin=margin.phase,
+        crossover=margin.crossover,
         peak=float(size.max()),
-        settled=bool(np.all(one["settled"].values > 0)),
+        settled=bool(np.all(response["settled"].values > 0)),
     )
+
+
+def loop_gain(
+    loop: Loop, par: ParameterSet, value: float, closed: Complex, frequencies: Array
+) -> Complex | None:
+    """Return the loop gain behind a measured closed response.
+
+    Parameters
+    ----------
+    loop, par, value
+        Loop, and the parameters and operating point it was measured with.
+    closed, frequencies
+        Response and frequencies [Hz], shape (n,).
+
+    Returns
+    -------
+    numpy.ndarray or None
+        Shape (n,); None for a loop whose laws are not known.
+    """
+    if loop.laws is None:
+        return None
+    demand, feedback = loop.laws(par, value, frequencies)
+    return np.asarray(feedback * closed / (demand - feedback * closed))
 
 
 def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str, float]] | None:

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from bywire.analysis.design.bench_figures import STEP_FIGURES, BenchFigures
-from bywire.analysis.design.linear_case import NOMINAL
-from bywire.analysis.design.optimizer import Problem
-from bywire.analysis.design.requirement import Requirement
+from bywire.synthesis.bench_figures import STEP_FIGURES, BenchFigures
+from bywire.synthesis.linear_case import NOMINAL
+from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.requirement import Requirement
 
 _LEAST = -3.0
 

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from bywire.analysis.design.bench_figures import BenchFigures
-from bywire.analysis.design.bench_tuning import GENERATIONS, Tuning, standing, tune
-from bywire.analysis.design.candidate import Candidate, judged, linear_slacks
-from bywire.analysis.design.corners import corners_of, worst_of
-from bywire.analysis.design.designer import largest_error
-from bywire.analysis.design.floors import bench_floors, linear_floors
-from bywire.analysis.design.linear_case import LinearCase
-from bywire.analysis.design.optimizer import Problem, Progress
-from bywire.analysis.design.requirement import FIGURES, Requirement
-from bywire.analysis.design.trial import Trial, measured
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
+from bywire.synthesis.bench_figures import BenchFigures
+from bywire.synthesis.bench_tuning import GENERATIONS, Tuning, standing, tune
+from bywire.synthesis.candidate import Candidate, judged, linear_slacks
+from bywire.synthesis.corners import corners_of, worst_of
+from bywire.synthesis.designer import largest_error
+from bywire.synthesis.floors import bench_floors, linear_floors
+from bywire.synthesis.linear_case import LinearCase
+from bywire.synthesis.optimizer import Problem, Progress
+from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.trial import Trial, measured
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,207 @@
+"""Where a response passes a level: gain and phase crossovers, margins, bandwidth.
+
+Any response over ascending frequencies is taken, from a model or measured. Between its points it
+is read straight on logarithmic axes, or exactly where it is at hand as a function.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from scipy.optimize import brentq
+
+from bywire.core.typing import Array, Complex
+
+Response = Callable[[Array], Complex]
+"""``response(frequencies [Hz]) -> complex``, shape (n,) each"""
+
+DROP = math.sqrt(0.5)
+"""share of the start to which a response has fallen at its bandwidth: -3 dB"""
+NEARLY_ZERO = 1.0
+"""phase [degree] at the lower end that still counts as 0: a loop of finite gain"""
+_BRACKETS = 4000  # points of the grid that brackets what a function of frequency passes
+
+
+class Crossing(NamedTuple):
+    """Where a loop gain is 1.
+
+    Parameters
+    ----------
+    frequency
+        In Hz.
+    margin
+        Phase margin there [degree]: 180 and the phase, followed without jumps from the lowest
+        frequency, where it counts as the value between -360 and 0: a loop with integral action
+        begins near -90.
+    falls
+        Whether the gain falls there.
+    """
+
+    frequency: float
+    margin: float
+    falls: bool
+
+    @property
+    def distance(self) -> float:
+        """Angle between the loop gain and -1, either way round [degree, 0 to 180]."""
+        return abs((self.margin + 180.0) % 360.0 - 180.0)
+
+
+def gain_crossings(
+    frequencies: Array, L: Complex, response: Response | None = None
+) -> list[Crossing]:
+    """Return where a loop gain is 1, falling or rising, by ascending frequency.
+
+    Parameters
+    ----------
+    frequencies, L
+        Frequencies [Hz], ascending, and loop gain there (negative feedback not counted), shape
+        (n,) each.
+    response
+        The loop gain as a function, where crossings are wanted to rounding.
+    """
+    size, phase = np.log(np.abs(L)), np.unwrap(np.angle(-L))
+    # L between -360 and 0 degree is -L between -180 and 180.
+    turns = math.ceil((math.degrees(phase[0]) - 180.0 - NEARLY_ZERO) / 360.0)
+    crossings = []
+    for k in map(int, np.flatnonzero(np.diff(np.signbit(size)))):
+        if response is None:
+            at = _passing(frequencies, size, k)
+            share = size[k] / (size[k] - size[k + 1])
+            angle = phase[k] + share * (phase[k + 1] - phase[k])
+        else:
+            at = _solved(response, 1.0, frequencies[k], frequencies[k + 1])
+            angle = np.unwrap([phase[k], np.angle(-response(np.array([at]))[0])])[1]
+        margin = math.degrees(angle) - 360.0 * turns
+        crossings.append(Crossing(at, margin, not np.signbit(size[k])))
+    return crossings
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Stability margin of an open loop.
+
+    Parameters
+    ----------
+    crossover
+        Highest frequency at which the loop gain falls to 1 [Hz]; NaN where it never does.
+    phase
+        Smallest phase margin of all frequencies at which the loop gain is 1 [degree]; NaN likewise.
+        The one nearest to -1 counts, whether the gain falls there or rises.
+    at
+        Frequency at which that is read [Hz]; NaN likewise.
+    """
+
+    crossover: float
+    phase: float
+    at: float = math.nan
+
+
+def margin_of(crossings: Sequence[Crossing]) -> Margin:
+    """Return crossover and phase margin of a loop gain that passes 1 at some crossings."""
+    falls = [crossing.frequency for crossing in crossings if crossing.falls]
+    if not falls:
+        return Margin(math.nan, math.nan)
+    nearest = min(crossings, key=lambda crossing: crossing.distance)
+    return Margin(falls[-1], nearest.margin, nearest.frequency)
+
+
+def margin(loop: Response, band: tuple[float, float]) -> Margin:
+    """Return crossover and phase margin of a loop gain within a band [Hz]."""
+    f = np.geomspace(*band, _BRACKETS)
+    return margin_of(gain_crossings(f, loop(f), loop))
+
+
+def measured_margin(frequencies: Array, L: Complex) -> Margin:
+    """Return crossover and phase margin of a loop gain known at some frequencies [Hz] only.
+
+    The margin is the distance from -1, within 180 degree. NaN where the frequencies hold no fall
+    to 1, with a crossover of infinity where the gain ends above: then it falls only beyond them.
+    """
+    if abs(L[-1]) >= 1.0:
+        return Margin(math.inf, math.nan)
+    crossings = gain_crossings(frequencies, L)
+    distances = [crossing.distance for crossing in crossings]
+    return replace(margin_of(crossings), phase=min(distances, default=math.nan))
+
+
+def fall(
+    gain: Array, frequencies: Array, start: float = 1.0, response: Response | None = None
+) -> float:
+    """Return the lowest frequency at which a gain has fallen to -3 dB.
+
+    Parameters
+    ----------
+    gain
+        Magnitudes, shape (n,); NaN, where the output sticks, counts as 0.
+    frequencies
+        Ascending [Hz], shape (n,).
+    start
+        Magnitude that counts as 1, in the gain's unit: that at standstill.
+    response
+        The response as a function, where the frequency is wanted to rounding.
+
+    Returns
+    -------
+    float
+        In Hz; 0 where the gain is below from the lowest frequency on, infinity where it stays
+        above.
+    """
+    size, level = np.nan_to_num(gain), DROP * start
+    below = np.flatnonzero(size < level)
+    if below.size == 0:
+        return math.inf
+    k = int(below[0])
+    if k == 0:
+        return 0.0
+    if size[k] == 0.0:  # it breaks off there: the last frequency at which it moved
+        return float(frequencies[k - 1])
+    if response is not None:
+        return _solved(response, level, frequencies[k - 1], frequencies[k])
+    return _passing(frequencies[k - 1 :], np.log(size[k - 1 : k + 1] / level), 0)
+
+
+def bandwidth(response: Response, band: tuple[float, float]) -> float:
+    """Return where a response falls to -3 dB of that at the band's lower end [Hz]; NaN for never.
+
+    Parameters
+    ----------
+    response
+        Any.
+    band
+        Frequencies to look at [Hz].
+    """
+    f = np.geomspace(*band, _BRACKETS)
+    size = np.abs(response(f))
+    at = fall(size, f, float(size[0]), response)
+    return at if math.isfinite(at) else math.nan
+
+
+def disk_margin(L: Complex) -> float:
+    """Return the symmetric disk margin (skew 0) of a loop gain, 0 to 2."""
+    return 2.0 / float(np.max(np.abs((1.0 - L) / (1.0 + L))))
+
+
+def real_crossings(L: Complex) -> list[int]:
+    """Return the points behind which a loop gain crosses the negative real axis."""
+    return np.flatnonzero(np.diff(np.signbit(L.imag)) & (L.real[:-1] < 0)).tolist()
+
+
+def _passing(frequencies: Array, values: Array, k: int) -> float:
+    """Return the frequency at which logarithms pass zero between points k and k + 1."""
+    share = values[k] / (values[k] - values[k + 1])
+    low, high = frequencies[k], frequencies[k + 1]
+    return float(low * (high / low) ** share)
+
+
+def _solved(response: Response, level: float, low: float, high: float) -> float:
+    """Return the frequency between two others at which a magnitude passes a level."""
+
+    def excess(f: float) -> float:
+        return float(np.abs(response(np.array([f])))[0]) - level
+
+    return float(brentq(excess, low, high))

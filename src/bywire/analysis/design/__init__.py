@@ -1,1 +1,0 @@
-"""Design of control loops: requirements in, gains and what they give out."""

@@ -1,0 +1,14 @@
+"""Types that signatures of all rooms share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
+
+Progress = Callable[[str, float], None]
+"""called with a label and the finished share, 0 to 1"""
