@@ -167,7 +167,7 @@ def margins(
     >>> import bywire
     >>> found = bywire.margins("pressure", at="20 bar")
     >>> round(found.margins[0].phase)  # degree
-    64
+    76
     """
     case = loop_case(loop, parameters, at, overrides)
     if not over:
