@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import ast
+import re
 import runpy
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,8 @@ import pytest
 ROOT = Path(__file__).parents[2]
 SCRIPTS = [ROOT / "examples" / "servo_axis.py", *sorted((ROOT / "examples/gallery").glob("*.py"))]
 SERVO = SCRIPTS[0]
+QUICK = ROOT / "examples" / "gallery" / "seal_friction.py"  # no simulation
+WRITES = re.compile(r"savefig|save_\w+|mkdir|open|write\w*|to_\w+|print_png|dump|tofile")
 
 
 def execute(script: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> None:
@@ -18,26 +23,63 @@ def execute(script: Path, monkeypatch: pytest.MonkeyPatch, *arguments: str) -> N
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
-def test_claims_hold_and_nothing_is_written_unasked(
+def test_claims_hold_and_the_figure_goes_where_it_is_told(
     script: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
+    elsewhere, folder = tmp_path / "elsewhere", tmp_path / "figures"
+    elsewhere.mkdir()
     monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.chdir(elsewhere)
+    option = ["--plot", str(tmp_path / "axis.png")] if script == SERVO else ["--out", str(folder)]
+    execute(script, monkeypatch, *option)
+    assert list(elsewhere.iterdir()) == []
+    if script == SERVO:
+        assert (tmp_path / "axis.png").stat().st_size > 0
+    else:
+        assert [file.name for file in folder.iterdir()] == [f"{script.stem}.png"]
+
+
+@pytest.mark.parametrize("script", [SERVO, QUICK], ids=lambda script: script.stem)
+def test_nothing_is_written_unasked(
+    script: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     monkeypatch.chdir(tmp_path)
     execute(script, monkeypatch)
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("script", SCRIPTS[1:], ids=lambda script: script.stem)
-def test_figure_goes_where_it_is_told(
-    script: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
-    execute(script, monkeypatch, "--out", str(tmp_path / "figures"))
-    assert [file.name for file in (tmp_path / "figures").iterdir()] == [f"{script.stem}.png"]
+def written_unasked(text: str) -> list[str]:
+    """Return the calls of a script that leave files, but those after ``if`` it was asked to."""
+
+    def calls(node: ast.AST) -> Iterator[str]:
+        if isinstance(node, ast.If) and re.fullmatch(r"(arguments\.)?(out|file)", _said(node.test)):
+            node = ast.Module(node.orelse, [])
+        elif isinstance(node, ast.Call) and WRITES.fullmatch(_said(node.func).split(".")[-1]):
+            yield _said(node.func)
+        for child in ast.iter_child_nodes(node):
+            yield from calls(child)
+
+    return list(calls(ast.parse(text)))
 
 
-def test_servo_axis_draws_when_asked(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    execute(SERVO, monkeypatch, "--plot", str(tmp_path / "axis.png"))
-    assert (tmp_path / "axis.png").stat().st_size > 0
+def _said(node: ast.AST) -> str:
+    return ast.unparse(node)
+
+
+@pytest.mark.parametrize("script", SCRIPTS, ids=lambda script: script.stem)
+def test_every_script_asks_before_it_writes(script: Path) -> None:
+    """Run once, with an option; what it does without one can be read."""
+    text = script.read_text()
+    assert written_unasked(text) == []
+    assert re.search(r"\.savefig\(|\.print_png\(|save_figure\(", text)
+
+
+def test_the_gate_of_unasked_files_can_fail() -> None:
+    assert written_unasked("if out:\n    f.savefig(out)\nelse:\n    f.savefig('x.png')")
+    assert written_unasked("Path('x').mkdir()\nif out and more:\n    open('y')") == [
+        "Path('x').mkdir",
+        "open",
+    ]
 
 
 def test_a_false_claim_is_noticed(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
