@@ -19,6 +19,7 @@ from bywire import control, plant
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.brakes.wedge import elements, laws
@@ -184,6 +185,17 @@ def bench_reference() -> str:
         lines += table(titles, ((*row[:2], "", *row[3:]) for row in rows))
         figures = (f"`{name}`{bracketed(unit)}" for name, unit in e.kpis.items())
         lines += [f"Key figures: {', '.join(figures)}.", ""]
+    lines += [
+        "## Experiments of any brake", "",
+        "Given by names of signals. `input`, `output` and the like stand for the unit of the "
+        "signal that the option of that name names; levels are by default multiples of its "
+        "nominal magnitude.", "",
+    ]  # fmt: skip
+    for g in GENERIC_EXPERIMENTS.all().values():
+        summary = g.summary[0].upper() + g.summary[1:]
+        lines += [f"### {g.name}, of any brake", "", f"{summary}.", ""]
+        rows = [("", *row[1:3], "", *row[4:]) for row in parameter_rows(g.options)]
+        lines += table(("", "option", "unit", "", "range or choices", "meaning"), rows)
     lines += ["## Loops", "", "What `linearize`, `frequency-response` and `margins` know.", ""]
     rows = (
         (f"`{one.name}`", one.summary, one.assembly, f"{one.at.name} [{unit_text(one.at.unit)}]",

@@ -15,6 +15,8 @@ from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.stribeck_curve import stribeck_curve
 from bywire.report.tracking import tracking
 
+LOOP = ("p_mc", "i", "i_star")  # response, drive, demand
+
 HERTZ = np.logspace(-2, 2, 50)
 LAG = 10.0 / (1.0 + 1j * HERTZ)
 
@@ -39,11 +41,12 @@ def test_loop_divides_at_the_top_of_the_demand() -> None:
         },
         coords={"time": time},
     )
-    applying, releasing = [v for v in heights(hysteresis_loop({"ramp": ramp}).axes[0]) if len(v)]
+    drawn = hysteresis_loop({"ramp": ramp}, *LOOP).axes[0]
+    applying, releasing = [v for v in heights(drawn) if len(v)]
     assert applying[0] == pytest.approx(0.1)
     assert applying[-1] == releasing[0] == pytest.approx(5.1)
     with pytest.raises(ParameterError, match="at least one"):
-        hysteresis_loop({})
+        hysteresis_loop({}, *LOOP)
 
 
 def test_loop_of_a_dithered_current_is_its_average() -> None:
@@ -57,12 +60,13 @@ def test_loop_of_a_dithered_current_is_its_average() -> None:
         },
         coords={"time": time},
     )
-    drawn = hysteresis_loop({"dithered": ramp}, average=0.02).axes[0]
+    drawn = hysteresis_loop({"dithered": ramp}, *LOOP, average=0.02).axes[0]
     raw, applying, releasing, _ = heights(drawn)
     assert raw.max() > 5.5
     assert max(applying.max(), releasing.max()) < 5.05
     assert "ripple around the average over 20 ms" in legend_of(drawn)
-    assert not any("ripple" in name for name in legend_of(hysteresis_loop({"raw": ramp}).axes[0]))
+    raw = hysteresis_loop({"raw": ramp}, *LOOP).axes[0]
+    assert not any("ripple" in name for name in legend_of(raw))
 
 
 def test_stribeck_curve_is_vertical_at_rest(curve: xr.Dataset) -> None:
@@ -72,13 +76,13 @@ def test_stribeck_curve_is_vertical_at_rest(curve: xr.Dataset) -> None:
     speed, torque = (np.asarray(v) for v in axes.lines[0].get_data())
     assert np.allclose(torque[speed == 0], [-5.2e-3, 5.2e-3])
     with pytest.raises(UnknownNameError, match="T_fr"):
-        stribeck_curve(curve, torque="T_f")
-    with pytest.raises(ParameterError, match="pressure and speed"):
+        stribeck_curve(curve, friction="T_f")
+    with pytest.raises(ParameterError, match="a level and a speed"):
         stribeck_curve(curve.isel(p_mc=0))
 
 
 def test_tracking_shows_the_error(recording: xr.Dataset) -> None:
-    error = heights(tracking(recording).axes[1])[0]
+    error = heights(tracking(recording, "p_mc", "p_ref").axes[1])[0]
     wanted = (recording["p_ref"] - recording["p_mc"]).values / 1e5
     assert np.allclose(error, wanted)
     with pytest.raises(ParameterError, match="name a set point"):

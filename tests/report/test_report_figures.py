@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -24,6 +25,9 @@ from bywire.report.stribeck_curve import stribeck_curve
 from bywire.report.time_traces import time_traces
 from bywire.report.tracking import tracking
 
+step_figure = partial(step_response, variable="p_mc", set_point="p_ref")
+LOOP = ("p_mc", "i", "i_star")  # response, drive, demand
+
 LIMITS = StepLimits(start=0.1, before=6e5, after=37e5, overshoot=0.15)
 FACTS = StepFacts(rise_time=0.042, settling_time=0.187, overshoot=0.126)
 HERTZ = np.logspace(-2, 2, 50)
@@ -32,10 +36,10 @@ LAG = 10.0 / (1.0 + 1j * HERTZ)
 DRAWN: dict[str, Callable[[xr.Dataset], Figure]] = {
     "traces": lambda r: time_traces(r, limits=LIMITS),
     "traces compared": lambda r: time_traces(r, measured=r),
-    "step": lambda r: step_response(r, limits=LIMITS, facts=FACTS),
-    "step compared": lambda r: step_response(r, limits=LIMITS, measured=r),
-    "loop": lambda r: hysteresis_loop({"with dither": r, "without": r}),
-    "tracking": tracking,
+    "step": lambda r: step_figure(r, limits=LIMITS, facts=FACTS),
+    "step compared": lambda r: step_figure(r, limits=LIMITS, measured=r),
+    "loop": lambda r: hysteresis_loop({"with dither": r, "without": r}, *LOOP),
+    "tracking": lambda r: tracking(r, "p_mc", "p_ref"),
     "energy": energy_balance,
     "bode": lambda r: bode([Response("plant", HERTZ, LAG)], marks={"crossover 10 Hz": 10.0}),
 }
@@ -92,7 +96,7 @@ def test_panels_do_not_overlap(recording: xr.Dataset) -> None:
 
 
 def test_pressure_is_drawn_in_bar(recording: xr.Dataset) -> None:
-    axes = step_response(recording).axes[0]
+    axes = step_figure(recording).axes[0]
     assert axes.get_ylabel() == "master-cylinder pressure [bar]"
     assert heights(axes)[0].max() == pytest.approx(recording["p_mc"].max().item() / 1e5)
 
@@ -104,7 +108,7 @@ def test_short_recordings_are_drawn_in_milliseconds(recording: xr.Dataset) -> No
 
 
 def test_step_marks_stand_where_they_belong(recording: xr.Dataset) -> None:
-    axes = step_response(recording, limits=LIMITS, facts=FACTS).axes[0]
+    axes = step_figure(recording, limits=LIMITS, facts=FACTS).axes[0]
     drawn = {str(line.get_label()): line for line in axes.lines}
     limit = drawn["overshoot limit 15 %"].get_ydata()
     assert np.allclose(limit, 37.0 + 0.15 * 31.0)
@@ -117,7 +121,7 @@ def test_step_marks_stand_where_they_belong(recording: xr.Dataset) -> None:
 
 
 def test_marks_sit_on_the_averaged_curve_where_that_was_judged(recording: xr.Dataset) -> None:
-    axes = step_response(recording, limits=LIMITS, facts=FACTS, smoothing=0.02).axes[0]
+    axes = step_figure(recording, limits=LIMITS, facts=FACTS, smoothing=0.02).axes[0]
     drawn = {str(line.get_label()): line for line in axes.lines}
     averaged, raw = drawn["averaged over 20 ms"], drawn["master-cylinder pressure"]
     top = np.max(np.asarray(averaged.get_ydata(), dtype=float))
@@ -138,14 +142,14 @@ def test_a_falling_step_is_judged_downward(recording: xr.Dataset) -> None:
 
 
 def test_no_overshoot_is_said_but_not_marked(recording: xr.Dataset) -> None:
-    axes = step_response(recording, limits=LIMITS, facts=StepFacts(overshoot=0.0)).axes[0]
+    axes = step_figure(recording, limits=LIMITS, facts=StepFacts(overshoot=0.0)).axes[0]
     drawn = {str(line.get_label()): line for line in axes.lines}
     assert len(np.asarray(drawn["overshoot: 0 %"].get_xdata())) == 0
 
 
 def test_facts_that_do_not_exist_are_not_drawn(recording: xr.Dataset) -> None:
     facts = StepFacts(rise_time=float("nan"), settling_time=None)
-    axes = step_response(recording, limits=LIMITS, facts=facts).axes[0]
+    axes = step_figure(recording, limits=LIMITS, facts=facts).axes[0]
     assert not [label for label in legend_of(axes) if "rise" in label or "settling" in label]
 
 
@@ -218,13 +222,13 @@ def test_unknown_variables_and_unselected_cases_are_explained(recording: xr.Data
     with pytest.raises(UnknownNameError, match="p_mc"):
         step_response(recording, "p_mcc")
     with pytest.raises(ParameterError, match="select one case"):
-        step_response(xr.concat([recording, recording], "case"))
+        step_response(xr.concat([recording, recording], "case"), "p_mc", "p_ref")
     with pytest.raises(ParameterError, match="no samples"):
-        step_response(recording.isel(time=slice(0, 0)))
+        step_response(recording.isel(time=slice(0, 0)), "p_mc", "p_ref")
 
 
 def test_labels_are_never_read_as_formulas(recording: xr.Dataset) -> None:
     hostile = recording.copy()
     hostile["p_mc"].attrs = {"units": "Pa", "long_name": "cost $\\frac{ in \x1b[31m 圧力\n" * 9}
-    assert figure_bytes(step_response(hostile, limits=LIMITS), "svg").startswith(b"<?xml")
-    assert figure_bytes(hysteresis_loop({"$\\bad{$": hostile}), "png").startswith(b"\x89PNG")
+    assert figure_bytes(step_figure(hostile, limits=LIMITS), "svg").startswith(b"<?xml")
+    assert figure_bytes(hysteresis_loop({"$\\bad{$": hostile}, *LOOP), "png").startswith(b"\x89PNG")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from functools import partial
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -28,6 +29,8 @@ from bywire.report.page import page_html, write_page
 from bywire.report.step_response import step_response
 from bywire.report.tables import text_table
 from bywire.report.time_traces import time_traces
+
+step_figure = partial(step_response, variable="p_mc", set_point="p_ref")
 
 HOSTILE = '"><script>alert(1)</script><img src=http://evil.example/x onerror=\'y\'>\x00\x1b\u202e&'
 VOID = {"meta", "img", "br", "link", "input", "hr"}
@@ -74,7 +77,7 @@ def parsed(html: str) -> Checker:
 def page(recording: xr.Dataset) -> str:
     hertz = np.logspace(0, 2, 30)
     figures = [
-        FigureBlock(step_response(recording), "Pressure."),
+        FigureBlock(step_figure(recording), "Pressure."),
         FigureBlock(bode([Response("plant", hertz, 1 / (1 + 1j * hertz))]), "Plant."),
     ]
     inputs = Details("Inputs", [Paragraph("As given."), TableBlock(text_table(["a"], [["b"]]))])
@@ -127,7 +130,7 @@ def test_page_loads_nothing_and_runs_nothing(page: str) -> None:
 def test_hostile_text_is_only_text(recording: xr.Dataset) -> None:
     hostile = recording.copy()
     hostile["p_mc"].attrs = {"units": "Pa", "long_name": HOSTILE}
-    figure = FigureBlock(step_response(hostile), HOSTILE)
+    figure = FigureBlock(step_figure(hostile), HOSTILE)
     table = TableBlock(text_table([HOSTILE], [[HOSTILE]]), HOSTILE)
     texts = [Paragraph(HOSTILE), Listing([HOSTILE])]
     blocks = [figure, table, *texts, Details(HOSTILE, texts)]
@@ -142,7 +145,7 @@ def test_hostile_text_is_only_text(recording: xr.Dataset) -> None:
 
 
 def test_the_same_report_gives_the_same_bytes(recording: xr.Dataset, tmp_path: Path) -> None:
-    sections = [Section("Outcome", [FigureBlock(step_response(recording), "Pressure.")])]
+    sections = [Section("Outcome", [FigureBlock(step_figure(recording), "Pressure.")])]
     first = write_page(tmp_path / "a.html", "t", "s", sections).read_bytes()
     assert write_page(tmp_path / "b.html", "t", "s", sections).read_bytes() == first
 
@@ -163,7 +166,7 @@ def test_figures_beyond_the_budget_become_pixels_largest_first(recording: xr.Dat
     cloud = Figure(figsize=(2.0, 1.0))
     x, y = np.random.default_rng(1).random((2, 5000))
     cloud.subplots().plot(x, y, ".")
-    figures = [(step_response(recording, set_point=None), "small"), (cloud, "large")]
+    figures = [(step_response(recording, "p_mc"), "small"), (cloud, "large")]
     vector = inline_figures(figures)
     assert [html[:4] for html in vector] == ["<svg", "<svg"]
     mixed = inline_figures(figures, budget=sum(map(len, vector)) - 1)

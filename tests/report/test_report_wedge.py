@@ -10,8 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bywire.core.model import ASSEMBLIES
 from bywire.report.energy_balance import energy_balance
-from bywire.report.panels import KINDS
+from bywire.report.panels import PANELS
 from bywire.report.time_traces import time_traces
 
 T = np.linspace(0.0, 0.5, 501)
@@ -113,9 +114,12 @@ def test_a_brake_at_rest_still_has_a_figure() -> None:
 
 
 def test_every_kind_of_panels_names_a_variable_once() -> None:
-    for kind in KINDS:
-        names = [trace.variable for panel in kind for trace in panel.traces]
+    for kind in PANELS.all().values():
+        names = [trace.variable for panel in kind.panels for trace in panel.traces]
         assert len(names) == len(set(names))
+        assert set(kind.assemblies) <= set(ASSEMBLIES.all())
+        recorded = {n for name in kind.assemblies for n in ASSEMBLIES.find(name).Output._fields}
+        assert set(names) <= recorded
 
 
 def test_energy_of_the_wedge_brake_comes_from_motors_disc_and_run_out() -> None:

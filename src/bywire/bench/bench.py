@@ -9,13 +9,16 @@ from typing import Any
 
 from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment, as_run
 from bywire.bench.extent import check_seed, checked_interval, checked_step
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.requirements import check
 from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
 from bywire.bench.stimulus_file import with_nodes
 from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
+from bywire.core.registry import pick
 from bywire.simulation.run import Run
 
 
@@ -34,7 +37,8 @@ class Bench:
         units such as ``"0.35 ohm"``. Durations below may be written so as well.
     stimulus
         ``{"kind": ..., **parameters}`` for experiments that take a stimulus; a table may come
-        from a file, see ``stimulus_file``.
+        from a file, see ``stimulus_file``. Experiments of any brake also take such a mapping
+        under the name of each further signal of the model's Stimulus.
     step
         Substep [s].
     record
@@ -45,6 +49,9 @@ class Bench:
         KPI name -> limit, such as ``{"overshoot": "<= 15 %"}``.
     name
         What reports call it.
+    assembly
+        Which model of the parameters' brake is tested, where an experiment of any brake leaves
+        the choice; that of the parameter set where empty.
 
     Raises
     ------
@@ -63,9 +70,10 @@ class Bench:
     seed: int = 0
     requirements: Mapping[str, str] = field(default_factory=dict)
     name: str = ""
+    assembly: str = ""
 
     def __post_init__(self) -> None:
-        for key in ("experiment", "parameters", "name"):
+        for key in ("experiment", "parameters", "name", "assembly"):
             if not isinstance(getattr(self, key), str):
                 raise ParameterError(f"{key} = {quoted(getattr(self, key))}: a text is wanted")
         for key in ("overrides", "options", "stimulus", "requirements"):
@@ -73,20 +81,36 @@ class Bench:
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
-        chosen, found = EXPERIMENTS.find(self.experiment), PARAMETER_SETS.find(self.parameters)
-        if chosen.assembly != found.assembly:
+        found = PARAMETER_SETS.find(self.parameters)
+        if self.assembly == found.assembly:
+            object.__setattr__(self, "assembly", "")
+        chosen = self.definition
+        if chosen.assembly != self.system:
             raise ParameterError(
-                f"experiment {chosen.name!r} tests a {chosen.assembly}, but parameter set "
-                f"{found.name!r} is for a {found.assembly}"
+                f"experiment {chosen.name!r} tests a {chosen.assembly}, but "
+                + (
+                    f"assembly = {self.assembly!r}"
+                    if self.assembly
+                    else f"parameter set {found.name!r} is for a {found.assembly}"
+                )
             )
-        if self.stimulus and chosen.driven_unit is None:
+        self._check_stimulus(chosen)
+        self._check_names()
+        check(self.requirements, chosen.kpis_with(self.chosen_options))
+        self._made(chosen.preview or chosen.cases)
+
+    def _check_stimulus(self, chosen: Experiment) -> None:
+        """Refuse a stimulus that the experiment does not take."""
+        further = [name for name, each in self.stimulus.items() if isinstance(each, Mapping)]
+        if len(further) < len(self.stimulus) and chosen.driven_unit is None:
             raise ParameterError(
                 f"experiment {chosen.name!r} brings its own stimulus: leave out [stimulus], or "
                 "use experiment 'open-loop'"
             )
-        self._check_names()
-        check(self.requirements, chosen.kpis_with(self.chosen_options))
-        self._made(chosen.preview or chosen.cases)
+        known = {} if chosen.beside is None else chosen.beside(self.chosen_options)
+        for name in further:
+            if name not in known:
+                raise unknown_name(f"stimulus beside {chosen.name}", name, known)
 
     def _check_names(self) -> None:
         """Refuse options that stand among the parameters, the likeliest mistake of all."""
@@ -97,9 +121,14 @@ class Bench:
                 raise unknown_name("parameter", name, [f"options.{name}"])
 
     @property
+    def system(self) -> str:
+        """Name of the assembly that is tested."""
+        return self.assembly or PARAMETER_SETS.find(self.parameters).assembly
+
+    @cached_property
     def definition(self) -> Experiment:
-        """The experiment behind the name."""
-        return EXPERIMENTS.find(self.experiment)
+        """The experiment behind the name: one of the brake itself goes before one of any brake."""
+        return experiment_of(self.experiment, self.parameters, self.assembly, self.options)
 
     @cached_property
     def par(self) -> ParameterSet:
@@ -116,25 +145,32 @@ class Bench:
         return chosen.defaults.replace({**following, **values})
 
     @cached_property
+    def chosen_stimuli(self) -> Mapping[str, Stimulus]:
+        """Validated stimuli by the names of their signals; that of a plain section under ""."""
+        chosen, sections = self.definition, stimulus_sections(self.stimulus)
+        units = {} if chosen.beside is None else dict(chosen.beside(self.chosen_options))
+        if chosen.driven_unit is not None:
+            units[""] = chosen.driven_unit(self.chosen_options)
+        return {name: _stimulus(each, units[name], name) for name, each in sections.items()}
+
+    @property
     def chosen_stimulus(self) -> Stimulus | None:
-        """Validated stimulus; None where none is given."""
-        driven_unit = self.definition.driven_unit
-        if not self.stimulus or driven_unit is None:
-            return None
-        values = dict(self.stimulus)
-        kind = values.pop("kind", None)
-        if not isinstance(kind, str):
-            raise ParameterError(f"[stimulus] needs a kind: {', '.join(sorted(STIMULI.all()))}")
-        unit = driven_unit(self.chosen_options)
-        return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)
+        """Validated stimulus of a plain section; None where none is given."""
+        return self.chosen_stimuli.get("")
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs that the experiment consists of, with settling times as they are run."""
         return self._made(self.definition.cases)
 
+    def cases_with(self, par: Any, options: Any, make: Cases | None = None) -> tuple[Case, ...]:
+        """Return the runs as they would be with other parameters and options."""
+        has_several = self.definition.beside is not None
+        stimuli = self.chosen_stimuli if has_several else self.chosen_stimulus
+        return (make or self.definition.cases)(par, options, stimuli)
+
     def _made(self, make: Cases) -> tuple[Case, ...]:
         """Return cases, or refuse overrides without effect and steps that do not divide."""
-        found = make(self.par, self.chosen_options, self.chosen_stimulus)
+        found = self.cases_with(self.par, self.chosen_options, make)
         wanted, made = self.par.flat(), [case.par.flat() for case in found]
         for name in self.overrides:
             if made and all(values[name] != wanted[name] for values in made):
@@ -157,3 +193,59 @@ class Bench:
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
         """Return this bench with further parameters changed."""
         return replace(self, overrides={**self.overrides, **overrides})
+
+
+def experiment_of(
+    name: str, parameters: str, assembly: str = "", options: Mapping[str, Any] | None = None
+) -> Experiment:
+    """Return the experiment of a name for a parameter set.
+
+    An experiment that a brake brings for this assembly goes before one of any brake, and that
+    before one of another assembly.
+
+    Parameters
+    ----------
+    name
+        Name of the experiment.
+    parameters
+        Name of the parameter set.
+    assembly
+        Model of the set's brake; that of the set where empty.
+    options
+        Options as the user gave them: they name signals.
+
+    Raises
+    ------
+    InputError
+        When there is no such experiment, or its options name signals that the model lacks.
+    """
+    cited = PARAMETER_SETS.find(parameters)
+    system = assembly or cited.assembly
+    likely = EXPERIMENTS.guess(name)
+    if likely is not None and likely.assembly == system:
+        return likely
+    brake = PARAMETER_SETS.owner(parameters)
+    its_own = EXPERIMENTS.of(brake).get(name)
+    if its_own is not None and its_own.assembly == system:
+        return its_own
+    known = GENERIC_EXPERIMENTS.all()
+    if name in known:
+        models = ASSEMBLIES.of(brake)
+        return known[name].bound(pick(models, system, "assembly")(), options or {})
+    return pick(EXPERIMENTS.all(), name, "experiment", also=known)
+
+
+def stimulus_sections(stimulus: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """Return the sections of a stimulus by signal: what is no section itself under ""."""
+    plain = {key: value for key, value in stimulus.items() if not isinstance(value, Mapping)}
+    further = {key: value for key, value in stimulus.items() if isinstance(value, Mapping)}
+    return ({"": plain} if plain else {}) | further
+
+
+def _stimulus(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:
+    values = dict(section)
+    kind = values.pop("kind", None)
+    if not isinstance(kind, str):
+        title = f"stimulus.{name}" if name else "stimulus"
+        raise ParameterError(f"[{title}] needs a kind: {', '.join(sorted(STIMULI.all()))}")
+    return create(kind, with_nodes(values, unit) if kind == "table" else values, unit)

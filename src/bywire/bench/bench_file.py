@@ -9,8 +9,9 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from bywire.bench.bench import Bench
+from bywire.bench.bench import Bench, experiment_of, stimulus_sections
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.values import parsed, require_unit, require_units
 from bywire.core.catalog import PARAMETER_SETS, main_set
@@ -56,7 +57,7 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         ``experiment``, ``parameters``, or the dotted name of a parameter.
     """
     file = Path(path)
-    content = _of_experiment(file) or read_toml(
+    content = _of_experiment(file, changes) or read_toml(
         file, "bench file", missing=_nearest, too_large=_TOO_LARGE
     )
     try:
@@ -74,23 +75,21 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
             raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")
     _require_units(content)
     options = _located(flattened(content.get("options", {})), "trace", folder)
-    bench = Bench(
+    stimulus = {
+        key: _located(value, "file", folder) if isinstance(value, Mapping) else value
+        for key, value in _located(content.get("stimulus", {}), "file", folder).items()
+    }
+    return Bench(
         experiment=content["experiment"],
         parameters=content["parameters"],
         overrides=flattened(content.get("set", {})),
         options=options,
-        stimulus=_located(content.get("stimulus", {}), "file", folder),
+        stimulus=stimulus,
         requirements=content.get("requirements", {}),
         name=content.get("name", name),
+        assembly=content.get("assembly", ""),
         **_simulation(content.get("simulation", {})),
     )
-    assembly = content.get("assembly", bench.definition.assembly)
-    if assembly != bench.definition.assembly:
-        raise ParameterError(
-            f"assembly = {quoted(assembly)}, but experiment {bench.experiment!r} tests a "
-            f"{bench.definition.assembly}"
-        )
-    return bench
 
 
 def _located(values: Mapping[str, Any], key: str, folder: Path) -> dict[str, Any]:
@@ -112,13 +111,25 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
-def _of_experiment(file: Path) -> dict[str, Any]:
+def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
     """Return the shortest bench file of an experiment; nothing where there is a file instead."""
     name = str(file)
-    if not _NAME.fullmatch(name) or file.is_file() or name not in EXPERIMENTS.all():
+    known = EXPERIMENTS.all()
+    if not _NAME.fullmatch(name) or file.is_file() or name not in {*known, *_any_brake()}:
         return {}
-    assembly = EXPERIMENTS.find(name).assembly
-    return {"experiment": name, "parameters": main_set(assembly)}
+    if "parameters" in changes:
+        return {"experiment": name}
+    if name not in known:
+        sets = ", ".join(PARAMETER_SETS.all())
+        raise ParameterError(
+            f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
+            f"({sets})"
+        )
+    return {"experiment": name, "parameters": main_set(known[name].assembly)}
+
+
+def _any_brake() -> Mapping[str, GenericExperiment]:
+    return GENERIC_EXPERIMENTS.all()
 
 
 def _nearest(file: Path) -> str:
@@ -126,7 +137,7 @@ def _nearest(file: Path) -> str:
     with contextlib.suppress(OSError):
         there = [path.name for path in file.parent.glob("*.toml")]
         near = get_close_matches(file.name, there, n=1, cutoff=0.5)
-        near += get_close_matches(str(file), EXPERIMENTS.all(), n=1, cutoff=0.7)
+        near += get_close_matches(str(file), {**EXPERIMENTS.all(), **_any_brake()}, n=1, cutoff=0.7)
         if near:
             return f"did you mean {file.with_name(near[0])}?"
     return "check the path, or name an experiment of 'bywire list'"
@@ -152,20 +163,29 @@ def _require_shape(content: Mapping[str, Any]) -> None:
 
 def _require_units(content: Mapping[str, Any]) -> None:
     """Refuse plain numbers where a unit is wanted: 37 is not 37 bar, and hardly 37 Pa."""
-    definition = EXPERIMENTS.find(content["experiment"])
     options = flattened(content.get("options", {}))
+    definition = experiment_of(
+        content["experiment"], content["parameters"], content.get("assembly", ""), options
+    )
     require_units(definition.options, options)
     overrides = flattened(content.get("set", {}))
     require_units(type(PARAMETER_SETS.find(content["parameters"]).parameters()), overrides)
-    simulation, stimulus = content.get("simulation", {}), content.get("stimulus", {})
+    simulation = content.get("simulation", {})
     for key in ("step", "record"):
         require_unit(simulation.get(key), "s", f"simulation.{key}")
-    require_unit(stimulus.get("max_gap"), "s", "stimulus.max_gap")
-    kind = stimulus.get("kind")
-    if definition.driven_unit is not None and isinstance(kind, str):
-        values = parsed(definition.options, options, f"option of {definition.name}")
-        unit = definition.driven_unit(definition.defaults.replace(values))
-        require_units(STIMULI.find(kind).parameter_class, stimulus, unit)
+    sections = stimulus_sections(content.get("stimulus", {}))
+    if definition.driven_unit is None and definition.beside is None:
+        return
+    values = parsed(definition.options, options, f"option of {definition.name}")
+    chosen = definition.defaults.replace(values)
+    units = {} if definition.beside is None else dict(definition.beside(chosen))
+    if definition.driven_unit is not None:
+        units[""] = definition.driven_unit(chosen)
+    for name, section in sections.items():
+        require_unit(section.get("max_gap"), "s", "stimulus.max_gap")
+        kind = section.get("kind")
+        if isinstance(kind, str) and name in units:
+            require_units(STIMULI.find(kind).parameter_class, section, units[name])
 
 
 def _simulation(section: Mapping[str, Any]) -> dict[str, Any]:
@@ -184,7 +204,12 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
     for name, value in changes.items():
         section, _, key = name.partition(".")
         near = get_close_matches(section, _SECTIONS, n=1, cutoff=0.8)
-        if section in _SECTIONS and key:
+        if section == "stimulus" and "." in key:
+            signal, _, field = key.partition(".")
+            known = changed.setdefault(section, {})
+            below = known.get(signal, {})
+            known[signal] = {**(below if isinstance(below, Mapping) else {}), field: value}
+        elif section in _SECTIONS and key:
             changed.setdefault(section, {})[key] = value
         elif near and key:
             raise unknown_name("section", section, _SECTIONS)

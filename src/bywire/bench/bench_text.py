@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from bywire.bench.bench import Bench
+from bywire.bench.bench import Bench, stimulus_sections
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -35,27 +35,38 @@ def bench_text(bench: Bench, comment: str = "") -> str:
     <BLANKLINE>
     """
     definition = bench.definition
-    stimulus: dict[str, str] = {}
-    if "kind" in bench.stimulus and definition.driven_unit is not None:
-        level = definition.driven_unit(bench.chosen_options)
-        stimulus = _units(STIMULI.find(str(bench.stimulus["kind"])).parameter_class, level)
     simulation: dict[str, Any] = {"step": bench.step} if bench.step != Bench.step else {}
     simulation |= {} if bench.record is None else {"record": bench.record}
     simulation |= {"seed": bench.seed} if bench.seed else {}
     sections: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {
         "options": (bench.options, _units(definition.options)),
-        "stimulus": (bench.stimulus, stimulus),
+        **_stimulus(bench),
         "set": (bench.overrides, _units(type(bench.par))),
         "simulation": (simulation, {"step": "s", "record": "s"}),
         "requirements": (bench.requirements, {}),
     }
     lines = [f"# {line}" for line in comment.splitlines()]
     lines += [f'experiment = "{bench.experiment}"', f'parameters = "{bench.parameters}"']
+    lines += [f'assembly = "{bench.assembly}"'] if bench.assembly else []
     for name, (values, units) in sections.items():
         if values:
             lines += ["", f"[{name}]"]
             lines += [f"{_key(k)} = {_text(k, v, units.get(k, '1'))}" for k, v in values.items()]
     return "\n".join(lines) + "\n"
+
+
+def _stimulus(bench: Bench) -> dict[str, tuple[Mapping[str, Any], Mapping[str, str]]]:
+    """Return the sections of the stimulus by title, each with the units of its values."""
+    definition, options = bench.definition, bench.chosen_options
+    levels = {} if definition.beside is None else dict(definition.beside(options))
+    if definition.driven_unit is not None:
+        levels[""] = definition.driven_unit(options)
+    found: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {}
+    for name, section in stimulus_sections(bench.stimulus).items():
+        cls = STIMULI.find(str(section["kind"])).parameter_class
+        units = _units(cls, levels[name])
+        found[f"stimulus.{name}" if name else "stimulus"] = (section, units)
+    return found
 
 
 def _units(cls: type[ParameterSet], level: str = "") -> dict[str, str]:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.bench.kpis import step_response
+from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
@@ -85,7 +84,7 @@ class Case:
         return replace(self, settle=float(f"{settle:.12g}"), record=record)
 
 
-Cases = Callable[[Any, Any, Stimulus | None], tuple[Case, ...]]
+Cases = Callable[[Any, Any, Any], tuple[Case, ...]]
 """``cases(par, options, stimulus)``"""
 
 
@@ -107,7 +106,9 @@ class Experiment:
         Options as in the source.
     cases
         ``cases(par, options, stimulus)``: the runs it consists of; none for a static
-        characteristic. ``stimulus`` is that of the bench file, where the experiment takes one.
+        characteristic. ``stimulus`` is the `Stimulus` of the bench file, or None; of an
+        experiment with ``beside`` it is all of them by the names of their signals, that of the
+        plain section under an empty name.
     judge
         ``judge(recordings, options)``: its KPIs.
     kpis
@@ -118,17 +119,25 @@ class Experiment:
         ``finish(recording, options)``: adds derived signals to a recording, in place of it.
     step
         ``step(options)``: what a step response is judged by, for KPIs and figures.
+    loop, followed, sweep
+        The same of a hysteresis loop, of a signal that follows another, and of sines.
     static
         ``static(par, options)``: recordings of a static characteristic, without any run.
     driven_unit
         ``driven_unit(options)``: SI unit of what a ``[stimulus]`` section drives; None where
         the experiment brings its own stimulus.
+    beside
+        ``beside(options)``: SI unit of every stimulus that a section ``[stimulus.NAME]`` may
+        drive, by its name; such an experiment records what it drives. None where it drives all
+        by itself.
     following
         ``following(par)``: options that follow the parameters unless they are given.
     preview
         ``cases`` with any start, for checks alone; where those have to compute runs first.
     without
         ``without(options)``: key figures that some options leave out.
+    compared
+        What its overlaid traces compare of several runs: what an ordinate says, by signal.
     named
         ``named(options)``: unit of every key figure by name, where a table among the options
         decides which there are; ``kpis`` then holds those of the defaults.
@@ -145,12 +154,17 @@ class Experiment:
     figures: tuple[str, ...]
     finish: Callable[[xr.Dataset, Any], xr.Dataset] | None = None
     step: Callable[[Any], step_response.Setting] | None = None
+    loop: Callable[[Any], hysteresis.Setting] | None = None
+    followed: Callable[[Any], tracking.Setting] | None = None
+    sweep: Callable[[Any], sine_sweep.Setting] | None = None
     static: Callable[[Any, Any], dict[str, xr.Dataset]] | None = None
     driven_unit: Callable[[Any], str] | None = None
+    beside: Callable[[Any], Mapping[str, str]] | None = None
     following: Callable[[Any], Mapping[str, Any]] | None = None
     preview: Cases | None = None
     without: Callable[[Any], tuple[str, ...]] | None = None
     named: Callable[[Any], Mapping[str, str]] | None = None
+    compared: Mapping[str, str] = field(default_factory=dict)
 
     def kpis_with(self, options: Any) -> dict[str, str]:
         """Return the unit of every key figure by name, those that the options leave out apart."""
@@ -200,7 +214,5 @@ def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArr
     return lambda t: {name: np.full(t.shape, value) for name, value in levels.items()}
 
 
-EXPERIMENTS = Kind(
-    "experiment", ("experiments",), instances(Experiment), "bywire.bench.experiments"
-)
-"""every experiment: the generic ones, and those of the brakes"""
+EXPERIMENTS = Kind("experiment", ("experiments",), instances(Experiment))
+"""every experiment of a brake; those of any brake are `GENERIC_EXPERIMENTS`"""

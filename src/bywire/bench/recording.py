@@ -12,7 +12,7 @@ import pandas as pd
 import xarray as xr
 
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import signals_of
+from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
 from bywire.simulation.run import Run, Trajectory
 
@@ -46,7 +46,7 @@ def record(
     kept = time >= -keep - 1e-9
     signals = signals_of(run.model.Output)
     variables = {
-        name: ("time", trajectory[name][kept], {"units": s.unit, "long_name": s.label})
+        name: ("time", trajectory[name][kept], _attributes(s))
         for name, s in signals.items()
         if name in trajectory.names
     }
@@ -69,6 +69,11 @@ def record(
         **notes,
     }
     return recording
+
+
+def _attributes(signal: Signal) -> dict[str, str]:
+    found = {"units": signal.unit, "long_name": signal.label}
+    return found | ({"set_point_of": signal.set_point_of} if signal.set_point_of else {})
 
 
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import xarray as xr
@@ -16,6 +16,7 @@ from bywire.bench.requirements import judge
 from bywire.bench.result import Result
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.interrupts import interrupts_deferred
+from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
 
@@ -81,13 +82,27 @@ def _recorded(
         "parameter_set": bench.parameters,
         "seed": bench.seed,
         "options": bench.chosen_options.model_dump_json(),
-        "stimulus": json.dumps(_described(bench.chosen_stimulus)),
+        "stimulus": json.dumps(_described(bench.chosen_stimuli)),
     }
-    return record(made, trajectory, case.settle, case.keep, notes)
+    recording = record(made, trajectory, case.settle, case.keep, notes)
+    return recording if bench.definition.beside is None else _with_inputs(recording, case)
 
 
-def _described(stimulus: Stimulus | None) -> dict[str, Any]:
-    """Return a stimulus as a ``[stimulus]`` section in SI; empty where none is given."""
-    if stimulus is None:
-        return {}
-    return {"kind": stimulus.kind, **stimulus.parameters.model_dump(mode="json")}
+def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:
+    """Return a recording with what drove the model, where the model does not record that."""
+    time = recording["time"].values
+    signals = signals_of(case.model.Stimulus)
+    given = {name: y for name, y in case.stimulus(time).items() if name not in recording}
+    return recording.assign({
+        name: ("time", y, {"units": signals[name].unit, "long_name": signals[name].label})
+        for name, y in given.items()
+    })  # fmt: skip
+
+
+def _described(stimuli: Mapping[str, Stimulus]) -> dict[str, Any]:
+    """Return stimuli as ``[stimulus]`` sections in SI; empty where none is given."""
+    found = {
+        name: {"kind": each.kind, **each.parameters.model_dump(mode="json")}
+        for name, each in stimuli.items()
+    }
+    return {**found.pop("", {}), **found}

@@ -8,6 +8,7 @@ from typing import Any
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS, Experiment
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.cli.described_parameters import (
@@ -56,6 +57,7 @@ def described(name: str) -> list[Object]:
         "method": (METHODS.all(), _method),
         "method of any bench": (BENCH_METHODS.all(), _bench_method),
         "experiment": (EXPERIMENTS.all(), _experiment),
+        "experiment of any brake": (GENERIC_EXPERIMENTS.all(), _generic),
         "study": (STUDIES.all(), _study),
         "parameter set": (PARAMETER_SETS.all(), _set),
         "loop": (LOOPS.all(), described_loop),
@@ -152,6 +154,34 @@ def _experiment(one: Experiment) -> Object:
         "options": option_rows(one.options, one.defaults),
         "changed_with": "--set options.NAME=VALUE",
     }  # fmt: skip
+
+
+def _generic(one: GenericExperiment) -> Object:
+    rows = option_rows(one.options, None)
+    for row in rows:
+        value = one.defaults.get(row["name"])
+        row["value"] = None if value is None else _default(value, row["unit"], one)
+    return {
+        "summary": one.summary,
+        "assembly": "any",
+        "options": rows,
+        "changed_with": "--set options.NAME=VALUE",
+        "see": "'bywire list' with the name of an assembly shows its stimuli and what it records; "
+        f"levels are multiples of what is nominal for the signal of option {_named(one)}",
+    }
+
+
+def _default(value: Any, unit: str, one: GenericExperiment) -> str:
+    from bywire.report.tables import value_text
+
+    if any(option in unit for option in one.signals):  # the unit is that of a signal
+        values = value if isinstance(value, tuple) else (value,)
+        return ", ".join(f"{v:g} x nominal" if v else "0" for v in values)
+    return value_text(value, unit)
+
+
+def _named(one: GenericExperiment) -> str:
+    return " or ".join(one.signals)
 
 
 def _study(one: Study) -> Object:

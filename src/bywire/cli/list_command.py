@@ -9,6 +9,7 @@ from textwrap import wrap
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.cli.output import result
@@ -31,6 +32,8 @@ def execute(name: str | None, as_json: bool) -> None:
         "assemblies": sorted({e.assembly for e in PARAMETER_SETS.all().values()}),
         "parameter_sets": {e.name: e.summary for e in PARAMETER_SETS.all().values()},
         "experiments": {e.name: f"{e.summary} ({e.assembly})" for e in experiments.values()},
+        "generic_experiments": {e.name: f"{e.summary} (any)"
+                                for e in GENERIC_EXPERIMENTS.all().values()},
         "loops": {loop.name: f"{loop.summary} ({loop.assembly})" for loop in LOOPS.all().values()},
         "plants": {one.name: f"{one.summary} ({one.assembly})" for one in PLANTS.all().values()},
         "studies": {one.name: f"{one.summary} ({one.assembly})" for one in STUDIES.all().values()},

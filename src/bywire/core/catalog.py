@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet
-from bywire.core.provenance import Cited
+from bywire.core.provenance import Cited, chosen
 from bywire.core.registry import Kind, instances
-
 
 @dataclass(frozen=True)
 class CitedSet:
@@ -22,13 +22,13 @@ class CitedSet:
     assembly
         Name of the assembly that it is for.
     source
-        Full citation.
+        Full citation; empty where the values have none.
     summary
         One line for listings.
     parameter_class
         Class that validates the values.
     values
-        Every value by dotted name, with its provenance.
+        Every value by dotted name, with its provenance; a plain one counts as chosen.
     """
 
     name: str
@@ -36,7 +36,13 @@ class CitedSet:
     source: str
     summary: str
     parameter_class: type[ParameterSet]
-    values: Mapping[str, Cited]
+    values: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        plain = {k: v for k, v in self.values.items() if not isinstance(v, Cited)}
+        cited = {k: chosen(v, "") for k, v in plain.items()}
+        object.__setattr__(self, "values", {**self.values, **cited})
+        object.__setattr__(self, "source", self.source or "not given")
 
     def parameters(self) -> ParameterSet:
         """Return the validated parameter set."""

@@ -66,11 +66,11 @@ class Kind(Generic[T]):
         UnknownNameError
             With the nearest known names.
         """
-        guess = self._guess(name)
+        guess = self.guess(name)
         return guess if guess is not None else pick(self.all(), name, self.name)
 
-    def _guess(self, name: str) -> T | None:
-        """Return the thing of a name if the file of that name declares it: loads no other."""
+    def guess(self, name: str) -> T | None:
+        """Return the thing of a name if a file of that name declares it: loads no other."""
         stem = name.replace("-", "_")
         if not stem.isidentifier():
             return None
@@ -149,14 +149,17 @@ def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, str], ..
     )
 
 
-def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:
+def pick(
+    known: Mapping[str, Thing], name: str, kind: str, also: Iterable[str] = ()
+) -> Thing:
     """Return the thing of a name.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names; ``kind`` says what they are names of.
+        With the nearest known names, and those that would do ``also``; ``kind`` says what they
+        are names of.
     """
     if name not in known:
-        raise unknown_name(kind, name, known)
+        raise unknown_name(kind, name, {*known, *also})
     return known[name]

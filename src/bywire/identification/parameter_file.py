@@ -8,6 +8,7 @@ from typing import Any
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -41,7 +42,7 @@ def parameter_file(
     wanted, left_out, problem = _accepted(experiment, parameters, changes)
     notes = comment.splitlines()
     if problem:
-        for other in _alternatives(experiment):
+        for other in _alternatives(parameters):
             found, left, trouble = _accepted(other, parameters, changes)
             if not trouble:
                 notes.append(f"experiment {experiment!r} wants more than this file says: {problem}")
@@ -76,9 +77,9 @@ def _accepted(
         return wanted, left_out, ""
 
 
-def _alternatives(experiment: str) -> list[str]:
-    """Return the other experiments of the same assembly that bring all they need."""
-    assembly = EXPERIMENTS.find(experiment).assembly
+def _alternatives(parameters: str) -> list[str]:
+    """Return the experiments of a parameter set's assembly that bring all they need."""
+    assembly = PARAMETER_SETS.find(parameters).assembly
     return [one.name for one in EXPERIMENTS.all().values()
             if one.assembly == assembly and one.driven_unit is None]  # fmt: skip
 

@@ -10,9 +10,11 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from bywire.bench.energy_ledger import actuator_ledger, disc_ledger
+from bywire.bench.kpis import sine_sweep
 from bywire.bench.result import Result
 from bywire.core.errors import ParameterError
 from bywire.core.registry import Kind, instances
+from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import ledger_bars
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.overlaid_traces import overlaid_traces
@@ -71,7 +73,7 @@ def _step_response(result: Result) -> list[Shown]:
             settling_time=kpis.get("settling_time"),
             overshoot=kpis["overshoot"] / 100.0 if "overshoot" in kpis else None,
         )
-    demand = {"p_mc": "p_ref", "i": "i_ref"}[setting.signal] if limits is not None else None
+    demand = setting.set_point or None
     figure = step_response(
         recording,
         setting.signal,
@@ -104,7 +106,7 @@ def _overlaid_traces(result: Result) -> list[Shown]:
     return [
         Shown(
             f"overlaid-traces-{group}" if group else "overlaid-traces",
-            overlaid_traces(recordings),
+            overlaid_traces(recordings, result.bench.definition.compared),
             f"{', '.join(recordings)}{f': {group}' if group else ''}.",
         )
         for group, recordings in groups.items()
@@ -130,19 +132,44 @@ def _energy_balance(result: Result) -> list[Shown]:
 
 
 def _hysteresis_loop(result: Result) -> list[Shown]:
-    average = float(result.bench.chosen_options.flat().get("smoothing", 0.0))
-    figure = hysteresis_loop(result.recordings, current="i_filtered", average=average)
-    return [Shown("hysteresis-loop", figure, "Current over pressure, up and down again.")]
+    definition = result.bench.definition
+    if definition.loop is None:
+        return []
+    setting = definition.loop(result.bench.chosen_options)
+    figure = hysteresis_loop(
+        result.recordings, setting.response, setting.drive, setting.demand, setting.smoothing
+    )
+    caption = "Drive over response, up and down again."
+    return [Shown("hysteresis-loop", figure, caption)]
 
 
 def _stribeck_curve(result: Result) -> list[Shown]:
     figure = stribeck_curve(result.recordings["curve"])
-    return [Shown("stribeck-curve", figure, "Friction torque over motor speed.")]
+    return [Shown("stribeck-curve", figure, "Friction over speed.")]
 
 
 def _tracking(result: Result) -> list[Shown]:
-    figure = tracking(result.recordings["run"])
-    return [Shown("tracking", figure, "Pressure and its set point from the pedal.")]
+    definition = result.bench.definition
+    if definition.followed is None:
+        return []
+    setting = definition.followed(result.bench.chosen_options)
+    figure = tracking(result.recordings["run"], setting.signal, setting.set_point)
+    return [Shown("tracking", figure, "What follows, and its set point.")]
+
+
+def _sine_sweep(result: Result) -> list[Shown]:
+    definition = result.bench.definition
+    if definition.sweep is None:
+        return []
+    setting = definition.sweep(result.bench.chosen_options)
+    sweep = sine_sweep.select(result.recordings["run"], setting)
+    if not sweep.frequencies.size:  # interrupted within the first sine
+        return []
+    response = Response(
+        f"{setting.response} over {setting.drive}", sweep.frequencies, sweep.values, measured=True
+    )
+    caption = "Gain and phase of the output, at the frequencies of the sines."
+    return [Shown("sine-sweep", bode([response]), caption)]
 
 
 GENERAL = (
@@ -153,6 +180,7 @@ GENERAL = (
     FigureKind("hysteresis-loop", _hysteresis_loop),
     FigureKind("stribeck-curve", _stribeck_curve),
     FigureKind("tracking", _tracking),
+    FigureKind("sine-sweep", _sine_sweep),
 )
 
 FIGURES = Kind("figure", ("figures",), instances(FigureKind), "bywire.report.bench_figures")

@@ -1,4 +1,4 @@
-"""Figure: the loop of current over pressure that dry friction opens."""
+"""Figure: the loop of drive over response that dry friction and play open."""
 
 from __future__ import annotations
 
@@ -27,23 +27,22 @@ ARROWS_AT = (0.35, 0.75)
 
 def hysteresis_loop(
     recordings: Mapping[str, xr.Dataset],
-    *,
-    pressure: str = "p_mc",
-    current: str = "i",
-    demand: str = "i_star",
+    response: str,
+    drive: str,
+    demand: str = "",
     average: float = 0.0,
 ) -> Figure:
-    """Draw current over pressure, applying solid and releasing dashed, one color per recording.
+    """Draw drive over response, applying solid and releasing dashed, one color per recording.
 
     Parameters
     ----------
     recordings
         Recordings of a ramp up and down again, by the label that the legend shows.
-    pressure, current
-        Variables.
+    response, drive
+        Variables, for instance a pressure and a current.
     demand
         Variable whose maximum divides applying from releasing; where a recording lacks it, the
-        current does.
+        drive does.
     average
         Averaging time [s] of the loop, usually one dither period; the ripple around it is then
         drawn pale. 0 draws the raw signals.
@@ -58,7 +57,7 @@ def hysteresis_loop(
     figure, (axes,) = style.new_figure(4.2)
     for k, (label, recording) in enumerate(recordings.items()):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
-        x, y = channel(recording, pressure), channel(recording, current)
+        x, y = channel(recording, response), channel(recording, drive)
         by = channel(recording, demand) if demand in recording.data_vars else y
         turn = _turn(by.values)
         if average > 0:

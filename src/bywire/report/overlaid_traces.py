@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,17 +17,12 @@ from bywire.report.decimation import decimate
 if TYPE_CHECKING:
     import xarray as xr
 
-VARIABLES: Mapping[str, str] = MappingProxyType(
-    {"y_M": "moment", "theta": "angle", "F_M": "force", "i_2": "current 2", "P_meas": "power"}
-)
-"""what is compared of wedge brakes, and what a low panel calls it"""
-
 _ROOM = "  "  # short labels of wide letters need more than the legend's mean width of a letter
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))
 
 
 def overlaid_traces(
-    recordings: Mapping[str, xr.Dataset], variables: Mapping[str, str] = VARIABLES
+    recordings: Mapping[str, xr.Dataset], variables: Mapping[str, str]
 ) -> Figure:
     """Draw variables over time, one panel each, with a line for every recording.
 

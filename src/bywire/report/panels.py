@@ -1,10 +1,22 @@
-"""What the panels of stacked time traces show: the motorcycle brake's, and the wedge brake's."""
+"""What the panels of stacked time traces show, also where no brake declares them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
+import numpy as np
+
+from bywire.core.registry import Kind, instances
 from bywire.report.style import Role
+from bywire.report.wording import clean
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_NO_PANEL = ("E_", "W_", "t_", "noise_")  # beginnings of names: what only accumulates, and noise
+_LINES = 2  # of a panel, set points apart: one look for each
 
 
 @dataclass(frozen=True)
@@ -47,58 +59,72 @@ class Panel:
     height: float = 1.0
 
 
-MOTORCYCLE_PANELS = (
-    Panel(
-        "pressure",
-        (Trace("p_mc"), Trace("p_pd", Role.SECOND), Trace("p_ref", Role.SET_POINT)),
-        height=1.8,
-    ),
-    Panel("current", (Trace("i"), Trace("i_ref", Role.SET_POINT)), saturation="sat_current"),
-    Panel("speed", (Trace("omega"),)),
-    Panel("duty cycle", (Trace("duty"),), saturation="sat_duty"),
-    Panel("power", (Trace("P_el"),)),
-)
+@dataclass(frozen=True)
+class Panels:
+    """The panels of a brake, or of a rig.
 
-WEDGE_PANELS = (
-    Panel(
-        "moment",
-        (Trace("y_M"), Trace("M_B", Role.SECOND), Trace("M_set", Role.SET_POINT)),
-        height=1.8,
-    ),
-    Panel(
-        "motor speed",
-        (Trace("omega_1"), Trace("omega_2", Role.SECOND)),
-        saturation="sat_rate",
-        saturated="on the software rate limit",
-    ),
-    Panel("current", (Trace("i_1"), Trace("i_2", Role.SECOND)), limit="drive.i_max"),
-    # The rig shows the filtered power; the peaks of the raw one would hide it.
-    Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
-    Panel("force", (Trace("F_M"),)),
-    Panel("mode", (Trace("mode"),), levels=("parked", "gap", "moment", "retracting")),
-)
-"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
+    Parameters
+    ----------
+    name
+        What messages call them.
+    assemblies
+        Names of the models whose recordings they show.
+    panels
+        From top to bottom.
+    """
 
-RIG_PANELS = (
-    Panel(
-        "angle",
-        (
-            Trace("theta_1"), Trace("theta_2", Role.SECOND), Trace("theta_1_ref", Role.SET_POINT),
-        ),
-        height=1.8,
-    ),
-    Panel("motor speed", (Trace("omega_1"), Trace("omega_2", Role.SECOND))),
-    Panel(
-        "current",
-        (Trace("i_1"), Trace("i_2", Role.SECOND), Trace("i_1_ref", Role.SET_POINT)),
-        limit="drive.i_max",
-    ),
-    Panel("force", (Trace("y_F"),)),
-    Panel("force", (Trace("F_M"),)),
-    Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
-    Panel("power", (Trace("P_el"),)),
-)  # fmt: skip
-"""motors and screws alone, or the wedge brake under position or current control"""
+    name: str
+    assemblies: tuple[str, ...]
+    panels: tuple[Panel, ...]
 
-KINDS = (MOTORCYCLE_PANELS, WEDGE_PANELS, RIG_PANELS)
-"""panels that time traces choose from"""
+
+PANELS = Kind("panels", ("panels",), instances(Panels))
+"""the panels of every brake, in a module ``panels`` of its package"""
+
+
+def declared_panels(recording: xr.Dataset) -> list[Panels]:
+    """Return the panels declared for the model of a recording; all where it does not say which."""
+    known, model = list(PANELS.all().values()), recording.attrs.get("model")
+    return [each for each in known if model is None or model in each.assemblies]
+
+
+def panels_by_unit(recording: xr.Dataset) -> tuple[Panel, ...]:
+    """Return panels for a recording of any model: signals of one unit, two by two.
+
+    A set point (attribute ``set_point_of``) stands beside its signal. What accumulates (energies,
+    times) and modes, which are 0 or 1, have no panel.
+    """
+    names = [str(name) for name in recording.data_vars if _is_drawn(recording, str(name))]
+    targets = {name: str(recording[name].attrs.get("set_point_of", "")) for name in names}
+    lines = [name for name in names if targets[name] not in names]
+    groups: dict[str, list[str]] = {}
+    for name in lines:
+        groups.setdefault(str(recording[name].attrs.get("units", "1")), []).append(name)
+    found = []
+    for group in groups.values():
+        for first in range(0, len(group), _LINES):
+            shown = group[first : first + _LINES]
+            roles = zip(shown, (Role.MAIN, Role.SECOND), strict=False)
+            traces = [Trace(name, role) for name, role in roles]
+            traces += [Trace(n, Role.SET_POINT) for n in names if targets[n] in shown]
+            found.append(Panel(_quantity(recording, shown), tuple(traces)))
+    return tuple(found)
+
+
+def _is_drawn(recording: xr.Dataset, name: str) -> bool:
+    if name.startswith(_NO_PANEL) or recording[name].dims != ("time",):
+        return False
+    values = recording[name].values
+    is_mode = recording[name].attrs.get("units", "1") == "1" and np.isin(values, (0.0, 1.0)).all()
+    return not is_mode
+
+
+def _quantity(recording: xr.Dataset, names: Sequence[str]) -> str:
+    """Return what an ordinate says: a label, or the last words that two labels have in common."""
+    labels = [clean(recording[name].attrs.get("long_name", name)).split() for name in names]
+    shared: list[str] = []
+    for words in zip(*(reversed(label) for label in labels), strict=False):
+        if len(set(words)) > 1:
+            break
+        shared.insert(0, words[0])
+    return " ".join(shared or labels[0])

@@ -51,5 +51,6 @@ def _origin(cited: Cited | None, value: object) -> tuple[str, str]:
     if cited is None:
         return "", ""
     if cited.value != value:
-        return OVERRIDDEN, f"cited: {cited.value} in SI ({cited.kind}, {cited.where})"
+        origin = ", ".join(filter(None, (cited.kind, cited.where)))
+        return OVERRIDDEN, f"cited: {cited.value} in SI ({origin})"
     return cited.kind, cited.where

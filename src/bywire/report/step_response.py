@@ -25,8 +25,8 @@ if TYPE_CHECKING:
 
 def step_response(
     recording: xr.Dataset,
-    variable: str = "p_mc",
-    set_point: str | None = "p_ref",
+    variable: str,
+    set_point: str | None = None,
     *,
     limits: StepLimits | None = None,
     facts: StepFacts | None = None,

@@ -1,4 +1,4 @@
-"""Figure: friction torque over speed, for several pressures."""
+"""Figure: dry friction over speed, for several levels of what it depends on."""
 
 from __future__ import annotations
 
@@ -20,45 +20,48 @@ if TYPE_CHECKING:
 def stribeck_curve(
     curve: xr.Dataset,
     *,
-    torque: str = "T_fr",
+    friction: str = "",
     measured: Mapping[float, tuple[FloatArray, FloatArray]] | None = None,
 ) -> Figure:
-    """Draw friction torque over shaft speed, one line per pressure.
+    """Draw dry friction over speed, one line per level.
 
-    At rest the torque is set-valued: between the two breakaway torques the line is vertical.
+    At rest friction is set-valued: between its two breakaway values the line is vertical.
 
     Parameters
     ----------
     curve
-        Dataset with the torque [N m] over two dimensions: pressure [Pa] and ascending speed
-        [rad/s], which contains 0 twice, once for each end of the interval at rest.
-    torque
-        Name of the torque in it.
+        Dataset with the friction over two dimensions: what it depends on, for instance a
+        pressure, and ascending speed, which contains 0 twice, once for each end of the interval
+        at rest. All say their units.
+    friction
+        Name of the friction in it; its first variable where empty.
     measured
-        Measured speeds [rad/s] and torques [N m], by pressure [Pa]; drawn as points.
+        Measured speeds and frictions, SI, by level; drawn as points.
 
     Raises
     ------
     UnknownNameError
-        When the dataset has no such torque.
+        When the dataset has no such variable.
     ParameterError
-        When it does not depend on pressure and speed.
+        When it does not depend on a level and a speed.
     """
-    if torque not in curve.data_vars:
-        raise unknown_name("variable", torque, map(str, curve.data_vars))
-    array = curve[torque]
+    friction = friction or next(map(str, curve.data_vars), "")
+    if friction not in curve.data_vars:
+        raise unknown_name("variable", friction, map(str, curve.data_vars))
+    array = curve[friction]
     if array.ndim != 2 or array.size == 0:
         raise ParameterError(
-            f"{torque} has the shape {array.shape}: a Stribeck curve needs pressure and speed"
+            f"{friction} has the shape {array.shape}: a Stribeck curve needs a level and a speed"
         )
-    pressure, speed = (array[name] for name in array.dims)
+    level, speed = (array[name] for name in array.dims)
+    unit = str(level.attrs.get("units", "1"))
     figure, (axes,) = style.new_figure(3.8)
-    for k, p in enumerate(pressure.values.astype(float)):
+    for k, p in enumerate(level.values.astype(float)):
         color = style.SEQUENCE[k % len(style.SEQUENCE)]
         values = np.asarray(array.values[k], dtype=float)
         # Short intervals at rest lie above long ones, so that all are seen.
         above = 2.0 + 0.9 / (1.0 + float(np.ptp(values)))
-        label = amount(p, "Pa")
+        label = amount(p, unit)
         axes.plot(speed.values, values, color=color, linewidth=1.4, zorder=above, label=label)
         if measured is not None and p in measured:
             axes.plot(
@@ -67,7 +70,12 @@ def stribeck_curve(
             )
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.margins(x=0.01)
-    axes.set_xlabel(style.axis_label(str(speed.attrs.get("long_name", "speed")), "rad/s"))
-    axes.set_ylabel(style.axis_label(str(array.attrs.get("long_name", torque)), "N*m"))
+    axes.set_xlabel(_title(speed, "speed"))
+    axes.set_ylabel(_title(array, friction))
     style.legend_above(axes)
     return figure
+
+
+def _title(shown: xr.DataArray, name: str) -> str:
+    unit = str(shown.attrs.get("units", "1"))
+    return style.axis_label(str(shown.attrs.get("long_name", name)), unit)

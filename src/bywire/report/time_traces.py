@@ -15,7 +15,7 @@ from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
 from bywire.report.decimation import phases
-from bywire.report.panels import KINDS, Panel, Trace
+from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
 from bywire.report.step_marks import StepLimits, draw_limits
 from bywire.report.style import Role
 
@@ -45,9 +45,9 @@ def time_traces(
     recording
         Recording to draw.
     panels
-        What to draw; by default the panels of the brake or rig that the recording shows most of.
-        Those without any variable in the recording are left out, and those that stay at zero
-        unless all do.
+        What to draw; by default those that the recording's brake or rig declares (of several, the
+        ones that the recording shows most of), else its signals by their units. Those without any
+        variable in the recording are left out, and those that stay at zero unless all do.
     limits
         Step by which the first trace of the first panel is judged: its band and limit are drawn.
     measured
@@ -65,9 +65,13 @@ def time_traces(
     """
     present = _chosen(recording) if panels is None else _drawable(recording, panels)
     if not present:
-        known = [p for kind in KINDS for p in kind] if panels is None else panels
-        wanted = ", ".join(trace.variable for panel in known for trace in panel.traces)
-        raise ParameterError(f"the recording has none of the variables {wanted}")
+        wanted = ", ".join(trace.variable for panel in panels or () for trace in panel.traces)
+        raise ParameterError(
+            f"the recording has none of the variables {wanted}"
+            if wanted
+            else "the recording has none of the variables that time traces show: energies and "
+            "modes alone have no panel"
+        )
     heights = [panel.height for panel, _ in present]
     figure, rows = style.new_figure(0.5 + 1.15 * sum(heights), heights)
     for axes, (panel, traces) in zip(rows, present, strict=True):
@@ -88,8 +92,10 @@ def time_traces(
 
 
 def _chosen(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
-    """Return the panels of that kind of which the recording shows most."""
-    return max((_drawable(recording, kind) for kind in KINDS), key=len)
+    """Return the declared panels of which the recording shows most, or those by unit."""
+    known = [_drawable(recording, each.panels) for each in declared_panels(recording)]
+    most = max(known, key=len, default=[])
+    return most or _drawable(recording, panels_by_unit(recording))
 
 
 def _drawable(

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def tracking(recording: xr.Dataset, variable: str = "p_mc", set_point: str = "p_ref") -> Figure:
+def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
     """Draw a variable with its set point, and below it the error between them.
 
     Parameters

@@ -17,7 +17,7 @@ def loop(t, i, p, smoothing=0.0):
         {"i": ("time", i, {"units": "A"}), "p_mc": ("time", p, {"units": "Pa"})},
         {"time": ("time", t)},
     )
-    return registry.evaluate("hysteresis", recording, hysteresis.Setting(smoothing=smoothing))
+    return registry.evaluate("hysteresis", recording, hysteresis.Setting("i", "p_mc", smoothing))
 
 
 @pytest.mark.parametrize("start", [0.0, 1.0, 4.0])
@@ -111,7 +111,10 @@ def test_moving_average_of_a_period_is_exact_on_ramps_and_blind_to_ripple():
 
 def test_every_figure_is_declared_for_listings():
     found = registry.definitions()
-    assert set(registry.FAMILIES.all()) == {"effort", "hysteresis", "occupation", "step_response"}
+    assert set(registry.FAMILIES.all()) == {
+        "effort", "extremes", "hysteresis", "occupation", "release", "sine_sweep",
+        "step_response", "tracking",
+    }  # fmt: skip
     assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
     for figure in found.values():
         assert figure.definition.endswith(".")

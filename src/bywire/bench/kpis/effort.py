@@ -67,7 +67,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Effort:
     return Effort(t, *found)
 
 
-@measure("A")
+@measure("A", needs=("current",))
 def peak_current(data: Effort) -> float | Undefined:
     """Largest magnitude of the motor current.
 
@@ -78,7 +78,7 @@ def peak_current(data: Effort) -> float | Undefined:
     return float(np.max(np.abs(data.current)))
 
 
-@measure("A")
+@measure("A", needs=("current",))
 def mean_current(data: Effort) -> float | Undefined:
     """Mean over time of the magnitude of the motor current.
 
@@ -89,7 +89,7 @@ def mean_current(data: Effort) -> float | Undefined:
     return integral(data.t, np.abs(data.current)) / float(data.t[-1] - data.t[0])
 
 
-@measure("W")
+@measure("W", needs=("power",))
 def peak_power(data: Effort) -> float | Undefined:
     """Largest electrical power drawn from battery or source.
 
@@ -100,14 +100,14 @@ def peak_power(data: Effort) -> float | Undefined:
     return float(np.max(data.power))
 
 
-@measure("W")
+@measure("W", needs=("energy", "power"))
 def mean_power(data: Effort) -> float | Undefined:
     """Energy drawn over the duration of the recording."""
     drawn = _drawn(data)
     return drawn if isinstance(drawn, Undefined) else drawn / float(data.t[-1] - data.t[0])
 
 
-@measure("J")
+@measure("J", needs=("energy", "power"))
 def energy(data: Effort) -> float | Undefined:
     """Energy drawn from battery or source during the recording.
 

@@ -27,11 +27,22 @@ _LEVELS = 401  # levels at which the width is looked up, both extremes left out
 
 @dataclass(frozen=True)
 class Setting:
-    """Names of drive and response in the recording, and an averaging time [s], 0 for none."""
+    """What the loop is of.
 
-    drive: str = "i"
-    response: str = "p_mc"
+    Parameters
+    ----------
+    drive, response
+        Names of the signals in the recording.
+    smoothing
+        Averaging time [s]; 0 for none.
+    demand
+        Signal whose maximum divides applying from releasing in figures; empty for the drive.
+    """
+
+    drive: str
+    response: str
     smoothing: float = 0.0
+    demand: str = ""
 
 
 @dataclass(frozen=True, eq=False)

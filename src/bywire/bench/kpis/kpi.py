@@ -86,11 +86,17 @@ class Measure(Generic[D]):
     function
         Returns the value, or why there is none. Its name and its docstring's first line are
         the figure's name and definition.
+    needs
+        Fields of the family's setting that name signals, one of which at least it needs; none
+        where the family cannot do without any of them.
     """
 
-    def __init__(self, unit: str, function: Callable[[D], float | Undefined]) -> None:
+    def __init__(
+        self, unit: str, function: Callable[[D], float | Undefined], needs: tuple[str, ...] = ()
+    ) -> None:
         self.name = function.__name__
         self.unit = unit
+        self.needs = needs
         self.definition = inspect.cleandoc(function.__doc__ or "").splitlines()[0]
         self.__doc__ = function.__doc__
         self.__wrapped__ = function
@@ -105,12 +111,12 @@ class Measure(Generic[D]):
 
 
 def measure(
-    unit: str,
+    unit: str, needs: tuple[str, ...] = ()
 ) -> Callable[[Callable[[D], float | Undefined]], Measure[D]]:
-    """Declare a function as a key figure with a unit."""
+    """Declare a function as a key figure with a unit, and what it needs; see `Measure`."""
 
     def declare(function: Callable[[D], float | Undefined]) -> Measure[D]:
-        return Measure(unit, function)
+        return Measure(unit, function, needs)
 
     return declare
 

@@ -66,7 +66,7 @@ def select(recording: xr.Dataset, setting: Setting) -> Occupation:
     return Occupation(t, *found)
 
 
-@measure("1")
+@measure("1", needs=("t_stuck", "stuck"))
 def share_stuck(data: Occupation) -> float | Undefined:
     """Share of the time during which the shaft is stuck.
 
@@ -78,7 +78,7 @@ def share_stuck(data: Occupation) -> float | Undefined:
     return _share(data.t, data.stuck, "stuck")
 
 
-@measure("1")
+@measure("1", needs=("sat_current",))
 def share_sat_current(data: Occupation) -> float | Undefined:
     """Share of the time during which the current demand is saturated.
 
@@ -87,7 +87,7 @@ def share_sat_current(data: Occupation) -> float | Undefined:
     return _share(data.t, data.sat_current, "saturated current")
 
 
-@measure("1")
+@measure("1", needs=("sat_duty",))
 def share_sat_duty(data: Occupation) -> float | Undefined:
     """Share of the time during which the duty cycle is saturated.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import MappingProxyType, ModuleType
@@ -78,6 +78,25 @@ def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) ->
     """
     figures = (figure for name in names for figure in FAMILIES.find(name).measures.values())
     return {figure.name: resolved.get(figure.unit, figure.unit) for figure in figures}
+
+
+def recorded(name: str, setting: Any, signals: Collection[str]) -> dict[str, str]:
+    """Return the unit of every figure of a family that such a recording can show, by its name.
+
+    Parameters
+    ----------
+    name
+        Name of the family.
+    setting
+        The family's ``Setting``.
+    signals
+        Names of the recorded signals.
+    """
+    return {
+        figure.name: figure.unit
+        for figure in FAMILIES.find(name).measures.values()
+        if not figure.needs or any(getattr(setting, need) in signals for need in figure.needs)
+    }
 
 
 def evaluate(name: str, recording: xr.Dataset, setting: Any) -> dict[str, Kpi]:

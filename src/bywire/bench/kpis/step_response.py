@@ -41,6 +41,8 @@ class Setting:
         Beginning and end [s] of the steady state; None for the last 20 % after the step.
     smoothing
         Averaging time [s], usually one dither period; 0 for the raw signal.
+    set_point
+        Name of the set point in the recording, for figures; empty where none is recorded.
     """
 
     signal: str
@@ -49,6 +51,7 @@ class Setting:
     end: float | None = None
     window: tuple[float, float] | None = None
     smoothing: float = 0.0
+    set_point: str = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -121,3 +121,19 @@ def _in_terms_of(message: str, kind: str, level_unit: str) -> str:
     unit = "" if level_unit == "1" else f" {level_unit}"
     lines = message.replace(" level/s", f" {level_unit}/s").replace(" level", unit).splitlines()
     return "\n".join(f"stimulus {kind!r}: {line.removeprefix('Parameters: ')}" for line in lines)
+
+
+def wanted(stimulus: Stimulus | None, experiment: str) -> Stimulus:
+    """Return a stimulus that an experiment cannot do without.
+
+    Raises
+    ------
+    ParameterError
+        When the bench gives none.
+    """
+    if stimulus is None:
+        raise ParameterError(
+            f"{experiment} needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
+            "or table, with its parameters"
+        )
+    return stimulus

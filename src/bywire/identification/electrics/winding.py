@@ -87,10 +87,7 @@ class Winding(Model):
         """Return the voltage across the inductance, and the filter's rate."""
         voltage = dc_motor.balance(dc_motor.State(x.i), dc_motor.Input(m.v, m.omega), par.motor)
         filtered = anti_alias_filter.Parameters.model_construct(f_aa=par.f_aa)
-        seen = anti_alias_filter.rate(
-            anti_alias_filter.State(x.i_meas), anti_alias_filter.Input(x.i), filtered
-        )
-        return Currents(voltage.i, seen.y)
+        return Currents(voltage.i, anti_alias_filter.rate(x.i_meas, x.i, filtered))
 
     def powers(
         self, x: Currents, xe: Currents, rate: Currents, m: Inputs, par: Parameters,

@@ -202,7 +202,7 @@ def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, A
     options = {n.removeprefix("start."): v for n, v in values.items() if n.startswith("start.")}
     own = {n: v for n, v in values.items() if not n.startswith("start.")}
     par, chosen = bench.par.replace(own), bench.chosen_options.replace(options)
-    made = bench.definition.cases(par, chosen, bench.chosen_stimulus)
+    made = bench.cases_with(par, chosen)
     (one,) = (k for k in made if k.label == case.label)
     return one.state, one.memory
 

@@ -58,7 +58,7 @@ def on(bench: Bench, asked: Asked) -> Method:
     fit = BenchFit(bench, asked)
     return Method(
         name=_NAME,
-        assembly=bench.definition.assembly,
+        assembly=bench.system,
         summary=f"parameters of {bench.experiment} by output error",
         experiment=bench.experiment,
         signals={s: stimuli[name].unit for name, s in asked.inputs.items()} | measured,

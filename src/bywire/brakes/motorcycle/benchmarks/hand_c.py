@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode
 from bywire.benchmark.peers.hand_source import Subject
+from bywire.brakes.motorcycle.energy import Flow
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters as Par
 from bywire.simulation.compiler import PLAIN
@@ -14,7 +15,7 @@ SUBJECT = Subject(
     source="hand_written.c",
     indices="hand_written_indices.h",
     model=MotorcycleBrake,
-    flow=MotorcycleBrake.Flow,
+    flow=Flow,
     choices={
         "gear.law": ("paper",),
         "port.law": ("makeup",),

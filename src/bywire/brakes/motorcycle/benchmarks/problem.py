@@ -20,6 +20,7 @@ from bywire.brakes.motorcycle import ecu as motorcycle_ecu
 from bywire.brakes.motorcycle.ecu import Memory, Readings, Stimulus
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.plant import State
 from bywire.core import ops
 from bywire.core.signals import signals_of, zeros
 from bywire.plant import current_sensor, pressure_sensor
@@ -30,7 +31,7 @@ Demand = Callable[[Array], Array]
 Advance = Callable[[Array, float], Array]
 
 DURATION = 1.2
-SCALE = np.array([signal.nominal for signal in signals_of(MotorcycleBrake.State).values()])
+SCALE = np.array([signal.nominal for signal in signals_of(State).values()])
 
 
 class Solution(NamedTuple):
@@ -57,9 +58,9 @@ def hard_braking(t: Array) -> Array:
     return rows
 
 
-def rest(par: MotorcycleParameters) -> Any:
+def rest(par: MotorcycleParameters) -> State:
     """Return the retracted piston at rest without pressure."""
-    return zeros(MotorcycleBrake.State)._replace(
+    return zeros(State)._replace(
         theta=par.master_cylinder.x_rest / par.gear.k_g,
         y_p=pressure_sensor.reading(par.fluid.p_atm, par.pressure_sensor),
         y_i=current_sensor.reading(0.0, par.current_sensor),
@@ -100,7 +101,7 @@ def rates(z: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
         Speed over which the friction changes its sign, as tanh(omega / width) [rad/s].
     """
     model = MotorcycleBrake()
-    x = MotorcycleBrake.State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
+    x = State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
     memory = zeros(Memory)._replace(duty=duty)
     contact = tuple(
         ops.fmax(gap / compliance, 0.0)
@@ -138,7 +139,7 @@ def march(
     z, m = np.array(rest(par)) / SCALE, zeros(Memory)
     p_mc, seconds = np.empty(ticks + 1), 0.0
     for k, row in enumerate(demand.tolist()):
-        state = MotorcycleBrake.State(*(SCALE * z).tolist())
+        state = State(*(SCALE * z).tolist())
         p_mc[k] = state.p_mc
         m = motorcycle_ecu.tick(Readings(state.y_p, state.y_i), m, Stimulus(*row), par)
         if k < ticks:

@@ -39,7 +39,7 @@ def cases(
 
 def step(options: Options) -> step_response.Setting:
     """Return the step of the motor current."""
-    return step_response.Setting("i", 0.0, 0.0, options.i_step)
+    return step_response.Setting("i", 0.0, 0.0, options.i_step, set_point="i_ref")
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -64,10 +64,15 @@ def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
     return recording.assign(i_filtered=("time", filtered, attrs))
 
 
+def loop(options: Options) -> hysteresis.Setting:
+    """Return what the loops are of: filtered current over pressure."""
+    return hysteresis.Setting("i_filtered", "p_mc", options.smoothing, demand="i_star")
+
+
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return each loop's KPIs and their ratio."""
     found: dict[str, Kpi] = {}
-    setting = hysteresis.Setting("i_filtered", "p_mc", smoothing=options.smoothing)
+    setting = loop(options)
     for label, suffix in ((WITHOUT, "undithered"), (WITH, "dithered")):
         run = recordings[label]
         kpis = evaluate("hysteresis", run, setting) | evaluate(
@@ -106,5 +111,6 @@ EXPERIMENT = Experiment(
     | {"loop_area_ratio": "1"},
     figures=("hysteresis-loop", "time-traces"),
     finish=finish,
+    loop=loop,
     following=smoothing,
 )

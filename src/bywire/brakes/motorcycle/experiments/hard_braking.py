@@ -44,8 +44,9 @@ def cases(
 def step(options: Options) -> step_response.Setting:
     """Return the step of the pressure."""
     return step_response.Setting(
-        "p_mc", 0.0, options.p_from, options.p_to, smoothing=options.smoothing
-    )
+        "p_mc", 0.0, options.p_from, options.p_to, smoothing=options.smoothing,
+        set_point="p_ref",
+    )  # fmt: skip
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:

@@ -9,10 +9,9 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis import effort, occupation, tracking
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
@@ -29,8 +28,6 @@ _COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the bes
 # modulated one, and a hold; the map makes 5 to 30 bar of it, the range of Fig. 7b.
 _TIMES = (0.0, 0.5, 0.9, 1.6, 2.0, 2.5, 2.7, 3.3, 3.6, 4.2, 4.3, 4.8, 5.0, 5.3, 5.6, 5.9, 6.5, 7.5)
 _TRAVELS = (9, 9, 26, 26, 12, 12, 33, 33, 16, 16, 36, 36, 30, 37, 31, 37, 12, 12)
-
-_LONGEST_LAG = 0.3  # s: longer delays are not looked for
 
 
 class Options(ParameterSet):
@@ -61,28 +58,18 @@ def cases(
     return (case_from_rest("run", par, mode, start, stimulus, float(t[-1]), settle=1.0, keep=0.0),)
 
 
+def followed(options: Options) -> tracking.Setting:
+    """Return what follows what."""
+    return tracking.Setting("p_mc", "p_ref", options.smoothing)
+
+
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how well the pressure follows its set point."""
     run = recordings["run"]
-    t, p_ref = run["time"].values, run["p_ref"].values
-    p = smoothed(t, run["p_mc"].values, options.smoothing)
-    note = treatment(options.smoothing)
-    lag, reason = _lag(t, p_ref, p)
-    shifted = np.interp(t - lag, t, p_ref)
-    own = (
-        Kpi("tracking_rms", float(np.sqrt(np.mean((p - p_ref) ** 2))), "Pa",
-            "Root mean square of pressure less set point.", note),
-        Kpi("tracking_max", float(np.max(np.abs(p - p_ref))), "Pa",
-            "Largest magnitude of pressure less set point.", note),
-        Kpi("tracking_lag", lag, "s",
-            "Delay of the set point that fits the pressure best, in the mean square.",
-            reason or note),
-        Kpi("tracking_rms_without_lag", float(np.sqrt(np.mean((p - shifted) ** 2))), "Pa",
-            "Root mean square of pressure less the delayed set point.", reason or note),
-    )  # fmt: skip
-    found = evaluate("effort", run, effort.Setting())
+    found = evaluate("tracking", run, followed(options))
+    found |= evaluate("effort", run, effort.Setting())
     found |= evaluate("occupation", run, occupation.Setting())
-    return (*own, *found.values())
+    return tuple(found.values())
 
 
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
@@ -127,29 +114,6 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
     return pedal_map.output(voltage, par.ecu.pedal_map)
 
 
-def _lag(
-    t: NDArray[np.float64], demand: NDArray[np.float64], p: NDArray[np.float64]
-) -> tuple[float, str]:
-    """Return the delay of the demand [s] that fits best, or NaN and why there is none."""
-    from scipy import optimize  # slow to load, and only this experiment needs it
-
-    if np.ptp(demand) == 0.0:
-        return float("nan"), "the set point does not move"
-
-    def misfit(delay: float) -> float:
-        return float(np.mean((p - np.interp(t - delay, t, demand)) ** 2))
-
-    delays = np.linspace(0.0, _LONGEST_LAG, 61)
-    best = float(delays[int(np.argmin([misfit(d) for d in delays]))])
-    bounds = (max(best - delays[1], 0.0), min(best + delays[1], _LONGEST_LAG))
-    fine = optimize.minimize_scalar(misfit, bounds=bounds, method="bounded")
-    if misfit(0.0) <= fine.fun:
-        return float("nan"), "no delay fits better than none"
-    if misfit(_LONGEST_LAG) <= fine.fun:
-        return float("nan"), f"the delay that fits best is not below {_LONGEST_LAG:g} s"
-    return float(fine.x), ""
-
-
 EXPERIMENT = Experiment(
     name="pedal-tracking",
     assembly="motorcycle-brake",
@@ -158,13 +122,8 @@ EXPERIMENT = Experiment(
     defaults=Options(trace="", max_gap=0.1, smoothing=0.02),
     cases=cases,
     judge=judge,
-    kpis={
-        "tracking_rms": "Pa",
-        "tracking_max": "Pa",
-        "tracking_lag": "s",
-        "tracking_rms_without_lag": "Pa",
-        **units_of("effort", "occupation"),
-    },
+    kpis=units_of("tracking", "effort", "occupation", resolved={"level": "Pa"}),
     figures=("tracking", "time-traces"),
+    followed=followed,
     following=smoothing,
 )

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis import effort, occupation, release
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli.registry import Stimulus
@@ -63,19 +64,14 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return time to empty, residual pressure, energies."""
     run = recordings["run"]
     after = run.sel(time=slice(-1e-9, None))
-    pressure = after["p_pd"].values
-    above = np.flatnonzero(pressure > options.p_empty)
+    fallen = evaluate("release", run, release.Setting("p_pd", options.p_empty))
     time = after["time"].values
-    emptied = above.size == 0 or above[-1] + 1 < time.size
-    t_empty = float(time[above[-1] + 1] if above.size else 0.0) if emptied else float("nan")
     power = after["P_el"].values
     fed_back = float(np.trapezoid(np.minimum(power, 0.0), time))
     stored = after["E_stored"].values
     own = (
-        Kpi("time_to_empty", t_empty, "s",
-            "Time from the release until the caliper pressure stays below p_empty.",
-            "" if emptied else "the caliper does not empty in the recorded time"),
-        Kpi("residual_pressure", float(pressure[-1]), "Pa", "Caliper pressure at the end."),
+        fallen["time_to_empty"],
+        replace(fallen["residual_level"], name="residual_pressure"),
         Kpi("energy_stored", float(stored[0] - stored[-1]), "J",
             "Stored energy that the release sets free."),
         Kpi("energy_returned", float(after["W_shaft"].values[0] - after["W_shaft"].values[-1]), "J",

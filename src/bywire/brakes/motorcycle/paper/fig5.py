@@ -118,7 +118,7 @@ def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
     recordings = runs.bench("friction-ramp", name).recordings
     return Exhibit(
         f"fig5{suffix.replace('@', '-')}",
-        hysteresis_loop(recordings, current="i_filtered", average=0.02),
+        hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
         "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow ramp, "
         f"averaged over one dither period; pale: with its ripple. Parameter set {name}.",
     )

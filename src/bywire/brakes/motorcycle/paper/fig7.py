@@ -176,14 +176,14 @@ def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
     return (
         Exhibit(
             "fig7a",
-            step_response(hard.recordings["run"], limits=limits, facts=marks,
+            step_response(hard.recordings["run"], "p_mc", "p_ref", limits=limits, facts=marks,
                 smoothing=options["smoothing"],
             ),
             "Fig. 7a: hard braking from 6 to 37 bar, calibrated set.",
         ),
         Exhibit(
             "fig7b",
-            tracking(runs.bench("pedal-tracking", MAIN).recordings["run"]),
+            tracking(runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
             "Fig. 7b: the pressure follows the pedal; the ride is ours, the range the paper's.",
         ),
         Exhibit(

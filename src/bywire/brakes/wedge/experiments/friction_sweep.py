@@ -20,6 +20,7 @@ from bywire.bench.kpis.step_response import Setting
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.case import case_from_parked, figure, mean, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
@@ -153,5 +154,6 @@ EXPERIMENT = Experiment(
     judge=judge,
     kpis=named(_DEFAULTS),
     figures=("overlaid-traces",),
+    compared=COMPARED,
     named=named,
 )

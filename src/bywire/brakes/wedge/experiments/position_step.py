@@ -21,6 +21,7 @@ from bywire.bench.kpis.step_response import Setting
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.case import case_from_parked, parameters_of, steps
 from bywire.brakes.wedge.elements import brake_heart
+from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Position, Unit
@@ -213,6 +214,7 @@ EXPERIMENT = Experiment(
     judge=judge,
     kpis=named(_DEFAULTS),
     figures=("overlaid-traces",),
+    compared=COMPARED,
     finish=finish,
     following=following,
     named=named,

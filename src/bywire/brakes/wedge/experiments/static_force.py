@@ -18,6 +18,7 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.case import Array, case_from_parked, parameters_of
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
@@ -219,5 +220,6 @@ EXPERIMENT = Experiment(
     judge=judge,
     kpis=named(_DEFAULTS),
     figures=("brake-factor", "overlaid-traces"),
+    compared=COMPARED,
     named=named,
 )

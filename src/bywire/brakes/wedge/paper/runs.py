@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.panels import BRAKING
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.series import FRICTIONLESS
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.report.panels import WEDGE_PANELS
 from bywire.report.time_traces import time_traces
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ IDEAL = {
     "motor_2.T_cog": 0.0,
 }
 """overrides that leave the equations of section "Wedge and brake calliper", without friction"""
-STACK = tuple(panel for panel in WEDGE_PANELS if panel.quantity != "force")
+STACK = tuple(panel for panel in BRAKING.panels if panel.quantity != "force")
 """moment, speed, current, power and mode, one above the other as in Figs. 7 to 9"""
 
 

@@ -1,0 +1,144 @@
+"""Sine sweep: sines of rising frequency at an input, one after the other, in whole periods."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.generic_experiment import (
+    GenericExperiment,
+    InputAmplitude,
+    InputLevel,
+    Subject,
+)
+from bywire.bench.kpis import sine_sweep
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, TimeConstant, Unit
+
+Array = NDArray[np.float64]
+Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
+
+_LEAST_ROWS = 8  # of the recording in the shortest period
+
+
+class Options(ParameterSet):
+    """The sines, from time zero on."""
+
+    input: str
+    """stimulus of the model that is shaken; its only one unless given"""
+    output: str
+    """recorded signal that answers; the first one of the input's unit unless given"""
+    mean: InputLevel
+    """mean of the input"""
+    amplitude: InputAmplitude
+    """amplitude: half of peak to peak"""
+    f_start: Frequency
+    """lowest frequency"""
+    f_end: Frequency
+    """highest frequency"""
+    n: Count
+    """how many frequencies, evenly over the logarithm"""
+    n_settle: Count
+    """periods at each frequency before its response is looked at"""
+    n_periods: Count
+    """periods over which it is looked at"""
+    record: Duration
+    """recording interval"""
+    settle: TimeConstant
+    """time before the first sine, at the mean"""
+
+
+def build(subject: Subject) -> Experiment:
+    """Return the experiment of a model."""
+    gain = sine_sweep.gain_unit(subject.units["input"], subject.units["output"])
+
+    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
+        """Return the one run."""
+        _require_rows(options)
+        return (
+            subject.case(
+                par, lambda t: course(t, options), stimuli, duration=windows(options)[-1][2],
+                settle=options.settle, record=options.record,
+            ),
+        )  # fmt: skip
+
+    def sweep(options: Any) -> sine_sweep.Setting:
+        """Return where the sines are."""
+        return sine_sweep.Setting(subject.input, subject.output, windows(options))
+
+    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
+        """Return gain, bandwidth and lag, effort and occupation."""
+        run = recordings["run"]
+        return (*evaluate("sine_sweep", run, sweep(options)).values(), *subject.judged(run))
+
+    return Experiment(
+        name=GENERIC.name,
+        assembly=subject.model.name,
+        summary=GENERIC.summary,
+        options=subject.options,
+        defaults=subject.defaults,
+        cases=cases,
+        judge=judge,
+        kpis={**units_of("sine_sweep", resolved={"gain": gain}), **subject.totals()},
+        figures=subject.figures("sine-sweep"),
+        sweep=sweep,
+        beside=subject.beside(),
+    )
+
+
+def windows(options: Any) -> tuple[tuple[float, float, float], ...]:
+    """Return frequency [Hz], beginning and end [s] of what is looked at, of every sine."""
+    found, begin = [], 0.0
+    for f in np.geomspace(options.f_start, options.f_end, options.n):
+        looked = begin + options.n_settle / f
+        begin = looked + options.n_periods / f
+        found.append((float(f), float(looked), float(begin)))
+    return tuple(found)
+
+
+def course(t: Array, options: Any) -> Array:
+    """Return the input [SI] at times [s]: each sine begins and ends at its mean."""
+    phase, begin = np.zeros(t.shape), 0.0
+    for f, _, end in windows(options):
+        inside = (t >= begin) & (t < end)
+        phase = np.where(inside, 2.0 * math.pi * f * (t - begin), phase)
+        begin = end
+    return np.asarray(options.mean + options.amplitude * np.sin(phase))
+
+
+def _require_rows(options: Any) -> None:
+    """Refuse a recording that cannot show the highest frequency, and frequencies that fall."""
+    if options.f_end < options.f_start:
+        raise ParameterError(
+            f"options.f_end = {options.f_end:g} Hz is below options.f_start = "
+            f"{options.f_start:g} Hz: a sweep rises"
+        )
+    longest = 1.0 / (_LEAST_ROWS * options.f_end)
+    if options.record > longest:
+        raise ParameterError(
+            f"options.record = {options.record:g} s is too long for sines of {options.f_end:g} Hz: "
+            f"it must be <= {longest:g} s"
+        )
+
+
+GENERIC = GenericExperiment(
+    name="sine-sweep",
+    summary="sines of rising frequency at any input: gain, bandwidth and lag of any output",
+    options=Options,
+    signals={"input": "stimulus", "output": "recording"},
+    defaults={
+        "mean": 0.5, "amplitude": 0.1, "f_start": 0.5, "f_end": 50.0, "n": 13, "n_settle": 3,
+        "n_periods": 5, "record": 1e-3, "settle": 1.0,
+    },
+    build=build,
+)  # fmt: skip

@@ -1,0 +1,95 @@
+"""Step: an input jumps from one level to another."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.generic_experiment import GenericExperiment, InputLevel, Subject
+from bywire.bench.kpis import step_response
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.quantities import reached
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, TimeConstant
+
+
+class Options(ParameterSet):
+    """The step, at time zero."""
+
+    input: str
+    """stimulus of the model that steps; its only one unless given"""
+    output: str
+    """recorded signal that answers; the first one of the input's unit unless given"""
+    start: InputLevel
+    """input before the step"""
+    end: InputLevel
+    """input from the step on"""
+    duration: Duration
+    """time recorded after the step"""
+    record: Duration
+    """recording interval"""
+    settle: TimeConstant
+    """time before the step, at its first level"""
+    smoothing: TimeConstant
+    """moving average for the step's key figures, 0 for the raw output"""
+
+
+def build(subject: Subject) -> Experiment:
+    """Return the experiment of a model."""
+
+    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
+        """Return the one run."""
+        return (
+            subject.case(
+                par, lambda t: np.where(reached(t, 0.0), options.end, options.start), stimuli,
+                duration=options.duration, settle=options.settle, record=options.record,
+            ),
+        )  # fmt: skip
+
+    def step(options: Any) -> step_response.Setting:
+        """Return the step; without a set point its levels are those of the response."""
+        if not subject.is_set_point:
+            return step_response.Setting(subject.output, 0.0, smoothing=options.smoothing)
+        return step_response.Setting(
+            subject.output, 0.0, options.start, options.end, smoothing=options.smoothing,
+            set_point=subject.input,
+        )  # fmt: skip
+
+    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
+        """Return key figures of the step, effort and occupation."""
+        run = recordings["run"]
+        return (*evaluate("step_response", run, step(options)).values(), *subject.judged(run))
+
+    return Experiment(
+        name=GENERIC.name,
+        assembly=subject.model.name,
+        summary=GENERIC.summary,
+        options=subject.options,
+        defaults=subject.defaults,
+        cases=cases,
+        judge=judge,
+        kpis={
+            **units_of("step_response", resolved={"level": subject.units["output"]}),
+            **subject.totals(),
+        },
+        figures=subject.figures("step-response"),
+        step=step,
+        beside=subject.beside(),
+    )
+
+
+GENERIC = GenericExperiment(
+    name="step",
+    summary="step of any input: rise, settling, overshoot of any output",
+    options=Options,
+    signals={"input": "stimulus", "output": "recording"},
+    defaults={
+        "start": 0.0, "end": 1.0, "duration": 1.0, "record": 1e-3, "settle": 0.0, "smoothing": 0.0
+    },
+    build=build,
+)  # fmt: skip

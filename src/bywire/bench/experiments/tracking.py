@@ -1,0 +1,95 @@
+"""Tracking: an output follows a moving input, for instance a measured pedal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.generic_experiment import GenericExperiment, Subject
+from bywire.bench.kpis import tracking
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus, wanted
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, TimeConstant
+
+
+class Options(ParameterSet):
+    """What follows what."""
+
+    input: str
+    """stimulus of the model that [stimulus] drives, the set point; its only one unless given"""
+    output: str
+    """recorded signal that follows, of the same unit; the first one of that unit unless given"""
+    duration: Duration
+    """length of the run"""
+    record: Duration
+    """recording interval"""
+    settle: TimeConstant
+    """time before zero, at the stimulus' first value"""
+    smoothing: TimeConstant
+    """moving average for the tracking's key figures, 0 for the raw output"""
+
+
+def build(subject: Subject) -> Experiment:
+    """Return the experiment of a model.
+
+    Raises
+    ------
+    ParameterError
+        When the output is of another unit than the input.
+    """
+    if not subject.is_set_point:
+        raise ParameterError(
+            f"options.output: {subject.output} is in {subject.units['output']}, and the set point "
+            f"{subject.input} in {subject.units['input']}: name an output of that unit"
+        )
+
+    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
+        """Return the one run."""
+        course = wanted(stimuli.get(""), "tracking")
+        return (
+            subject.case(
+                par, course.sample, stimuli, duration=options.duration, settle=options.settle,
+                record=options.record,
+            ),
+        )  # fmt: skip
+
+    def followed(options: Any) -> tracking.Setting:
+        """Return what follows what."""
+        return tracking.Setting(subject.output, subject.input, options.smoothing)
+
+    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
+        """Return how well the output follows, effort and occupation."""
+        run = recordings["run"]
+        return (*evaluate("tracking", run, followed(options)).values(), *subject.judged(run))
+
+    return Experiment(
+        name=GENERIC.name,
+        assembly=subject.model.name,
+        summary=GENERIC.summary,
+        options=subject.options,
+        defaults=subject.defaults,
+        cases=cases,
+        judge=judge,
+        kpis={
+            **units_of("tracking", resolved={"level": subject.units["output"]}),
+            **subject.totals(),
+        },
+        figures=subject.figures("tracking"),
+        followed=followed,
+        driven_unit=lambda _: subject.units["input"],
+        beside=subject.beside(),
+    )
+
+
+GENERIC = GenericExperiment(
+    name="tracking",
+    summary="any output follows a moving set point, for instance a table out of a file",
+    options=Options,
+    signals={"input": "stimulus", "output": "recording"},
+    defaults={"duration": 1.0, "record": 1e-3, "settle": 0.0, "smoothing": 0.0},
+    build=build,
+)

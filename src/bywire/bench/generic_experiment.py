@@ -1,0 +1,302 @@
+"""Experiments that any brake gets without writing one, given by the names of its signals.
+
+A `GenericExperiment` is bound to a model: its levels then have the units of the signals that its
+options name, and everything else is as for an `Experiment` of one brake.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Annotated, Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, create_model
+from pydantic.fields import FieldInfo
+
+from bywire.bench.experiment import Case, Experiment
+from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, recorded
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.errors import ModelError, ParameterError, quoted, unknown_name
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.quantities import Unit
+from bywire.core.registry import Kind, instances
+from bywire.core.signals import Signal, signals_of, zeros
+
+Array = NDArray[np.float64]
+Course = Callable[[Array], Array]
+
+InputLevel = Annotated[float, Unit("input"), Field(allow_inf_nan=False)]
+InputAmplitude = Annotated[float, Unit("input"), Field(gt=0, allow_inf_nan=False)]
+InputRate = Annotated[float, Unit("input/s"), Field(gt=0, allow_inf_nan=False)]
+OutputLevel = Annotated[float, Unit("output"), Field(allow_inf_nan=False)]
+
+_TOTALS = {"effort": effort.Setting(), "occupation": occupation.Setting()}
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What a generic experiment is bound to.
+
+    Parameters
+    ----------
+    model
+        The system under test.
+    names
+        Signal by the option that names it.
+    units
+        SI unit of each of these, by the option.
+    options, defaults
+        Class of the options with these units, and what they are unless given.
+    """
+
+    model: Model
+    names: Mapping[str, str]
+    units: Mapping[str, str]
+    options: type[ParameterSet]
+    defaults: ParameterSet
+
+    @property
+    def input(self) -> str:
+        """Stimulus that is driven."""
+        return self.names["input"]
+
+    @property
+    def output(self) -> str:
+        """Recorded signal that answers."""
+        return self.names["output"]
+
+    @property
+    def is_set_point(self) -> bool:
+        """Whether the input is of the output's unit: a set point that the output follows."""
+        return self.units["input"] == self.units["output"]
+
+    def case(
+        self, par: Any, course: Course, beside: Mapping[str, Stimulus], **timing: float
+    ) -> Case:
+        """Return the run that starts at rest, with the input on a course.
+
+        Parameters
+        ----------
+        course
+            ``course(t)``: the input [SI] at times [s].
+        beside
+            Stimuli of other inputs by their names.
+        timing
+            ``duration``, ``settle`` and ``record`` of the case [s].
+        """
+        state, memory = at_rest(self.model, par)
+
+        def stimulus(t: Array) -> dict[str, Array]:
+            others = {name: each.sample(t) for name, each in beside.items() if name}
+            return {**others, self.input: course(t)}
+
+        return Case("run", self.model, par, state, memory, stimulus, keep=0.0, **timing)
+
+    def beside(self) -> Callable[[Any], Mapping[str, str]]:
+        """Return the SI unit of every other stimulus that a bench may drive, by its name."""
+        known = _known(self.model, "stimulus")
+        units = {name: signal.unit for name, signal in known.items() if name != self.input}
+        return lambda _: units
+
+    def totals(self) -> dict[str, str]:
+        """Return units of the key figures of effort and occupation that the model can show."""
+        signals = self.model.Output._fields
+        return {
+            name: unit
+            for family, setting in _TOTALS.items()
+            for name, unit in recorded(family, setting, signals).items()
+        }
+
+    def judged(self, recording: Any) -> tuple[Kpi, ...]:
+        """Return the key figures of `totals`."""
+        wanted = self.totals()
+        return tuple(
+            kpi
+            for family, setting in _TOTALS.items()
+            for name, kpi in evaluate(family, recording, setting).items()
+            if name in wanted
+        )
+
+    def figures(self, *kinds: str) -> tuple[str, ...]:
+        """Return kinds of figures, and the energy balance where the model records energies."""
+        books = any(name.startswith(("E_", "W_")) for name in self.model.Output._fields)
+        return (*kinds, "time-traces", *(("energy-balance",) if books else ()))
+
+
+@dataclass(frozen=True)
+class GenericExperiment:
+    """A virtual test of any system.
+
+    Parameters
+    ----------
+    name
+        What bench files and the command line call it. An experiment of that name that a brake
+        brings for its own assembly goes before it.
+    summary
+        One line for listings.
+    options
+        Class of its options; ``input`` and the like stand for the unit of the signal that the
+        option of that name names.
+    signals
+        What each option that names a signal names: a ``stimulus``, a ``recording``, one of both
+        (``input or recording``), a ``friction`` or a ``state``. The latter two and the third are
+        what the first option names, unless given.
+    defaults
+        Options unless given; a level is a multiple of its signal's nominal magnitude.
+    build
+        ``build(subject)``: the experiment of a model. Its cases get the stimuli by name.
+    """
+
+    name: str
+    summary: str
+    options: type[ParameterSet]
+    signals: Mapping[str, str]
+    defaults: Mapping[str, Any]
+    build: Callable[[Subject], Experiment]
+
+    def bound(self, model: Model, given: Mapping[str, Any]) -> Experiment:
+        """Return the experiment of a model.
+
+        Parameters
+        ----------
+        given
+            Options as the user gave them, by name.
+
+        Raises
+        ------
+        UnknownNameError
+            When the model has no signal that an option names.
+        ParameterError
+            When a name is missing and the model leaves a choice.
+        """
+        known: dict[str, tuple[str, Signal]] = {}
+        for option, place in self.signals.items():
+            known[option] = _signal(model, self.name, option, place, given.get(option), known)
+        places = tuple((option, s.unit, s.nominal) for option, (_, s) in known.items())
+        options = with_units(self.options, places)
+        names = {option: name for option, (name, _) in known.items()}
+        defaults = options.create({**self._levels(options), **names})
+        units = {option: signal.unit for option, (_, signal) in known.items()}
+        return self.build(Subject(model, names, units, options, defaults))
+
+    def _levels(self, options: type[ParameterSet]) -> dict[str, Any]:
+        """Return the defaults, levels in SI."""
+        templates, leaves = leaf_fields(self.options), leaf_fields(options)
+        found = dict(self.defaults)
+        for name, leaf in leaves.items():
+            if name in found and leaf.unit != templates[name].unit:
+                size, value = leaf.unit.nominal, found[name]
+                several = isinstance(value, tuple)
+                found[name] = tuple(size * v for v in value) if several else size * value
+        return found
+
+
+GENERIC_EXPERIMENTS = Kind(
+    "experiment", ("generic_experiments",), instances(GenericExperiment), "bywire.bench.experiments"
+)
+"""every experiment that is not of one brake"""
+
+
+@cache
+def with_units(
+    template: type[ParameterSet], places: tuple[tuple[str, str, float], ...]
+) -> type[ParameterSet]:
+    """Return a class of options whose levels have the units of the signals that they belong to.
+
+    Parameters
+    ----------
+    places
+        Option that names the signal, which its levels have as unit; SI unit and nominal
+        magnitude of the signal.
+    """
+    fields: dict[str, Any] = {}
+    for name, info in template.model_fields.items():
+        notes = [_placed(note, places) for note in info.metadata]
+        if notes != info.metadata:
+            fields[name] = (Annotated[(info.annotation, *notes)], _required(info))
+    return create_model(
+        template.__name__, __base__=template, __module__=template.__module__, **fields
+    )
+
+
+def _required(info: FieldInfo) -> Any:
+    return ... if info.is_required() else info.default
+
+
+def _placed(note: Any, places: Sequence[tuple[str, str, float]]) -> Any:
+    for place, unit, nominal in places if isinstance(note, Unit) else ():
+        symbol = re.sub(rf"\b{place}\b", unit, note.symbol)
+        if symbol != note.symbol:
+            return Unit(symbol, nominal)
+    return note
+
+
+def _signal(
+    model: Model, experiment: str, option: str, place: str, wanted: Any,
+    chosen: Mapping[str, tuple[str, Signal]],
+) -> tuple[str, Signal]:  # fmt: skip
+    """Return the signal that an option names, or the one that there is no choice about."""
+    known = _known(model, place)
+    if wanted is not None and not isinstance(wanted, str):
+        raise ParameterError(f"options.{option} = {quoted(wanted)}: name a {place} of {model.name}")
+    if wanted:
+        if wanted not in known:
+            raise unknown_name(f"{place} of {model.name} in options.{option}", wanted, known)
+        return wanted, known[wanted]
+    if place in ("state", "input or recording"):
+        return next(iter(chosen.values()))
+    if not known:
+        raise ParameterError(f"experiment {experiment!r} needs a {place}: {model.name} has none")
+    if place == "recording":
+        unit = chosen["input"][1].unit
+        name = next((name for name, each in known.items() if each.unit == unit), next(iter(known)))
+    elif len(known) == 1 or place == "friction":
+        name = next(iter(known))
+    else:
+        raise ParameterError(
+            f"options.{option} is missing: name the {place} of {model.name} that experiment "
+            f"{experiment!r} drives: {', '.join(known)}"
+        )
+    return name, known[name]
+
+
+def _known(model: Model, place: str) -> dict[str, Signal]:
+    """Return the signals of a model that an option may name."""
+    states = signals_of(model.State)
+    stimuli, outputs = signals_of(model.Stimulus), signals_of(model.Output)
+    driven = {name: each for name, each in stimuli.items() if not name.startswith("noise_")}
+    return {
+        "friction": {name: states[name] for name in model.frictions},
+        "state": states,
+        "stimulus": driven,
+        "recording": outputs,
+        "input or recording": {**driven, **outputs},
+    }[place]
+
+
+def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
+    """Return state and memory in which a model rests without any stimulus.
+
+    What ``rest(par)`` of the model gives; zeros where it has none.
+
+    Raises
+    ------
+    ModelError
+        When it gives something else than the model's State and Memory.
+    """
+    rest = getattr(model, "rest", None)
+    if rest is None:
+        return zeros(model.State), zeros(model.Memory)
+    found = rest(par)
+    if not (isinstance(found, tuple) and len(found) == 2):
+        raise ModelError(
+            f"{model.name}: rest(par) must return (State, Memory), got {quoted(found)}"
+        )
+    return found

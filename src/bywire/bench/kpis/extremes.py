@@ -1,0 +1,66 @@
+"""Between which values a signal stays."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Array, defect, measure, signal
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Name of the signal in the recording."""
+
+    signal: str
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """Samples of a signal: times [s] and values of shape ``(n,)``, and its SI unit."""
+
+    t: Array
+    y: Array
+    unit: str = "1"
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of the signal."""
+        return {"level": self.unit}
+
+    @property
+    def defect(self) -> str:
+        """Why no figure is defined."""
+        return defect(self.t, self.y)
+
+    @property
+    def note(self) -> str:
+        """Nothing is treated."""
+        return ""
+
+
+def select(recording: xr.Dataset, setting: Setting) -> Course:
+    """Return the signal.
+
+    Raises
+    ------
+    UnknownNameError
+        When the recording does not hold it.
+    """
+    t, _ = signal(recording, "time")
+    return Course(t, *signal(recording, setting.signal))
+
+
+@measure("level")
+def output_max(data: Course) -> float:
+    """Largest value of the output, over the recorded samples."""
+    return float(np.max(data.y))
+
+
+@measure("level")
+def output_min(data: Course) -> float:
+    """Smallest value of the output, over the recorded samples."""
+    return float(np.min(data.y))

@@ -1,0 +1,148 @@
+r"""Gain and phase of an output to sines of a drive, one frequency after the other.
+
+At each frequency f both signals are projected on :math:`e^{-j 2 \pi f t}` over whole periods; the
+response is the quotient. What the output answers at other frequencies is left out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.kpis.kpi import Array, Undefined, defect, measure, signal
+
+_HALF_POWER = math.sqrt(0.5)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """Where the sines are.
+
+    Parameters
+    ----------
+    drive, response
+        Names of the signals in the recording.
+    windows
+        Frequency [Hz], beginning and end [s] of whole periods in which the response is settled.
+    """
+
+    drive: str
+    response: str
+    windows: tuple[tuple[float, float, float], ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Sweep:
+    """Samples of drive and response over times [s], their units, and the windows of `Setting`."""
+
+    t: Array
+    drive: Array
+    response: Array
+    windows: tuple[tuple[float, float, float], ...]
+    drive_unit: str = "1"
+    response_unit: str = "1"
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of the gain."""
+        return {"gain": gain_unit(self.drive_unit, self.response_unit)}
+
+    @property
+    def defect(self) -> str:
+        """Why no figure is defined."""
+        broken = defect(self.t, self.drive, self.response)
+        if not broken and not self.frequencies.size:
+            return "no whole period is recorded"
+        return broken
+
+    @property
+    def note(self) -> str:
+        """Nothing is treated."""
+        return ""
+
+    @property
+    def frequencies(self) -> Array:
+        """Frequencies whose window is recorded [Hz], shape (k,)."""
+        last = float(self.t[-1]) + 1e-9
+        return np.array([f for f, _, end in self.windows if end <= last])
+
+    @cached_property
+    def values(self) -> NDArray[np.complexfloating[Any, Any]]:
+        """Response at these frequencies, shape (k,)."""
+        return np.array([
+            self._line(self.response, *window) / self._line(self.drive, *window)
+            for window in self.windows[: self.frequencies.size]
+        ])  # fmt: skip
+
+    def _line(self, y: Array, f: float, begin: float, end: float) -> complex:
+        """Return the Fourier coefficient of a signal over a window."""
+        k = slice(*np.searchsorted(self.t, [begin - 1e-9, end + 1e-9]))
+        t, turned = self.t[k], y[k] * np.exp(-2j * np.pi * f * self.t[k])
+        return complex(np.sum(0.5 * (turned[1:] + turned[:-1]) * np.diff(t)))
+
+
+def gain_unit(drive: str, response: str) -> str:
+    """Return the unit of a gain from the SI units of drive and response."""
+    return "1" if drive == response else f"({response})/({drive})"
+
+
+def select(recording: xr.Dataset, setting: Setting) -> Sweep:
+    """Return drive and response.
+
+    Raises
+    ------
+    UnknownNameError
+        When the recording does not hold them.
+    """
+    t, _ = signal(recording, "time")
+    drive, drive_unit = signal(recording, setting.drive)
+    response, response_unit = signal(recording, setting.response)
+    return Sweep(t, drive, response, setting.windows, drive_unit, response_unit)
+
+
+@measure("gain")
+def sweep_gain(data: Sweep) -> float:
+    """Gain of the output at the lowest frequency: its amplitude over that of the input."""
+    return float(np.abs(data.values[0]))
+
+
+@measure("1")
+def sweep_peak(data: Sweep) -> float | Undefined:
+    """Largest gain over that at the lowest frequency."""
+    gains = np.abs(data.values)
+    if gains[0] == 0.0:
+        return Undefined("the output does not move at the lowest frequency")
+    return float(np.max(gains) / gains[0])
+
+
+@measure("Hz")
+def sweep_bandwidth(data: Sweep) -> float | Undefined:
+    """Frequency from which the gain is below 0.707 of that at the lowest frequency (-3 dB).
+
+    The first crossing, interpolated in the logarithms of frequency and gain.
+    """
+    gains, f = np.abs(data.values), data.frequencies
+    below = np.flatnonzero(gains < _HALF_POWER * gains[0])
+    if gains[0] == 0.0:
+        return Undefined("the output does not move at the lowest frequency")
+    if not below.size:
+        return Undefined(f"above {f[-1]:g} Hz, the highest frequency")
+    k = int(below[0])
+    if gains[k] == 0.0:
+        return float(f[k])
+    x = np.log([gains[k - 1], gains[k], _HALF_POWER * gains[0]])
+    share = float((x[0] - x[2]) / (x[0] - x[1]))
+    return float(f[k - 1] * (f[k] / f[k - 1]) ** share)
+
+
+@measure("deg")
+def sweep_lag(data: Sweep) -> float:
+    """Phase by which the output lags behind the input at the highest frequency."""
+    return float(-np.rad2deg(np.unwrap(np.angle(data.values))[-1]))

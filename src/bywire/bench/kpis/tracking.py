@@ -1,0 +1,132 @@
+"""How well a signal follows its moving set point."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Array, Undefined, defect, measure, signal
+from bywire.bench.kpis.smoothing import smoothed, treatment
+
+_LONGEST_LAG = 0.3  # s: longer delays are not looked for
+
+
+@dataclass(frozen=True)
+class Setting:
+    """What follows what.
+
+    Parameters
+    ----------
+    signal, set_point
+        Names of the signals in the recording, of one unit.
+    smoothing
+        Averaging time [s] of the signal, usually one dither period; 0 for the raw one.
+    """
+
+    signal: str
+    set_point: str
+    smoothing: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """Samples of a signal and its set point.
+
+    Parameters
+    ----------
+    t
+        Times [s], increasing, shape ``(n,)``.
+    y, demand
+        Signal and set point, shape ``(n,)`` each.
+    unit
+        Their SI unit.
+    note
+        How the samples were treated.
+    """
+
+    t: Array
+    y: Array
+    demand: Array
+    unit: str = "1"
+    note: str = ""
+
+    @property
+    def units(self) -> Mapping[str, str]:
+        """Unit of the signal."""
+        return {"level": self.unit}
+
+    @property
+    def defect(self) -> str:
+        """Why no figure is defined."""
+        return defect(self.t, self.y, self.demand)
+
+    @cached_property
+    def lag(self) -> float | Undefined:
+        """Delay of the set point [s] that fits best."""
+        from scipy import optimize  # slow to load, and only this needs it
+
+        if np.ptp(self.demand) == 0.0:
+            return Undefined("the set point does not move")
+
+        def misfit(delay: float) -> float:
+            return float(np.mean((self.y - self.delayed(delay)) ** 2))
+
+        delays = np.linspace(0.0, _LONGEST_LAG, 61)
+        best = float(delays[int(np.argmin([misfit(d) for d in delays]))])
+        bounds = (max(best - delays[1], 0.0), min(best + delays[1], _LONGEST_LAG))
+        fine = optimize.minimize_scalar(misfit, bounds=bounds, method="bounded")
+        if misfit(0.0) <= fine.fun:
+            return Undefined("no delay fits better than none")
+        if misfit(_LONGEST_LAG) <= fine.fun:
+            return Undefined(f"the delay that fits best is not below {_LONGEST_LAG:g} s")
+        return float(fine.x)
+
+    def delayed(self, delay: float) -> Array:
+        """Return the set point as it was a delay [s] earlier."""
+        return np.interp(self.t - delay, self.t, self.demand)
+
+
+def select(recording: xr.Dataset, setting: Setting) -> Tracking:
+    """Return the signal, averaged as the setting says, and its set point.
+
+    Raises
+    ------
+    UnknownNameError
+        When the recording does not hold them.
+    """
+    t, _ = signal(recording, "time")
+    y, unit = signal(recording, setting.signal)
+    demand, _ = signal(recording, setting.set_point)
+    return Tracking(
+        t, smoothed(t, y, setting.smoothing), demand, unit, treatment(setting.smoothing)
+    )
+
+
+@measure("level")
+def tracking_rms(data: Tracking) -> float | Undefined:
+    """Root mean square of the signal less its set point."""
+    return float(np.sqrt(np.mean((data.y - data.demand) ** 2)))
+
+
+@measure("level")
+def tracking_max(data: Tracking) -> float | Undefined:
+    """Largest magnitude of the signal less its set point."""
+    return float(np.max(np.abs(data.y - data.demand)))
+
+
+@measure("s")
+def tracking_lag(data: Tracking) -> float | Undefined:
+    """Delay of the set point that fits the signal best, in the mean square."""
+    return data.lag
+
+
+@measure("level")
+def tracking_rms_without_lag(data: Tracking) -> float | Undefined:
+    """Root mean square of the signal less the delayed set point."""
+    if isinstance(data.lag, Undefined):
+        return data.lag
+    return float(np.sqrt(np.mean((data.y - data.delayed(data.lag)) ** 2)))

@@ -1,0 +1,22 @@
+"""What time traces of the motorcycle brake show."""
+
+from __future__ import annotations
+
+from bywire.report.panels import Panel, Panels, Trace
+from bywire.report.style import Role
+
+PANELS = Panels(
+    "motorcycle",
+    ("motorcycle-brake",),
+    (
+        Panel(
+            "pressure",
+            (Trace("p_mc"), Trace("p_pd", Role.SECOND), Trace("p_ref", Role.SET_POINT)),
+            height=1.8,
+        ),
+        Panel("current", (Trace("i"), Trace("i_ref", Role.SET_POINT)), saturation="sat_current"),
+        Panel("speed", (Trace("omega"),)),
+        Panel("duty cycle", (Trace("duty"),), saturation="sat_duty"),
+        Panel("power", (Trace("P_el"),)),
+    ),
+)

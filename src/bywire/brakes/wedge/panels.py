@@ -1,0 +1,65 @@
+"""What time traces of the wedge brake and its rigs show, and what is compared of several runs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+
+from bywire.report.panels import Panel, Panels, Trace
+from bywire.report.style import Role
+
+BRAKING = Panels(
+    "wedge",
+    ("wedge-brake",),
+    (
+        Panel(
+            "moment",
+            (Trace("y_M"), Trace("M_B", Role.SECOND), Trace("M_set", Role.SET_POINT)),
+            height=1.8,
+        ),
+        Panel(
+            "motor speed",
+            (Trace("omega_1"), Trace("omega_2", Role.SECOND)),
+            saturation="sat_rate",
+            saturated="on the software rate limit",
+        ),
+        Panel("current", (Trace("i_1"), Trace("i_2", Role.SECOND)), limit="drive.i_max"),
+        # The rig shows the filtered power; the peaks of the raw one would hide it.
+        Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
+        Panel("force", (Trace("F_M"),)),
+        Panel("mode", (Trace("mode"),), levels=("parked", "gap", "moment", "retracting")),
+    ),
+)
+"""moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
+
+DRIVES = Panels(
+    "wedge-drives",
+    ("wedge-brake", "screw-rig", "shaft-rig"),
+    (
+        Panel(
+            "angle",
+            (
+                Trace("theta_1"),
+                Trace("theta_2", Role.SECOND),
+                Trace("theta_1_ref", Role.SET_POINT),
+            ),
+            height=1.8,
+        ),
+        Panel("motor speed", (Trace("omega_1"), Trace("omega_2", Role.SECOND))),
+        Panel(
+            "current",
+            (Trace("i_1"), Trace("i_2", Role.SECOND), Trace("i_1_ref", Role.SET_POINT)),
+            limit="drive.i_max",
+        ),
+        Panel("force", (Trace("y_F"),)),
+        Panel("force", (Trace("F_M"),)),
+        Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
+        Panel("power", (Trace("P_el"),)),
+    ),
+)
+"""motors and screws alone, or the brake under position or current control"""
+
+COMPARED: Mapping[str, str] = MappingProxyType(
+    {"y_M": "moment", "theta": "angle", "F_M": "force", "i_2": "current 2", "P_meas": "power"}
+)
+"""what overlaid traces compare, and what a low panel calls it"""

@@ -1,0 +1,213 @@
+"""Experiments that any brake gets, on a user's brake of one file, against closed forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
+from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
+from bywire.report.bench_figures import bench_figures
+from systems.loading import SPRING_AXIS, loaded
+
+SET = "spring-axis-one"
+K, M, D, F_C, K_C = 1e4, 2.0, 60.0, 5.0, 200.0
+SMOOTH = {"F_c": 0.0, "k_c": 1e-9}
+STEP = {"kind": "step", "start": 0, "end": "100 N", "t_step": 0}
+
+
+@pytest.fixture(autouse=True, scope="module")
+def axis() -> Iterator[None]:
+    """Have the brake known."""
+    with loaded(SPRING_AXIS):
+        yield
+
+
+def bench(experiment: str, options: dict[str, Any] | None = None, **more: Any) -> bywire.Bench:
+    """Return a bench of the brake, driven by its force."""
+    chosen = {"input": "F_set", **(options or {})} if experiment != "stribeck" else options or {}
+    return bywire.Bench(experiment, SET, options=chosen, **more)
+
+
+@pytest.mark.parametrize("name", sorted(GENERIC_EXPERIMENTS.all()))
+def test_every_one_runs_with_its_defaults_and_gives_what_it_declares(name: str) -> None:
+    driven = name in ("open-loop", "tracking")
+    made = bench(name, stimulus=STEP if driven else {})
+    result = bywire.run(made)
+    assert result.status == "passed"
+    assert {kpi.name: kpi.unit for kpi in result.kpis} == made.definition.kpis_with(
+        made.chosen_options
+    )
+    for kpi in result.kpis:
+        assert kpi.definition.endswith(".")
+        assert math.isfinite(kpi.value) or kpi.note
+    shown = {figure.name for figure in bench_figures(result)}
+    assert set(made.definition.figures) == shown
+    assert "energy-balance" not in shown  # it records no energy
+    for recording in result.recordings.values():
+        assert all(v.attrs["units"] and v.attrs["long_name"] for v in recording.variables.values())
+    assert result.as_object()["kpis"].keys() == {kpi.name for kpi in result.kpis}
+
+
+def test_a_step_has_the_overshoot_of_a_second_order_lag() -> None:
+    result = bywire.run(bench("step", {"output": "x", "end": "200 N"}, overrides=SMOOTH))
+    damping = D / (2.0 * math.sqrt(K * M))
+    expected = 100.0 * math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
+    assert result.kpi("overshoot").value == pytest.approx(expected, rel=5e-3)
+    assert result.kpi("steady_state_error").note == "no set point is given"
+    assert result.recording["x"].values[-1] == pytest.approx(200.0 / K, rel=1e-3)
+    assert result.recording["F_set"].values[-1] == 200.0  # what drove it is recorded
+
+
+def test_a_step_of_a_set_point_has_an_error() -> None:
+    result = bywire.run(bench("step", {"output": "F"}))
+    assert result.kpi("steady_state_error").value == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_ramp_opens_the_loop_of_its_friction() -> None:
+    options = {"output": "x", "end": "200 N", "slope": "50 N/s"}
+    result = bywire.run(bench("ramp", options, overrides={"k_c": 1e-9}))
+    apart = 2.0 * (F_C + D * 50.0 / K)  # friction and damping, both ways
+    assert result.kpi("loop_width_mid").value == pytest.approx(apart + 50.0 * 1e-3, rel=1e-3)
+    assert result.kpi("loop_width_mid").unit == "N"
+    assert result.kpi("output_max").value == pytest.approx((200.0 - F_C) / K, rel=0.01)
+    held = bywire.run(bench("ramp", {**options, "drive": "F"}, overrides={"k_c": 1e-9}))
+    assert held.kpi("loop_width_mid").value == pytest.approx(apart, rel=1e-2)
+
+
+def test_a_sine_sweep_has_the_gain_of_the_equation() -> None:
+    options = {"output": "x", "mean": 0, "amplitude": "10 N", "f_start": "1 Hz", "f_end": "40 Hz",
+               "n": 9, "n_settle": 12}  # fmt: skip
+    made = bench("sine-sweep", options, overrides=SMOOTH)
+    result = bywire.run(made)
+    setting = made.definition.sweep(made.chosen_options)
+    from bywire.bench.kpis.sine_sweep import select
+
+    sweep = select(result.recording, setting)
+    w = 2.0 * np.pi * sweep.frequencies
+    expected = 1.0 / (K - M * w**2 + 1j * D * w) * np.exp(-0.5j * w * 1e-3)  # held for 1 ms
+    assert np.abs(sweep.values / expected - 1.0).max() < 0.03
+    assert result.kpi("sweep_gain").value == pytest.approx(abs(expected[0]), rel=1e-2)
+    w_b = math.sqrt(K / M) * math.sqrt(1 - 2 * 0.0450 + math.sqrt((1 - 2 * 0.0450) ** 2 + 1))
+    assert result.kpi("sweep_bandwidth").value == pytest.approx(w_b / 2 / math.pi, rel=0.1)
+
+
+def test_a_stribeck_curve_is_the_friction_of_the_model() -> None:
+    options = {"along": "x", "levels": ["0 mm", "10 mm"], "speed_max": "0.2 m/s"}
+    result = bywire.run(bench("stribeck", options))
+    curve = result.recording["friction"]
+    assert curve.dims == ("x", "v")
+    assert curve.attrs["units"] == "N"
+    assert result.kpi("breakaway_forward").value == pytest.approx(F_C + 0.01 * K_C)
+    assert result.kpi("least_friction").value == pytest.approx(F_C)
+    assert np.allclose(curve.values[0], np.sign(curve["v"].values + 1e-12) * F_C, atol=2 * F_C)
+    assert curve.values[0, 0] == -F_C
+    assert curve.values[0, -1] == F_C
+
+
+def test_a_release_tells_when_it_is_empty_and_what_is_left() -> None:
+    options = {"output": "x", "start": "100 N", "empty": "1 mm"}
+    result = bywire.run(bench("release", options, overrides={"k_c": 1e-9}))
+    # Without current it sticks where the spring is as strong as the friction, or nearer to zero.
+    assert abs(result.kpi("residual_level").value) <= F_C / K + 1e-6
+    assert 0.0 < result.kpi("time_to_empty").value < 0.2
+
+
+def test_tracking_of_what_is_held_lags_half_a_sample_at_most() -> None:
+    stimulus = {"kind": "sine", "mean": 0, "amplitude": "10 N", "f": "5 Hz", "t_start": 0,
+                "phase": 0}  # fmt: skip
+    result = bywire.run(bench("tracking", {"output": "F"}, stimulus=stimulus))
+    assert result.kpi("tracking_max").value < 10.0 * 2.0 * math.pi * 5.0 * 1.1e-3
+    with pytest.raises(ParameterError, match=r"options.output: x is in m, and the set point F_set"):
+        bench("tracking", {"output": "x"}, stimulus=stimulus)
+
+
+def test_further_stimuli_act_beside() -> None:
+    beside = {"load": {"kind": "step", "start": 0, "end": "40 N", "t_step": 0}}
+    driven = {"kind": "step", "start": 0, "end": "100 N", "t_step": 0}
+    options = {"output": "x"}
+    both = bywire.run(
+        bench("open-loop", options, stimulus={**driven, **beside}, overrides=SMOOTH)
+    ).recording
+    assert both["x"].values[-1] == pytest.approx(60.0 / K, rel=1e-3)
+    assert both["load"].values[-1] == 40.0
+    step = bywire.run(bench("step", options, stimulus=beside, overrides=SMOOTH)).recording
+    assert step["x"].values[-1] == pytest.approx(60.0 / K, rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "text"),
+    [
+        ({"input": "F_sett"}, UnknownNameError, "stimulus of spring-axis in options.input 'F_sett'"
+         ": did you mean 'F_set'?"),
+        ({"input": "noise_x"}, UnknownNameError, "known are F_set, load"),
+        ({"output": "y"}, UnknownNameError, "recording of spring-axis in options.output 'y'"),
+        ({"input": ""}, ParameterError, "options.input is missing: name the stimulus of spring-axis"
+         " that experiment 'step' drives: F_set, load"),
+        ({"input": 3}, ParameterError, "options.input = 3: name a stimulus of spring-axis"),
+        ({"end": "2 bar"}, UnitError, "end"),
+        ({"endd": "2 N"}, UnknownNameError, "did you mean 'end'?"),
+        ({"duration": "-1 s"}, ParameterError, "duration = -1.0 s is not admissible"),
+    ],
+)  # fmt: skip
+def test_names_and_units_are_checked_against_the_model(
+    options: dict[str, Any], error: type[InputError], text: str
+) -> None:
+    with pytest.raises(error) as caught:
+        bench("step", options)
+    assert text in str(caught.value)
+
+
+def test_stimuli_are_checked_too() -> None:
+    with pytest.raises(UnknownNameError, match="stimulus beside step 'lod': did you mean 'load'"):
+        bench("step", stimulus={"lod": STEP})
+    with pytest.raises(UnknownNameError, match="stimulus beside step 'F_set'"):
+        bench("step", stimulus={"F_set": STEP})  # the step drives it itself
+    with pytest.raises(ParameterError, match="brings its own stimulus"):
+        bench("step", stimulus=STEP)
+    with pytest.raises(ParameterError, match=r"\[stimulus.load\] needs a kind"):
+        bench("step", stimulus={"load": {"start": 0}})
+    with pytest.raises(ParameterError, match=r"open-loop needs a \[stimulus\] section"):
+        bench("open-loop")
+
+
+def test_a_bench_file_of_any_brake_and_its_text(tmp_path: Any) -> None:
+    from bywire.bench.bench_text import bench_text
+
+    path = tmp_path / "axis.toml"
+    path.write_text(
+        f'experiment = "step"\nparameters = "{SET}"\nassembly = "spring-axis"\n'
+        '[options]\ninput = "F_set"\noutput = "x"\nend = "150 N"\n'
+        '[stimulus.load]\nkind = "step"\nstart = 0\nend = "50 N"\nt_step = 0\n'
+        '[requirements]\novershoot = "<= 90 %"\n'
+    )
+    made = bywire.load(path)
+    assert made.chosen_options.flat()["end"] == 150.0
+    again = tmp_path / "again.toml"
+    again.write_text(bench_text(made))
+    assert bywire.load(again).chosen_stimuli == made.chosen_stimuli
+    assert bywire.run(made).status == "passed"
+    path.write_text(f'experiment = "step"\nparameters = "{SET}"\n[options]\nend = 150\n')
+    with pytest.raises(InputError, match=r"options.input is missing"):
+        bywire.load(path)
+    path.write_text(
+        f'experiment = "step"\nparameters = "{SET}"\n[options]\ninput = "F_set"\nend = 150\n'
+    )
+    with pytest.raises(UnitError, match="end = '150' has the wrong unit"):
+        bywire.load(path)
+
+
+def test_a_brake_s_own_experiment_goes_before_one_of_any_brake() -> None:
+    own = bywire.Bench("open-loop", "dardanelli2010", stimulus={**STEP, "end": "1 A"})
+    assert own.definition is EXPERIMENTS.find("open-loop")
+    assert bench("open-loop", stimulus=STEP).definition.assembly == "spring-axis"
+    with pytest.raises(ParameterError, match="'hard-braking' tests a motorcycle-brake, but param"):
+        bywire.Bench("hard-braking", SET)
+    with pytest.raises(UnknownNameError, match="unknown assembly 'spring-axes'"):
+        bench("step", assembly="spring-axes")

@@ -1,0 +1,66 @@
+"""Panels of recordings whose model declares none: signals by unit, set points beside them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bywire.core.errors import ParameterError
+from bywire.report.panels import declared_panels, panels_by_unit
+from bywire.report.style import Role
+from bywire.report.time_traces import time_traces
+
+T = np.linspace(0.0, 1.0, 51)
+
+
+def recording(**signals: tuple[str, str, Any]) -> xr.Dataset:
+    """Return a recording of an unknown model: unit, label and values of each signal."""
+    return xr.Dataset(
+        {name: ("time", np.broadcast_to(np.asarray(y, float), T.shape),
+                {"units": unit, "long_name": label}) for name, (unit, label, y) in signals.items()},
+        coords={"time": T},
+        attrs={"model": "somebody's axis"},
+    )  # fmt: skip
+
+
+OWN = recording(
+    angle=("rad", "angle of the motor", T),
+    target=("rad", "demand", 1.0),
+    F=("N", "clamp force", 2.0 * T),
+    F_pad=("N", "pad force", T),
+    F_hat=("N", "estimate", T),
+    at_stop=("1", "at its stop", T > 0.5),
+    E_source=("J", "energy", T),
+    duty=("1", "duty cycle", 0.5 * T),
+)
+
+
+def test_signals_of_a_unit_share_panels_two_by_two() -> None:
+    assert declared_panels(OWN) == []
+    own = OWN.copy()
+    own["target"].attrs["set_point_of"] = "angle"
+    panels = panels_by_unit(own)
+    drawn = [[(trace.variable, trace.role) for trace in panel.traces] for panel in panels]
+    assert drawn == [
+        [("angle", Role.MAIN), ("target", Role.SET_POINT)],
+        [("F", Role.MAIN), ("F_pad", Role.SECOND)],
+        [("F_hat", Role.MAIN)],
+        [("duty", Role.MAIN)],
+    ]
+    assert [panel.quantity for panel in panels] == [
+        "angle of the motor", "force", "estimate", "duty cycle",
+    ]  # fmt: skip
+    assert len(time_traces(own).axes) == 4
+
+
+def test_without_a_declaration_a_set_point_is_a_line_like_any_other() -> None:
+    first = panels_by_unit(OWN)[0]
+    assert [trace.role for trace in first.traces] == [Role.MAIN, Role.SECOND]
+
+
+def test_energies_and_modes_alone_draw_nothing() -> None:
+    with pytest.raises(ParameterError, match="energies and modes alone have no panel"):
+        time_traces(OWN[["E_source", "at_stop"]])
