@@ -11,6 +11,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import Cited, chosen
 from bywire.core.registry import Kind, instances
 
+
 @dataclass(frozen=True)
 class CitedSet:
     """A named parameter set.
