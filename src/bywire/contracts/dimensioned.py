@@ -30,28 +30,28 @@ class Dimensioned:
     def __repr__(self) -> str:
         return f"{self.quantity:~}"
 
-    def __add__(self, other: Any) -> Dimensioned:
+    def __add__(self, other: Any) -> Any:
         return _combined(operator.add, self, other)
 
-    def __radd__(self, other: Any) -> Dimensioned:
+    def __radd__(self, other: Any) -> Any:
         return _combined(operator.add, other, self)
 
-    def __sub__(self, other: Any) -> Dimensioned:
+    def __sub__(self, other: Any) -> Any:
         return _combined(operator.sub, self, other)
 
-    def __rsub__(self, other: Any) -> Dimensioned:
+    def __rsub__(self, other: Any) -> Any:
         return _combined(operator.sub, other, self)
 
-    def __mul__(self, other: Any) -> Dimensioned:
+    def __mul__(self, other: Any) -> Any:
         return _combined(operator.mul, self, other)
 
-    def __rmul__(self, other: Any) -> Dimensioned:
+    def __rmul__(self, other: Any) -> Any:
         return _combined(operator.mul, other, self)
 
-    def __truediv__(self, other: Any) -> Dimensioned:
+    def __truediv__(self, other: Any) -> Any:
         return _combined(operator.truediv, self, other)
 
-    def __rtruediv__(self, other: Any) -> Dimensioned:
+    def __rtruediv__(self, other: Any) -> Any:
         return _combined(operator.truediv, other, self)
 
     def __pow__(self, exponent: float) -> Dimensioned:
@@ -121,17 +121,23 @@ def _quantity(value: Any) -> Any:
     return value.quantity if isinstance(value, Dimensioned) else registry().Quantity(value)
 
 
-def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> Dimensioned:
+def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
     if operation in (operator.add, operator.sub):
         return Dimensioned.of(operation(*_alike(left, right)))
+    if _is_nothing(left) or (operation is operator.mul and _is_nothing(right)):
+        return 0.0  # nothing goes with every unit, times anything too
     return Dimensioned.of(operation(_quantity(left), _quantity(right)))
+
+
+def _is_nothing(value: Any) -> bool:
+    return not isinstance(value, Dimensioned) and value == 0
 
 
 def _alike(left: Any, right: Any) -> tuple[Any, Any]:
     """Return two quantities of one dimension; a plain zero takes that of the other one."""
     x, y = _quantity(left), _quantity(right)
-    if not isinstance(left, Dimensioned) and left == 0:
+    if _is_nothing(left):
         x = 0.0 * y
-    elif not isinstance(right, Dimensioned) and right == 0:
+    elif _is_nothing(right):
         y = 0.0 * x
     return x, y.to(x.units)

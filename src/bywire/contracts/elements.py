@@ -13,6 +13,7 @@ from typing import Any
 from annotated_types import Ge, Gt, Le, Lt
 
 from bywire.core.brake import Brake
+from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.registry import Kind
 from bywire.core.signals import Signal
@@ -68,6 +69,7 @@ def every_element() -> dict[str, Element]:
 
 def elements_of(brake: Brake) -> dict[str, Element]:
     """Return the elements and laws of a brake's package, and those that its modules import."""
+    ASSEMBLIES.of(brake.module)  # loads its models, and so what they use
     known = every_element()
     bring = {**ELEMENTS.of(brake.module), **LAWS.of(brake.module)}
     files = {each.module.__name__: name for name, each in known.items()}

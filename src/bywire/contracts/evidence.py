@@ -77,8 +77,13 @@ Contract = Callable[[Any], Evidence | Iterator[Evidence]]
 """one thing that a subject (function, module, class, model) must keep"""
 
 
-def examine(contract: Contract, subject: Any) -> Evidence:
+def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evidence:
     """Return what a contract finds; an error in the subject's equations breaks it.
+
+    Parameters
+    ----------
+    place
+        Where the subject stands, if it is another place than that of its own code.
 
     Raises
     ------
@@ -92,8 +97,8 @@ def examine(contract: Contract, subject: Any) -> Evidence:
         raise
     except Exception as error:  # whatever a user's equations raise
         text = " ".join(str(error).split())
-        file = place_of(subject).file
-        return Evidence(False, f"{type(error).__name__}: {text}", place=_raised_at(error, file))
+        at = place or place_of(subject)
+        return Evidence(False, f"{type(error).__name__}: {text}", place=_raised_at(error, at.file))
 
 
 def place_of(subject: Any) -> Place:

@@ -57,7 +57,7 @@ class Demand:
         """Return what comes out."""
         place = self.place or place_of(self.on)
         try:
-            found = examine(self.contract, self.on)
+            found = examine(self.contract, self.on, place)
         except NotCheckedError as reason:
             return Finding(self.subject, self.name, "not checked", str(reason), place)
         outcome: Outcome = "holds" if found.holds else "broken"

@@ -32,7 +32,9 @@ def set_survives_json(par: ParameterSet) -> Evidence:
     again = type(par).model_validate_json(par.model_dump_json())
     before, after = par.flat(), again.flat()
     lost = [name for name in before if before[name] != after.get(name)]
-    return Evidence(again == par and not lost, f"JSON changes {', '.join(lost) or 'nothing'}")
+    kept = again == par and not lost
+    text = "its JSON gives the same set back" if kept else f"JSON changes {', '.join(lost)}"
+    return Evidence(kept, text)
 
 
 def keeps_its_ranges(cls: Class) -> Iterator[Evidence]:

@@ -1,0 +1,160 @@
+"""``bywire check``: what a brake, a model, an element or a parameter set keeps, and what not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bywire.contracts import element_contracts, model_contracts
+from bywire.contracts.elements import Element, elements_of, every_element
+from bywire.contracts.finding import Demand, Finding
+from bywire.contracts.start import start_of, start_of_a_rig
+from bywire.contracts.trial import Trial
+from bywire.core.brake import Brake, brakes, load_system
+from bywire.core.catalog import PARAMETER_SETS, CitedSet
+from bywire.core.errors import unknown_name
+from bywire.core.model import ASSEMBLIES
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Check:
+    """What was found of what was asked for.
+
+    Parameters
+    ----------
+    subject
+        What was checked: the name of a brake, a model, an element or a parameter set.
+    findings
+        One per subject and contract.
+    """
+
+    subject: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing is broken."""
+        return not self.broken
+
+    @property
+    def broken(self) -> tuple[Finding, ...]:
+        """What does not hold."""
+        return tuple(f for f in self.findings if f.outcome == "broken")
+
+    @property
+    def not_checked(self) -> tuple[Finding, ...]:
+        """What could not be put to the test; each says why."""
+        return tuple(f for f in self.findings if f.outcome == "not checked")
+
+
+def check(
+    name: str | None = None,
+    system: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Check:
+    """Put a brake, or a part of one, to the test of every contract.
+
+    Elements and laws: units, back ends, derivatives, energy, losses, round trip and ranges of
+    their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
+    lanes, linear model, derivatives of a run.
+
+    Parameters
+    ----------
+    name
+        Of a brake, a model, an element, a control law or a parameter set; by default the brake of
+        ``system``, else all that is installed.
+    system
+        File or folder of a brake to load first; its code is run.
+    progress
+        Called with what is being checked and the finished share, 0 to 1.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    FileError, ModelError
+        When the system cannot be loaded.
+
+    Examples
+    --------
+    >>> check("plant.pedal").holds
+    True
+    """
+    brake = None if system is None else load_system(system)
+    demands = list(_demands(name, brake))
+    findings = []
+    for k, demand in enumerate(demands):
+        if progress is not None:
+            progress(f"{demand.subject}: {demand.name}", k / len(demands))
+        findings.append(demand.settle())
+    subject = name or (brake.name if brake else "everything installed")
+    return Check(subject, tuple(findings))
+
+
+def _demands(name: str | None, brake: Brake | None) -> Iterator[Demand]:
+    if name is None:
+        known = every_element() if brake is None else elements_of(brake)
+        yield from _on_elements(known.values())
+        for each in brakes().values() if brake is None else (brake,):
+            yield from _on_brake(each)
+    elif name in brakes():
+        yield from _on_elements(elements_of(brakes()[name]).values())
+        yield from _on_brake(brakes()[name])
+    elif name in ASSEMBLIES.all():
+        yield from _on_model(ASSEMBLIES.find(name))
+    elif name in PARAMETER_SETS.all():
+        yield from _on_set(PARAMETER_SETS.find(name))
+    else:
+        yield from element_contracts.demands_on(_element(name))
+
+
+def _element(name: str) -> Element:
+    """Return an element by its dotted name, or by the last part of it where that is enough."""
+    known = every_element()
+    ends = [full for full in known if full.rpartition(".")[2] == name]
+    if name in known or len(ends) == 1:
+        return known[name if name in known else ends[0]]
+    every = {*known, *brakes(), *ASSEMBLIES.all(), *PARAMETER_SETS.all()}
+    every |= {full.rpartition(".")[2] for full in known}
+    raise unknown_name("brake, model, element or parameter set", name, ends or every)
+
+
+def _on_elements(elements: Iterable[Element]) -> Iterator[Demand]:
+    for element in elements:
+        yield from element_contracts.demands_on(element)
+
+
+def _on_brake(brake: Brake) -> Iterator[Demand]:
+    for entry in PARAMETER_SETS.of(brake.module).values():
+        yield from _on_set(entry)
+    for model in ASSEMBLIES.of(brake.module).values():
+        yield from _on_model(model)
+
+
+def _on_set(entry: CitedSet) -> Iterator[Demand]:
+    yield from model_contracts.demands_on_set(entry.name, entry.parameters())
+
+
+def _on_model(model: Any) -> Iterator[Demand]:
+    """Yield the contracts of a model: all with its first parameter set, of numbers with others."""
+    entries = [e for e in PARAMETER_SETS.all().values() if e.assembly == model.name]
+    for k, entry in enumerate(entries):
+        subject = f"{model.name} ({entry.name})"
+        yield from model_contracts.demands_on_model(subject, _trial(model, entry), k > 0)
+    if not entries:
+        yield from model_contracts.demands_on_model(model.name, _rig_trial(model), False)
+
+
+def _trial(model: type[Any], entry: CitedSet) -> Trial:
+    return Trial(model, lambda: start_of(model(), entry.parameters()))
+
+
+def _rig_trial(model: type[Any]) -> Trial:
+    """Return the trial of a model without a parameter set: an experiment of its brake starts it."""
+    module = ASSEMBLIES.owner(model.name)
+    sets = [entry.parameters() for entry in PARAMETER_SETS.of(module).values()]
+    return Trial(model, lambda: start_of_a_rig(model(), sets, module))
