@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from bywire.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
+    from bywire.api.check import Check, check
     from bywire.api.margins import margins
     from bywire.api.run import BenchResult, run
     from bywire.bench.bench import Bench
@@ -35,6 +36,8 @@ _HOMES = {
     "BywireError": "core.errors",
     "Ensemble": "simulation.ensemble",
     "BenchResult": "api.run",
+    "Check": "api.check",
+    "check": "api.check",
     "Run": "simulation.run",
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
@@ -56,10 +59,12 @@ __all__ = [
     "Bench",
     "BenchResult",
     "BywireError",
+    "Check",
     "Ensemble",
     "Run",
     "Sensitivity",
     "Trajectory",
+    "check",
     "load",
     "margins",
     "parameters",

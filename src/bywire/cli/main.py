@@ -13,6 +13,7 @@ from bywire.cli.bench_commands import (
     reproduce,
     run,
 )
+from bywire.cli.brake_commands import check_command
 from bywire.cli.data_commands import convert
 from bywire.cli.identification_commands import identify, replay
 from bywire.cli.loop_commands import (
@@ -50,6 +51,7 @@ app.command("design")(design_command)
 app.command("convert")(convert)
 app.command("identify")(identify)
 app.command("replay")(replay)
+app.command("check")(check_command)
 
 
 @app.callback(invoke_without_command=True)

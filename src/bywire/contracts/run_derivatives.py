@@ -25,6 +25,8 @@ INFLUENCE = 1e-3
 """relative change of a parameter by which its influence is judged"""
 DIFFERENCE = 1e-6
 """relative step of the differences"""
+LEAST = 1e-6
+"""of a state's usual magnitude: what all of a parameter moves it by at least"""
 SLOPE = 0.02
 """by how much a derivative may differ from them, of its largest value, at half of the instants:
 what a first breakaway that moves in time leaves at 20 us; without one it is a millionth"""
@@ -48,6 +50,7 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
         ahead[name][2 * k : 2 * k + 2] = [_moved(run, name, sign * DIFFERENCE) for sign in (1, -1)]
     values = trial.lanes(ahead)[:, :, : len(names)]
     whose = "the plant alone" if trial.rounds else "the run"
+    nominal = [abs(s.nominal) for s in signals_of(trial.model.State).values()]
     smooth = _until_a_reversal(trial, exact.trajectory.values)
     for k, name in enumerate(chosen):
         width = ahead[name][2 * k] - ahead[name][2 * k + 1]
@@ -56,7 +59,8 @@ def has_its_derivatives(trial: Trial) -> Iterator[Evidence]:
         rounding = np.abs(values[2 * k]).max(axis=0) * 1e-12 / width
         for j, state in enumerate(trial.model.State._fields):
             largest = max(np.abs(slopes[:, j]).max(), np.abs(differences[:, j]).max())
-            if largest * SLOPE <= rounding[j]:
+            felt_at_all = largest * abs(at[name]) > LEAST * nominal[j]
+            if largest * SLOPE <= rounding[j] or not felt_at_all:
                 continue  # what the state feels of this parameter drowns in rounding
             off = np.abs(slopes[:, j] - differences[:, j])
             felt = np.abs(slopes[:, j]) + np.abs(differences[:, j]) > 1e-3 * largest

@@ -1,101 +1,36 @@
-"""``bywire check``: what a brake, a model, an element or a parameter set keeps, and what not."""
+"""What can be checked by name: brakes, models, elements, control laws and parameter sets."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from pathlib import Path
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from bywire.contracts import element_contracts, model_contracts
 from bywire.contracts.elements import Element, elements_of, every_element
-from bywire.contracts.finding import Demand, Finding
+from bywire.contracts.finding import Demand
 from bywire.contracts.start import start_of, start_of_a_rig
 from bywire.contracts.trial import Trial
-from bywire.core.brake import Brake, brakes, load_system
+from bywire.core.brake import Brake, brakes
 from bywire.core.catalog import PARAMETER_SETS, CitedSet
 from bywire.core.errors import unknown_name
 from bywire.core.model import ASSEMBLIES
 
-Progress = Callable[[str, float], None]
 
-
-@dataclass(frozen=True)
-class Check:
-    """What was found of what was asked for.
-
-    Parameters
-    ----------
-    subject
-        What was checked: the name of a brake, a model, an element or a parameter set.
-    findings
-        One per subject and contract.
-    """
-
-    subject: str
-    findings: tuple[Finding, ...]
-
-    @property
-    def holds(self) -> bool:
-        """Whether nothing is broken."""
-        return not self.broken
-
-    @property
-    def broken(self) -> tuple[Finding, ...]:
-        """What does not hold."""
-        return tuple(f for f in self.findings if f.outcome == "broken")
-
-    @property
-    def not_checked(self) -> tuple[Finding, ...]:
-        """What could not be put to the test; each says why."""
-        return tuple(f for f in self.findings if f.outcome == "not checked")
-
-
-def check(
-    name: str | None = None,
-    system: str | Path | None = None,
-    progress: Progress | None = None,
-) -> Check:
-    """Put a brake, or a part of one, to the test of every contract.
-
-    Elements and laws: units, back ends, derivatives, energy, losses, round trip and ranges of
-    their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
-    lanes, linear model, derivatives of a run.
+def demands_on(name: str | None, brake: Brake | None) -> Iterator[Demand]:
+    """Yield every contract that something has to keep.
 
     Parameters
     ----------
     name
-        Of a brake, a model, an element, a control law or a parameter set; by default the brake of
-        ``system``, else all that is installed.
-    system
-        File or folder of a brake to load first; its code is run.
-    progress
-        Called with what is being checked and the finished share, 0 to 1.
+        Of a brake, a model, an element, a control law or a parameter set.
+    brake
+        What is meant where there is no name; everything installed where there is neither.
 
     Raises
     ------
     UnknownNameError
         With the nearest known names.
-    FileError, ModelError
-        When the system cannot be loaded.
-
-    Examples
-    --------
-    >>> check("plant.pedal").holds
-    True
     """
-    brake = None if system is None else load_system(system)
-    demands = list(_demands(name, brake))
-    findings = []
-    for k, demand in enumerate(demands):
-        if progress is not None:
-            progress(f"{demand.subject}: {demand.name}", k / len(demands))
-        findings.append(demand.settle())
-    subject = name or (brake.name if brake else "everything installed")
-    return Check(subject, tuple(findings))
-
-
-def _demands(name: str | None, brake: Brake | None) -> Iterator[Demand]:
     if name is None:
         known = every_element() if brake is None else elements_of(brake)
         yield from _on_elements(known.values())

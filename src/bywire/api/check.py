@@ -1,0 +1,171 @@
+"""A brake, or a part of one, put to the test of every contract."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from bywire.contracts.finding import Finding
+from bywire.contracts.subjects import demands_on
+from bywire.core.brake import load_system
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Banner, Document, Flat, Listing, Section, TableBlock
+from bywire.report.tables import Cell, Column, Table
+from bywire.report.wording import clean
+
+Progress = Callable[[str, float], None]
+
+_VERDICTS: dict[str, Any] = {"holds": "good", "broken": "bad", "not checked": "none"}
+_HEADINGS = ("subject", "contract", "outcome", "what was found")
+
+
+@dataclass(frozen=True)
+class Check(Answer):
+    """What was found of what was asked for.
+
+    Parameters
+    ----------
+    subject
+        What was checked: a brake, a model, an element, a parameter set, or everything.
+    findings
+        One per part of it and contract.
+    """
+
+    subject: str
+    findings: tuple[Finding, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether nothing is broken."""
+        return not self.broken
+
+    @property
+    def broken(self) -> tuple[Finding, ...]:
+        """What does not hold."""
+        return self._with("broken")
+
+    @property
+    def not_checked(self) -> tuple[Finding, ...]:
+        """What could not be put to the test; each says why."""
+        return self._with("not checked")
+
+    def _with(self, outcome: str) -> tuple[Finding, ...]:
+        return tuple(f for f in self.findings if f.outcome == outcome)
+
+    def document(self) -> Document:
+        """Return what holds and what does not, with figure, limit and the line to look at."""
+        kept = len(self._with("holds"))
+        counts = [f"{kept} of {len(self.findings)} contracts hold"]
+        counts += [f"{len(self.broken)} do not"] if self.broken else []
+        counts += [f"{len(self.not_checked)} could not be checked"] if self.not_checked else []
+        summary = f"{self.subject}: {', '.join(counts)}"
+        shown = [f for f in self.findings if f.figure is not None and "(" in f.subject]
+        brief: list[str | Flat] = [TableBlock(_figures(shown)), ""] if shown else []
+        if self.not_checked:
+            texts = [f"{f.subject}: {f.contract}: {f.text}" for f in self.not_checked]
+            brief += [Listing(texts, "not checked, because"), ""]
+        return Document(
+            f"Check of {self.subject}",
+            "Every contract that elements, parameter sets and models have to keep.",
+            sections=[
+                Section("What does not hold", [TableBlock(_table(self.broken))]),
+                Section("What could not be checked", [TableBlock(_table(self.not_checked))]),
+                Section("All contracts", [TableBlock(_table(self.findings))]),
+            ],
+            brief=[*brief, summary],
+            data=self._data(),
+            banner=Banner(summary, "good" if self.holds else "bad"),
+            record="check.json",
+            remarks=[
+                f"does not hold: {f.subject}: {f.contract}: {f.text}; look at {f.place}"
+                for f in self.broken
+            ],
+        )  # fmt: skip
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "subject": self.subject,
+            "holds": self.holds,
+            "broken": len(self.broken),
+            "not_checked": len(self.not_checked),
+            "findings": [
+                {
+                    "subject": f.subject, "contract": f.contract, "outcome": f.outcome,
+                    "text": f.text, "figure": f.figure, "limit": f.limit,
+                    "file": f.place.file, "line": f.place.line,
+                }
+                for f in self.findings
+            ],
+        }  # fmt: skip
+
+
+@use_case
+def check(
+    name: str | None = None,
+    *,
+    system: str | Path | None = None,
+    progress: Progress | None = None,
+) -> Check:
+    """Put a brake, or a part of one, to the test of every contract.
+
+    Elements and laws: units, back ends, derivatives, energy, losses, round trip and ranges of
+    their parameters. Models: units, order of the step, exact rest, energy of a run, engines,
+    lanes, linear model, derivatives of a run.
+
+    Parameters
+    ----------
+    name
+        Of a brake, a model, an element, a control law or a parameter set; by default the brake of
+        ``system``, else everything that is installed.
+    system
+        File or folder of a brake to load first; its code is run.
+    progress
+        Called with what is being checked and the finished share, 0 to 1.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    FileError, ModelError
+        When the system cannot be loaded.
+
+    Examples
+    --------
+    >>> check("plant.pedal").holds
+    True
+    """
+    brake = None if system is None else load_system(system)
+    subject = name or (brake.name if brake is not None else "everything installed")
+    demands = list(demands_on(name, brake))
+    findings = []
+    for k, demand in enumerate(demands):
+        if progress is not None:
+            progress(subject, k / len(demands))
+        findings.append(demand.settle())
+    return Check(subject, tuple(findings))
+
+
+def _figures(findings: list[Finding]) -> Table:
+    """Return what was measured, one line each."""
+    rows = [
+        (
+            Cell(clean(f.subject)), Cell(f.contract), Cell(f"{f.figure:.2g}"),
+            Cell(f"{f.limit:g}"), Cell(f.outcome, _VERDICTS[f.outcome]),
+        )
+        for f in findings
+    ]  # fmt: skip
+    numeric = ("figure", "limit")
+    headings = ("subject", "contract", *numeric, "outcome")
+    return Table(tuple(Column(name, name in numeric) for name in headings), tuple(rows))
+
+
+def _table(findings: tuple[Finding, ...] | list[Finding]) -> Table:
+    rows = []
+    for f in findings:
+        limit = "" if f.limit is None else f" (limit {f.limit:g})"
+        found = f"{f.text}{limit}" if f.outcome != "broken" else f"{f.text}{limit}; {f.place}"
+        outcome = Cell(f.outcome, _VERDICTS[f.outcome])
+        rows.append((Cell(clean(f.subject)), Cell(f.contract), outcome, Cell(clean(found))))
+    return Table(tuple(Column(heading) for heading in _HEADINGS), tuple(rows))
