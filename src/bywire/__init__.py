@@ -17,8 +17,13 @@ from bywire.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
     from bywire.api.check import Check, check
+    from bywire.api.convert import Conversion, convert
+    from bywire.api.identification import Identification
+    from bywire.api.identify import identify
     from bywire.api.margins import margins
+    from bywire.api.replay import Replay, replay
     from bywire.api.run import BenchResult, run
+    from bywire.api.trust import TrustStudy, trust
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
     from bywire.core.catalog import parameters
@@ -34,23 +39,31 @@ if TYPE_CHECKING:
 _HOMES = {
     "Bench": "bench.bench",
     "BywireError": "core.errors",
+    "Conversion": "api.convert",
     "Ensemble": "simulation.ensemble",
     "BenchResult": "api.run",
     "Check": "api.check",
     "check": "api.check",
+    "Identification": "api.identification",
+    "Replay": "api.replay",
     "Run": "simulation.run",
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
+    "TrustStudy": "api.trust",
+    "convert": "api.convert",
+    "identify": "api.identify",
     "load": "bench.bench_file",
     "parameters": "core.catalog",
     "read_measurement": "data.measurement",
     "read_recording": "data.netcdf",
+    "replay": "api.replay",
     "resample": "data.alignment",
     "margins": "api.margins",
     "run": "api.run",
     "simulate": "simulation.run",
     "simulate_ensemble": "simulation.ensemble",
     "simulate_with_sensitivities": "simulation.sensitivity",
+    "trust": "api.trust",
     "write_measurement": "data.writing",
     "write_recording": "data.netcdf",
 }
@@ -60,21 +73,29 @@ __all__ = [
     "BenchResult",
     "BywireError",
     "Check",
+    "Conversion",
     "Ensemble",
+    "Identification",
+    "Replay",
     "Run",
     "Sensitivity",
     "Trajectory",
+    "TrustStudy",
     "check",
+    "convert",
+    "identify",
     "load",
     "margins",
     "parameters",
     "read_measurement",
     "read_recording",
+    "replay",
     "resample",
     "run",
     "simulate",
     "simulate_ensemble",
     "simulate_with_sensitivities",
+    "trust",
     "write_measurement",
     "write_recording",
 ]

@@ -130,7 +130,9 @@ def test_interrupt_while_the_results_are_written(bywire, bench, tmp_path, monkey
     monkeypatch.setattr("bywire.report.files.save_figure", stopped)
     text = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'
     outcome = bywire("run", bench(text), "--out", tmp_path / "out")
-    assert (outcome.status, outcome.lines) == (130, ["bywire: interrupted"])
+    unfinished = f"the report in {tmp_path / 'out'} is not complete: the same command writes it"
+    assert outcome.status == 130
+    assert outcome.lines == [f"bywire: {unfinished}", "bywire: interrupted"]
     assert [p.name for p in (tmp_path / "out").iterdir()] == ["curve.nc"]
 
 

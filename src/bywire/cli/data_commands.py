@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import JsonFlag, Map, execute
+from bywire.cli.options import JsonFlag, Map
+from bywire.cli.show import show
 
 
 def convert(
@@ -39,7 +40,18 @@ def convert(
     json: JsonFlag = False,
 ) -> None:
     """Convert a measurement file: CSV, TSV, Parquet, MAT, MDF4, NetCDF."""
-    from bywire.cli.convert_command import Wanted
+    from bywire.api.convert import convert as convert_file
 
-    wanted = Wanted(map_, signals, rate, method, exclude, max_gap, format_, force)
-    execute("convert_command", source, target, wanted, json)
+    left_out = [] if exclude == "nothing" else _listed(exclude)
+    show(
+        lambda progress: convert_file(
+            source, target, mapping=map_, signals=_listed(signals), rate=rate or None,
+            method=method, exclude=left_out if exclude else None, max_gap=max_gap,
+            format=format_, force=force, progress=progress,
+        ),
+        as_json=json,
+    )  # fmt: skip
+
+
+def _listed(text: str) -> list[str]:
+    return [part.strip() for part in text.split(",") if part.strip()]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -17,9 +17,10 @@ from bywire.cli.options import (
     OutFolder,
     Parameters,
     changes,
-    execute,
     named,
 )
+from bywire.cli.show import show
+from bywire.core.errors import ParameterError
 
 # What methods of any bench take.
 _ANY_BENCH = "Methods of any bench"
@@ -97,19 +98,44 @@ def identify(
     json: JsonFlag = False,
 ) -> None:
     """Identify parameters with their confidence from measurements; status 1 if a check fails."""
-    from bywire.cli.measured_bench import OnBench
-    from bywire.cli.method_choice import Wanted
+    from bywire.api.identify import identify as identify_parameters
+    from bywire.api.trust import trust
 
-    on_bench = OnBench(
-        bench, changes(input_, "--input"), named(output, "--output"), named(unknown, "--unknown"),
-        changes(prior, "--prior"), start or [], case, holdout, loss,
+    shared: dict[str, Any] = {
+        "parameters": parameters, "overrides": changes(set_),
+        "options": changes(option, "--option"), "seed": seed, "bench": bench,
+        "inputs": changes(input_, "--input"), "outputs": named(output, "--output"),
+        "unknowns": named(unknown, "--unknown"), "priors": changes(prior, "--prior"),
+        "states": start or [], "case": case, "loss": loss, "folder": out,
+    }  # fmt: skip
+    if study is None:
+        show(
+            lambda progress: identify_parameters(
+                method, measurements or [], mapping=map_, starts=starts or 16,
+                synthetic=synthetic, holdout=holdout, progress=progress, **shared,
+            ),
+            out, json,
+        )  # fmt: skip
+        return
+    _require_no_measurement(method, measurements, synthetic, map_, holdout)
+    count = study
+    show(
+        lambda progress: trust(method, count, starts=starts or 1, progress=progress, **shared),
+        out, json,
     )  # fmt: skip
-    options = changes([*(option or []), *([f"loss={loss}"] if loss else [])], "--option")
-    wanted = Wanted(
-        measurements or [], map_, parameters, changes(set_), options,
-        starts or (16 if study is None else 1), seed, synthetic, study, on_bench,
-    )  # fmt: skip
-    raise typer.Exit(execute("identify_command", method, wanted, out, json))
+
+
+def _require_no_measurement(
+    method: str, measurements: object, synthetic: int | None, mapping: object, holdout: object
+) -> None:
+    """Refuse what a study of simulated experiments cannot use."""
+    if measurements or synthetic is not None:
+        raise ParameterError(
+            f"{method}: give only one of measurement files, --synthetic SEED, --study COUNT"
+        )
+    for flag, value in {"--map": mapping, "--holdout": holdout}.items():
+        if value is not None:
+            raise ParameterError(f"{flag} is for measurement files: leave it out")
 
 
 def replay(
@@ -138,10 +164,13 @@ def replay(
     json: JsonFlag = False,
 ) -> None:
     """Drive the model with a measured demand and compare; status 1 if a tolerance is missed."""
-    from bywire.cli.replay_command import Wanted
+    from bywire.api.replay import replay as replay_measurement
 
-    wanted = Wanted(
-        measurement, bench, map_, changes(set_), changes(input_, "--input"), output or [], case,
-        tolerance or [], segments, track or [],
+    show(
+        lambda progress: replay_measurement(
+            measurement, bench, changes(set_), mapping=map_, inputs=changes(input_, "--input"),
+            outputs=output or [], case=case, tolerances=tolerance or [], segments=segments,
+            track=track or [], progress=progress,
+        ),
+        out, json,
     )  # fmt: skip
-    raise typer.Exit(execute("replay_command", wanted, out, json))

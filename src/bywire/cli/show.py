@@ -43,6 +43,9 @@ def show(
     typer.Exit
         With status 1 where something required does not hold, and 130 after an interrupt.
     """
+    from bywire.report.answer import AnswerWarning, with_files, write_document
+    from bywire.report.terminal import terminal_text
+
     if out is not None:
         require_folder(out)
     files: list[Path] = []
@@ -54,31 +57,33 @@ def show(
                 answer = compute(progress)
             document = answer.document()
             if out is not None:
-                from bywire.report.answer import write_document
-
                 try:
                     files = write_document(document, out)
                 except BywireError as error:
                     trouble = error
-        except KeyboardInterrupt:  # typer would exit without a word
-            output.message("interrupted")
+        except KeyboardInterrupt as stop:  # typer would exit without a word
+            for text in (*stop.args, "interrupted"):
+                output.message(str(text))
             raise typer.Exit(INTERRUPTED) from None
-    for text in dict.fromkeys([*(str(w.message) for w in caught), *answer.warnings]):
+    others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
+    for text in dict.fromkeys([*others, *answer.warnings]):
         output.message(f"warning: {text}")
+    for text in (*answer.notes, *([] if out is None else document.file_notes)):
+        output.message(f"note: {text}")
     if as_json:
-        from bywire.report.answer import with_files
-
         output.result(json.dumps(with_files(document, files)))
-    elif text := str(answer):
+    elif text := terminal_text(document):
         output.result(text)
-    for remark in document.remarks:
+    for remark in (*answer.failures, *document.remarks):
         output.message(remark)
     if trouble is not None:
         raise trouble
     interrupted = getattr(answer, "status", "") == "interrupted"
     if interrupted:
         output.message("interrupted" + (f"; what was finished is in {out}" if out else ""))
-    elif out is not None and document.is_paged:
-        output.message(f"report: {out / document.page_name}")
+    elif out is not None:
+        written = [f"written: {path}" for path in files]
+        for line in [f"report: {out / document.page_name}"] if document.is_paged else written:
+            output.message(line)
     if interrupted or not answer.holds:
         raise typer.Exit(INTERRUPTED if interrupted else 1)

@@ -78,6 +78,11 @@ class Estimate:
         return tuple(u.label for u in self.unknowns)
 
     @property
+    def all_unknowns(self) -> tuple[Unknown, ...]:
+        """What was estimated, and what the data does not tell."""
+        return (*self.unknowns, *(kept.unknown for kept in self.kept))
+
+    @property
     def deviations(self) -> Array:
         """Standard deviations, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))

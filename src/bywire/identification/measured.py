@@ -42,7 +42,7 @@ class Measured:
 
 
 def measured(
-    paths: Sequence[str | Path],
+    sources: Sequence[str | Path | xr.Dataset],
     mapping: str | Path | None = None,
     signals: Mapping[str, str] | None = None,
     *,
@@ -56,8 +56,8 @@ def measured(
 
     Parameters
     ----------
-    paths
-        Files; several of them become records, named by the files.
+    sources
+        Files, or signals that were read before; several become records, named by the files.
     mapping
         File that says what their columns mean.
     signals
@@ -80,17 +80,27 @@ def measured(
     """
     meaning = None if mapping is None else read_mapping(mapping)
     records, notes = {}, []
-    for path in map(Path, paths):
-        data = read_measurement(path, meaning, progress=progress)
+    for number, source in enumerate(sources):
+        if isinstance(source, xr.Dataset):
+            data, where, label = source, "the measurement", f"record_{number}"
+        else:
+            data, where = read_measurement(source, meaning, progress=progress), str(source)
+            label = Path(source).stem if Path(source).stem not in records else where
         if signals is not None:
             too = {n: unit for n, unit in (optional or {}).items() if n in data}
-            data = data[list(require(data, {**signals, **too}, str(path)))]
+            data = data[list(require(data, {**signals, **too}, where))]
         even, said = as_even(data, interval, multiple)
-        notes += [f"{path.name}: {text}" for text in said]
-        _require_whole(even, path, gaps)
-        label = path.stem if path.stem not in records else str(path)
+        notes += [f"{name_of(source)}: {text}" for text in said]
+        _require_whole(even, where, gaps)
         records[label] = even
     return Measured(joined(records), tuple(notes))
+
+
+def name_of(source: str | Path | xr.Dataset) -> str:
+    """Return what reports call a measurement: the file's name, or that it came from memory."""
+    if isinstance(source, xr.Dataset):
+        return str(source.attrs.get("source", "signals in memory"))
+    return Path(source).name
 
 
 def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[str, ...]:
@@ -156,7 +166,7 @@ def _said(report: AlignmentReport) -> str:
     )
 
 
-def _require_whole(data: xr.Dataset, path: Path, gaps: bool) -> None:
+def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
     if gaps:
         return
     for name, signal in data.data_vars.items():
@@ -164,6 +174,6 @@ def _require_whole(data: xr.Dataset, path: Path, gaps: bool) -> None:
         if missing.size:
             at = float(data["time"].values[missing[0]])
             raise ParameterError(
-                f"{path}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
+                f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
                 "record there, or fill it knowingly with 'bywire convert --exclude nothing'"
             )

@@ -16,7 +16,6 @@ from typing import Any
 import numpy as np
 
 from bywire.identification.method import Effort, Method
-from bywire.identification.put_in import put_in
 from bywire.identification.simulated_experiments import Outcome, experiments
 
 Progress = Callable[[str, float], None]
@@ -128,6 +127,25 @@ def trust(
         store=store, progress=progress,
     )  # fmt: skip
     return Trust(outcomes, tuple(_recovered(method, par, options, outcomes)))
+
+
+def put_in(method: Method, par: Any, options: Any) -> dict[str, float]:
+    """Return the true values of a method's simulated measurements, SI, by label.
+
+    Parameters
+    ----------
+    method
+        Simulates with ``method.synthetic``.
+    par, options
+        Its parameters, None for a method of any assembly, and its options.
+
+    Raises
+    ------
+    ParameterError
+        When what is simulated has no true values of what the method estimates.
+    """
+    truth: dict[str, float] = {} if par is None else par.leaves()
+    return truth if method.truth is None else {**truth, **method.truth(par, options)}
 
 
 def _recovered(

@@ -34,6 +34,16 @@ class Answer(ABC):
         return []
 
     @property
+    def notes(self) -> list[str]:
+        """What was done to the data, and what else to know of the result; none by default."""
+        return []
+
+    @property
+    def failures(self) -> list[str]:
+        """Checks of the result itself that failed: it is not to be used as it is."""
+        return []
+
+    @property
     def holds(self) -> bool:
         """Whether all that was required, or checked, holds; commands exit with 1 where not."""
         return True
@@ -85,13 +95,13 @@ Given = TypeVar("Given", bound=Answer)
 def use_case(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
     """Have a function warn of what its answer warns of, so that nothing coarse passes in silence.
 
-    Commands catch these warnings and print them once.
+    Commands take warnings, notes and failures from the answer, and print each in its place.
     """
 
     @wraps(function)
     def warned(*args: Asked.args, **kwargs: Asked.kwargs) -> Given:
         answer = function(*args, **kwargs)
-        for text in answer.warnings:
+        for text in (*answer.warnings, *answer.notes, *answer.failures):
             warnings.warn(text, AnswerWarning, stacklevel=2)
         return answer
 
@@ -105,8 +115,26 @@ def write_document(document: Document, folder: Path) -> list[Path]:
     ------
     FileError
         When a file cannot be written.
+    KeyboardInterrupt
+        When interrupted, with what to do about what is missing.
     """
-    files = [each.write(folder / each.name) for each in document.attachments]
+    if document.prepare is not None:
+        document.prepare(folder)
+    try:
+        return _written(document, folder)
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"the report in {folder} is not complete: the same command writes it"
+        ) from None
+
+
+def _written(document: Document, folder: Path) -> list[Path]:
+    files: list[Path] = []
+    for each in document.attachments:
+        target = folder / each.name
+        if each.after_record and document.record:
+            _record(document, folder, [*files, target])
+        files.append(each.write(target))
     if document.is_paged:
         from bywire.report.files import save_figure
         from bywire.report.page import write_page
@@ -122,18 +150,22 @@ def write_document(document: Document, folder: Path) -> list[Path]:
             )
         )  # fmt: skip
     if document.record:
-        from bywire.report.files import write_bytes
-
-        target = folder / document.record
-        shown = with_files(document, [*files, target])
-        files.append(write_bytes(target, (json.dumps(shown, indent=2) + "\n").encode()))
+        files.append(_record(document, folder, files))
     return files
 
 
+def _record(document: Document, folder: Path, files: list[Path]) -> Path:
+    from bywire.report.files import write_bytes
+
+    target = folder / document.record
+    shown = with_files(document, [*files, target])
+    return write_bytes(target, (json.dumps(shown, indent=2) + "\n").encode())
+
+
 def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
-    """Return the JSON object of a document with the files that were written."""
+    """Return the JSON object of a document with the files that were written, its own among them."""
     shown: dict[str, Any] = finite(dict(document.data))
-    return {**shown, "files": [str(path) for path in files]}
+    return {**shown, "files": [*shown.get("files", []), *map(str, files)]}
 
 
 def finite(value: Any) -> Any:

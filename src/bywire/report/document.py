@@ -5,7 +5,7 @@ A `Document` loads no plotting: its figures are drawn when a page or a file want
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -64,11 +64,14 @@ class TableBlock:
     ----------
     width
         Characters per line that a terminal may give it.
+    title
+        Line above it on a terminal, which shows no captions; none where it is empty.
     """
 
     table: Table
     caption: str = ""
     width: int = 100
+    title: str = ""
 
 
 @dataclass(frozen=True)
@@ -109,10 +112,14 @@ class Attachment:
         File name in the output folder.
     write
         ``write(path)``: writes it whole or not at all and returns the path.
+    after_record
+        Whether the document's record is written before it: values that must never lie without
+        what says whether to believe them.
     """
 
     name: str
     write: Callable[[Path], Path]
+    after_record: bool = False
 
 
 @dataclass(frozen=True)
@@ -137,6 +144,10 @@ class Document:
         File of the output folder that keeps the JSON object; none where it is empty.
     remarks
         Lines for standard error after the result, such as requirements that are not met.
+    file_notes
+        What is to be known of the files of an output folder, or why there are none.
+    prepare
+        ``prepare(folder)``: called before anything is written, to refuse a folder or to tidy it.
     is_paged
         Whether an output folder gets a page and figures; not where an interrupt left too little.
     page_name
@@ -152,6 +163,8 @@ class Document:
     attachments: Sequence[Attachment] = ()
     record: str = ""
     remarks: Sequence[str] = ()
+    file_notes: Sequence[str] = ()
+    prepare: Callable[[Path], None] | None = None
     is_paged: bool = True
     page_name: str = "report.html"
 
@@ -163,6 +176,14 @@ class Document:
     def flat(self) -> Iterator[Flat]:
         """Yield the blocks of all sections, folded ones among them."""
         return flat_blocks(block for section in self.page for block in section.blocks)
+
+
+def spaced(blocks: Iterable[str | Flat]) -> list[str | Flat]:
+    """Return blocks of a brief with an empty line between them."""
+    apart: list[str | Flat] = []
+    for block in blocks:
+        apart += ["", block] if apart else [block]
+    return apart
 
 
 def flat_blocks(blocks: Iterator[Block] | Sequence[Block]) -> Iterator[Flat]:

@@ -30,15 +30,21 @@ def estimate_table(
         What a simulated measurement is made of, by label.
     """
     beside: dict[str, Mapping[str, float]] = {"put in": put_in or {}, "start": start or {}}
-    shown = [*estimate.unknowns, *(kept.unknown for kept in estimate.kept)]
-    beside = {t: known for t, known in beside.items() if any(u.label in known for u in shown)}
+    beside = {
+        title: known for title, known in beside.items()
+        if any(u.label in known for u in estimate.all_unknowns)
+    }  # fmt: skip
     rows = []
     for unknown, value, (low, high) in zip(
         estimate.unknowns, estimate.values, estimate.intervals(), strict=True
     ):
         number, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
         share = _percent(50.0 * float(high - low) / abs(value)) if value else "-"
-        rows.append((unknown, (Cell(number), Cell(half), Cell(share), Cell(unit))))
+        shown = in_display_unit(float(value), unknown.unit)[0]
+        reach = in_display_unit(0.5 * float(high - low), unknown.unit)[0]
+        rows.append(
+            (unknown, (Cell(number, value=shown), Cell(half, value=reach), Cell(share), Cell(unit)))
+        )
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
         rows.append((u, (Cell(number), Cell("not told", "bad"), Cell("-"), Cell(unit))))

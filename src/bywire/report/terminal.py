@@ -26,4 +26,5 @@ def _text(block: str | Flat) -> str:
         lines = [f"- {text}" for text in block.texts]
         return "\n".join([block.title, *lines] if block.title else lines)
     assert not isinstance(block, FigureBlock)
-    return table_text(block.table, block.width)
+    text = table_text(block.table, block.width)
+    return f"{block.title}\n{text}" if block.title else text

@@ -17,22 +17,36 @@ from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
 
 SIGNED = ("bias", "lag")
 """figures that may be negative"""
+_SIGNS = ("<=", ">=", "<", ">")
 _LIMIT = re.compile(r"\s*(<=|>=|<|>)\s*([^<>=]+?)\s*")
 _BOTH = re.compile(r"\s+and\s+")
 
 
-def joined(texts: Sequence[tuple[str, str]]) -> dict[str, str]:
+def read_tolerances(texts: Sequence[str]) -> dict[str, str]:
     """Return the limits of each figure, where one is named several times all of them.
+
+    Raises
+    ------
+    ParameterError
+        When a text has no figure, no sign or no limit.
 
     Examples
     --------
-    >>> joined([("lag", ">= -1 ms"), ("nrmse", "<= 5 %"), ("lag", "<= 5 ms")])
+    >>> read_tolerances(["lag >= -1 ms", "nrmse <= 5 %", "lag <= 5 ms"])
     {'lag': '>= -1 ms and <= 5 ms', 'nrmse': '<= 5 %'}
     """
-    found: dict[str, str] = {}
-    for name, text in texts:
-        found[name] = f"{found[name]} and {text}" if name in found else text
-    return found
+    limits: dict[str, str] = {}
+    for text in texts:
+        sign = next((s for s in _SIGNS if s in text), "")
+        name, _, bound = (part.strip() for part in text.partition(sign or "<="))
+        if not sign or not name or not bound:
+            raise ParameterError(
+                f"--tolerance {text!r} cannot be read: write for instance 'nrmse <= 5 %' or "
+                "'p_mc.max_error <= 2 bar'"
+            )
+        limit = f"{sign} {bound}"
+        limits[name] = f"{limits[name]} and {limit}" if name in limits else limit
+    return limits
 
 
 def judge_fit(

@@ -1,0 +1,253 @@
+"""A measurement file in another format, on one time axis where a rate is given."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from bywire.core import units
+from bywire.core.errors import ParameterError
+from bywire.data.file_format import Progress, no_progress
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Document, Section, TableBlock
+from bywire.report.tables import Table, text_table
+
+if TYPE_CHECKING:
+    from bywire.data.alignment_report import AlignedChannel, AlignmentReport
+    from bywire.data.channel_quality import Stretch
+
+_LISTED = 20
+"""stretches of a kind that the JSON object lists for a channel; it counts all of them"""
+
+_ROUNDING = 1e-9  # steps: the jitter of numbers, not of a clock
+
+
+@dataclass(frozen=True)
+class Conversion(Answer):
+    """A measurement as it was written.
+
+    Parameters
+    ----------
+    source, target
+        Files that were read and written.
+    recording
+        Its signals, SI.
+    alignment
+        How they were brought to one time axis; None where they were left on their own.
+    """
+
+    source: Path
+    target: Path
+    recording: xr.Dataset
+    alignment: AlignmentReport | None = None
+
+    def document(self) -> Document:
+        """Return the signals, and what was found while they were aligned."""
+        report = self.alignment
+        table = TableBlock(self._signal_table() if report is None else _channel_table(report))
+        head, foot = ([], []) if report is None else _around(report)
+        written = f"written: {self.target}"
+        return Document(
+            f"Conversion of {self.source.name}",
+            written,
+            sections=[Section("Signals", [table])],
+            brief=[*head, table, *foot, written],
+            data=self._data(),
+            is_paged=False,
+        )
+
+    def _signal_table(self) -> Table:
+        rows = [
+            (name, told["unit"], str(told["samples"]), told["time"], told["column"])
+            for name, told in self._signals().items()
+        ]
+        return text_table(("signal", "unit", "samples", "instants", "column"), rows)
+
+    def _signals(self) -> dict[str, dict[str, Any]]:
+        return {
+            str(name): {
+                "unit": signal.attrs["units"],
+                "samples": int(signal.size),
+                "time": str(signal.dims[0]),
+                "column": signal.attrs.get("column", str(name)),
+            }
+            for name, signal in self.recording.data_vars.items()
+        }
+
+    def _data(self) -> dict[str, Any]:
+        report = self.alignment
+        return {
+            "source": str(self.source),
+            "format": self.recording.attrs.get("format"),
+            "signals": self._signals(),
+            "alignment": None if report is None else {
+                "interval": report.interval,
+                "start": report.start,
+                "stop": report.stop,
+                "samples": report.samples,
+                "method": report.method,
+                "excluded": list(report.exclude),
+                "folded": list(report.folded),
+                "channels": {channel.name: _channel(channel) for channel in report.channels},
+            },
+            "files": [str(self.target)],
+        }  # fmt: skip
+
+
+@use_case
+def convert(
+    source: str | Path,
+    target: str | Path,
+    *,
+    mapping: str | Path | None = None,
+    signals: Sequence[str] = (),
+    rate: str | float | None = None,
+    method: str = "",
+    exclude: Sequence[str] | None = None,
+    max_gap: str = "",
+    format: str = "",
+    force: bool = False,
+    progress: Progress | None = None,
+) -> Conversion:
+    """Read a measurement file, align its signals where a rate is given, write the other file.
+
+    Parameters
+    ----------
+    source, target
+        File to read, and file to write: CSV, TSV, Parquet, MAT, MDF4, NetCDF.
+    mapping
+        File that says what the columns mean.
+    signals
+        Signals to keep; all by default.
+    rate
+        Rate of the one time axis, for instance ``"1 kHz"`` [Hz]; by default every signal keeps its
+        own instants.
+    method
+        How to resample: ``linear`` (default), ``previous``, ``nearest`` or ``average``.
+    exclude
+        What is left out: ``gaps`` and ``missing`` (both by default), ``clipped``.
+    max_gap
+        Longest pause that is no gap, for instance ``"50 ms"``; 10 steps by default.
+    format
+        Format to write, for instance ``mat73``; else by the ending.
+    force
+        Whether a file that is there is replaced.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        When the file cannot be read or written, or something does not fit.
+    """
+    from bywire.data.format_registry import format_to_write
+    from bywire.data.measurement import read_measurement
+    from bywire.data.writing import require_free, write_measurement
+
+    shown = no_progress if progress is None else progress
+    source, target = Path(source), Path(target)
+    format_to_write(target, format)
+    require_free(target, overwrite=force)
+    left_out = None if exclude is None else ", ".join(exclude) or "nothing"
+    for option, value in {"method": method, "exclude": left_out, "max-gap": max_gap}.items():
+        if value and rate is None:
+            raise ParameterError(
+                f"--{option} {value}: it says how to resample: give the rate too, as --rate '1 kHz'"
+            )
+    dataset = read_measurement(source, mapping, signals=list(signals) or None, progress=shown)
+    report = None
+    if rate is not None:
+        dataset, report = _aligned(dataset, rate, method, exclude, max_gap)
+    write_measurement(dataset, target, format=format, overwrite=force, progress=shown)
+    return Conversion(source, target, dataset, report)
+
+
+def _aligned(
+    dataset: xr.Dataset,
+    rate: str | float,
+    method: str,
+    exclude: Sequence[str] | None,
+    max_gap: str,
+) -> tuple[xr.Dataset, AlignmentReport]:
+    from bywire.data.alignment import resample
+
+    frequency = units.parse(rate, "Hz", "--rate")
+    if not frequency > 0.0:
+        raise ParameterError(f"--rate {rate}: it must be > 0 Hz")
+    given = {"method": method, "max_gap": max_gap}
+    options: dict[str, Any] = {key: value for key, value in given.items() if value}
+    if exclude is not None:
+        options["exclude"] = list(exclude)
+    aligned = resample(dataset, 1.0 / frequency, **options)
+    return aligned.dataset, aligned.report
+
+
+def _channel(channel: AlignedChannel) -> dict[str, Any]:
+    quality = channel.quality
+    return {
+        "samples": quality.samples,
+        "rate": quality.rate,
+        "jitter": quality.jitter,
+        "start": quality.start,
+        "stop": quality.stop,
+        "delay": channel.delay,
+        "excluded_samples": channel.excluded,
+        "gaps": _stretches(quality.gaps),
+        "missing": _stretches(quality.missing),
+        "clipped": _stretches(quality.clipped),
+    }
+
+
+def _stretches(stretches: tuple[Stretch, ...]) -> dict[str, Any]:
+    """Return count, total length, and the longest of some stretches in the order of time."""
+    longest = sorted(stretches, key=lambda stretch: -stretch.length)[:_LISTED]
+    return {
+        "count": len(stretches),
+        "length": sum(stretch.length for stretch in stretches),
+        "longest": [
+            {"start": stretch.start, "length": stretch.length, "samples": stretch.samples}
+            for stretch in sorted(longest, key=lambda stretch: stretch.start)
+        ],
+    }
+
+
+def _around(report: AlignmentReport) -> tuple[list[str], list[str]]:
+    """Return what stands above and below the table of an alignment."""
+    head = (
+        f"{report.samples} samples every {units.shown(report.interval, 's')} from "
+        f"{units.shown(report.start, 's')} to {units.shown(report.stop, 's')}, method "
+        f"{report.method}; excluded: {', '.join(report.exclude) or 'nothing'}"
+    )
+    folded = (
+        f"faster than the axis: {', '.join(report.folded)}; what they hold above half its rate "
+        "folds into slow content, unless --method average"
+    )
+    return [head], [folded] if report.folded else []
+
+
+def _channel_table(report: AlignmentReport) -> Table:
+    heading = ("signal", "rate", "jitter", "delay", "gaps", "missing", "clipped", "left out")
+    return text_table(heading, [_row(channel) for channel in report.channels])
+
+
+def _row(channel: AlignedChannel) -> tuple[str, ...]:
+    quality = channel.quality
+    return (
+        channel.name,
+        f"{quality.rate:.6g} Hz",
+        f"{1e3 * quality.jitter:.3g} ms" if quality.jitter * quality.rate > _ROUNDING else "-",
+        f"{1e3 * channel.delay:.4g} ms" if channel.delay else "-",
+        *(_in_short(stretches) for stretches in (quality.gaps, quality.missing, quality.clipped)),
+        str(channel.excluded),
+    )
+
+
+def _in_short(stretches: tuple[Stretch, ...]) -> str:
+    if not stretches:
+        return "-"
+    longest = max(stretches, key=lambda stretch: stretch.length)
+    return f"{len(stretches)}, longest {longest.length:.3g} s at {longest.start:.4g} s"

@@ -1,0 +1,319 @@
+"""Identified parameters with their confidence: what an identification gives and shows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from bywire.api import earlier_result
+from bywire.api.method_choice import ChosenMethod
+from bywire.identification.estimate import Estimate, as_object
+from bywire.identification.method import Curve, Identified
+from bywire.identification.parameter_file import parameter_file
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Details,
+    Document,
+    FigureBlock,
+    Flat,
+    Listing,
+    Paragraph,
+    Section,
+    TableBlock,
+    spaced,
+)
+from bywire.report.estimate_tables import check_table, estimate_table, figure_table
+from bywire.report.parameter_rows import parameter_rows
+from bywire.report.subject import Subject
+from bywire.report.tables import parameter_table
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+@dataclass(frozen=True)
+class Identification(Answer):
+    """An identification with all that went into it.
+
+    Parameters
+    ----------
+    chosen
+        The method with its parameters and options.
+    identified
+        What it found.
+    data
+        The measurement, over ``time`` [s].
+    source
+        The measurement in one line.
+    start
+        Values from which the search began, by the estimates' labels, SI.
+    put_in
+        What a simulated measurement is made of, likewise; empty for a measured one.
+    data_notes
+        What was done to the measurement, and what of it is doubtful.
+    is_simulated
+        Whether the measurement is simulated, and kept beside the result.
+    files
+        Measurement files: they stay when an earlier result is tidied away.
+    """
+
+    chosen: ChosenMethod
+    identified: Identified
+    data: xr.Dataset
+    source: str
+    start: Mapping[str, float] = field(default_factory=dict)
+    put_in: Mapping[str, float] = field(default_factory=dict)
+    data_notes: tuple[str, ...] = ()
+    is_simulated: bool = False
+    files: tuple[Path, ...] = ()
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Identified parameters by dotted name, SI: what a bench takes as overrides."""
+        return dict(self.identified.parameters)
+
+    @property
+    def estimates(self) -> dict[str, Estimate]:
+        """Estimates with their covariance, by what they are of."""
+        return dict(self.identified.estimates)
+
+    @property
+    def notes(self) -> list[str]:
+        """What was done to the measurement, and what of it is doubtful."""
+        return list(self.data_notes)
+
+    @property
+    def failures(self) -> list[str]:
+        """The checks that failed, with their meaning."""
+        return [
+            f"check failed: {check.name}: {check.note}"
+            for check in self.identified.checks if not check.holds
+        ]  # fmt: skip
+
+    @property
+    def holds(self) -> bool:
+        """Whether every check holds."""
+        return not self.failures
+
+    def bench_file(self) -> str:
+        """Return the text of a bench file with the parameters; failed checks stand at its top.
+
+        Empty where there are no parameters of an assembly, or none that are fit for use.
+        """
+        method, par = self.chosen.method, self.chosen.par
+        if par is None or not self.identified.parameters:
+            return ""
+        lines = [
+            f"CHECK FAILED, do not use it as it is: {c.name} = {c.value:.4g} "
+            f"(limit {'>=' if c.at_least else '<='} {c.limit:g}): {c.note}"
+            for c in self.identified.checks if not c.holds
+        ]  # fmt: skip
+        lines.append(f"identified by {method.name} from {self.source}")
+        for estimate in self.identified.estimates.values():
+            lines += [f"not told by the data: {k.unknown.label}" for k in estimate.kept]
+            lines += [f"lies at its bound: {label}" for label in estimate.at_bounds()]
+        comment = "\n".join([*lines, *([method.bench_note] if method.bench_note else [])])
+        if method.bench is not None:
+            from bywire.bench.bench_text import bench_text
+
+            return bench_text(method.bench.with_overrides(self.identified.parameters), comment)
+        changes = {**self.chosen.changes, **self.identified.parameters}
+        return parameter_file(method.experiment, self.chosen.name, par, changes, comment)
+
+    def document(self) -> Document:
+        """Return parameters, checks, curves, residuals, correlations, and how it was made."""
+        method, subject = self.chosen.method, self._subject()
+        head = f"{method.name}, {self.source}: {method.summary}"
+        return Document(
+            f"Identification {method.name}",
+            method.summary if subject is None else subject.line,
+            sections=lambda: [
+                Section("Parameters", [b for b in self._parameters() if not isinstance(b, str)]),
+                *self._curves(),
+                Section("Residuals", self._residuals()),
+                Section("Correlations", self._correlations()),
+                Section("Data", [Paragraph(f"Measurement: {self.source}."), *self._data_notes()]),
+                self._made(subject),
+            ],
+            brief=spaced([head, *self._parameters()]),
+            data=self._data(),
+            banner=self._banner(),
+            attachments=list(self._attachments()),
+            record=earlier_result.ESTIMATE,
+            file_notes=self._file_notes(),
+            prepare=self._prepare,
+        )
+
+    def _subject(self) -> Subject | None:
+        method, par = self.chosen.method, self.chosen.par
+        if par is None:
+            return None
+        return Subject(method.name, method.summary, self.chosen.name, par)
+
+    def _parameters(self) -> Iterator[str | Flat]:
+        for name, estimate in self.identified.estimates.items():
+            table = estimate_table(estimate, self.start, self.put_in)
+            texts = [f"{k.unknown.label} is not told by the data: {k.reason}"
+                     for k in estimate.kept]  # fmt: skip
+            yield TableBlock(table, f"{name[:1].upper()}{name[1:]}.", title=name)
+            if texts or estimate.notes:
+                yield Listing([*texts, *estimate.notes])
+        if self.identified.figures:
+            yield TableBlock(figure_table(self.identified), "Further results.")
+        if self.identified.checks:
+            yield TableBlock(check_table(self.identified.checks), "Whether to believe it.")
+        if self.identified.notes:
+            yield Listing(self.identified.notes)
+
+    def _curves(self) -> list[Section]:
+        curves = self.identified.curves
+        blocks = [FigureBlock(partial(_curve, c), c.caption, c.name) for c in curves]
+        return [Section("Curves", blocks)] if blocks else []
+
+    def _residuals(self) -> list[Block]:
+        return [
+            FigureBlock(partial(_residual_figure, estimate), _residual_caption(name, estimate), key)
+            for key, name, estimate in self._keyed("residuals") if estimate.residuals.size > 1
+        ]  # fmt: skip
+
+    def _correlations(self) -> list[Block]:
+        blocks: list[Block] = [
+            FigureBlock(
+                partial(_correlations, estimate),
+                f"{name}: correlations of the estimates. Near 1 or -1 the data tells a "
+                "combination of the two rather than either.",
+                key,
+            )
+            for key, name, estimate in self._keyed("correlation") if len(estimate.unknowns) > 1
+        ]  # fmt: skip
+        return blocks or [Paragraph("One unknown alone has no correlations.")]
+
+    def _keyed(self, kind: str) -> Iterator[tuple[str, str, Estimate]]:
+        """Yield file name of a figure, capitalized name of an estimate, and the estimate."""
+        several = len(self.identified.estimates) > 1
+        for k, (name, estimate) in enumerate(self.identified.estimates.items(), 1):
+            yield f"{kind}-{k}" if several else kind, f"{name[:1].upper()}{name[1:]}", estimate
+
+    def _data_notes(self) -> list[Block]:
+        return [Listing(self.data_notes)] if self.data_notes else []
+
+    def _made(self, subject: Subject | None) -> Section:
+        method, options = self.chosen.method, self.chosen.options
+        idle = () if self.is_simulated else method.simulated
+        rows = [r for r in parameter_rows(options) if r.name.split(".")[0] not in idle]
+        chosen = Details("Options of the method", [TableBlock(parameter_table(rows))])
+        if subject is None:
+            return Section("How it was made", [Paragraph(method.summary), chosen])
+        section = subject.made(f"Method {method.name}: {method.summary}.")
+        return Section(section.title, [*section.blocks, chosen])
+
+    def _banner(self) -> Banner:
+        failed = [check.name for check in self.identified.checks if not check.holds]
+        untold = [k.unknown.label for e in self.identified.estimates.values() for k in e.kept]
+        if failed:
+            return Banner(f"Do not use it as it is: {', '.join(failed)} failed.", "bad")
+        if untold:
+            return Banner(f"All checks hold; not told by the data: {', '.join(untold)}.", "none")
+        return Banner("All checks hold.", "good")
+
+    def _data(self) -> dict[str, Any]:
+        method, identified = self.chosen.method, self.identified
+        idle = set() if self.is_simulated else set(method.simulated)
+        return {
+            "method": method.name,
+            "parameter_set": None if self.chosen.par is None else self.chosen.name,
+            "measurement": self.source,
+            "options": self.chosen.options.model_dump(mode="json", exclude=idle),
+            "parameters": dict(identified.parameters),
+            "estimates": {name: as_object(e) for name, e in identified.estimates.items()},
+            "start": self._of_estimates(self.start),
+            "put_in": self._of_estimates(self.put_in),
+            "figures": {
+                name: {"value": value, "unit": unit}
+                for name, (value, unit) in identified.figures.items()
+            },
+            "checks": [
+                {"name": c.name, "value": c.value, "unit": c.unit, "limit": c.limit,
+                 "at_least": c.at_least, "holds": c.holds, "note": c.note}
+                for c in identified.checks
+            ],
+            "notes": [*self.data_notes, *identified.notes],
+        }  # fmt: skip
+
+    def _of_estimates(self, values: Mapping[str, float]) -> dict[str, float]:
+        """Return those values that an estimate, or an unknown that is not told, stands beside."""
+        labels = [u.label for e in self.identified.estimates.values() for u in e.all_unknowns]
+        return {label: values[label] for label in labels if label in values}
+
+    def _attachments(self) -> Iterator[Attachment]:
+        if self.is_simulated:
+            yield Attachment("measurement.nc", self._write_data)
+        if text := self.bench_file():
+            yield Attachment("parameters.toml", partial(_write_text, text), after_record=True)
+
+    def _write_data(self, path: Path) -> Path:
+        from bywire.data.writing import write_measurement
+
+        return write_measurement(self.data, path, overwrite=True)
+
+    def _file_notes(self) -> list[str]:
+        """Return what the user should know of the bench file, or why there is none."""
+        method = self.chosen.method
+        if self.identified.parameters and self.chosen.par is not None:
+            return [f"parameters.toml: {method.bench_note}"] if method.bench_note else []
+        asked = self.chosen.par is not None and method.unknowns
+        reason = (
+            "no estimate is fit for use" if asked
+            else f"{method.name} gives no parameters of an assembly; take its figures from "
+            "estimate.json"
+        )  # fmt: skip
+        return [f"no parameters.toml is written: {reason}"]
+
+    def _prepare(self, folder: Path) -> None:
+        earlier_result.require_own(folder, self.chosen.method.name)
+        earlier_result.remove(folder, self.files)
+
+
+def _residual_caption(name: str, estimate: Estimate) -> str:
+    follows = (
+        "Neighbors go together: what the model misses lasts longer than a sample, and the "
+        "intervals allow for that"
+        if estimate.colored
+        else "Neighbors are independent, as noise is"
+    )
+    return (
+        f"{name}: residuals of {estimate.residuals.size} measured values, root mean square "
+        f"{estimate.rms:.3g}. {follows}."
+    )
+
+
+def _write_text(text: str, path: Path) -> Path:
+    from bywire.report.files import write_bytes
+
+    return write_bytes(path, text.encode())
+
+
+def _curve(curve: Curve) -> Figure:
+    from bywire.report.method_curve import method_curve
+
+    return method_curve(curve)
+
+
+def _residual_figure(estimate: Estimate) -> Figure:
+    from bywire.report.residual_figure import residual_figure
+
+    return residual_figure(estimate)
+
+
+def _correlations(estimate: Estimate) -> Figure:
+    from bywire.report.correlation_matrix import correlation_matrix
+
+    return correlation_matrix(estimate)

@@ -1,0 +1,223 @@
+"""Which identification method is taken, with its parameters, its options and its bench."""
+
+from __future__ import annotations
+
+import filecmp
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from bywire.api.parameter_choice import set_for
+from bywire.api.replay import driven_bench
+from bywire.bench.bench import Bench
+from bywire.bench.values import parsed
+from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.data.file_format import Progress, no_progress
+from bywire.identification.fitting.asked import BENCH_METHODS, Asked, BenchMethod, find_method
+from bywire.identification.measured import measured
+
+if TYPE_CHECKING:
+    from bywire.core.parameters import ParameterSet
+    from bywire.identification.method import Method
+
+Source = str | Path | xr.Dataset
+"""a measurement: a file, or what `bywire.read_measurement` gives"""
+
+Texts = Mapping[str, str] | Iterable[str]
+"""what is said of each name; or the names alone"""
+
+
+@dataclass(frozen=True)
+class BenchQuestion:
+    """What a method of any bench is asked.
+
+    Parameters
+    ----------
+    bench
+        A bench, the path of a bench file, or an experiment's name; None where none is given.
+    asked
+        What is measured there and what is unknown.
+    holdout
+        A measurement that is not fitted.
+    loss
+        How large residuals count; empty for the method's own choice.
+    """
+
+    bench: Bench | str | Path | None = None
+    asked: Asked = field(default_factory=Asked)
+    holdout: Source | None = None
+    loss: str = ""
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """What was given, as options of the command."""
+        asked = self.asked
+        options = {
+            "--bench": self.bench is not None, "--input": asked.inputs, "--output": asked.outputs,
+            "--unknown": asked.unknowns, "--prior": asked.priors, "--estimate-start": asked.states,
+            "--case": asked.case, "--holdout": self.holdout is not None, "--loss": self.loss,
+        }  # fmt: skip
+        return tuple(name for name, value in options.items() if value)
+
+
+@dataclass(frozen=True)
+class ChosenMethod:
+    """A method with its parameters and options.
+
+    Parameters
+    ----------
+    method, options
+        What is done, and how.
+    name, par
+        Parameter set and values from which the search begins; empty and None for a method of any
+        assembly.
+    changes
+        What of the parameter set was changed, by dotted name, SI.
+    """
+
+    method: Method
+    options: ParameterSet
+    name: str = ""
+    par: ParameterSet | None = None
+    changes: Mapping[str, Any] = field(default_factory=dict)
+
+
+def texts_of(names: Texts) -> dict[str, str]:
+    """Return what is said of each name, nothing where there are names alone."""
+    if isinstance(names, Mapping):
+        return dict(names)
+    return dict.fromkeys([names] if isinstance(names, str) else names, "")
+
+
+def choose(
+    name: str,
+    parameters: str,
+    overrides: Mapping[str, Any],
+    options: Mapping[str, Any],
+    question: BenchQuestion,
+    *,
+    measurements: Sequence[Source] = (),
+    mapping: str | Path | None = None,
+    progress: Progress = no_progress,
+) -> ChosenMethod:
+    """Return the method of a name with what it needs.
+
+    Parameters
+    ----------
+    name
+        Method of ``bywire list``.
+    parameters, overrides, options
+        Parameter set, and what of it and of the method's options is changed.
+    question
+        For methods of any bench.
+    measurements, mapping
+        What is identified, and what the columns of its files mean; none for simulated ones.
+    progress
+        Called with a label and the finished share.
+
+    Raises
+    ------
+    InputError
+        When something does not fit.
+    """
+    bench_method = BENCH_METHODS.all().get(name)
+    if bench_method is None:
+        method = find_method(name)
+        if question.given:
+            raise ParameterError(
+                f"{question.given[0]} is for methods of any bench "
+                f"({', '.join(BENCH_METHODS.all())}): leave it out for {name}"
+            )
+    else:
+        if question.holdout is not None:
+            _require_not_fitted(question.holdout, measurements)
+        chosen = {"parameters": parameters} if parameters else {}
+        method = _on_bench(bench_method, question, {**chosen, **overrides}, mapping, progress)
+    if len(measurements) > 1 and not method.several:
+        raise ParameterError(f"{name} takes one measurement, not {len(measurements)}")
+    idle = [key for key in options if key.split(".")[0] in method.simulated]
+    if measurements and idle:
+        raise ParameterError(
+            f"option {idle[0]} of {name} only shapes simulated experiments: leave it out for "
+            "measurement files"
+        )
+    loss = {"loss": question.loss} if question.loss else {}
+    return _with_parameters(method, _options(method, {**options, **loss}), parameters, overrides)
+
+
+def _with_parameters(
+    method: Method, options: ParameterSet, parameters: str, overrides: Mapping[str, Any]
+) -> ChosenMethod:
+    if not method.assembly:
+        if parameters or overrides:
+            raise ParameterError(
+                f"{method.name} needs no parameters: leave out --parameters and --set"
+            )
+        return ChosenMethod(method, options)
+    if method.bench is not None:
+        bench = method.bench
+        changes = parsed(type(bench.par), bench.overrides, "parameter")
+        return ChosenMethod(method, options, bench.parameters, bench.par, changes)
+    cited = set_for(f"method {method.name!r}", method.assembly, parameters)
+    base = cited.parameters()
+    for key in overrides:
+        if key in options.flat() and key not in base.flat():
+            raise unknown_name("parameter (--option sets the method's)", key, base.flat())
+    changes = parsed(type(base), overrides, "parameter")
+    return ChosenMethod(method, options, cited.name, base.replace(changes), changes)
+
+
+def _options(method: Method, values: Mapping[str, Any]) -> ParameterSet:
+    """Return a method's options with some of them changed."""
+    try:
+        given = parsed(method.options, values, f"option of {method.name}")
+        return method.defaults.replace(given)
+    except InputError as error:
+        raise type(error)(f"{error}; 'bywire list {method.name}' shows the options") from None
+
+
+def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None:
+    """Refuse a held-out measurement that is fitted too, or none beside it: it proves nothing."""
+    if not measurements:
+        raise ParameterError("--holdout is for measurement files: leave it out")
+    for fitted in measurements:
+        if isinstance(holdout, xr.Dataset) or isinstance(fitted, xr.Dataset):
+            if isinstance(fitted, xr.Dataset) and fitted is holdout:
+                raise ParameterError("--holdout is fitted too: hold out a record that is not")
+            continue
+        try:
+            equal = filecmp.cmp(fitted, holdout, shallow=False)
+        except OSError:  # reading says what is wrong with it
+            continue
+        if equal:
+            same = "is" if Path(fitted).samefile(holdout) else "has the same content as"
+            raise ParameterError(
+                f"--holdout {holdout} {same} {fitted}, which is fitted: hold out a record that is "
+                "not"
+            )
+
+
+def _on_bench(
+    method: BenchMethod,
+    question: BenchQuestion,
+    changes: Mapping[str, Any],
+    mapping: str | Path | None,
+    progress: Progress,
+) -> Method:
+    """Return a method of any bench for the one that is asked about."""
+    if question.bench is None:
+        raise ParameterError(
+            f"{method.name} needs --bench: a bench file (TOML), or an experiment of 'bywire list'"
+        )
+    bench = driven_bench(question.bench, changes)
+    on_bench = method.on(bench, question.asked)
+    if question.holdout is None:
+        return on_bench
+    held = measured(
+        [question.holdout], mapping, on_bench.signals, optional=on_bench.optional, gaps=True,
+        multiple=bench.step, progress=progress,
+    )  # fmt: skip
+    return method.on(bench, replace(question.asked, holdout=held.data))

@@ -1,0 +1,340 @@
+"""A measured demand drives a bench's model, and what it gives is laid beside the measurement."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import xarray as xr
+
+from bywire.bench import bench_file
+from bywire.bench.bench import Bench
+from bywire.bench.kpis.kpi import Kpi
+from bywire.core.errors import ParameterError
+from bywire.data.file_format import Progress, no_progress
+from bywire.identification.measured import measured, name_of
+from bywire.identification.replaying import bench_replay, tracking
+from bywire.identification.replaying.bench_replay import Replayed
+from bywire.identification.replaying.fit import SegmentFit, judged, undefined
+from bywire.identification.replaying.segments import (
+    Segment,
+    found_in,
+    read_segments,
+    whole_record,
+)
+from bywire.identification.replaying.tolerances import read_tolerances
+from bywire.identification.replaying.tracking import Track
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+    spaced,
+)
+from bywire.report.subject import Subject
+from bywire.report.tables import Cell, Column, Table
+from bywire.report.wording import amount, clean, duration
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NONE: Mapping[str, Any] = MappingProxyType({})
+_SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
+_SILENT = {"kind": "step", "start": "0", "end": "0", "t_step": "0"}
+
+
+@dataclass(frozen=True)
+class Replay(Answer):
+    """A measurement beside what the model makes of the same demand.
+
+    Parameters
+    ----------
+    bench, source
+        The model, and the measurement in one line.
+    replayed
+        Inputs, and each output measured and modeled.
+    fits
+        Figures of every signal and stretch, with the tolerances.
+    tracks
+        Drifting parameters, tracked.
+    data_notes
+        What was done to the measurement.
+    """
+
+    bench: Bench
+    source: str
+    replayed: Replayed
+    fits: tuple[SegmentFit, ...]
+    tracks: tuple[Track, ...] = ()
+    data_notes: tuple[str, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether every tolerance is met."""
+        return all(v.met for fit in self.fits for v in fit.verdicts)
+
+    @property
+    def notes(self) -> list[str]:
+        """What was done to the measurement, what is assumed, and why figures are not defined."""
+        return [*self.data_notes, *self.replayed.notes, *undefined(self.fits)]
+
+    @property
+    def recording(self) -> xr.Dataset:
+        """Inputs, and each output as ``NAME_measured`` and ``NAME_modeled``, over ``time`` [s]."""
+        signals = {
+            f"{name}_{kind}": pair[kind]
+            for name, pair in self.replayed.outputs.items()
+            for kind in ("measured", "modeled")
+        }
+        return xr.Dataset({**signals, **{str(n): v for n, v in self.replayed.inputs.items()}})
+
+    def document(self) -> Document:
+        """Return how well it fits, stretch by stretch, with figures and tracked parameters."""
+        bench, inputs = self.bench, ", ".join(map(str, self.replayed.inputs.data_vars))
+        subject = Subject(
+            bench.name or bench.experiment, bench.definition.summary, bench.parameters,
+            self.replayed.run.par,
+        )  # fmt: skip
+        table = TableBlock(fit_table(self.fits), width=110)
+        definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
+        tracked = [
+            FigureBlock(
+                partial(_track_figure, each, self.replayed.run.par.leaves()),
+                f"{each.relation.parameter} tracked from {', '.join(each.relation.signals)}: "
+                f"{each.relation.assumption}.",
+                f"track-{each.relation.parameter}",
+            )
+            for each in self.tracks
+        ]
+        head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
+        return Document(
+            f"Replay of {self.source}",
+            subject.line,
+            sections=lambda: [
+                Section("How well it fits", [table, Listing(definitions)]),
+                Section("Measured and simulated", list(self._figures())),
+                *([Section("Tracked parameters", tracked)] if tracked else []),
+                subject.made(f"Measurement: {self.source}.",
+                             *(f"{note[:1].upper()}{note[1:]}." for note in self.notes)),
+            ],
+            brief=spaced([head, table, *self._tracked_texts()]),
+            data=self._data(),
+            banner=self._banner(),
+            attachments=[Attachment("replay.nc", self._write_signals)],
+            record="replay.json",
+        )  # fmt: skip
+
+    def _figures(self) -> Iterator[FigureBlock]:
+        for name, pair in self.replayed.outputs.items():
+            fits = [fit for fit in self.fits if fit.signal == name]
+            yield FigureBlock(
+                partial(_replay_figure, name, pair, self.replayed.inputs, fits),
+                f"{name}: measured (solid), simulated (dashed), and their difference; the demand "
+                "above.",
+                name,
+            )
+
+    def _tracked_texts(self) -> Iterator[str]:
+        for each in self.tracks:
+            data, unit = each.data.isel(parameter=0), each.relation.units[0]
+            told = data.isel(time=data["used"].values > 0)
+            if told.sizes["time"]:
+                first, last = (
+                    f"{amount(float(told['value'][k]), unit)} "
+                    f"({amount(float(told['low'][k]), unit)} "
+                    f"to {amount(float(told['high'][k]), unit)})"
+                    for k in (0, -1)
+                )
+                yield f"{each.relation.parameter} tracked: at first {first}, at last {last}"
+
+    def _banner(self) -> Banner | None:
+        if not any(fit.verdicts for fit in self.fits):
+            return None
+        missed = sum(not v.met for fit in self.fits for v in fit.verdicts)
+        text = f"{missed} tolerances are missed." if missed else "All tolerances are met."
+        return Banner(text, "bad" if missed else "good")
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "bench": self.bench.name or self.bench.experiment,
+            "measurement": self.source,
+            "inputs": [str(name) for name in self.replayed.inputs.data_vars],
+            "notes": self.notes,
+            "holds": self.holds,
+            "segments": [
+                {
+                    "name": fit.segment.name, "signal": fit.signal,
+                    "start": fit.segment.start, "stop": fit.segment.stop,
+                    "figures": {k.name: {"value": k.value, "unit": k.unit} for k in fit.kpis},
+                    "tolerances": [
+                        {"figure": v.kpi, "limit": v.limit, "value": v.value, "met": v.met}
+                        for v in fit.verdicts
+                    ],
+                }
+                for fit in self.fits
+            ],
+            "tracked": {each.relation.parameter: _tracked(each) for each in self.tracks},
+        }  # fmt: skip
+
+    def _write_signals(self, path: Path) -> Path:
+        from bywire.data.netcdf import write_recording
+
+        return write_recording(self.recording, path)
+
+
+@use_case
+def replay(
+    measurement: str | Path | xr.Dataset,
+    bench: Bench | str | Path,
+    overrides: Mapping[str, Any] = _NONE,
+    *,
+    mapping: str | Path | None = None,
+    inputs: Mapping[str, str] = _NONE,
+    outputs: Sequence[str] = (),
+    case: str = "",
+    tolerances: Sequence[str] = (),
+    segments: str | Path = "",
+    track: Sequence[str] = (),
+    progress: Progress | None = None,
+) -> Replay:
+    """Drive a bench's model with a measured demand, and compare.
+
+    Parameters
+    ----------
+    measurement
+        A file, or what `bywire.read_measurement` gives.
+    bench, overrides
+        A `Bench`, the path of a bench file, or an experiment's name; and what of it is changed,
+        as ``--set`` takes it.
+    mapping
+        File that says what the columns of a measurement file mean.
+    inputs
+        Stimulus of the model -> measured signal; by default all of the same name.
+    outputs
+        What is compared; by default all that are measured and tell how well the model fits.
+    case
+        Run of the experiment; the first by default.
+    tolerances
+        Such as ``"nrmse <= 5 %"`` or ``"p_mc.max_error <= 2 bar"``.
+    segments
+        Stretches that are judged: ``"auto"`` for steps and holds, or a TOML file; by default the
+        whole record.
+    track
+        Parameters that drift and are tracked, for instance ``"mu_B"``.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        When something that is asked for does not fit, or the measurement cannot be used.
+    """
+    shown = no_progress if progress is None else progress
+    driven = driven_bench(bench, overrides)
+    limits = read_tolerances(tolerances)
+    read = measured([measurement], mapping, gaps=True, progress=shown)
+    shown("replay", 0.0)
+    replayed = bench_replay.replay(driven, read.data, inputs or None, outputs or None, case)
+    shown("replay", 1.0)
+    fits = judged(replayed.outputs, _segments(segments, replayed.inputs, limits))
+    tracks = [tracking.track(name, read.data, replayed.run.par) for name in track]
+    return Replay(driven, name_of(measurement), replayed, fits, tuple(tracks), tuple(read.notes))
+
+
+def driven_bench(bench: Bench | str | Path, changes: Mapping[str, Any]) -> Bench:
+    """Return a bench; one that wants a stimulus gets none of its own, for it is measured.
+
+    Parameters
+    ----------
+    bench
+        A `Bench`, the path of a bench file, or an experiment's name.
+    changes
+        As ``--set`` takes them.
+
+    Raises
+    ------
+    InputError
+        When it cannot be read, or something does not fit.
+    """
+    if isinstance(bench, Bench):
+        return bench.with_overrides(changes) if changes else bench
+    try:
+        return bench_file.read(bench, changes)
+    except ParameterError as error:
+        if "[stimulus]" not in str(error):
+            raise
+    silent = {f"stimulus.{key}": value for key, value in _SILENT.items()}
+    return bench_file.read(bench, {**silent, **changes})
+
+
+def fit_table(fits: Sequence[SegmentFit]) -> Table:
+    """Return the figures of every signal and stretch, with the tolerances that are missed."""
+    rows = []
+    for fit in fits:
+        by_name = {k.name: k for k in fit.kpis}
+        missed = [
+            f"{v.kpi} {v.limit}{' (not defined)' if math.isnan(v.value) else ''}"
+            for v in fit.verdicts if not v.met
+        ]  # fmt: skip
+        verdict = Cell("-")
+        if fit.verdicts:
+            verdict = Cell(f"missed: {', '.join(missed)}", "bad") if missed else Cell("ok", "good")
+        rows.append(
+            (Cell(clean(fit.segment.name)), Cell(clean(fit.signal)),
+             *(_figure(by_name[n]) for n in _SHOWN), verdict)
+        )  # fmt: skip
+    numbers = (Column(name.replace("_", " "), numeric=True) for name in _SHOWN)
+    return Table(
+        (Column("segment"), Column("signal"), *numbers, Column("tolerances")), tuple(rows)
+    )
+
+
+def _figure(kpi: Kpi) -> Cell:
+    if kpi.unit == "s" and math.isfinite(kpi.value):
+        return Cell(duration(kpi.value), value=kpi.value)
+    return Cell(amount(kpi.value, kpi.unit, 3), value=kpi.value)
+
+
+def _segments(
+    wanted: str | Path, inputs: xr.Dataset, limits: Mapping[str, str]
+) -> list[Segment]:
+    if not wanted:
+        return whole_record(inputs["time"].values, limits)
+    if wanted == "auto":
+        return found_in(next(iter(inputs.data_vars.values())), limits)
+    return read_segments(wanted, limits)
+
+
+def _tracked(track: Track) -> dict[str, Any]:
+    data = track.data.isel(parameter=0)
+    return {
+        "unit": track.relation.units[0],
+        "from": list(track.relation.signals),
+        "assumption": track.relation.assumption,
+        "time": data["time"].values.tolist(),
+        **{n: data[n].values.tolist() for n in ("value", "low", "high")},
+        "used": data["used"].values.tolist(),
+    }
+
+
+def _track_figure(track: Track, known: Mapping[str, float]) -> Figure:
+    from bywire.report.track_figure import track_figure
+
+    return track_figure(track, known.get(track.relation.parameter))
+
+
+def _replay_figure(
+    name: str, pair: xr.Dataset, inputs: xr.Dataset, fits: Sequence[SegmentFit]
+) -> Figure:
+    from bywire.report.replay_figure import replay_figure
+
+    return replay_figure(name, pair, inputs, fits)

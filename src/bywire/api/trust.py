@@ -1,0 +1,176 @@
+"""Whether a method gives back what is put into many simulated experiments."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+from bywire.api import earlier_result
+from bywire.api.method_choice import BenchQuestion, ChosenMethod, Texts, choose, texts_of
+from bywire.data.file_format import Progress, no_progress
+from bywire.identification import trust as trusted
+from bywire.identification.fitting.asked import Asked
+from bywire.identification.method import Effort
+from bywire.identification.trust import Trust
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Document, Flat, Listing, Section, TableBlock
+from bywire.report.estimate_tables import trust_table
+
+if TYPE_CHECKING:
+    from bywire.bench.bench import Bench
+
+STORE = "experiments.jsonl"
+"""file of the output folder that keeps finished experiments"""
+
+_NONE: Mapping[str, Any] = MappingProxyType({})
+_MOST = 5  # experiments without a result that are named one by one
+
+
+@dataclass(frozen=True)
+class TrustStudy(Answer):
+    """What many simulated experiments say of a method.
+
+    Parameters
+    ----------
+    chosen
+        The method with its parameters and options.
+    trust
+        Every experiment's outcome, and how well each unknown comes back.
+    """
+
+    chosen: ChosenMethod
+    trust: Trust
+
+    @property
+    def holds(self) -> bool:
+        """Whether every unknown comes back, from every experiment."""
+        return self.trust.holds
+
+    @cached_property
+    def troubles(self) -> list[str]:
+        """What did not come back: experiments, unknowns that were not told, failed checks."""
+        outcomes, failed = self.trust.outcomes, self.trust.failed
+        texts = [f"seed {o.seed} gave nothing: {o.error}" for o in failed[:_MOST]]
+        if len(failed) > _MOST:
+            texts.append(f"and {len(failed) - _MOST} more")
+        kept = Counter(label for o in outcomes for label in o.kept)
+        checks = Counter(name for o in outcomes for name in o.failed_checks)
+        texts += [f"{label} was not told in {n} of {len(outcomes)}" for label, n in kept.items()]
+        texts += [f"check {name} failed in {n} of {len(outcomes)}" for name, n in checks.items()]
+        return texts
+
+    def document(self) -> Document:
+        """Return how well each unknown comes back, and what did not."""
+        method, trust = self.chosen.method, self.trust
+        count = len(trust.outcomes)
+        blocks = list(self._blocks())
+        return Document(
+            f"Trust in {method.name}",
+            f"{count} simulated experiments, each with its own noise",
+            sections=[Section("What comes back", blocks)],
+            brief=[
+                f"{method.name}: {count} simulated experiments, each with its own noise", *blocks
+            ],
+            data={
+                "method": method.name,
+                "parameter_set": self.chosen.name or None,
+                "options": self.chosen.options.model_dump(mode="json"),
+                "seeds": [o.seed for o in trust.outcomes],
+                "holds": trust.holds,
+                "recovered": {
+                    r.label: {k: v for k, v in asdict(r).items() if k != "label"}
+                    | {"holds": r.holds}
+                    for r in trust.recovered
+                },
+                "experiments": [asdict(o) for o in trust.outcomes],
+            },
+            record=earlier_result.STUDY,
+            prepare=lambda folder: earlier_result.require_own(folder, method.name),
+            is_paged=False,
+        )
+
+    def _blocks(self) -> Iterator[Flat]:
+        if self.trust.recovered:
+            yield TableBlock(trust_table(self.trust), f"{self.chosen.method.name}.")
+        if self.troubles:
+            yield Listing(self.troubles)
+
+
+@use_case
+def trust(
+    method: str,
+    count: int = 200,
+    parameters: str = "",
+    overrides: Mapping[str, Any] = _NONE,
+    *,
+    options: Mapping[str, Any] = _NONE,
+    starts: int = 1,
+    seed: int = 1,
+    bench: Bench | str | Path | None = None,
+    inputs: Mapping[str, str] = _NONE,
+    outputs: Texts = (),
+    unknowns: Texts = (),
+    priors: Mapping[str, str] = _NONE,
+    states: Sequence[str] = (),
+    case: str = "",
+    loss: str = "",
+    folder: str | Path | None = None,
+    processes: int | None = None,
+    progress: Progress | None = None,
+) -> TrustStudy:
+    """Identify many simulated experiments, each with its own noise and from a start that is off.
+
+    Parameters
+    ----------
+    method, parameters, overrides, options
+        As of `bywire.identify`.
+    bench, inputs, outputs, unknowns, priors, states, case, loss
+        For methods of any bench, likewise.
+    count
+        Number of experiments.
+    starts, seed
+        Starts of each search, and the first experiment's seed; the others follow it.
+    folder
+        Where the result will be written: a folder with the result of another method is refused, an
+        earlier study is removed, and finished experiments are kept there, so that an interrupted
+        study goes on.
+    processes
+        Experiments at a time; all cores by default.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        When something that is asked for does not fit.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    asked = Asked(
+        dict(inputs), texts_of(outputs), texts_of(unknowns), dict(priors), tuple(states), case
+    )
+    question = BenchQuestion(bench, asked, loss=loss)
+    shown = no_progress if progress is None else progress
+    chosen = choose(method, parameters, overrides, options, question, progress=shown)
+    store = None
+    if folder is not None:
+        earlier_result.require_own(Path(folder), method)
+        earlier_result.remove_study(Path(folder))
+        store = Path(folder) / STORE
+    try:
+        found = trusted.trust(
+            chosen.method, chosen.par, chosen.options, range(seed, seed + count),
+            Effort(starts=starts), processes=processes, store=store, progress=shown,
+        )  # fmt: skip
+    except KeyboardInterrupt:
+        if store is None or not store.exists():
+            raise
+        raise KeyboardInterrupt(
+            f"finished experiments are in {store}: the same command goes on"
+        ) from None
+    return TrustStudy(chosen, found)
