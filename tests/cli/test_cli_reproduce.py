@@ -43,11 +43,11 @@ def test_source_is_a_name_and_never_a_path(bywire):
 def test_folder_is_checked_before_anything_is_computed(bywire, tmp_path, quick):
     taken = tmp_path / "taken"
     taken.write_text("mine")
-    started = time.perf_counter()
+    started = time.process_time()
     outcome = bywire("reproduce", "dardanelli2010", "--out", taken)
     refused(outcome, "output folder", "File exists", "--out")
     assert quick == []
-    assert time.perf_counter() - started < 5.0
+    assert time.process_time() - started < 5.0
 
 
 def test_results_are_shown_even_when_they_cannot_be_written(bywire, tmp_path, quick, monkeypatch):

@@ -161,10 +161,10 @@ HOSTILE = [
 @pytest.mark.parametrize("text", HOSTILE, ids=lambda text: text[:12])
 def test_hostile_text_is_refused_at_once(text):
     units.registry()  # its loading does not count
-    started = time.perf_counter()
+    started = time.process_time()
     with pytest.raises(BywireError) as refused:
         units.parse(text, "m", "x")
-    assert time.perf_counter() - started < 0.5
+    assert time.process_time() - started < 0.5
     assert len(str(refused.value)) < 300
 
 

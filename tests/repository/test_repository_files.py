@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import configparser
 import re
-import tomllib
 import warnings
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import pytest
-from repository_sources import MODULES, PACKAGE, ROOT, label, tracked
+from repository_sources import MODULES, PACKAGE, PROJECT, ROOT, label, tracked
 
-PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 SIGN = 250  # lines; CONTRIBUTING says the same
 WALL = 2 * SIGN
 # Home folders, temporary folders, hosts that serve packages.
@@ -160,11 +157,3 @@ def test_every_locked_package_has_hashes():
 def test_version_is_one():
     text = (PACKAGE / "core" / "version.py").read_text(encoding="utf-8")
     assert f'__version__ = "{PROJECT["project"]["version"]}"' in text
-
-
-def test_every_marker_of_pytest_is_used():
-    markers = PROJECT["tool"]["pytest"]["ini_options"].get("markers", [])
-    texts = [p.read_text(encoding="utf-8") for p in (ROOT / "tests").rglob("*.py")]
-    for marker in markers:
-        name = marker.split(":")[0]
-        assert any(f"mark.{name}" in text for text in texts), name

@@ -1,8 +1,8 @@
 """Contracts of an element: what it stores is what comes in less what it loses.
 
-An element with ``energy`` also has ``power_in``; with a ``State`` it has ``mass`` and
-``balance``; with inputs that its energy depends on it has ``input_rate``, a tuple of their
-derivatives under their names; without ``power_loss`` it is lossless. An argument whose type
+An element with ``energy`` also has ``power_in``; where the energy depends on a ``State`` it has
+``mass`` and ``balance``; with inputs that its energy depends on it has ``input_rate``, a tuple of
+their derivatives under their names; without ``power_loss`` it is lossless. An argument whose type
 another function of the element returns (the contact forces) is computed by that function.
 """
 
@@ -60,7 +60,9 @@ def has_rates_of_its_states(module: ModuleType) -> Iterator[Evidence]:
 def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
     """Find whether an element makes or hides energy."""
     laws = {k: f for k, f in functions(module).items() if k in ENERGETIC}
-    needed = {"power_in", *(("mass", "balance") if hasattr(module, "State") else ())}
+    powers = [law for name, law in laws.items() if name in ("energy", "power_in", "power_loss")]
+    moving = getattr(module, "State", None) in merged(powers).values()
+    needed = {"power_in", *(("mass", "balance") if moving else ())}
     place = place_of(laws["energy"])
     if needed - laws.keys():
         missing = ", ".join(sorted(needed - laws.keys()))
@@ -134,7 +136,7 @@ def _rates(
     """Return the derivatives of all states and moving inputs, by the name of their argument."""
     rates: dict[str, Any] = {}
     place = {note: name for name, note in known.items() if is_signals(note)}
-    if hasattr(module, "State"):
+    if "balance" in laws and hasattr(module, "State"):
         pairs = zip(
             flat(call(laws["balance"], sample)), flat(call(laws["mass"], sample)), strict=True
         )

@@ -6,9 +6,39 @@ import typing
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Annotated, Any, NamedTuple, TypeVar
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
 T = TypeVar("T", bound=tuple[Any, ...])
+
+
+@dataclass(frozen=True)
+class Role:
+    """What an energy is in the books of a run.
+
+    Parameters
+    ----------
+    side
+        Whether it is given (``"source"``) or taken (``"sink"``: losses and stores). A time in which
+        all stands still is ``"standstill"``.
+    label
+        What the books call it.
+    split
+        Of a sink: whether what it takes during the standstill is booked apart, as holding.
+    whole
+        Of a source: the one in whose place it stands where it is recorded.
+    rest, rest_label
+        The sink that takes what it gives more than that one.
+    book
+        Name of the further book in which it stands; empty for the actuator's own.
+    """
+
+    side: Literal["source", "sink", "standstill"]
+    label: str = ""
+    split: bool = False
+    whole: str = ""
+    rest: str = ""
+    rest_label: str = ""
+    book: str = ""
 
 
 @dataclass(frozen=True)
@@ -25,12 +55,15 @@ class Signal:
         Usual magnitude in that unit.
     set_point_of
         Name of the signal whose set point this is, for figures; empty for none.
+    role
+        What it is in the books, of an energy or of a power whose integral is one.
     """
 
     unit: str
     label: str
     nominal: float = 1.0
     set_point_of: str = ""
+    role: Role | None = None
 
 
 Power = Annotated[float, Signal("W", "power")]
@@ -57,12 +90,17 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
     hints = typing.get_type_hints(tuple_type, include_extras=True)
     found: dict[str, Signal] = {}
     for name in tuple_type._fields:
-        notes = getattr(hints[name], "__metadata__", ())
-        signal = next((note for note in notes if isinstance(note, Signal)), None)
+        signal = signal_in(hints[name])
         if signal is None:
             raise TypeError(f"{tuple_type.__qualname__}.{name} has no Signal annotation")
         found[name] = signal
     return found
+
+
+def signal_in(annotation: Any) -> Signal | None:
+    """Return the Signal of an annotation; None where it has none."""
+    notes = getattr(annotation, "__metadata__", ())
+    return next((note for note in notes if isinstance(note, Signal)), None)
 
 
 def places_of(model: Any) -> dict[str, type[NamedTuple]]:

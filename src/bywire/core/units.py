@@ -174,6 +174,30 @@ def split(text: str) -> tuple[str, str]:
     return (match[1], match[2]) if match else (text, "")
 
 
+def base_powers(unit: str, bases: tuple[str, ...]) -> tuple[float, ...]:
+    """Return the exponents of SI base units in a unit.
+
+    Raises
+    ------
+    UnitError
+        When nobody knows the unit.
+
+    Examples
+    --------
+    >>> base_powers("bar", ("kg", "m", "s"))
+    (1.0, -1.0, -2.0)
+    """
+    import pint
+
+    try:
+        base = registry().Quantity(1.0, _as_pint(unit)).to_base_units()
+        known = {name: registry().Quantity(1.0, name).dimensionality for name in bases}
+    except (pint.PintError, ValueError, TypeError, ArithmeticError, AttributeError):
+        raise UnitError(f"the unit {unit!r} is not known: write it as N*m/rad or m**3/s") from None
+    powers = {str(dimension): float(str(p)) for dimension, p in base.dimensionality.items()}
+    return tuple(powers.get(next(iter(known[name])), 0.0) for name in bases)
+
+
 def has_own_zero(unit: str, symbol: str) -> bool:
     """Return whether zero of a unit is not zero in an SI unit: of degC and degF in K."""
     return parse(f"0 {unit}", symbol, unit) != 0.0

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,22 @@ class Source(Protocol):
         ...
 
 
+class PieceSource(Protocol):
+    """An open file of columns as a library reads it in a child process, piece by piece."""
+
+    @property
+    def columns(self) -> Mapping[str, Column]:
+        """Every column of numbers by its name, each with its length."""
+        ...
+
+    def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
+        """Yield numbers of some columns: name, first row, and so many that memory stays small.
+
+        The pieces of a column come in the order of its rows. What is missing is NaN.
+        """
+        ...
+
+
 @dataclass(frozen=True)
 class ReadOptions:
     """How to read a file that does not say it itself.
@@ -105,20 +121,28 @@ class FileFormat:
     recognizes
         Tells a file by its first 1024 bytes.
     open
-        Opens a file for reading; raises FileError for one that is damaged.
+        Opens a file for reading; raises FileError for one that is damaged. With libraries it runs
+        in the child and may raise whatever they do.
     write
         Writes a dataset whole to a path that is moved into place afterwards.
     has_many_axes
         Whether its files hold signals on different instants.
+    libraries
+        Modules of libraries that read it, in a child process; none where our code reads it here.
+        A module that names some declares its format as ``FORMAT``.
+    counts
+        What a library calls a row, and the number of its first one.
     """
 
     name: str
     title: str
     endings: tuple[str, ...]
     recognizes: Callable[[bytes], bool]
-    open: Callable[[Path, ReadOptions], AbstractContextManager[Source]]
+    open: Callable[[Path, ReadOptions], AbstractContextManager[Source | PieceSource]]
     write: Callable[[xr.Dataset, Path, Progress], None]
-    has_many_axes: bool = field(default=False)
+    has_many_axes: bool = False
+    libraries: tuple[str, ...] = ()
+    counts: tuple[str, int] = ("row", 0)
 
 
 def library(name: str, what: str) -> ModuleType:

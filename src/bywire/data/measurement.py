@@ -8,9 +8,10 @@ here: `bywire.data.alignment.resample` brings signals to one time axis, and says
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -19,8 +20,9 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, InputError, ParameterError, quoted
 from bywire.data.column_choice import Chosen, choose
-from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
+from bywire.data.file_format import FileFormat, Progress, ReadOptions, Source, no_progress
 from bywire.data.format_registry import format_to_read
+from bywire.data.limited_source import limited
 from bywire.data.mapping import MeasurementMapping
 from bywire.data.mapping_file import read_mapping
 from bywire.data.mapping_tables import mapping_from
@@ -75,7 +77,7 @@ def read_measurement(
     meaning = _mapping(mapping)
     kind = format_to_read(file, meaning.format)
     try:
-        with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as source:
+        with opened(file, kind, meaning) as source:
             chosen = choose(file, source, meaning, signals)
             _require_room(file, source, chosen, room() if largest is None else largest)
             dataset = _dataset(file, source, chosen, progress)
@@ -88,6 +90,17 @@ def read_measurement(
         raise FileError(f"{file} cannot be read ({reason}): it may be damaged or cut") from None
     dataset.attrs = {"source": file.name, "format": kind.name}
     return dataset
+
+
+@contextmanager
+def opened(file: Path, kind: FileFormat, meaning: MeasurementMapping) -> Iterator[Source]:
+    """Open a file, in a child process where a library reads it."""
+    if kind.libraries:
+        with limited(file, kind) as source:
+            yield source
+    else:
+        with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as plain:
+            yield cast(Source, plain)
 
 
 def _mapping(

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency
 from bywire.core.signals import Signal
-
-Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
 
 
 class Parameters(ParameterSet):
@@ -19,8 +17,24 @@ class Parameters(ParameterSet):
     """cut-off frequency (-3 dB)"""
 
 
-def rate(
-    filtered: Reading, raw: Reading, par: Parameters
-) -> Annotated[float, Signal("1/s", "rate of the reading", 500.0)]:
+class State(NamedTuple):
+    """What comes out."""
+
+    y: Annotated[float, Signal("1", "filtered reading", 0.5)]
+
+
+class Rate(NamedTuple):
+    """Derivative of the state."""
+
+    y: Annotated[float, Signal("1/s", "rate of the reading", 500.0)]
+
+
+class Input(NamedTuple):
+    """What goes in."""
+
+    raw: Annotated[float, Signal("1", "reading, share of the range", 0.5)]
+
+
+def rate(x: State, u: Input, par: Parameters) -> Rate:
     r"""Return the derivative of the filtered reading, 2 pi f_aa (raw - filtered)."""
-    return 2.0 * math.pi * par.f_aa * (raw - filtered)
+    return Rate(y=2.0 * math.pi * par.f_aa * (u.raw - x.y))

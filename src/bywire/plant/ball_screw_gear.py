@@ -35,7 +35,7 @@ class State(NamedTuple):
     """Shaft angle and speed, zero at the retracted end, positive toward clamping."""
 
     theta: Annotated[float, Signal("rad", "motor angle", 20.0)]
-    omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
+    omega: Annotated[float, Signal("rad/s", "motor speed", 20.0)]
 
 
 class Factors(NamedTuple):

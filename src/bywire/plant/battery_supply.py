@@ -6,7 +6,9 @@ from typing import Annotated, NamedTuple
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import InternalResistance, Voltage
-from bywire.core.signals import Power, Signal
+from bywire.core.signals import Power, Role, Signal
+
+Loss = Annotated[float, Signal("W", "loss in the supply's resistance", role=Role("sink", "supply"))]
 
 
 class Parameters(ParameterSet):
@@ -43,6 +45,6 @@ def power_source(u: Input, par: Parameters) -> Power:
     return par.V_bat * u.i_dc
 
 
-def power_loss(u: Input, par: Parameters) -> Power:
+def power_loss(u: Input, par: Parameters) -> Loss:
     """Return the heat in the internal resistance, >= 0."""
     return par.R_bat * u.i_dc * u.i_dc

@@ -14,8 +14,6 @@ from bywire.core.quantities import Area, Nodes, Stiffness, Unit
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.plant import brake_fluid
 
-Flow = Annotated[float, Signal("m**3/s", "flow in", 1e-6)]
-
 
 class Parameters(ParameterSet):
     """Single-acting cylinder against the pads' elasticity.
@@ -56,6 +54,12 @@ class State(NamedTuple):
     p: Annotated[float, Signal("Pa", "caliper pressure", 2e6), Ge(0)]
 
 
+class Input(NamedTuple):
+    """Flow in."""
+
+    q: Annotated[float, Signal("m**3/s", "flow in", 1e-6)]
+
+
 def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompliance:
     r"""Return dV/dp, the factor of dp/dt.
 
@@ -78,9 +82,9 @@ def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompl
     return spring if par.law == "linear" else spring * (1.0 + x.p / fluid.beta)
 
 
-def balance(q: Flow) -> Flow:
+def balance(u: Input) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
     """Return the flow that the pads take up: all that comes in."""
-    return q
+    return u.q
 
 
 def _slope(p: float, par: Parameters) -> float:
@@ -112,6 +116,6 @@ def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
     return spring * stored
 
 
-def power_in(x: State, q: Flow, fluid: brake_fluid.Parameters) -> Power:
+def power_in(x: State, u: Input, fluid: brake_fluid.Parameters) -> Power:
     """Return what the inflow carries."""
-    return brake_fluid.convected_power(q, x.p, fluid)
+    return brake_fluid.convected_power(u.q, x.p, fluid)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from pydantic import model_validator
 
@@ -10,6 +10,7 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import SignedCurrent
 from bywire.core.signals import Signal
+from bywire.core.validity import Array, first, outside
 
 MotorCurrent = Annotated[float, Signal("A", "motor current", 5.0)]
 Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
@@ -32,6 +33,12 @@ class Parameters(ParameterSet):
         return self
 
 
+class Input(NamedTuple):
+    """Current through it."""
+
+    i: MotorCurrent
+
+
 def reading(i: MotorCurrent, par: Parameters) -> Reading:
     """Return the reading, 0 to 1, for a current."""
     return ops.clip((i - par.i_low) / (par.i_high - par.i_low), 0.0, 1.0)
@@ -40,3 +47,10 @@ def reading(i: MotorCurrent, par: Parameters) -> Reading:
 def value(share: Reading, par: Parameters) -> MotorCurrent:
     """Return the current that a reading stands for."""
     return par.i_low + share * (par.i_high - par.i_low)
+
+
+def watch(t: Array, u: Input, par: Parameters) -> list[str]:
+    """Return whether the current left the sensor's range, and when first."""
+    text = f"the current leaves the sensor's range, {par.i_low:g} to {par.i_high:g} A,"
+    beyond = outside(u.i, par.i_low, par.i_high)
+    return first(t, beyond, text, ": what is measured stays at its end")

@@ -6,7 +6,9 @@ from typing import Annotated, NamedTuple
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Inductance, Resistance, TorqueConstant
-from bywire.core.signals import Energy, Power, Signal
+from bywire.core.signals import Energy, Power, Role, Signal
+
+Loss = Annotated[float, Signal("W", "copper loss", role=Role("sink", "copper", split=True))]
 
 
 class Parameters(ParameterSet):
@@ -88,6 +90,6 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
     return u.v * x.i - par.K_e * x.i * u.omega
 
 
-def power_loss(x: State, par: Parameters) -> Power:
+def power_loss(x: State, par: Parameters) -> Loss:
     """Return the copper loss, >= 0."""
     return par.R_m * x.i * x.i

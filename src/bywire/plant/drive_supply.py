@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
@@ -22,13 +22,29 @@ class Parameters(ParameterSet):
     """time constant of the power measurement"""
 
 
+class State(NamedTuple):
+    """What the measurement shows."""
+
+    P: Annotated[float, Signal("W", "input power, filtered", 50.0)]
+
+
+class Rate(NamedTuple):
+    """Derivative of the state."""
+
+    P: Annotated[float, Signal("W/s", "rate of the shown power", 1e3)]
+
+
+class Input(NamedTuple):
+    """What the motors take, all together."""
+
+    motors: Watts
+
+
 def power(motors: Watts, par: Parameters) -> Watts:
     """Return the power at the input; ``motors`` is the sum of V i of both motors."""
     return par.P_standby + motors
 
 
-def rate(
-    shown: Watts, actual: Watts, par: Parameters
-) -> Annotated[float, Signal("W/s", "rate of the shown power", 1e3)]:
+def rate(x: State, u: Input, par: Parameters) -> Rate:
     """Return the derivative of the measured power, a first-order lag."""
-    return (actual - shown) / par.tau_P
+    return Rate(P=(power(u.motors, par) - x.P) / par.tau_P)

@@ -7,7 +7,15 @@ from typing import Annotated, NamedTuple
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Stiffness, TimeConstant
-from bywire.core.signals import ContactCompliance, Energy, Power, Signal
+from bywire.core.signals import ContactCompliance, Energy, Role, Signal
+
+Work = Annotated[float, Signal("W", "work on the end stops")]
+Loss = Annotated[
+    float,
+    Signal(
+        "W", "loss in the end stops, less their energy at start", role=Role("sink", "end stops")
+    ),
+]
 
 
 class Parameters(ParameterSet):
@@ -85,12 +93,12 @@ def energy(u: Input, par: Parameters) -> Energy:
     return 0.5 * par.k_stop * (near * near + far * far)
 
 
-def power_in(u: Input, f: Forces) -> Power:
+def power_in(u: Input, f: Forces) -> Work:
     """Return the work that the body does on the stops."""
     return load(f) * u.v
 
 
-def power_loss(u: Input, f: Forces, par: Parameters) -> Power:
+def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
     """Return the power that the stops take and do not store, >= 0."""
     near, far = ops.fmax(u.x_rest - u.x, 0.0), ops.fmax(u.x - u.x_end, 0.0)
     return (load(f) - par.k_stop * (far - near)) * u.v

@@ -7,9 +7,15 @@ from typing import Annotated, NamedTuple
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency, Stiffness, TimeConstant
-from bywire.core.signals import ContactCompliance, Energy, Power, Signal
+from bywire.core.signals import ContactCompliance, Energy, Power, Role, Signal
 
 AxialForce = Annotated[float, Signal("N", "compression of the sensor", 1000.0)]
+Loss = Annotated[
+    float,
+    Signal(
+        "W", "damping of screws and force sensor", role=Role("sink", "damping of screws and sensor")
+    ),
+]
 
 
 class Parameters(ParameterSet):
@@ -21,6 +27,18 @@ class Parameters(ParameterSet):
     """damping over stiffness of sensor and screws"""
     f_F: Frequency
     """corner of its amplifier's filter"""
+
+
+class State(NamedTuple):
+    """What its amplifier shows."""
+
+    y: Annotated[float, Signal("N", "force shown by the sensor", 1000.0)]
+
+
+class Rate(NamedTuple):
+    """Derivative of the state."""
+
+    y: Annotated[float, Signal("N/s", "rate of the shown force", 1e5)]
 
 
 class Input(NamedTuple):
@@ -66,11 +84,9 @@ def force(u: Input, par: Parameters) -> AxialForce:
     return stiffness(u, par) * (compression(u) + par.tau_F * closing(u))
 
 
-def rate(
-    shown: AxialForce, actual: AxialForce, par: Parameters
-) -> Annotated[float, Signal("N/s", "rate of the shown force", 1e5)]:
+def rate(x: State, u: Input, par: Parameters) -> Rate:
     r"""Return the derivative of the shown force, :math:`2 \pi f_F (F - y_F)`."""
-    return 2.0 * math.pi * par.f_F * (actual - shown)
+    return Rate(y=2.0 * math.pi * par.f_F * (force(u, par) - x.y))
 
 
 def input_rate(u: Input) -> InputRate:
@@ -89,7 +105,7 @@ def power_in(u: Input, par: Parameters) -> Power:
     return force(u, par) * closing(u)
 
 
-def power_loss(u: Input, par: Parameters) -> Power:
+def power_loss(u: Input, par: Parameters) -> Loss:
     """Return what the damping takes, >= 0."""
     rate_d = closing(u)
     return stiffness(u, par) * par.tau_F * rate_d * rate_d

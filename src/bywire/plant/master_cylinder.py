@@ -9,8 +9,12 @@ from pydantic import model_validator
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Area, Damping, Length
-from bywire.core.signals import Energy, FluidCompliance, Power, Signal
+from bywire.core.signals import Energy, FluidCompliance, Power, Role, Signal
 from bywire.plant import brake_fluid
+
+Loss = Annotated[
+    float, Signal("W", "loss of the fluid's damping", role=Role("sink", "fluid damping"))
+]
 
 
 class Parameters(ParameterSet):
@@ -117,6 +121,6 @@ def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters)
     return output(x, u, par).force * u.v - brake_fluid.convected_power(u.q, x.p, fluid)
 
 
-def power_loss(u: Input, par: Parameters) -> Power:
+def power_loss(u: Input, par: Parameters) -> Loss:
     """Return the heat of the damping force, >= 0."""
     return par.k_damp * u.v * u.v

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency
 from bywire.core.signals import Signal
-
-Moment = Annotated[float, Signal("N*m", "braking moment", 300.0)]
 
 
 class Parameters(ParameterSet):
@@ -19,8 +17,24 @@ class Parameters(ParameterSet):
     """corner frequency"""
 
 
-def rate(
-    shown: Moment, moment: Moment, par: Parameters
-) -> Annotated[float, Signal("N*m/s", "rate of the shown moment", 1e4)]:
+class State(NamedTuple):
+    """What it shows."""
+
+    M: Annotated[float, Signal("N*m", "moment shown by the sensor", 300.0)]
+
+
+class Rate(NamedTuple):
+    """Derivative of the state."""
+
+    M: Annotated[float, Signal("N*m/s", "rate of the shown moment", 1e4)]
+
+
+class Input(NamedTuple):
+    """What acts on the mount."""
+
+    M: Annotated[float, Signal("N*m", "braking moment", 300.0)]
+
+
+def rate(x: State, u: Input, par: Parameters) -> Rate:
     r"""Return the derivative of the shown moment, :math:`2 \pi f_M (M_B - M)`."""
-    return 2.0 * math.pi * par.f_M * (moment - shown)
+    return Rate(M=2.0 * math.pi * par.f_M * (u.M - x.M))

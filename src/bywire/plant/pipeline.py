@@ -8,8 +8,11 @@ from typing import Annotated, NamedTuple
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Length
-from bywire.core.signals import FlowResistance, Power, Signal
+from bywire.core.signals import FlowResistance, Role, Signal
+from bywire.core.validity import Array, highest
 from bywire.plant import brake_fluid
+
+Loss = Annotated[float, Signal("W", "loss in the pipeline", role=Role("sink", "pipeline"))]
 
 
 class Parameters(ParameterSet):
@@ -35,7 +38,7 @@ class Input(NamedTuple):
 class Output(NamedTuple):
     """Flow toward the caliper and Reynolds number."""
 
-    q: Annotated[float, Signal("m**3/s", "flow", 1e-6)]
+    q: Annotated[float, Signal("m**3/s", "flow toward the caliper", 1e-6)]
     Re: Annotated[float, Signal("1", "Reynolds number", 10.0)]
 
 
@@ -65,7 +68,15 @@ def output(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Output:
     return Output(q=q, Re=4.0 / math.pi * ops.fabs(q) / (par.d_pl * fluid.nu))
 
 
-def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss:
     """Return the heat of the flow, with the compression energy that it gives up, >= 0."""
     q = output(u, par, fluid).q
     return q * (brake_fluid.flow_energy(u.p_a, fluid) - brake_fluid.flow_energy(u.p_b, fluid))
+
+
+def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
+    """Return whether the flow was too fast to be laminar."""
+    Re = highest(output(u, par, fluid).Re)
+    if not Re > par.Re_max:
+        return []
+    return [f"Re = {Re:.0f} in the pipeline is above {par.Re_max:g}: not laminar"]

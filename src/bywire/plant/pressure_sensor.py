@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import model_validator
 
@@ -10,6 +10,7 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import SignedPressure
 from bywire.core.signals import Signal
+from bywire.core.validity import Array, first, outside
 
 AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
 Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
@@ -35,6 +36,12 @@ class Parameters(ParameterSet):
         return self
 
 
+class Input(NamedTuple):
+    """Absolute pressure that it is put to."""
+
+    p: AbsolutePressure
+
+
 def reading(p: AbsolutePressure, par: Parameters) -> Reading:
     """Return the reading, 0 to 1, for an absolute pressure."""
     return ops.clip((p - par.p_low) / (par.p_high - par.p_low), 0.0, 1.0)
@@ -43,3 +50,11 @@ def reading(p: AbsolutePressure, par: Parameters) -> Reading:
 def value(share: Reading, par: Parameters) -> AbsolutePressure:
     """Return the absolute pressure that a reading stands for."""
     return par.p_low + share * (par.p_high - par.p_low)
+
+
+def watch(t: Array, u: Input, par: Parameters) -> list[str]:
+    """Return whether the pressure left the sensor's range, and when first."""
+    span = f"{par.p_low / 1e5:g} to {par.p_high / 1e5:g} bar absolute"
+    text = f"the pressure leaves the sensor's range, {span},"
+    beyond = outside(u.p, par.p_low, par.p_high)
+    return first(t, beyond, text, ": what is measured stays at its end")

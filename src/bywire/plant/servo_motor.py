@@ -17,11 +17,15 @@ from bywire.core.quantities import (
     TorqueConstant,
     Unit,
 )
-from bywire.core.signals import Energy, Power, Signal
+from bywire.core.signals import Energy, Power, Role, Signal
 
 TemperatureCoefficient = Annotated[float, Unit("1/K", 2e-3), Field(ge=0, allow_inf_nan=False)]
 TemperatureRise = Annotated[float, Unit("K", 20.0), Field(ge=-100, le=200, allow_inf_nan=False)]
 PoleCount = Annotated[float, Unit("1", 180.0), Field(gt=0, allow_inf_nan=False)]
+Loss = Annotated[float, Signal("W", "copper loss", role=Role("sink", "copper", split=True))]
+DampingLoss = Annotated[
+    float, Signal("W", "damping of the motors", role=Role("sink", "motor damping"))
+]
 
 
 class Parameters(ParameterSet):
@@ -134,12 +138,12 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
     return u.v * x.i + (u.load + u.friction) * x.omega
 
 
-def copper_loss(x: State, par: Parameters) -> Power:
+def copper_loss(x: State, par: Parameters) -> Loss:
     """Return the heat in the winding, >= 0."""
     return resistance(par) * x.i * x.i
 
 
-def damping_loss(x: State, par: Parameters) -> Power:
+def damping_loss(x: State, par: Parameters) -> DampingLoss:
     """Return the heat of the viscous damping, >= 0."""
     return par.D_M * x.omega * x.omega
 

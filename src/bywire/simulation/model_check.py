@@ -7,10 +7,12 @@ from typing import Any
 
 import casadi as ca
 
+from bywire.core.assembly import Assembly
 from bywire.core.errors import ModelError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.wiring_check import check_wiring
 from bywire.simulation.symbols import SX, scalars, symbol_tuple
 
 
@@ -37,6 +39,8 @@ def check_model(model: Model, par: ParameterSet) -> None:
             f"{model.name}: tasks returns none, but one task must sample the stimulus, if only "
             "to hold it: Task('source', period, lambda x, m, u, par: Memory(...))"
         )
+    if isinstance(model, Assembly):
+        check_wiring(model, par)
     _check_equations(model, par)
 
 

@@ -6,156 +6,247 @@ brake-by-wire actuator for a sport motorbike", 5th IFAC Symposium on Mechatronic
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from bywire.brakes.motorcycle import ecu, energy, plant
-from bywire.brakes.motorcycle import output as recording
+from bywire.brakes.motorcycle import ecu
 from bywire.brakes.motorcycle import watch as warnings
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.core.model import Bounds, Matrix, Model, Task
+from bywire.core import ops
+from bywire.core.assembly import Assembly
+from bywire.core.model import Bounds, Task
+from bywire.core.parts import Integral, Part, Shown, Wire
+from bywire.core.signals import Role
 from bywire.plant import (
     anti_alias_filter,
     ball_screw_gear,
+    battery_supply,
+    brake_fluid,
     caliper,
     current_sensor,
     dc_motor,
     end_stop,
+    h_bridge,
     master_cylinder,
+    pipeline,
     pressure_sensor,
+    reservoir_port,
     seal_friction,
 )
 
 Par = MotorcycleParameters
+IDEAL = ("voltage-source", "current-source")
+"""drive modes in which a source at the motor takes the place of battery, bridge and ECU"""
 
 
-class MotorcycleBrake(Model):
-    """Model of the brake for the engine; see ``bywire.core.model.Model``.
+class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
+    """Model of the brake.
 
     One dry friction (seals, and the gear when ``directional``) on the shaft; the chamber's
     pressure is one-sided because the reservoir makes up what is missing; two end stops.
     """
 
     name: ClassVar[str] = "motorcycle-brake"
-    State: ClassVar = plant.State
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
-    Flow: ClassVar = energy.Flow
-    Output: ClassVar = recording.Output
     frictions: ClassVar[tuple[str, ...]] = ("omega",)
     limits: ClassVar[tuple[str, ...]] = ("p_mc",)
-    usually_open: ClassVar[tuple[bool, ...]] = (True, True)
+    shared: ClassVar[tuple[str, ...]] = ("fluid",)
+
+    E_source = Integral("J", "energy from battery or source", role=Role("source", "source"))
+    supply = Part(battery_supply, loss="E_supply")
+    motor = Part(dc_motor, loss="E_copper")
+    gear = Part(ball_screw_gear, output={"x": "x_mc"})
+    E_gear = Integral("J", "loss of gear and screw, signed", role=Role("sink", "gear and screw"))
+    seal = Part(seal_friction)
+    E_seal = Integral("J", "loss of the seals' friction", role=Role("sink", "seal friction"))
+    chamber = Part(master_cylinder, par="master_cylinder", state={"p": "p_mc"}, loss="E_damping")
+    line = Part(pipeline, par="pipeline", output=("q", "Re"), loss="E_pipeline")
+    pads = Part(caliper, par="caliper", state={"p": "p_pd"})
+    stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
+    port = Part(reservoir_port)
+    E_port = Integral(
+        "J", "energy out through the reservoir port", role=Role("sink", "reservoir port")
+    )
+    W_shaft = Integral("J", "work of the motor on the gear")
+    t_stuck = Integral("s", "time stuck", role=Role("standstill"))
+    pressure_sensor = Part(pressure_sensor)
+    current_sensor = Part(current_sensor)
+    filter_p = Part(
+        anti_alias_filter,
+        par="anti_alias",
+        state={"y": "y_p"},
+        labels={"y": "filtered pressure reading"},
+    )
+    filter_i = Part(
+        anti_alias_filter,
+        par="anti_alias",
+        state={"y": "y_i"},
+        labels={"y": "filtered current reading"},
+    )
+
+    current = Wire("A", "motor current", 5.0)
+    voltage = Wire("V", "motor voltage", 5.0)
+    i_dc = Wire("A", "battery current", 2.0)
+    torque = Wire("N*m", "motor torque", 0.1)
+    load = Wire("N", "load on the piston", 200.0)
+    T_fr = Shown("N*m", "friction torque", 0.05)
+    F_stop = Shown("N", "end-stop load on the piston", 100.0)
+    q_makeup = Shown("m**3/s", "makeup flow from the reservoir", 1e-6)
+    stuck = Shown("1", "shaft stuck")
+    at_stop = Shown("1", "piston at an end stop")
+    P_gear = Shown("W", "gear loss power, signed")
+    P_el = Shown("W", "electrical power from battery or source", 10.0)
+
+    records: ClassVar[tuple[str, ...]] = (
+        "i", "i_ref", "i_star", "i_dit", "i_meas", "duty", "voltage", "theta", "omega", "x_mc",
+        "p_mc", "p_pd", "p_ref", "p_meas", "V_pedal", "q", "Re", "torque", "T_fr", "F_stop",
+        "q_makeup", "stuck", "at_stop", "sat_current", "sat_duty", "P_gear", "P_el", "E_source",
+        "E_supply", "E_copper", "E_gear", "E_seal", "E_damping", "E_pipeline", "E_stop", "E_port",
+        "E_stored", "W_shaft", "t_stuck",
+    )  # fmt: skip
+
+    def wire(self, w: Self) -> None:
+        """Say what every part feels: electrics, piston, fluid, load, sensors."""
+        w.current, w.voltage, w.i_dc = _electrics(w)
+        w.supply.u = battery_supply.Input(w.i_dc)
+        w.motor.u = dc_motor.Input(w.voltage, w.gear.x.omega)
+        w.torque = dc_motor.output(dc_motor.State(w.current), w.motor.par).torque
+        piston = ball_screw_gear.output(w.gear.x, w.gear.par)
+        cylinder = w.chamber.par
+        w.stop.u = end_stop.Input(piston.x, piston.v, cylinder.x_rest, cylinder.x_end)
+        w.port.u = reservoir_port.Input(piston.x - cylinder.x_rest, w.chamber.x.p)
+        w.line.u = pipeline.Input(w.chamber.x.p, w.pads.x.p)
+        q = pipeline.output(w.line.u, w.line.par, w.par.fluid).q
+        w.pads.u = caliper.Input(q)
+        leak = _port_conductance(w) * w.chamber.x.p
+        w.chamber.u = master_cylinder.Input(piston.x, piston.v, q + leak)
+        force = master_cylinder.output(w.chamber.x, w.chamber.u, cylinder).force
+        w.load = force + end_stop.load(w.stop.f)
+        w.gear.u = ball_screw_gear.Input(w.torque, w.load, 0.0)
+        w.seal.u = seal_friction.Input(w.gear.x.omega, w.chamber.x.p)
+        # Value-only: the brake does not feel its sensors.
+        w.pressure_sensor.u = pressure_sensor.Input(_gauge(w) + w.par.fluid.p_atm)
+        seen = pressure_sensor.reading(w.pressure_sensor.u.p, w.pressure_sensor.par)
+        w.filter_p.u = anti_alias_filter.Input(seen)
+        by_source = w.par.drive.mode == "current-source"
+        w.current_sensor.u = current_sensor.Input(w.m.i_source if by_source else w.motor.xe.i)
+        seen = current_sensor.reading(w.current_sensor.u.i, w.current_sensor.par)
+        w.filter_i.u = anti_alias_filter.Input(seen)
+
+    def balance(
+        self, x: Any, xe: Any, memory: ecu.Memory, par: Par, contact: tuple[float, ...]
+    ) -> Any:
+        """Return the right-hand sides; the winding's current rests beside a current source."""
+        rows = super().balance(x, xe, memory, par, contact)
+        return rows._replace(i=0.0 * rows.i) if par.drive.mode == "current-source" else rows
+
+    def friction(self, w: Self) -> tuple[Bounds, ...]:
+        """Return the limits of the dry friction torque on the shaft."""
+        seal = seal_friction.output(w.seal.u, w.seal.par)
+        low, high = ball_screw_gear.friction_bounds(seal.T_p, seal.T_n, w.load, w.gear.par)
+        return ((low, high),)
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return the powers that split a loss, cross the border or depend on the drive mode."""
+        friction, makeup = w.reaction
+        gear, seal = _dry_losses(w, friction)
+        loss = ball_screw_gear.transmission_loss(w.gear.x, w.torque, w.rate.omega, w.gear.par)
+        ideal = w.par.drive.mode in IDEAL
+        battery = battery_supply.power_source(w.supply.u, w.supply.par)
+        port = reservoir_port.power_loss(w.port.u, w.port.par, w.par.fluid)
+        return {
+            "E_source": w.voltage * w.current if ideal else battery,
+            "E_copper": dc_motor.power_loss(dc_motor.State(w.current), w.motor.par),
+            "E_gear": gear + loss,
+            "E_seal": seal,
+            "E_port": port - brake_fluid.convected_power(makeup, w.chamber.x.p, w.par.fluid),
+            "W_shaft": w.torque * w.gear.x.omega,
+            "t_stuck": ops.where(w.gear.x.omega == 0, 1.0, 0.0),
+        }
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return what is recorded beside states, wires and losses."""
+        friction, makeup = w.reaction
+        F_stop = end_stop.load(w.stop.f)
+        ideal = w.par.drive.mode in IDEAL
+        return {
+            **ecu.shown(w.m, w.par),
+            "i": w.current,
+            "T_fr": -friction,
+            "F_stop": F_stop,
+            "q_makeup": makeup,
+            "stuck": ops.where(w.gear.x.omega == 0, 1.0, 0.0),
+            "at_stop": ops.where(F_stop == 0, 0.0, 1.0),
+            "P_gear": _gear_power(w, friction),
+            "P_el": w.voltage * w.current if ideal else w.supply.par.V_bat * w.i_dc,
+        }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the ECU's task, or that of an ideal source."""
-        if par.drive.mode in ("voltage-source", "current-source"):
-            return (Task("source", par.drive.T_source, self._source),)
-        return (Task("ecu", par.ecu.T_s, self._ecu),)
-
-    def _ecu(self, x: plant.State, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-        return ecu.tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)
-
-    def _source(self, x: plant.State, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
-        return ecu.source_tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)
-
-    def mass(self, xe: plant.State, par: Par) -> plant.State:
-        """Return inductance, inertia and fluid compliances."""
-        cylinder = plant.cylinder_input(xe, 0.0, par)
-        return plant.State(
-            i=dc_motor.mass(dc_motor.State(xe.i), par.motor).i,
-            theta=1.0,
-            omega=ball_screw_gear.inertia(par.gear),
-            p_mc=master_cylinder.mass(
-                master_cylinder.State(xe.p_mc), cylinder, par.master_cylinder, par.fluid
-            ),
-            p_pd=caliper.mass(caliper.State(xe.p_pd), par.caliper, par.fluid),
-            y_p=1.0,
-            y_i=1.0,
-        )
-
-    def balance(
-        self, x: plant.State, xe: plant.State, m: ecu.Memory, par: Par, contact: tuple[float, ...]
-    ) -> plant.State:
-        """Return voltage, torque and flow balances, and the filters' rates."""
-        w = plant.wires(x, m, par, contact)
-        motor = dc_motor.balance(dc_motor.State(x.i), dc_motor.Input(w.voltage, x.omega), par.motor)
-        shaft = ball_screw_gear.balance(
-            ball_screw_gear.State(x.theta, x.omega),
-            ball_screw_gear.Input(torque=w.torque, force=w.force, friction=0.0),
-            par.gear,
-        )
-        leak = plant.port_conductance(xe, par) * x.p_mc
-        driven = par.drive.mode != "current-source"
-        return plant.State(
-            i=motor.i if driven else 0.0 * x.i,
-            theta=shaft.theta,
-            omega=shaft.omega,
-            p_mc=master_cylinder.balance(
-                plant.cylinder_input(x, w.q + leak, par), par.master_cylinder
-            ),
-            p_pd=w.q,
-            y_p=anti_alias_filter.rate(x.y_p, _pressure_reading(xe, par), par.anti_alias),
-            y_i=anti_alias_filter.rate(
-                x.y_i,
-                current_sensor.reading(_sensed(xe, m, par), par.current_sensor),
-                par.anti_alias,
-            ),
-        )
-
-    def bounds(
-        self, x: plant.State, xe: plant.State, m: ecu.Memory, par: Par, contact: tuple[float, ...]
-    ) -> tuple[Bounds, ...]:
-        """Return the limits of the dry friction torque on the shaft."""
-        seal = seal_friction.output(seal_friction.Input(x.omega, x.p_mc), par.seal)
-        load = plant.wires(x, m, par, contact).force
-        low, high = ball_screw_gear.friction_bounds(seal.T_p, seal.T_n, load, par.gear)
-        return ((low, high),)
-
-    def compliance(self, par: Par) -> tuple[Matrix, ...]:
-        """Return the compliances of the two end stops, which do not touch each other."""
-        c = end_stop.compliance(par.stop)
-        return (((c,),), ((c,),))
-
-    def gap(self, x: plant.State, xe: plant.State, par: Par) -> tuple[tuple[float, ...], ...]:
-        """Return the damped overlaps at the two end stops."""
-        d = end_stop.overlaps(plant.stop_input(x, par), par.stop)
-        return ((d.near,), (d.far,))
-
-    def powers(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        rate: plant.State,
-        m: ecu.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-    ) -> energy.Flow:
-        """Return the powers for the energy balance."""
-        return energy.rates(x, rate, m, par, contact, reaction)
-
-    def output(
-        self,
-        x: plant.State,
-        m: ecu.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-        flow: energy.Flow,
-    ) -> recording.Output:
-        """Return what is recorded at an instant."""
-        return recording.instant(x, m, par, contact, reaction, flow)
+        if par.drive.mode in IDEAL:
+            return (Task("source", par.drive.T_source, _source),)
+        return (Task("ecu", par.ecu.T_s, _ecu),)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the user should know of a recording."""
-        return warnings.watch(recording, par)
+        held = par.drive.mode == "current-source" and "i" in recording
+        seen = recording.assign(i_source=recording["i"]) if held else recording
+        return warnings.watch(recording, par) + super().watch(seen, par)
 
 
-def _pressure_reading(xe: plant.State, par: Par) -> float:
-    """Return the pressure sensor's reading, value-only: the brake does not feel its sensor."""
-    middle = par.pressure_sensor.place == "mid-pipeline"
-    gauge = 0.5 * (xe.p_mc + xe.p_pd) if middle else xe.p_mc
-    return pressure_sensor.reading(gauge + par.fluid.p_atm, par.pressure_sensor)
+def _ecu(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
+    return ecu.tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)
 
 
-def _sensed(xe: plant.State, m: ecu.Memory, par: Par) -> float:
-    return m.i_source if par.drive.mode == "current-source" else xe.i
+def _source(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
+    return ecu.source_tick(ecu.Readings(p=x.y_p, i=x.y_i), m, u, par)
+
+
+def _electrics(w: MotorcycleBrake) -> tuple[float, float, float]:
+    """Return motor current, motor voltage and battery current of the drive mode."""
+    m, i = w.m, w.motor.x.i
+    if w.par.drive.mode == "current-source":
+        # The winding's state stays at rest; the source supplies what the voltage balance needs.
+        voltage = w.motor.par.R_m * m.i_source + w.motor.par.K_e * w.gear.x.omega
+        return m.i_source, voltage, 0.0 * m.i_source
+    if w.par.drive.mode == "voltage-source":
+        return i, m.v_source, 0.0 * i
+    bus = battery_supply.output(battery_supply.Input(i_dc=m.duty * i), w.supply.par)
+    bridge = h_bridge.output(h_bridge.Input(duty=m.duty, v_bus=bus.v_bus, i=i))
+    return i, bridge.v, bridge.i_dc
+
+
+def _port_conductance(w: MotorcycleBrake) -> float:
+    """Return the port's conductance [m^3/(s Pa)], value-only: it follows slow geometry."""
+    travel = ball_screw_gear.output(w.gear.xe, w.gear.par).x
+    place = reservoir_port.Input(travel - w.chamber.par.x_rest, w.chamber.xe.p)
+    return reservoir_port.output(place, w.port.par).G
+
+
+def _gauge(w: MotorcycleBrake) -> float:
+    """Return the pressure [Pa] where the sensor sits."""
+    if w.pressure_sensor.par.place == "mid-pipeline":
+        return 0.5 * (w.chamber.xe.p + w.pads.xe.p)
+    return w.chamber.xe.p
+
+
+def _dry_losses(w: MotorcycleBrake, friction: float) -> tuple[float, float]:
+    """Return the powers lost in the gear's and in the seals' dry friction.
+
+    What the seals can take at this speed is theirs, the rest is the gear's.
+    """
+    total = -friction * w.gear.x.omega
+    if w.gear.par.law == "paper":
+        return 0.0 * total, total
+    loss = ops.fmin(seal_friction.power_loss(w.seal.u, w.seal.par), total)
+    return total - loss, loss
+
+
+def _gear_power(w: MotorcycleBrake, friction: float) -> float:
+    """Return what the gear takes at an instant [W]."""
+    if w.gear.par.law == "paper":
+        torque = ball_screw_gear.Input(w.torque, w.load, friction)
+        acceleration = ball_screw_gear.balance(w.gear.x, torque, w.gear.par).omega
+        acceleration = acceleration / ball_screw_gear.inertia(w.gear.par)
+        return ball_screw_gear.transmission_loss(w.gear.x, w.torque, acceleration, w.gear.par)
+    return -friction * w.gear.x.omega - seal_friction.power_loss(w.seal.u, w.seal.par)

@@ -4,14 +4,25 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from typing import Any
 
 from bywire.brakes.motorcycle.ecu import Memory
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.brakes.motorcycle.plant import State
 from bywire.control import low_pass_2, pressure_pid
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
-from bywire.plant import brake_fluid, caliper, current_sensor, pressure_sensor, reservoir_port
+from bywire.plant import (
+    anti_alias_filter,
+    ball_screw_gear,
+    brake_fluid,
+    caliper,
+    current_sensor,
+    dc_motor,
+    master_cylinder,
+    pressure_sensor,
+    reservoir_port,
+)
 
 Par = MotorcycleParameters
 _INNER, _OUTER = (math.sqrt(5.0 + sign * 2.0 * math.sqrt(10.0 / 7.0)) / 3.0 for sign in (-1, 1))
@@ -73,7 +84,7 @@ def holding_current(p: float, par: Par) -> float:
     return torque / (efficiency * par.motor.K_e)
 
 
-def state_at(p: float, par: Par, current: float | None = None) -> State:
+def state_at(p: float, par: Par, current: float | None = None) -> Any:
     """Return the state at rest at a pressure [Pa]; the friction holds what is left over.
 
     Without pressure the piston rests at its retracted end.
@@ -97,14 +108,15 @@ def state_at(p: float, par: Par, current: float | None = None) -> State:
             "stop (master_cylinder.x_end)"
         )
     held = holding_current(p, par) if current is None else current
-    return State(
-        i=0.0 if par.drive.mode == "current-source" else held,
-        theta=x / par.gear.k_g,
-        omega=0.0,
-        p_mc=p,
-        p_pd=p,
-        y_p=pressure_sensor.reading(p + par.fluid.p_atm, par.pressure_sensor),
-        y_i=current_sensor.reading(held, par.current_sensor),
+    p_seen = pressure_sensor.reading(p + par.fluid.p_atm, par.pressure_sensor)
+    i_seen = current_sensor.reading(held, par.current_sensor)
+    return MotorcycleBrake.state(
+        motor=dc_motor.State(i=0.0 if par.drive.mode == "current-source" else held),
+        gear=ball_screw_gear.State(theta=x / par.gear.k_g, omega=0.0),
+        chamber=master_cylinder.State(p),
+        pads=caliper.State(p),
+        filter_p=anti_alias_filter.State(p_seen),
+        filter_i=anti_alias_filter.State(i_seen),
     )
 
 

@@ -1,4 +1,4 @@
-"""What the user should know of a recording of the motorcycle brake: stops, sensors, flow."""
+"""What a recording of the motorcycle brake shows that no element can say: its stops."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.parameters import ParameterSet
 
@@ -29,13 +28,7 @@ def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
             first = float(recording["time"].values[int(np.argmax(far))])
             found.append(f"the piston reached its end stop at t = {first:.4g} s")
     known = par.flat()
-    found += _pressed_back(recording, known) + _beyond_sensors(recording, known)
-    limit = known.get("pipeline.Re_max")
-    if limit is not None and "Re" in recording:
-        highest = float(recording["Re"].max())
-        if highest > limit:
-            found.append(f"Re = {highest:.0f} in the pipeline is above {limit:g}: not laminar")
-    return found
+    return found + _pressed_back(recording, known)
 
 
 def _pressed_back(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
@@ -52,31 +45,3 @@ def _pressed_back(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
             "(port.law = 'makeup'), port.law = 'dead-stroke' lets the fluid out"
         )
     return [text]
-
-
-def _beyond_sensors(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
-    """Return which sensors were asked to show more than their range, and when first."""
-    found: list[str] = []
-    if "pressure_sensor.p_high" in known and "p_mc" in recording:
-        p = recording["p_mc"].values
-        if known["pressure_sensor.place"] == "mid-pipeline":
-            p = 0.5 * (p + recording["p_pd"].values)
-        low, high = known["pressure_sensor.p_low"], known["pressure_sensor.p_high"]
-        outside = (p + known["fluid.p_atm"] < low) | (p + known["fluid.p_atm"] > high)
-        span = f"{low / 1e5:g} to {high / 1e5:g} bar absolute"
-        found += _first(recording, outside, f"the pressure leaves the sensor's range, {span},")
-    if "current_sensor.i_high" in known and "i" in recording:
-        i = recording["i"].values
-        low, high = known["current_sensor.i_low"], known["current_sensor.i_high"]
-        outside = (i < low) | (i > high)
-        span = f"{low:g} to {high:g} A"
-        found += _first(recording, outside, f"the current leaves the sensor's range, {span},")
-    return found
-
-
-def _first(recording: xr.Dataset, happens: NDArray[np.bool_], text: str) -> list[str]:
-    """Return what happens with the time of the first row that shows it, if one does."""
-    if not happens.any():
-        return []
-    t = float(recording["time"].values[int(np.argmax(happens))])
-    return [f"{text} at t = {t:.4g} s: what is measured stays at its end"]

@@ -85,10 +85,11 @@ class WedgeBrake(Model):
         body = wedge.balance(wedge.State(x.x, x.v), plant.wedge_input(w, 0.0), par.wedge)
         disc = flywheel.balance(flywheel.State(x.Omega, x.phi), flywheel.Input(0.0), par.flywheel)
         # Value-only: the brake does not feel the measurement of its power.
-        power = drive_supply.power(plant.motor_power(xe, m, par), par.supply)
-        moment = moment_sensor.rate(x.y_M, w.M_B, par.moment_sensor)
-        shown = drive_supply.rate(x.y_P, power, par.supply)
-        return plant.State._make((*rows, *body, *disc, moment, shown))
+        power = drive_supply.Input(plant.motor_power(xe, m, par))
+        sensor = moment_sensor.State(x.y_M)
+        moment = moment_sensor.rate(sensor, moment_sensor.Input(w.M_B), par.moment_sensor)
+        shown = drive_supply.rate(drive_supply.State(x.y_P), power, par.supply)
+        return plant.State._make((*rows, *body, *disc, *moment, *shown))
 
     def bounds(
         self,

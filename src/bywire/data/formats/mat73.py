@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
-from bywire.data.declared_size import require_possible
 from bywire.data.failing_stream import kept
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
 from bywire.data.matlab_layout import Part, columns_of, described, parts_of
@@ -38,41 +37,34 @@ class Mat73Source:
         self._is_matlab = file.userblock_size >= _USER_BLOCK
         self._arrays: dict[str, Any] = {}
         self._texts: dict[str, str] = {}
-        self._walk(file, "", 0, library("h5py", _WHAT))
+        self._walk(file, "", 0)
         self._parts: dict[str, Part] = {}
         for name, array in self._arrays.items():
             self._parts |= parts_of(name, self._shape(array))
         columns = columns_of(self._parts, self._texts)
         self.columns: Mapping[str, Column] = {n: self._with_unit(c) for n, c in columns.items()}
 
-    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
-        """Return the numbers of some columns."""
-        found = {}
-        for k, name in enumerate(names):
+    def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
+        """Yield the numbers of some columns."""
+        for name in names:
             part = self._parts[name]
             array = self._arrays[part.array]
-            self._require_possible(part.array, array)
-            numbers = np.empty(part.length)
+            self._require_whole(part.array, array)
             for begin in range(0, part.length, _VALUES):
                 piece = slice(begin, min(begin + _VALUES, part.length))
-                numbers[piece] = array[self._index(array, part, piece)]
-                progress(f"reading {self._path.name}", (k + piece.stop / part.length) / len(names))
-            found[name] = numbers
-        return found
+                yield name, begin, array[self._index(array, part, piece)]
 
-    def place(self, name: str, row: int) -> str:
-        """Return the index of a value, counted from 1 as in MATLAB."""
-        return f"index {row + 1}"
-
-    def _walk(self, group: Any, prefix: str, depth: int, h5py: Any) -> None:
+    def _walk(self, group: Any, prefix: str, depth: int) -> None:
         """Find arrays and texts; links are not followed, neither out of the file nor within."""
+        import h5py
+
         for name in group:
             if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue
             one = group[name]
             if isinstance(one, h5py.Group):
                 if depth < _DEEPEST:
-                    self._walk(one, f"{prefix}{name}.", depth + 1, h5py)
+                    self._walk(one, f"{prefix}{name}.", depth + 1)
             elif isinstance(one, h5py.Dataset) and one.dtype.kind in "iufb" and one.shape:
                 if _attribute(one, "MATLAB_class") == "char":
                     self._texts[f"{prefix}{name}"] = self._text(one)
@@ -84,7 +76,6 @@ class Mat73Source:
     def _text(self, array: Any) -> str:
         if array.size > _LONGEST or array.dtype != np.uint16:
             return ""
-        self._require_possible("a text", array)
         codes = np.asarray(array[()]).astype("<u2").reshape(-1)
         return codes.tobytes().decode("utf-16-le", "replace")
 
@@ -105,13 +96,22 @@ class Mat73Source:
         long = max(range(array.ndim), key=lambda axis: array.shape[axis])
         return tuple(piece if axis == long else 0 for axis in range(array.ndim))
 
-    def _require_possible(self, name: str, array: Any) -> None:
+    def _require_whole(self, name: str, array: Any) -> None:
+        """Refuse numbers that are not in the file: the library would read zeros."""
         if array.is_virtual or array.external:
             raise FileError(
                 f"{self._path}: {name!r} lies in other files, which are not opened: save it whole"
             )
-        declared = max(array.nbytes, math.prod(array.chunks or (0,)) * array.dtype.itemsize)
-        require_possible(self._path, repr(name), declared, array.id.get_storage_size())
+        if array.chunks is None:
+            is_whole = array.id.get_storage_size() >= array.nbytes
+        else:
+            wanted = (-(-n // m) for n, m in zip(array.shape, array.chunks, strict=True))
+            is_whole = array.id.get_num_chunks() >= math.prod(wanted)
+        if not is_whole and not np.isnan(float(array.fillvalue)):
+            raise FileError(
+                f"{self._path}: of the {array.size} numbers of {name!r} some were never written: "
+                "was the recording stopped? Save those that were"
+            )
 
 
 def _attribute(one: Any, name: str) -> str:
@@ -125,21 +125,14 @@ def _attribute(one: Any, name: str) -> str:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[Mat73Source]:
-    h5py = library("h5py", _WHAT)
-    try:
-        with h5py.File(path, "r") as file:
-            if _NETCDF in file.attrs:
-                raise FileError(
-                    f"{path} is a NetCDF file: rename it with the ending .nc, or say "
-                    "format = 'netcdf'"
-                )
-            yield Mat73Source(path, file)
-    # The library tells a damaged file by any of these, depending on what is damaged.
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError, OverflowError) as error:
-        reason = " ".join(str(error).split())[:200]
-        raise FileError(
-            f"{path} is a damaged HDF5 file ({reason}): copy or save it again"
-        ) from None
+    import h5py
+
+    with h5py.File(path, "r") as file:
+        if _NETCDF in file.attrs:
+            raise FileError(
+                f"{path} is a NetCDF file: rename it with the ending .nc, or say format = 'netcdf'"
+            )
+        yield Mat73Source(path, file)
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
@@ -176,5 +169,5 @@ def _write_text(group: Any, name: str, text: str, codes: NDArray[np.uint16]) -> 
 FORMAT = FileFormat(
     "mat73", "an HDF5 file", (".mat", ".h5", ".hdf5"),
     lambda head: head[:8] == _HDF5 or head[512:520] == _HDF5,
-    _open, _write, has_many_axes=True,
+    _open, _write, has_many_axes=True, libraries=("h5py",), counts=("index", 1),
 )  # fmt: skip

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import logging
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -13,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import BywireError, FileError
+from bywire.core.errors import FileError, quoted
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
-from bywire.data.mdf4_checks import require_sound
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,6 +20,7 @@ if TYPE_CHECKING:
 _NUMBERS = range(6)  # data types: integers and reals, either byte order
 _VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL = 0, 2, 3, 6
 _TEXTS = range(7, 12)  # conversions to and from texts
+_FORMULA = 3  # conversion
 _TIME = 1  # what a master channel counts
 # A file that is given by its path is mapped into memory: quick, and too much for large ones.
 _MAPPED = 2**29  # bytes
@@ -33,31 +31,22 @@ _WHAT = "MDF files"
 class Mdf4Source:
     """An open MDF file; a name that several groups have gets the number of its group."""
 
-    def __init__(self, path: Path, file: Any, formulas: set[int], records: int | None) -> None:
+    def __init__(self, path: Path, file: Any, records: int | None) -> None:
         self._path, self._file, self._records = path, file, records
         self._places: dict[str, tuple[int, int]] = {}
-        self.columns: Mapping[str, Column] = self._columns(formulas)
+        self.columns: Mapping[str, Column] = self._columns()
 
-    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
-        """Return the numbers of some channels; what is marked as invalid becomes NaN."""
-        found = {name: np.empty(self.columns[name].length or 0) for name in names}
-        total, done = sum(one.size for one in found.values()), 0
+    def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
+        """Yield the numbers of some channels; what is marked as invalid becomes NaN."""
         for group in sorted({self._places[name][0] for name in names}):
             wanted = [name for name in names if self._places[name][0] == group]
             length = self._file.groups[group].channel_group.cycles_nr
             step = self._records or length
             for begin in range(0, length, step):
-                end = min(begin + step, length)
-                self._read_piece(group, {name: found[name][begin:end] for name in wanted}, begin)
-                done += len(wanted) * (end - begin)
-                progress(f"reading {self._path.name}", done / total)
-        return found
+                for name, numbers in self._read(group, wanted, begin, min(step, length - begin)):
+                    yield name, begin, numbers
 
-    def place(self, name: str, row: int) -> str:
-        """Return the record of a value."""
-        return f"record {row}"
-
-    def _columns(self, formulas: set[int]) -> dict[str, Column]:
+    def _columns(self) -> dict[str, Column]:
         groups = self._file.groups
         uses = Counter(one.name for group in groups for one in group.channels)
         found: dict[str, Column] = {}
@@ -69,7 +58,7 @@ class Mdf4Source:
             names = {
                 c: one.name if uses[one.name] == 1 else f"{one.name}@{g}"
                 for c, one in enumerate(group.channels)
-                if _is_read(one, group.channel_dependencies[c], formulas)
+                if _is_read(one, group.channel_dependencies[c])
             }
             if master not in names:
                 continue
@@ -82,64 +71,91 @@ class Mdf4Source:
                 found[name] = Column(name, (unit or "").strip(), length, clock, "")
         return found
 
-    def _read_piece(
-        self, group: int, pieces: Mapping[str, NDArray[np.float64]], begin: int
-    ) -> None:
-        """Fill pieces of channels of one group, and of their instants, from a record on."""
+    def _read(
+        self, group: int, names: Sequence[str], begin: int, size: int
+    ) -> Iterator[tuple[str, NDArray[Any]]]:
+        """Yield numbers of channels of one group, or of their instants, from a record on."""
         master = self._file.masters_db[group]
-        indices = [self._places[name][1] for name in pieces]
+        indices = [self._places[name][1] for name in names]
+        for index in {master, *indices}:
+            self._require_inside(group, index)
         # With a channel of values come the instants; alone, they are a channel like any other.
         wanted = [(None, group, index) for index in indices if index != master]
+        self._records_read = 0
         # Asked for a number of records, the library is slower by a third.
-        count = None if self._records is None else len(next(iter(pieces.values())))
         signals = self._file.select(
-            wanted or [(None, group, master)], record_offset=begin, record_count=count,
+            wanted or [(None, group, master)], record_offset=begin,
+            record_count=None if self._records is None else size,
             copy_master=False, ignore_value2text_conversions=True, validate=False,
         )  # fmt: skip
+        if self._records_read != size:
+            raise FileError(
+                f"{self._path} is damaged: group {group} has {size} records from {begin} on as it "
+                f"says, and {self._records_read} could be read: copy it again, or repair it with "
+                "the program that recorded it"
+            )
         instants = signals[0].timestamps
-        for (name, piece), index in zip(pieces.items(), indices, strict=True):
+        for name, index in zip(names, indices, strict=True):
             signal = None if index == master else signals.pop(0)
-            piece[:] = _numbers(self._path, name, instants if signal is None else signal.samples)
+            values = instants if signal is None else signal.samples
+            if values.ndim != 1 or values.dtype.kind not in "iufb":
+                raise FileError(
+                    f"{self._path}: channel {name!r} holds no numbers: leave it out"
+                )
             if signal is not None and signal.invalidation_bits is not None:
-                piece[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+                values = values.astype(np.float64)
+                values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
+            yield name, values
 
+    def _require_inside(self, group: int, index: int) -> None:
+        """Refuse a channel behind the end of its record: the library reads what lies there."""
+        place = self._file.groups[group]
+        channel, size = place.channels[index], place.channel_group.samples_byte_nr
+        end = channel.byte_offset + (channel.bit_offset + channel.bit_count + 7) // 8
+        if channel.channel_type not in (_VIRTUAL_MASTER, _VIRTUAL) and end > size:
+            raise FileError(
+                f"{self._path} is damaged: the channel {quoted(channel.name)} reaches to byte "
+                f"{end} of records of {size} bytes: copy it again, or repair it with the program "
+                "that recorded it"
+            )
 
-def _numbers(path: Path, name: str, values: Any) -> NDArray[Any]:
-    array = np.asarray(values)
-    if array.ndim != 1 or array.dtype.kind not in "iufb":
-        raise FileError(f"{path}: channel {name!r} holds no numbers: leave it out")
-    return array
+    def count_records(self) -> None:
+        """Count the records that are read: the library says nothing where some are missing.
+
+        It ends at a block that it cannot inflate or that is cut, and leaves whatever lay in memory.
+        """
+        inner = self._file._mdf
+        plain = inner._yield_selected_signals
+
+        def counted(*args: Any, **kwargs: Any) -> Iterator[Any]:
+            for k, signals in enumerate(plain(*args, **kwargs)):
+                self._records_read += len(signals[0].samples if k == 0 else signals[0][0])
+                yield signals
+
+        inner._yield_selected_signals = counted
 
 
 def _is_time(master: Any) -> bool:
     return bool(master.sync_type == _TIME)
 
 
-def _is_read(one: Any, parts: Any, formulas: set[int]) -> bool:
+def _is_read(channel: Any, parts: Any) -> bool:
     """Return whether a channel holds numbers: no text, no array, nothing that is computed."""
     kinds = (_VALUE, _MASTER, _VIRTUAL_MASTER, _VIRTUAL)
     return (
-        one.channel_type in kinds
-        and one.data_type in _NUMBERS
+        channel.channel_type in kinds
+        and channel.data_type in _NUMBERS
         and not parts
-        and one.address not in formulas
+        and not _has_formula(channel.conversion)
     )
 
 
-def _silence(asammdf: Any) -> None:
-    """Keep the library from speaking of a damaged file beside the one error that says so."""
-    logging.getLogger("asammdf").setLevel(logging.CRITICAL + 1)
-    kind = asammdf.blocks.mdf_v4.MDF4
-    finish = getattr(kind, "__del__", None)
-    if finish is None or getattr(finish, "is_quiet", False):
-        return
-
-    def quietly(file: Any) -> None:
-        with contextlib.suppress(AttributeError):  # of what a failed constructor has not made
-            finish(file)
-
-    quietly.is_quiet = True  # type: ignore[attr-defined]
-    kind.__del__ = quietly
+def _has_formula(conversion: Any) -> bool:
+    """Return whether a conversion is computed by a formula, or one of those in it is."""
+    if getattr(conversion, "conversion_type", None) == _FORMULA:
+        return True
+    inner = getattr(conversion, "referenced_blocks", None) or {}
+    return any(_has_formula(block) for block in inner.values())
 
 
 def _has_texts(one: Any) -> bool:
@@ -149,22 +165,27 @@ def _has_texts(one: Any) -> bool:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[Mdf4Source]:
-    asammdf = library("asammdf", _WHAT)
-    formulas = require_sound(path)
-    _silence(asammdf)
-    try:
-        is_small = path.stat().st_size <= _MAPPED
-        with path.open("rb") as stream, asammdf.MDF(path if is_small else stream) as file:
-            yield Mdf4Source(path, file, formulas, None if is_small else _RECORDS)
-    except (BywireError, MemoryError):
-        raise
-    except Exception as error:  # the library fails in as many ways as files can be damaged
-        reason = "" if isinstance(error, LookupError) else " ".join(str(error).split())[:200]
-        reason = reason or "its records cannot be read"
+    import asammdf
+
+    _require_mdf4(path)
+    is_small = path.stat().st_size <= _MAPPED
+    with path.open("rb") as stream, asammdf.MDF(path if is_small else stream) as file:
+        source = Mdf4Source(path, file, None if is_small else _RECORDS)
+        source.count_records()
+        yield source
+
+
+def _require_mdf4(path: Path) -> None:
+    with path.open("rb") as stream:
+        head = stream.read(16)
+    if head[:8] != b"MDF     ":
         raise FileError(
-            f"{path} is a damaged MDF file ({reason}): copy it again, or repair it with the "
-            "program that recorded it"
-        ) from None
+            f"{path} was not finished: the recorder was stopped before it could write how much "
+            "there is; finish it with the program that recorded it"
+        )
+    if head[8:9] != b"4":
+        version = head[8:16].decode("latin-1").strip("\0 ")
+        raise FileError(f"{path} is MDF {version}: convert it to MDF 4, as asammdf does")
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
@@ -188,5 +209,6 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 FORMAT = FileFormat(
     "mdf4", "an MDF file", (".mf4", ".mdf", ".dat"),
-    lambda head: head[:3] == b"MDF" or head[:7] == b"UnFinMF", _open, _write, has_many_axes=True,
+    lambda head: head[:3] == b"MDF" or head[:7] == b"UnFinMF", _open, _write,
+    has_many_axes=True, libraries=("asammdf",), counts=("record", 0),
 )  # fmt: skip

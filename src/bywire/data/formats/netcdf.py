@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,14 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
-from bywire.data.declared_size import require_possible
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
-from bywire.data.netcdf3_header import require_sound_header
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _VALUES = 1 << 22  # that are read at a time
+_CLASSIC = ("NETCDF3_CLASSIC", "NETCDF3_64BIT_OFFSET", "NETCDF3_64BIT")
 _MAGICS = (b"CDF\x01", b"CDF\x02", b"CDF\x05", b"\x89HDF\r\n\x1a\n")
 
 
@@ -30,25 +30,13 @@ class NetcdfSource:
         self._file = file
         self.columns = _columns(file)
 
-    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
-        """Return the numbers of some variables; what was never written becomes NaN."""
-        stored = self._path.stat().st_size
-        found = {}
-        for k, name in enumerate(names):
+    def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
+        """Yield the numbers of some variables; what was never written becomes NaN."""
+        for name in names:
             variable = self._file.variables[name]
-            (size,) = variable.shape
-            require_possible(self._path, repr(name), size * variable.dtype.itemsize, stored)
-            numbers = np.empty(size)
-            for begin in range(0, size, _VALUES):
-                part = slice(begin, min(begin + _VALUES, size))
-                numbers[part] = np.ma.filled(variable[part].astype(np.float64), np.nan)
-                progress(f"reading {self._path.name}", (k + part.stop / size) / len(names))
-            found[name] = numbers
-        return found
-
-    def place(self, name: str, row: int) -> str:
-        """Return the index of a value."""
-        return f"index {row}"
+            for begin in range(0, variable.shape[0], _VALUES):
+                values = variable[begin : begin + _VALUES]
+                yield name, begin, np.ma.filled(values.astype(np.float64), np.nan)
 
 
 def _columns(file: Any) -> Mapping[str, Column]:
@@ -69,15 +57,24 @@ def _columns(file: Any) -> Mapping[str, Column]:
 def _open(path: Path, options: ReadOptions) -> Iterator[NetcdfSource]:
     import netCDF4
 
-    require_sound_header(path)
-    try:
-        with netCDF4.Dataset(path, "r") as file:
-            yield NetcdfSource(path, file)
-    except (RuntimeError, ValueError, OSError, OverflowError, UnicodeError, IndexError) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
-        raise FileError(
-            f"{path} is a damaged NetCDF file ({reason}): copy or export it again"
-        ) from None
+    with netCDF4.Dataset(path, "r") as file:
+        _require_whole(path, file)
+        yield NetcdfSource(path, file)
+
+
+def _require_whole(path: Path, file: Any) -> None:
+    """Refuse a classic file that is cut: the library reads zeros behind its end."""
+    if file.data_model in _CLASSIC:
+        from scipy.io import netcdf_file
+
+        netcdf_file(path, mmap=True).close()  # maps every variable, which has to be there for it
+    elif file.data_model.startswith("NETCDF3"):  # with 64-bit sizes, which SciPy does not know
+        size = sum(math.prod(v.shape) * v.dtype.itemsize for v in file.variables.values())
+        if size > path.stat().st_size:
+            raise FileError(
+                f"{path} is damaged: it says that it holds {size} bytes of numbers, the file has "
+                f"{path.stat().st_size}: copy or export it again"
+            )
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
@@ -91,4 +88,5 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 FORMAT = FileFormat(
     "netcdf", "a NetCDF file", (".nc", ".nc4", ".cdf"),
     lambda head: head.startswith(_MAGICS), _open, _write, has_many_axes=True,
+    libraries=("netCDF4",), counts=("index", 0),
 )  # fmt: skip

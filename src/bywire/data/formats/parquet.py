@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import FileError
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions, library
 
 if TYPE_CHECKING:
@@ -33,31 +32,14 @@ class ParquetSource:
         self._instants = {name for name, kind in kinds.items() if kind.startswith("timestamp")}
         self._origins: dict[str, int] = {}
 
-    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
-        """Return the numbers of some columns; null becomes NaN."""
-        rows = self._file.metadata.num_rows
-        found = {name: np.empty(rows) for name in names}
+    def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
+        """Yield the numbers of some columns; null becomes NaN."""
         begin = 0
-        try:
-            for batch in self._file.iter_batches(batch_size=_ROWS, columns=list(names)):
-                end = begin + batch.num_rows
-                if end > rows:
-                    raise FileError(f"{self._path} holds more rows than the {rows} that it says")
-                for name in names:
-                    found[name][begin:end] = self._numbers(name, batch.column(name))
-                begin = end
-                progress(f"reading {self._path.name}", end / rows)
-        except FileError:
-            raise
-        except Exception as error:  # Arrow has an error class of its own for every layer
-            raise _damaged(self._path, error) from None
-        if begin != rows:
-            raise FileError(f"{self._path} holds {begin} rows and says {rows}: it is damaged")
-        return found
-
-    def place(self, name: str, row: int) -> str:
-        """Return the row, counted from 0 as pandas does."""
-        return f"row {row}"
+        for batch in self._file.iter_batches(batch_size=_ROWS, columns=list(names),
+                                             use_threads=False):  # fmt: skip
+            for name in names:
+                yield name, begin, self._numbers(name, batch.column(name))
+            begin += batch.num_rows
 
     def _numbers(self, name: str, column: Any) -> NDArray[Any]:
         """Return the numbers of a batch; instants as counts of their unit from the first one."""
@@ -93,24 +75,15 @@ def _columns(file: Any) -> Mapping[str, Column]:
     return found
 
 
-def _damaged(path: Path, error: Exception) -> FileError:
-    reason = " ".join(str(error).split())[:200]
-    return FileError(f"{path} is a damaged Parquet file ({reason}): copy or export it again")
-
-
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[ParquetSource]:
-    parquet = library("pyarrow.parquet", _WHAT)
-    try:
-        file = parquet.ParquetFile(
-            path, buffer_size=1 << 20, pre_buffer=False, page_checksum_verification=True,
-            thrift_string_size_limit=_LARGEST_FOOTER,
-        )  # fmt: skip
-        source = ParquetSource(path, file)
-    except Exception as error:  # Arrow has an error class of its own for every layer
-        raise _damaged(path, error) from None
-    with file:
-        yield source
+    import pyarrow.parquet as parquet
+
+    with parquet.ParquetFile(
+        path, buffer_size=1 << 20, pre_buffer=False, page_checksum_verification=True,
+        thrift_string_size_limit=_LARGEST_FOOTER,
+    ) as file:  # fmt: skip
+        yield ParquetSource(path, file)
 
 
 def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
@@ -142,4 +115,5 @@ def _notes(attributes: Mapping[str, Any]) -> dict[bytes, bytes]:
 FORMAT = FileFormat(
     "parquet", "a Parquet file", (".parquet", ".pq"),
     lambda head: head[:4] == b"PAR1", _open, _write,
+    libraries=("pyarrow.parquet", "pyarrow.compute"),
 )  # fmt: skip

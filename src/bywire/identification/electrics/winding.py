@@ -87,7 +87,10 @@ class Winding(Model):
         """Return the voltage across the inductance, and the filter's rate."""
         voltage = dc_motor.balance(dc_motor.State(x.i), dc_motor.Input(m.v, m.omega), par.motor)
         filtered = anti_alias_filter.Parameters.model_construct(f_aa=par.f_aa)
-        return Currents(voltage.i, anti_alias_filter.rate(x.i_meas, x.i, filtered))
+        seen = anti_alias_filter.rate(
+            anti_alias_filter.State(x.i_meas), anti_alias_filter.Input(x.i), filtered
+        )
+        return Currents(voltage.i, seen.y)
 
     def powers(
         self, x: Currents, xe: Currents, rate: Currents, m: Inputs, par: Parameters,

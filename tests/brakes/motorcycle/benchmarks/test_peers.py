@@ -20,8 +20,8 @@ from bywire.brakes.motorcycle.benchmarks.problem import (
     rest,
 )
 from bywire.brakes.motorcycle.benchmarks.symbolic import slope_and_jacobian
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.brakes.motorcycle.plant import State
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.simulation.run import simulate
 
@@ -37,7 +37,7 @@ def par() -> MotorcycleParameters:
 
 
 def state(**changes: float) -> Any:
-    x = State(i=3.0, theta=25.0, omega=4.0, p_mc=2e6, p_pd=1.9e6, y_p=0.4, y_i=0.6)
+    x = MotorcycleBrake.State(i=3.0, theta=25.0, omega=4.0, p_mc=2e6, p_pd=1.9e6, y_p=0.4, y_i=0.6)
     return np.array(x._replace(**changes)) / SCALE
 
 

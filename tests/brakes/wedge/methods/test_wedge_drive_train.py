@@ -51,10 +51,11 @@ def failed(found: Identified) -> list[str]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_what_is_put_in_comes_back(name: str, par: WedgeParameters) -> None:
-    """Ten experiments, from starts off the truth."""
+@pytest.mark.parametrize("count", [3, pytest.param(10, marks=pytest.mark.trust)])
+def test_what_is_put_in_comes_back(name: str, count: int, par: WedgeParameters) -> None:
+    """From starts off the truth."""
     method = find_method(name)
-    study = trust(method, par, method.defaults, range(1, 11), EFFORT)
+    study = trust(method, par, method.defaults, range(1, count + 1), EFFORT)
     assert not study.failed
     assert {r.label for r in study.recovered} >= set(method.unknowns)
     for one in study.recovered:

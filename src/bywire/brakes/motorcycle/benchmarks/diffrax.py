@@ -18,8 +18,8 @@ from bywire.brakes.motorcycle.benchmarks.problem import (
     rest,
 )
 from bywire.brakes.motorcycle.ecu import Memory, Readings, Stimulus
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.brakes.motorcycle.plant import State
 
 WIDTH = 3e-4
 TOLERANCE = 1e-3
@@ -103,7 +103,7 @@ def _program(par: MotorcycleParameters, width: float, tolerance: float) -> Any:
 
     def tick(carry: Any, u: Any) -> Any:
         z, memory = carry
-        x = traced_signals(State, z * SCALE)
+        x = traced_signals(MotorcycleBrake.State, z * SCALE)
         readings = Readings(x.y_p, x.y_i)
         after: Any = motorcycle_ecu.tick(
             readings, traced_signals(Memory, memory), traced_signals(Stimulus, u), par

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode
 from bywire.benchmark.peers.hand_source import Subject
-from bywire.brakes.motorcycle.energy import Flow
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters as Par
 from bywire.simulation.compiler import PLAIN
@@ -15,7 +14,7 @@ SUBJECT = Subject(
     source="hand_written.c",
     indices="hand_written_indices.h",
     model=MotorcycleBrake,
-    flow=Flow,
+    flow=MotorcycleBrake.Flow,
     choices={
         "gear.law": ("paper",),
         "port.law": ("makeup",),

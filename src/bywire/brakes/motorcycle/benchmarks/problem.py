@@ -20,7 +20,6 @@ from bywire.brakes.motorcycle import ecu as motorcycle_ecu
 from bywire.brakes.motorcycle.ecu import Memory, Readings, Stimulus
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.brakes.motorcycle.plant import State
 from bywire.core import ops
 from bywire.core.signals import signals_of, zeros
 from bywire.plant import current_sensor, pressure_sensor
@@ -31,7 +30,7 @@ Demand = Callable[[Array], Array]
 Advance = Callable[[Array, float], Array]
 
 DURATION = 1.2
-SCALE = np.array([signal.nominal for signal in signals_of(State).values()])
+SCALE = np.array([signal.nominal for signal in signals_of(MotorcycleBrake.State).values()])
 
 
 class Solution(NamedTuple):
@@ -58,9 +57,9 @@ def hard_braking(t: Array) -> Array:
     return rows
 
 
-def rest(par: MotorcycleParameters) -> State:
+def rest(par: MotorcycleParameters) -> Any:
     """Return the retracted piston at rest without pressure."""
-    return zeros(State)._replace(
+    return zeros(MotorcycleBrake.State)._replace(
         theta=par.master_cylinder.x_rest / par.gear.k_g,
         y_p=pressure_sensor.reading(par.fluid.p_atm, par.pressure_sensor),
         y_i=current_sensor.reading(0.0, par.current_sensor),
@@ -101,7 +100,7 @@ def rates(z: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
         Speed over which the friction changes its sign, as tanh(omega / width) [rad/s].
     """
     model = MotorcycleBrake()
-    x = State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
+    x = MotorcycleBrake.State(*(float(s) * z[k] for k, s in enumerate(SCALE)))
     memory = zeros(Memory)._replace(duty=duty)
     contact = tuple(
         ops.fmax(gap / compliance, 0.0)
@@ -139,7 +138,7 @@ def march(
     z, m = np.array(rest(par)) / SCALE, zeros(Memory)
     p_mc, seconds = np.empty(ticks + 1), 0.0
     for k, row in enumerate(demand.tolist()):
-        state = State(*(SCALE * z).tolist())
+        state = MotorcycleBrake.State(*(SCALE * z).tolist())
         p_mc[k] = state.p_mc
         m = motorcycle_ecu.tick(Readings(state.y_p, state.y_i), m, Stimulus(*row), par)
         if k < ticks:

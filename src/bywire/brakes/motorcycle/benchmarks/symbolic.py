@@ -9,8 +9,8 @@ import casadi as ca
 import numpy as np
 
 from bywire.brakes.motorcycle.benchmarks.problem import Array, rates
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.brakes.motorcycle.plant import State
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Plant:
 
 def plant(par: MotorcycleParameters, width: float) -> Plant:
     """Return the regularized plant with the values of the parameters as constants."""
-    z, duty = ca.SX.sym("z", len(State._fields)), ca.SX.sym("duty")
+    z, duty = ca.SX.sym("z", len(MotorcycleBrake.State._fields)), ca.SX.sym("duty")
     return Plant(z, duty, ca.vertcat(*rates(z, duty, par, width)))
 
 

@@ -52,8 +52,9 @@ class ScrewRig(Model):
         rows: list[float] = []
         for s, force in zip(plant.sides(x, xe, m, par), plant.forces(x, par), strict=True):
             rows += drive_train.balance(s, plant.ON, force, par)
-        shown = force_sensor.rate(x.y_F, plant.force(x, par), par.rig.sensor)
-        return plant.State._make((*rows, shown))
+        sensor = force_sensor.State(x.y_F)
+        shown = force_sensor.rate(sensor, plant.line(x, par), par.rig.sensor)
+        return plant.State._make((*rows, *shown))
 
     def bounds(
         self, x: plant.State, xe: plant.State, m: plant.Memory, par: Par, contact: tuple[float, ...]

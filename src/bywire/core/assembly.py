@@ -1,0 +1,434 @@
+"""Models by parts and wires: what follows from the elements is not written a second time.
+
+An assembly names its elements and writes down, once and in the order of the physics, what each of
+them feels. States, masses, balances, contacts, stored energies, plain losses and recorded signals
+follow from the elements. Causal on purpose: acausal connections would need index reduction and
+would fight the diagonal mass form of ``core.model``, which stays below this for those who want it.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Callable, Iterator, Mapping
+from functools import cache
+from itertools import islice, repeat
+from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
+
+import numpy as np
+
+from bywire.core.errors import ModelError, unknown_name
+from bywire.core.model import Bounds, Matrix, Model
+from bywire.core.parts import Instant, Integral, Part, Shown, Wire, Wired, instant_of
+from bywire.core.signals import Role, Signal, signals_of, zeros
+
+ParT = TypeVar("ParT")
+MemoryT = TypeVar("MemoryT")
+AnyPart = Part[Any, Any, Any, Any]
+
+_NAN = float("nan")
+STORED = Signal("J", "stored energy", role=Role("sink", "stored"))
+"""what every assembly can record as ``E_stored``"""
+
+
+class Assembly(Model, Generic[ParT, MemoryT]):
+    """A model made of parts; see ``docs/modeling.md``.
+
+    A subclass declares `Part`, `Wire`, `Integral` and `Shown` objects, ``Memory``, ``Stimulus`` and
+    ``records``, and defines ``wire``, ``tasks``, and as far as it has any ``friction``, ``power``
+    and ``record``. Where a mode replaces an equation it overrides ``mass`` or ``balance``.
+    """
+
+    State: ClassVar[Any]
+    Flow: ClassVar[Any]
+    Output: ClassVar[Any]
+    Memory: ClassVar[Any]
+    Stimulus: ClassVar[Any]
+    records: ClassVar[tuple[str, ...]] = ()
+    """names of what is recorded, in order; everything by default"""
+    shared: ClassVar[tuple[str, ...]] = ()
+    """groups of parameters that several elements take by name, such as a fluid"""
+    parts: ClassVar[dict[str, AnyPart]]
+
+    def __init_subclass__(cls, *, at_an_instant: bool = False, **options: Any) -> None:
+        """Gather what follows from the parts."""
+        super().__init_subclass__(**options)
+        if not at_an_instant and isinstance(cls.Memory, type):  # else there is more to come
+            _gather(cls)
+
+    # What an assembly writes.
+
+    def wire(self, w: Self) -> None:
+        """Set every input and every wire once, in the order of the physics."""
+
+    def friction(self, w: Self) -> tuple[Bounds, ...]:
+        """Return (low, high) of each friction, as ``bounds`` of the protocol."""
+        return ()
+
+    def power(self, w: Self) -> Mapping[str, float]:
+        """Return the rates of the integrals that no part gives."""
+        return {}
+
+    def record(self, w: Self) -> Mapping[str, float]:
+        """Return what is recorded and no part gives, and what replaces what one gives."""
+        return {}
+
+    # What it reads at an instant.
+
+    @property
+    def x(self) -> Any:
+        """State that enters the implicit solve."""
+        return instant_of(self, "x").x
+
+    @property
+    def xe(self) -> Any:
+        """State, value-only."""
+        return instant_of(self, "xe").xe
+
+    @property
+    def m(self) -> MemoryT:
+        """What the controllers hold."""
+        return instant_of(self, "m").memory  # type: ignore[no-any-return]
+
+    @property
+    def par(self) -> ParT:
+        """Parameters."""
+        return instant_of(self, "par").par  # type: ignore[no-any-return]
+
+    @property
+    def reaction(self) -> tuple[float, ...]:
+        """Forces of the frictions, then of the limits; in ``power`` and ``record``."""
+        return instant_of(self, "reaction").reaction
+
+    @property
+    def rate(self) -> Any:
+        """Derivative of the state; in ``power``."""
+        return instant_of(self, "rate").rate
+
+    @property
+    def flow(self) -> Any:
+        """Integrals since the start; in ``record``."""
+        return instant_of(self, "flow").flow
+
+    # What follows from the parts.
+
+    def at(
+        self,
+        state: Any,
+        memory: MemoryT,
+        par: ParT,
+        contact: tuple[float, ...] | None = None,
+        **more: Any,
+    ) -> Self:
+        """Return the assembly at an instant, wired: its parts, typed, have values there.
+
+        Parameters
+        ----------
+        contact
+            Contact forces; not known by default.
+        more
+            Further fields of `Instant`: ``xe`` where it is not the state, for instance.
+        """
+        w = self._unwired(state, memory, par, contact, **more)
+        self.wire(w)
+        return w
+
+    def _unwired(
+        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...] | None, **more: Any
+    ) -> Self:
+        each: dict[str, tuple[float, ...]] = {}
+        left = iter(contact) if contact is not None else repeat(_NAN)
+        for part in _contacts(type(self)):
+            each[part.name] = tuple(islice(left, len(part.element.Forces._fields)))
+        fields = {"x": x, "xe": x, "memory": memory, "par": par, "shared": self.shared}
+        w: Self = object.__new__(_at_an_instant(type(self)))
+        vars(w).update(vars(self) | {"_instant": Instant(**fields | {"contact": each} | more)})
+        return w
+
+    def mass(self, xe: Any, par: ParT) -> Any:
+        """Return the factor of each state's derivative."""
+        w = self.at(xe, self._nothing(), par)
+        rows: list[float] = []
+        for part in _stores(type(self)):
+            count = len(part.element.State._fields)
+            if part.has("mass"):
+                rows += _row(_wired(w, part).call(part.element.mass))
+            else:
+                rows += (1.0,) * count
+        return self.State._make(rows)
+
+    def balance(
+        self, x: Any, xe: Any, memory: MemoryT, par: ParT, contact: tuple[float, ...]
+    ) -> Any:
+        """Return the smooth right-hand sides."""
+        w = self.at(x, memory, par, contact, xe=xe)
+        rows: list[float] = []
+        for part in _stores(type(self)):
+            name = "balance" if part.has("balance") else "rate"
+            rows += _row(_wired(w, part).call(part.function(name)))
+        return self.State._make(rows)
+
+    def bounds(
+        self, x: Any, xe: Any, memory: MemoryT, par: ParT, contact: tuple[float, ...]
+    ) -> tuple[Bounds, ...]:
+        """Return the limits of the dry frictions."""
+        return self.friction(self.at(x, memory, par, contact, xe=xe))
+
+    def compliance(self, par: ParT) -> tuple[Matrix, ...]:
+        """Return a compliance matrix per contact group."""
+        state = self.State._make(_NAN for _ in self.State._fields)
+        w = self._unwired(state, self._nothing(), par, None)
+        groups: list[Matrix] = []
+        for part in _contacts(type(self)):
+            wired = _wired(w, part)
+            if part.has("matrix"):
+                groups.append(wired.call(part.element.matrix))
+            else:
+                own = wired.call(part.function("compliance"))
+                groups += (((own,),),) * len(part.element.Forces._fields)
+        return tuple(groups)
+
+    def gap(self, x: Any, xe: Any, par: ParT) -> tuple[tuple[float, ...], ...]:
+        """Return the damped overlaps, group by group."""
+        w = self.at(x, self._nothing(), par, xe=xe)
+        groups: list[tuple[float, ...]] = []
+        for part in _contacts(type(self)):
+            overlaps = _row(_wired(w, part).call(part.function("overlaps")))
+            groups += (overlaps,) if part.has("matrix") else ((each,) for each in overlaps)
+        return tuple(groups)
+
+    @property
+    def usually_open(self) -> tuple[bool, ...]:
+        """Per contact group, whether it rarely touches."""
+        return tuple(
+            part.rarely
+            for part in _contacts(type(self))
+            for _ in range(1 if part.has("matrix") else len(part.element.Forces._fields))
+        )
+
+    def powers(
+        self,
+        x: Any,
+        xe: Any,
+        rate: Any,
+        memory: MemoryT,
+        par: ParT,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> Any:
+        """Return the rates of the integrals."""
+        w = self.at(x, memory, par, contact, xe=xe, rate=rate, reaction=reaction)
+        values: dict[str, float] = {}
+        for part in self.parts.values():
+            for name in part.energies:
+                function = part.function("power_in" if part.work else part.losses[name])
+                value = _wired(w, part).call(function)
+                values[name] = values[name] + value if name in values else value
+        values |= _known(self, "power", self.power(w), self.Flow._fields)
+        return _filled(self, "power", self.Flow, values)
+
+    def output(
+        self,
+        x: Any,
+        memory: MemoryT,
+        par: ParT,
+        contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+        flow: Any,
+    ) -> Any:
+        """Return what is recorded at an instant."""
+        w = self.at(x, memory, par, contact, reaction=reaction, flow=flow)
+        values: dict[str, Any] = {}
+        given: tuple[Any, ...] = (x, memory, flow)
+        for source in given:
+            values |= source._asdict()
+        values |= instant_of(w, "wire").wires
+        values |= dict(_part_values(w, self.Output._fields))
+        if "E_stored" in self.Output._fields:
+            values["E_stored"] = stored(w)
+        values |= _known(self, "record", self.record(w), self.Output._fields)
+        return _filled(self, "record", self.Output, values)
+
+    @classmethod
+    def state(cls, **parts: NamedTuple) -> Any:
+        """Return a State from the states of parts, by their names; those left out are zero.
+
+        Raises
+        ------
+        ModelError
+            When there is no such part, or the state is another element's.
+        """
+        values: dict[str, float] = {}
+        for name, own in parts.items():
+            part = cls.parts.get(name)
+            if part is None:
+                raise ModelError(f"{cls.__name__}: {unknown_name('part', name, cls.parts)}")
+            if not part.has("State") or not isinstance(own, part.element.State):
+                raise ModelError(f"{part.where}: {type(own).__name__} is no state of {part.kind}")
+            values |= {part.state_name(k): v for k, v in own._asdict().items()}
+        return zeros(cls.State)._replace(**values)
+
+    def watch(self, recording: Any, par: Any) -> list[str]:
+        """Return what the elements say of a recording, each of what it felt in every row.
+
+        Of signals that are not recorded nothing is known, and nothing said.
+        """
+
+        def rows(kind: Any) -> Any:
+            return kind._make(
+                recording[name].values if name in recording else _NAN for name in kind._fields
+            )
+
+        watched = [part for part in self.parts.values() if part.has("watch")]
+        found: list[str] = []
+        with np.errstate(all="ignore"):
+            w = self.at(rows(self.State), rows(self.Memory), par) if watched else None
+            for part in watched:
+                found += _wired(w, part).call(part.element.watch, t=recording["time"].values)
+        return found
+
+    def _nothing(self) -> Any:
+        """Return a memory that is not known: where it does not count, nobody must see it."""
+        return self.Memory._make(_NAN for _ in self.Memory._fields)
+
+
+def stored(w: Assembly[Any, Any]) -> Any:
+    """Return the energy that the parts store at an instant [J]; contacts are added up apart."""
+    sums: list[Any] = []
+    for wanted in (False, True):
+        values = [
+            _wired(w, part).call(part.element.energy)
+            for part in w.parts.values()
+            if part.has("energy") and not part.outside and part.has("Forces") == wanted
+        ]
+        if values:
+            sums.append(sum(values[1:], values[0]))
+    return sum(sums[1:], sums[0]) if sums else 0.0
+
+
+def _part_values(w: Assembly[Any, Any], wanted: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
+    """Yield the recorded outputs of all parts, and the losses of contacts."""
+    for part in w.parts.values():
+        for name, there in part.output.items():
+            if there in wanted:
+                yield there, part.output_value(name, _wired(w, part))
+        for name in part.kept:
+            if name in wanted:
+                own = _wired(w, part).call(part.element.energy)
+                yield name, getattr(w.flow, part.work) - own
+
+
+def _wired(w: Any, part: AnyPart) -> Wired[Any, Any, Any, Any]:
+    value: Wired[Any, Any, Any, Any] = getattr(w, part.name)
+    return value
+
+
+def _row(value: Any) -> tuple[Any, ...]:
+    return tuple(value) if isinstance(value, tuple) else (value,)
+
+
+def _known(
+    model: Assembly[Any, Any], method: str, values: Mapping[str, Any], names: tuple[str, ...]
+) -> dict[str, Any]:
+    for name in values:
+        if name not in names:
+            raise ModelError(
+                f"{type(model).__name__}.{method}: {unknown_name('signal', name, names)}"
+            )
+    return dict(values)
+
+
+def _filled(model: Assembly[Any, Any], method: str, kind: Any, values: Mapping[str, Any]) -> Any:
+    for name in kind._fields:
+        if name not in values:
+            raise ModelError(
+                f"{type(model).__name__}.{method} does not return {name!r}, and no part gives it: "
+                f"add it to what {method} returns"
+            )
+    return kind(**{name: values[name] for name in kind._fields})
+
+
+def _stores(cls: type[Assembly[Any, Any]]) -> Iterator[AnyPart]:
+    return (part for part in cls.parts.values() if part.has("State"))
+
+
+def _contacts(cls: type[Assembly[Any, Any]]) -> Iterator[AnyPart]:
+    return (part for part in cls.parts.values() if part.has("Forces"))
+
+
+def _gather(cls: type[Assembly[Any, Any]]) -> None:
+    """Derive State, Flow and Output of an assembly from its declarations."""
+    declared = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
+    cls.parts = {k: v for k, v in declared.items() if isinstance(v, Part)}
+    states: dict[str, Signal] = {}
+    for part in _stores(cls):
+        if part.has("balance") and not part.has("mass"):
+            raise ModelError(
+                f"{part.where}: {part.kind} has states and a balance, but no mass: define mass "
+                "there, or name the function rate where it returns derivatives"
+            )
+        if not (part.has("balance") or part.has("rate")):
+            raise ModelError(f"{part.where}: {part.kind} has states, but no balance and no rate")
+        for name, signal in part.states().items():
+            if name in states:
+                raise ModelError(
+                    f"{part.where}: another part has a state {name!r} too: give this one a suffix "
+                    "or another name, Part(..., suffix='_2') or Part(..., state={...})"
+                )
+            states[name] = signal
+    flows: dict[str, Signal] = {}
+    shown: dict[str, Signal] = {}
+    for name, value in declared.items():
+        if isinstance(value, Part):
+            flows |= {k: s for k, s in value.energies.items() if k not in flows}
+            shown |= value.outputs() | value.kept
+        elif isinstance(value, Integral):
+            flows[name] = value.signal
+        elif isinstance(value, (Wire, Shown)):
+            shown[name] = value.signal
+    for kind, signals in (("State", states), ("Flow", flows)):
+        if _derives(declared.get(kind)):
+            setattr(cls, kind, _named_tuple(cls, kind, signals))
+    if _derives(declared.get("Output")):
+        known = signals_of(cls.State) | signals_of(cls.Memory) | signals_of(cls.Flow)
+        known |= {"E_stored": STORED} | shown
+        names = cls.records or tuple(known)
+        for name in names:
+            if name not in known:
+                raise ModelError(f"{cls.__name__}.records: {unknown_name('signal', name, known)}")
+        cls.Output = _named_tuple(cls, "Output", {name: known[name] for name in names})
+
+
+def _derives(kind: Any) -> bool:
+    """Tell whether a signal tuple follows from the parts: the class has none of its own."""
+    return not isinstance(kind, type) or hasattr(kind, "derived")
+
+
+def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
+    """Return a signal tuple that can be pickled as an attribute of its assembly."""
+    make: Callable[..., Any] = NamedTuple
+    made = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
+    made.__module__, made.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"
+    made.__doc__ = f"{kind} of {owner.__name__}, gathered from its parts."
+    made.derived = True
+    return made
+
+
+@cache
+def _at_an_instant(cls: type[Any]) -> type[Any]:
+    """Return what stands for an assembly at an instant: it takes wires and no other names."""
+    kinds = (Part, Wire, Integral, Shown)
+    every = {k: v for base in cls.__mro__ for k, v in vars(base).items()}
+    known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
+
+    def refuse(self: Any, name: str) -> Any:
+        raise ModelError(f"{cls.__name__}: {unknown_name('part or wire', name, known)}")
+
+    def assign(self: Any, name: str, value: Any) -> None:
+        if name not in known:
+            refuse(self, name)
+        object.__setattr__(self, name, value)
+
+    body = {"__getattr__": refuse, "__setattr__": assign, "__module__": cls.__module__}
+    return types.new_class(
+        cls.__name__, (cls,), {"at_an_instant": True}, lambda names: names.update(body)
+    )

@@ -1,0 +1,214 @@
+"""Dimensions in the place of numbers: equations evaluated on them refuse sums of unlike quantities.
+
+They carry no value, so that no operating point can hide a mistake, and need no library of units.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+from bywire.core.errors import UnitError
+from bywire.core.units import base_powers
+
+BASE = ("kg", "m", "s", "A", "K", "mol", "cd")
+_DERIVED = {
+    "1": "", "rad": "", "Hz": "1/s", "N": "kg*m/s**2", "Pa": "kg/(m*s**2)", "J": "kg*m**2/s**2",
+    "N*m": "kg*m**2/s**2", "W": "kg*m**2/s**3", "C": "A*s", "V": "kg*m**2/(s**3*A)",
+    "ohm": "kg*m**2/(s**3*A**2)", "H": "kg*m**2/(s**2*A**2)", "F": "s**4*A**2/(kg*m**2)",
+    "T": "kg/(s**2*A)", "Wb": "kg*m**2/(s**2*A)", "N*m/A": "kg*m**2/(s**2*A)",
+}  # fmt: skip
+_PURE = frozenset({"exp", "log", "sin", "cos", "floor"})
+
+
+class DimensionError(UnitError):
+    """Two quantities that cannot be added or compared, or a function of what is no pure number."""
+
+
+class Dimension:
+    """A quantity of which only the dimension is known.
+
+    Plain zero goes with every dimension; a plain NaN is a quantity of which nothing is known.
+
+    Parameters
+    ----------
+    powers
+        Exponents of kg, m, s, A, K, mol and cd. Angles are pure numbers.
+    """
+
+    __slots__ = ("powers",)
+    __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
+
+    def __init__(self, powers: tuple[float, ...]) -> None:
+        self.powers = powers
+
+    @classmethod
+    def of(cls, unit: str) -> Dimension:
+        """Return the dimension of a unit, for instance ``"N*m"``.
+
+        Raises
+        ------
+        UnitError
+            When nobody knows the unit.
+        """
+        return _parsed(unit)
+
+    def __str__(self) -> str:
+        return _names().get(self.powers) or "*".join(
+            name if power == 1 else f"{name}**{power:g}"
+            for name, power in zip(BASE, self.powers, strict=True)
+            if power
+        )
+
+    def __repr__(self) -> str:
+        return f"Dimension({self})"
+
+    def __add__(self, other: Any) -> Any:
+        return _alike("added", self, other)
+
+    __radd__ = __add__
+
+    def __sub__(self, other: Any) -> Any:
+        return _alike("subtracted", self, other)
+
+    __rsub__ = __sub__
+
+    def __mul__(self, other: Any) -> Any:
+        return _product(self, other, 1)
+
+    __rmul__ = __mul__
+
+    def __truediv__(self, other: Any) -> Any:
+        return _product(self, other, -1)
+
+    def __rtruediv__(self, other: Any) -> Any:
+        return _product(other, self, -1)
+
+    def __pow__(self, exponent: float) -> Dimension:
+        return Dimension(tuple(round(power * exponent, 9) for power in self.powers))
+
+    def __neg__(self) -> Dimension:
+        return self
+
+    def __abs__(self) -> Dimension:
+        return self
+
+    def __lt__(self, other: Any) -> Condition:
+        return Condition(self, other)
+
+    __le__ = __gt__ = __ge__ = __lt__
+
+    def __eq__(self, other: object) -> Any:
+        return Condition(self, other)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def fits(self, unit: str) -> bool:
+        """Tell whether this is the dimension of a unit."""
+        return self.powers == Dimension.of(unit).powers
+
+    def _bywire_op(self, name: str, *args: Any) -> Any:
+        if name in _PURE or name == "power":
+            for value in args:
+                if not _unknown(value) and any(_dimension(value).powers):
+                    raise DimensionError(f"ops.{name} of a quantity in {value}: no pure number")
+            return Dimension.of("1")
+        if name == "sqrt":
+            return self**0.5
+        if name == "fabs":
+            return self
+        if name in ("fmax", "fmin"):
+            return _alike("compared", *args)
+        raise DimensionError(f"ops.{name} says no dimension")
+
+
+class Condition:
+    """Outcome of a comparison: both sides of ``ops.where`` count, no ``if`` can hang on it."""
+
+    def __init__(self, left: Any, right: Any) -> None:
+        _alike("compared", left, right)
+
+    def __bool__(self) -> bool:
+        raise DimensionError("an if on a value: use core.ops.where")
+
+    def _bywire_op(self, name: str, *args: Any) -> Any:
+        _, then, otherwise = args  # of ops.where, the only one that takes a condition
+        return _alike("chosen between", then, otherwise)
+
+    def __and__(self, other: Any) -> Condition:
+        return self
+
+    __or__ = __rand__ = __ror__ = __and__
+
+
+def fits(value: Any, unit: str) -> bool:
+    """Tell whether a result has the dimension of a unit; a plain zero has that of any."""
+    if isinstance(value, Dimension):
+        return value.fits(unit)
+    return bool(value == 0) or _unknown(value) or Dimension.of("1").fits(unit)
+
+
+def _dimension(value: Any) -> Dimension:
+    return value if isinstance(value, Dimension) else Dimension.of("1")
+
+
+def _alike(verb: str, left: Any, right: Any) -> Any:
+    """Return the one dimension of two quantities; zero and what is unknown take the other's."""
+    for zero, other in ((left, right), (right, left)):
+        if not isinstance(zero, Dimension) and (zero == 0 or _unknown(zero)):
+            return other
+    x, y = _dimension(left), _dimension(right)
+    if x.powers != y.powers:
+        raise DimensionError(f"a quantity in {x} and one in {y} cannot be {verb}")
+    return x
+
+
+def _product(left: Any, right: Any, sign: int) -> Any:
+    if _unknown(left) or _unknown(right):
+        return math.nan
+    pairs = zip(_dimension(left).powers, _dimension(right).powers, strict=True)
+    return Dimension(tuple(a + sign * b for a, b in pairs))
+
+
+def _unknown(value: Any) -> bool:
+    return isinstance(value, float) and math.isnan(value)
+
+
+@cache
+def _parsed(unit: str) -> Dimension:
+    if unit in BASE:
+        return Dimension(tuple(float(name == unit) for name in BASE))
+    if unit in ("", "1"):
+        return Dimension((0.0,) * len(BASE))
+    if unit in _DERIVED:
+        return _parsed(_DERIVED[unit])
+    try:
+        return _walked(ast.parse(unit, mode="eval").body)
+    except (SyntaxError, KeyError):
+        return Dimension(base_powers(unit, BASE))
+
+
+def _walked(node: ast.expr) -> Dimension:
+    """Return the dimension of a product of units; KeyError where one is not known here."""
+    operations: dict[type[ast.operator], Callable[[Any, Any], Dimension]] = {
+        ast.Mult: lambda a, b: a * b,
+        ast.Div: lambda a, b: a / b,
+    }
+    if isinstance(node, ast.BinOp):
+        if isinstance(node.op, ast.Pow):
+            return _walked(node.left) ** float(ast.unparse(node.right))
+        return operations[type(node.op)](_walked(node.left), _walked(node.right))
+    name = node.id if isinstance(node, ast.Name) else ast.unparse(node)
+    if name not in BASE and name not in _DERIVED:
+        raise KeyError(name)
+    return _parsed(name)
+
+
+@cache
+def _names() -> dict[tuple[float, ...], str]:
+    """Return the usual name of every dimension that has one; of energy and torque, N*m."""
+    names = sorted((*_DERIVED, *BASE), key=lambda name: (name == "J", name == "rad", name))
+    return {_parsed(name).powers: name for name in reversed(names)}

@@ -1,0 +1,479 @@
+"""Parts and signals of an assembly: what its class declares, and what its equations see of them."""
+
+from __future__ import annotations
+
+import inspect
+import typing
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cache, cached_property
+from typing import Any, Generic, NamedTuple, Protocol, Self, TypedDict, TypeVar, Unpack, overload
+
+from bywire.core.errors import ModelError, unknown_name
+from bywire.core.signals import Signal, signal_in, signals_of
+
+X = TypeVar("X")
+U = TypeVar("U")
+F = TypeVar("F")
+P = TypeVar("P")
+X_co = TypeVar("X_co", covariant=True)
+U_co = TypeVar("U_co", covariant=True)
+F_co = TypeVar("F_co", covariant=True)
+P_co = TypeVar("P_co", covariant=True)
+
+
+class _Store(Protocol[X_co, U_co, P_co]):
+    """A module of an element with states and inputs."""
+
+    @property
+    def State(self) -> Callable[..., X_co]: ...
+    @property
+    def Input(self) -> Callable[..., U_co]: ...
+    @property
+    def Parameters(self) -> Callable[..., P_co]: ...
+
+
+class _Contact(Protocol[U_co, F_co, P_co]):
+    """A module of an element with contact forces."""
+
+    @property
+    def Input(self) -> Callable[..., U_co]: ...
+    @property
+    def Forces(self) -> Callable[..., F_co]: ...
+    @property
+    def Parameters(self) -> Callable[..., P_co]: ...
+
+
+class _Passive(Protocol[U_co, P_co]):
+    """A module of an element with inputs."""
+
+    @property
+    def Input(self) -> Callable[..., U_co]: ...
+    @property
+    def Parameters(self) -> Callable[..., P_co]: ...
+
+
+class _Plain(Protocol[P_co]):
+    """A module of an element with parameters."""
+
+    @property
+    def Parameters(self) -> Callable[..., P_co]: ...
+
+
+class Wired(Generic[X, U, F, P]):
+    """A part at an instant: its state, input, contact forces and parameters.
+
+    Parameters
+    ----------
+    part
+        What is declared.
+    instant
+        Where the model is evaluated.
+    """
+
+    def __init__(self, part: Part[X, U, F, P], instant: Instant) -> None:
+        self._part, self._instant = part, instant
+        self._input: Any = None
+
+    @property
+    def x(self) -> X:
+        """State; those that are declared as fixed are value-only."""
+        return self._part.state_at(self._instant, self._part.fixed)  # type: ignore[no-any-return]
+
+    @property
+    def xe(self) -> X:
+        """State, value-only."""
+        return self._part.state_at(self._instant, None)  # type: ignore[no-any-return]
+
+    @property
+    def par(self) -> P:
+        """Parameters."""
+        value = self._instant.par
+        for name in self._part.path.split("."):
+            value = getattr(value, name, None)
+        if value is None:
+            raise ModelError(
+                f"{self._part.where}: the parameters have no {self._part.path!r}: say where they "
+                f"stand, Part({self._part.kind}, par='...')"
+            )
+        return value  # type: ignore[no-any-return]
+
+    @property
+    def f(self) -> F:
+        """Contact forces."""
+        return self._part.forces_at(self._instant, self.par)  # type: ignore[no-any-return]
+
+    @property
+    def u(self) -> U:
+        """Input, as it was wired."""
+        if self._input is None:
+            raise ModelError(
+                f"{self._part.where}: its input is read before it is wired: assign "
+                f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire, above that"
+            )
+        return self._input  # type: ignore[no-any-return]
+
+    @u.setter
+    def u(self, value: U) -> None:
+        wanted = getattr(self._part.element, "Input", None)
+        if wanted is None or not isinstance(value, wanted):
+            takes = "no input" if wanted is None else f"a {self._part.kind}.Input"
+            raise ModelError(
+                f"{self._part.where}: {_line()} assigns a {type(value).__module__}."
+                f"{type(value).__name__} as its input, but it takes {takes}"
+            )
+        if self._input is not None:
+            raise ModelError(
+                f"{self._part.where}: {_line()} assigns its input a second time: wire it once"
+            )
+        self._input = value
+        self._instant.note(f"{self._part.name}.u")
+
+    def call(self, function: Callable[..., Any], **more: Any) -> Any:
+        """Return what a function of the element gives, its arguments taken by their names."""
+        return function(*(
+            more[name] if name in more else self._argument(name, function)
+            for name in _arguments(function)
+        ))  # fmt: skip
+
+    def _argument(self, name: str, function: Callable[..., Any]) -> Any:
+        if name in ("x", "xe", "u", "f", "par"):
+            return getattr(self, name)
+        if name in self._instant.shared:
+            return getattr(self._instant.par, name)
+        raise ModelError(
+            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which no "
+            f"assembly knows: x, u, f and par are, and parameters that it names in shared "
+            f"({', '.join(self._instant.shared) or 'none now'})"
+        )
+
+
+@dataclass
+class Instant:
+    """Where and with what a model is evaluated.
+
+    Parameters
+    ----------
+    x, xe
+        State, and the same value-only.
+    shared
+        Groups of parameters that elements take by name.
+    contact
+        Contact forces by part.
+    lines
+        File and line in which every wire and input was set, where that is wanted.
+    """
+
+    x: Any
+    xe: Any
+    memory: Any
+    par: Any
+    shared: tuple[str, ...]
+    contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
+    reaction: tuple[float, ...] = ()
+    rate: Any = None
+    flow: Any = None
+    wires: dict[str, Any] = field(default_factory=dict)
+    parts: dict[str, Wired[Any, Any, Any, Any]] = field(default_factory=dict)
+    lines: dict[str, str] | None = None
+
+    def note(self, name: str) -> None:
+        """Remember where a signal was set."""
+        if self.lines is not None:
+            self.lines[name] = _line()
+
+
+class PartOptions(TypedDict, total=False):
+    """What may be said of a part beside its element.
+
+    Parameters
+    ----------
+    par
+        Where its parameters stand in those of the assembly; its own name by default.
+    suffix
+        Put behind the names of its states, for the second of a kind: ``"_2"``.
+    state
+        Names of its states in the assembly, where they are others.
+    labels
+        Labels of its states, where they are others.
+    fixed
+        States that enter its equations value-only: periodic terms and slow geometry.
+    output
+        Its outputs and contact forces that are signals of the assembly, by their names there; or
+        the names alone, where they are the same.
+    loss
+        Name of the energy that its ``power_loss`` adds up to; or names, by function of the element.
+        Of a contact: what its work exceeds its stored energy by.
+    work
+        Of a contact: name of the energy that its ``power_in`` adds up to.
+    rarely
+        Of a contact: whether it rarely touches, as end stops do. Speed only.
+    outside
+        Whether what it stores stands in no book: it lies beyond the border of the balance.
+    """
+
+    par: str
+    suffix: str
+    state: Mapping[str, str]
+    labels: Mapping[str, str]
+    fixed: Iterable[str]
+    output: Mapping[str, str] | Iterable[str]
+    loss: str | Mapping[str, str]
+    work: str
+    rarely: bool
+    outside: bool
+
+
+OPTIONS = tuple(PartOptions.__annotations__)
+
+
+class Part(Generic[X, U, F, P]):
+    """An element of an assembly.
+
+    Parameters
+    ----------
+    element
+        Its module: State, Input, Output, Parameters and functions of them, by their usual names.
+    options
+        See `PartOptions`.
+    """
+
+    name: str
+    where: str
+
+    @overload
+    def __init__(
+        self: Part[X, U, None, P], element: _Store[X, U, P], **options: Unpack[PartOptions]
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Part[None, U, F, P], element: _Contact[U, F, P], **options: Unpack[PartOptions]
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Part[None, U, None, P], element: _Passive[U, P], **options: Unpack[PartOptions]
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Part[None, None, None, P], element: _Plain[P], **options: Unpack[PartOptions]
+    ) -> None: ...
+    def __init__(self, element: Any, **options: Unpack[PartOptions]) -> None:
+        self.element = element
+        self.path, self.suffix = options.get("par", ""), options.get("suffix", "")
+        self.renamed, self.labels = options.get("state", {}), options.get("labels", {})
+        self.fixed, output = tuple(options.get("fixed", ())), options.get("output", ())
+        self.output = dict(output) if isinstance(output, Mapping) else {k: k for k in output}
+        loss = options.get("loss", {})
+        self.losses = {loss: "power_loss"} if isinstance(loss, str) else dict(loss)
+        self.work, self.rarely = options.get("work", ""), options.get("rarely", False)
+        self.outside = options.get("outside", False)
+        self.kind = str(getattr(element, "__name__", type(element).__name__)).rpartition(".")[2]
+        unknown = set(options) - set(OPTIONS)
+        if unknown:
+            name = min(unknown)
+            raise ModelError(f"Part({self.kind}): {unknown_name('option', name, OPTIONS)}")
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name, self.where = name, f"{owner.__name__}.{name}"
+        self.path = self.path or name
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: Any, owner: type) -> Wired[X, U, F, P]: ...
+    def __get__(self, instance: Any, owner: type) -> Any:
+        """Return the part, or of an assembly at an instant what its equations see of it."""
+        if instance is None:
+            return self
+        instant = instant_of(instance, self.where)
+        if self.name not in instant.parts:
+            instant.parts[self.name] = Wired(self, instant)
+        return instant.parts[self.name]
+
+    def __set__(self, instance: Any, value: Any) -> None:
+        raise ModelError(f"{self.where} is a part: assign its input, w.{self.name}.u")
+
+    def has(self, function: str) -> bool:
+        """Tell whether the element defines a function."""
+        return hasattr(self.element, function)
+
+    def function(self, name: str) -> Callable[..., Any]:
+        """Return a function of the element.
+
+        Raises
+        ------
+        ModelError
+            When it has none of that name.
+        """
+        value = getattr(self.element, name, None)
+        if not callable(value):
+            raise ModelError(f"{self.where}: {self.kind} has no function {name}: define it there")
+        return typing.cast(Callable[..., Any], value)
+
+    def states(self) -> dict[str, Signal]:
+        """Return its states by their names in the assembly."""
+        if not self.has("State"):
+            return {}
+        own = signals_of(self.element.State)
+        for name in (*self.renamed, *self.labels, *self.fixed):
+            if name not in own:
+                raise ModelError(f"{self.where}: {unknown_name('state', name, own)}")
+        number = self.suffix.replace("_", " ")
+        return {
+            self.state_name(name): replace(s, label=self.labels.get(name, s.label) + number)
+            for name, s in own.items()
+        }
+
+    def state_name(self, name: str) -> str:
+        """Return the name in the assembly of one of its states."""
+        return self.renamed.get(name, name) + self.suffix
+
+    def outputs(self) -> dict[str, Signal]:
+        """Return its outputs and contact forces that the assembly records, by their names there."""
+        known: dict[str, Signal] = {}
+        for kind in ("Output", "Forces"):
+            if self.has(kind):
+                known |= signals_of(getattr(self.element, kind))
+        for name in self.output:
+            if name not in known:
+                raise ModelError(f"{self.where}: {unknown_name('output', name, known)}")
+        number = self.suffix.replace("_", " ")
+        return {
+            there: replace(known[name], label=known[name].label + number)
+            for name, there in self.output.items()
+        }
+
+    def output_value(self, name: str, wired: Wired[Any, Any, Any, Any]) -> Any:
+        """Return one of its outputs or contact forces at an instant."""
+        if self.has("Forces") and name in self.element.Forces._fields:
+            return getattr(wired.f, name)
+        return getattr(wired.call(self.function("output")), name)
+
+    @cached_property
+    def energies(self) -> dict[str, Signal]:
+        """Return the energies that its powers add up to, by name."""
+        if self.work:
+            return {self.work: self._energy("power_in", self.work)}
+        if self.has("Forces"):
+            return {}
+        return {name: self._energy(function, name) for name, function in self.losses.items()}
+
+    @cached_property
+    def kept(self) -> dict[str, Signal]:
+        """Return the loss of a contact, which follows from its work and what it stores."""
+        if not self.has("Forces"):
+            return {}
+        return {name: self._energy(function, name) for name, function in self.losses.items()}
+
+    def _energy(self, function: str, name: str) -> Signal:
+        """Return the integral of a power, with the label and the role that the element gives it."""
+        hints = typing.get_type_hints(self.function(function), include_extras=True)
+        power = signal_in(hints.get("return"))
+        if power is None:
+            raise ModelError(
+                f"{self.where}: {self.kind}.{function} says no unit: annotate its result with "
+                "Annotated[float, Signal('W', label)]"
+            )
+        return Signal("J", power.label, role=power.role)
+
+    def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
+        """Return its state; ``fixed`` are those taken value-only, None for all."""
+        if not self.has("State"):
+            raise ModelError(f"{self.where}: {self.kind} has no state")
+        own: type[Any] = self.element.State
+        return own._make(
+            getattr(instant.xe if fixed is None or k in fixed else instant.x, self.state_name(k))
+            for k in own._fields
+        )
+
+    def forces_at(self, instant: Instant, par: Any) -> Any:
+        """Return its contact forces, as its element bends them if it does."""
+        if not self.has("Forces"):
+            raise ModelError(f"{self.where}: {self.kind} has no contact forces")
+        forces = self.element.Forces(*instant.contact[self.name])
+        return self.element.bent(forces, par) if self.has("bent") else forces
+
+
+class _Named:
+    """A signal that the class of an assembly declares."""
+
+    name: str
+    where: str
+
+    def __init__(self, unit: str, label: str, nominal: float = 1.0, role: Any = None) -> None:
+        self.signal = Signal(unit, label, nominal, role=role)
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self.name, self.where = name, f"{owner.__name__}.{name}"
+
+
+class Wire(_Named):
+    """A signal between parts that ``wire`` sets once; it can be recorded."""
+
+    @overload
+    def __get__(self, instance: None, owner: type) -> Self: ...
+    @overload
+    def __get__(self, instance: Any, owner: type) -> float: ...
+    def __get__(self, instance: Any, owner: type) -> Any:
+        """Return the wire, or of an assembly at an instant its value."""
+        if instance is None:
+            return self
+        wires = instant_of(instance, self.where).wires
+        if self.name not in wires:
+            raise ModelError(
+                f"{self.where} is read before it is set: assign w.{self.name} = ... in wire, "
+                "above that"
+            )
+        return wires[self.name]
+
+    def __set__(self, instance: Any, value: float) -> None:
+        instant = instant_of(instance, self.where)
+        if self.name in instant.wires:
+            raise ModelError(f"{self.where}: {_line()} sets it a second time: set a wire once")
+        instant.wires[self.name] = value
+        instant.note(self.name)
+
+
+class Integral(_Named):
+    """What is integrated along with the states; ``power`` returns its rate."""
+
+
+class Shown(_Named):
+    """What is recorded and is no state, wire or integral; ``record`` returns it."""
+
+
+class StateFields(NamedTuple):
+    """Where a state of an assembly comes from."""
+
+    part: Part[Any, Any, Any, Any]
+    name: str
+
+
+def instant_of(instance: Any, where: str) -> Instant:
+    """Return the instant at which an assembly is evaluated.
+
+    Raises
+    ------
+    ModelError
+        When it is not: its parts have values at an instant only.
+    """
+    instant = vars(instance).get("_instant")
+    if instant is None:
+        raise ModelError(
+            f"{where} has no value here: within wire and its like take it from w, elsewhere from "
+            "model.at(state, memory, par)"
+        )
+    return typing.cast(Instant, instant)
+
+
+@cache
+def _arguments(function: Callable[..., Any]) -> tuple[str, ...]:
+    return tuple(inspect.signature(function).parameters)
+
+
+def _line() -> str:
+    """Return file and line of the equation that is being evaluated: the first beyond this file."""
+    frame = inspect.currentframe()
+    while frame is not None and frame.f_code.co_filename == __file__:
+        frame = frame.f_back
+    return f"{frame.f_code.co_filename}, line {frame.f_lineno}," if frame else ""

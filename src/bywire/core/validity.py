@@ -1,0 +1,38 @@
+"""What elements say of a recording: where their range was left, and when first."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+def outside(values: Any, low: float, high: float) -> Any:
+    """Return where values leave a range; what is not known lies in it."""
+    return np.logical_or(np.less(values, low), np.greater(values, high))
+
+
+def highest(values: Any) -> float:
+    """Return the largest of some values; NaN where one is not known."""
+    return float(np.max(values))
+
+
+def first(t: Array, happens: Any, text: str, after: str = "") -> list[str]:
+    """Return a warning with the time of the first row in which something happens, if in one.
+
+    Parameters
+    ----------
+    t
+        Times of the rows [s], shape (n,).
+    happens
+        Whether it happens in each row, shape (n,), or one for all.
+    text, after
+        What is said before and behind the time.
+    """
+    rows = np.broadcast_to(np.asarray(happens, dtype=bool), t.shape)
+    if not rows.any():
+        return []
+    return [f"{text} at t = {float(t[int(np.argmax(rows))]):.4g} s{after}"]

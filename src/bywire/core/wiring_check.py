@@ -1,0 +1,215 @@
+"""Whether an assembly is wired: every wire and input set once, all of them in their units."""
+
+from __future__ import annotations
+
+import inspect
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+from bywire.core.assembly import Assembly
+from bywire.core.dimensions import Dimension, fits
+from bywire.core.errors import ModelError, UnitError
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parts import Instant, Wire, instant_of
+from bywire.core.signals import signals_of
+
+AnyAssembly = Assembly[Any, Any]
+
+
+def check_wiring(model: AnyAssembly, par: ParameterSet) -> None:
+    """Evaluate an assembly on dimensions and check what it sets and returns.
+
+    Raises
+    ------
+    ModelError
+        Naming class, file and line, part, signal, both units and what to do.
+    """
+    at = _Operands(model, par)
+    w = at.wired("wire")
+    _check_inputs(model, w)
+    _check_balance(model, at, w)
+    _check_contacts(model, at)
+    bounds = at.evaluated("friction", model.friction, w)
+    for name, pair in zip(model.frictions, bounds, strict=False):
+        for value in pair if isinstance(pair, tuple) and name in at.balance else ():
+            _require(model, "friction", name, value, str(at.balance[name]))
+    for method, kind in (("power", model.Flow), ("record", model.Output)):
+        values = at.evaluated(method, *_protocol(model, at, method))
+        for (name, signal), value in zip(signals_of(kind).items(), values, strict=True):
+            if method == "power":
+                value = value * at.second if isinstance(value, Dimension) or value else value
+            _require(model, method, name, value, signal.unit, signal.label)
+
+
+class _Operands:
+    """What an assembly is evaluated on, and how."""
+
+    def __init__(self, model: AnyAssembly, par: ParameterSet) -> None:
+        self.model = model
+        self.second = Dimension.of("s")
+        self.state = self.tuple(model.State)
+        self.memory = self.tuple(model.Memory)
+        self.rate = model.State._make(each / self.second for each in self.state)
+        fields = leaf_fields(type(par))
+        numbers = {}
+        for name in par.leaves():
+            leaf = fields.get(name) or fields[name.rpartition(".")[0]]  # a node of a table
+            numbers[name] = self.dimension(leaf.unit.symbol, f"parameter {name}")
+        self.par = par.with_leaves(numbers)
+        self.contact = tuple(
+            each
+            for part in model.parts.values()
+            if part.has("Forces")
+            for each in self.tuple(part.element.Forces)
+        )
+        mass = self.evaluated("mass", model.mass, self.state, self.par)
+        rates = dict(zip(model.State._fields, mass, strict=True))
+        self.balance = {name: rate * getattr(self.rate, name) for name, rate in rates.items()}
+        forces = [self.balance.get(name) for name in (*model.frictions, *model.limits)]
+        self.reaction = tuple(forces)
+
+    def tuple(self, kind: Any) -> Any:
+        """Return a signal tuple of dimensions."""
+        return kind._make(
+            self.dimension(s.unit, f"{kind.__name__}.{name}")
+            for name, s in signals_of(kind).items()
+        )
+
+    def dimension(self, unit: str, what: str) -> Dimension:
+        """Return the dimension of a unit; the error names what it belongs to."""
+        try:
+            if not unit:
+                raise UnitError("it has no unit: write '1' for a pure number")
+            return Dimension.of(unit)
+        except UnitError as error:
+            raise ModelError(f"{_place(self.model)}: {what}: {error}") from None
+
+    def wired(self, method: str) -> AnyAssembly:
+        """Return the assembly at an instant, with the lines in which its wires were set."""
+        lines: dict[str, str] = {}
+        found: AnyAssembly = self.evaluated(
+            method,
+            lambda: self.model.at(
+                self.state, self.memory, self.par, self.contact, rate=self.rate,
+                reaction=self.reaction, lines=lines,
+            ),
+        )  # fmt: skip
+        return found
+
+    def evaluated(self, method: str, function: Callable[..., Any], *arguments: Any) -> Any:
+        """Return what an equation gives, its errors with their lines."""
+        try:
+            return function(*arguments)
+        except UnitError as error:
+            where = _line_of(error, self.model)
+            raise ModelError(
+                f"{type(self.model).__name__}.{method}, {where}: {error}: mend the equation or "
+                "the unit that one of its quantities is declared with"
+            ) from None
+
+
+def _check_inputs(model: AnyAssembly, w: AnyAssembly) -> None:
+    instant = instant_of(w, "wire")
+    for name, wire in _wires(type(model)).items():
+        if name not in instant.wires:
+            raise ModelError(
+                f"{_place(model)}: the wire {name} ({wire.signal.label}) is never set: assign "
+                f"w.{name} = ... [{wire.signal.unit}] in wire"
+            )
+        _require(model, "wire", name, instant.wires[name], wire.signal.unit, wire.signal.label,
+                 instant)  # fmt: skip
+    for part in model.parts.values():
+        if not part.has("Input"):
+            continue
+        value = vars(getattr(w, part.name))["_input"]
+        if value is None:
+            raise ModelError(
+                f"{_place(model)}: the input of {part.name} is never wired: assign w.{part.name}.u "
+                f"= {part.kind}.Input({', '.join(part.element.Input._fields)}) in wire"
+            )
+        for (field, signal), each in zip(
+            signals_of(part.element.Input).items(), value, strict=True
+        ):
+            _require(model, "wire", f"{part.name}.u.{field}", each, signal.unit, signal.label,
+                     instant)  # fmt: skip
+
+
+def _check_balance(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
+    rows = at.evaluated("balance", model.balance, at.state, at.state, at.memory, at.par, at.contact)
+    for name, row in zip(model.State._fields, rows, strict=True):
+        _require(model, "balance", name, row, str(at.balance[name]), "mass times its derivative")
+
+
+def _check_contacts(model: AnyAssembly, at: _Operands) -> None:
+    gaps = at.evaluated("gap", model.gap, at.state, at.state, at.par)
+    matrices = at.evaluated("compliance", model.compliance, at.par)
+    forces = iter(at.contact)
+    for group, rows in zip(gaps, matrices, strict=True):
+        for overlap, row, force in zip(group, rows, forces, strict=False):
+            if not fits(overlap, str(row[0] * force)) and isinstance(overlap, Dimension):
+                raise ModelError(
+                    f"{_place(model)}: an overlap in {overlap} meets a compliance times a force in "
+                    f"{row[0] * force}: they must be alike"
+                )
+
+
+def _protocol(model: AnyAssembly, at: _Operands, method: str) -> Iterator[Any]:
+    """Yield the function of the protocol that a method is a part of, and its arguments."""
+    if method == "power":
+        yield from (model.powers, at.state, at.state, at.rate, at.memory, at.par, at.contact,
+                    at.reaction)  # fmt: skip
+    else:
+        yield from (model.output, at.state, at.memory, at.par, at.contact, at.reaction,
+                    at.tuple(model.Flow))  # fmt: skip
+
+
+def _require(
+    model: AnyAssembly,
+    method: str,
+    name: str,
+    value: Any,
+    unit: str,
+    label: str = "",
+    instant: Instant | None = None,
+) -> None:
+    if value is None or fits(value, unit):
+        return
+    where = ((instant.lines or {}) if instant else {}).get(_assigned(name), "").rstrip(",")
+    shown = value if isinstance(value, Dimension) else "1"
+    meaning = f" ({label})" if label else ""
+    raise ModelError(
+        f"{type(model).__name__}.{method}, {where or _place(model, method)}: {name}{meaning} is in "
+        f"{unit}, but is given a quantity in {shown}: mend what is assigned or the declared unit"
+    )
+
+
+def _assigned(name: str) -> str:
+    """Return what is assigned: of a part's input all at once."""
+    return name.rpartition(".")[0] if ".u." in name else name
+
+
+def _wires(cls: type[Any]) -> Mapping[str, Wire]:
+    every = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
+    return {name: value for name, value in every.items() if isinstance(value, Wire)}
+
+
+def _place(model: AnyAssembly, method: str = "wire") -> str:
+    """Return class, file and line of a method."""
+    cls = type(model)
+    function = getattr(cls, method)
+    if function.__module__ == Assembly.__module__:
+        function = cls
+    try:
+        line = inspect.getsourcelines(function)[1]
+        return f"{cls.__name__}, {inspect.getsourcefile(function)}, line {line}"
+    except (OSError, TypeError):  # typed in, not read from a file
+        return cls.__name__
+
+
+def _line_of(error: BaseException, model: AnyAssembly) -> str:
+    """Return the innermost line outside of the numbers' own operations."""
+    own = {__file__, inspect.getsourcefile(Dimension), inspect.getsourcefile(fits)}
+    frames = [f for f in traceback.extract_tb(error.__traceback__)
+              if f.filename not in own and not f.filename.endswith("core/ops.py")]  # fmt: skip
+    return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else _place(model)

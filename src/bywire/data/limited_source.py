@@ -1,0 +1,284 @@
+"""Files of columns that a child process reads, with limits of memory and time.
+
+The memory of the child is limited on Linux alone; its time everywhere.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import threading
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from importlib.util import find_spec
+from itertools import count
+from pathlib import Path
+from tempfile import mkdtemp
+from typing import IO, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.core.errors import FileError
+from bywire.core.extras import how_to_install
+from bywire.core.machine_memory import machine_memory
+from bywire.data.file_format import Column, FileFormat, Progress
+from bywire.data.reading_child import fill, receive, send
+
+SECONDS = 60.0
+"""how long a library may take to open a file, and from one piece of it to the next"""
+
+MOST_MEMORY = 4 * 2**30
+"""bytes that a library may take to read a file, or half the machine's memory"""
+
+_IS_LINUX = sys.platform == "linux"
+_PIPE = 2**20  # bytes that wait in a pipe: fewer turns from one process to the other
+_State = Literal["idle", "open", "busy"]
+"""a child waits for a file, or for a question about the open one, or works on its answer"""
+
+_idle: dict[tuple[int, str], list[Child]] = {}
+_numbers = count()
+
+
+class Child:
+    """A process that reads files of one format.
+
+    Parameters
+    ----------
+    module
+        Module of the format.
+    """
+
+    def __init__(self, module: str) -> None:
+        # asammdf writes a temporary file; with its folder it goes, whatever becomes of the child.
+        self._folder = mkdtemp(prefix="bywire-")
+        paths = os.pathsep.join(path for path in sys.path if path)
+        self._process = subprocess.Popen(
+            # -P: a module beside the measurement must not run in place of a library's.
+            [sys.executable, "-P", "-m", "bywire.data.reading_child", module,
+             "forks" if _IS_LINUX else "alone"],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, bufsize=0,
+            env={**os.environ, "PYTHONPATH": paths, "OMP_NUM_THREADS": "1",
+                 "OPENBLAS_NUM_THREADS": "1", "TMPDIR": self._folder, "TEMP": self._folder},
+            start_new_session=True,  # Ctrl-C reaches the parent, which ends the child
+        )  # fmt: skip
+        self.state: _State = "idle"
+        self._is_late = False
+        with contextlib.suppress(ImportError, AttributeError, OSError):
+            import fcntl
+
+            fcntl.fcntl(self.stream, fcntl.F_SETPIPE_SZ, _PIPE)
+
+    @property
+    def stream(self) -> IO[bytes]:
+        """What the child says."""
+        assert self._process.stdout is not None
+        return self._process.stdout
+
+    def ask(self, message: Mapping[str, Any]) -> None:
+        """Send a message."""
+        assert self._process.stdin is not None
+        with contextlib.suppress(OSError):  # it has ended, which the answer will show
+            send(self._process.stdin, message)
+
+    @contextmanager
+    def within(self, seconds: float) -> Iterator[None]:
+        """End the child where what follows takes longer."""
+        watch = threading.Timer(seconds, self._end_late)
+        watch.start()
+        try:
+            yield
+        finally:
+            watch.cancel()
+
+    def reason(self) -> str:
+        """Return why it ended."""
+        status = self._process.wait()
+        return "" if self._is_late else _ending(status)
+
+    def _end_late(self) -> None:
+        self._is_late = True
+        self._kill()
+
+    def _kill(self) -> None:
+        if os.name == "posix":
+            with contextlib.suppress(OSError):
+                os.killpg(self._process.pid, signal.SIGKILL)  # with those that it forked
+        else:
+            self._process.kill()
+
+    def close(self) -> None:
+        """End the process."""
+        self._kill()
+        self._process.wait()
+        for stream in (self._process.stdin, self._process.stdout):
+            assert stream is not None
+            stream.close()
+        shutil.rmtree(self._folder, ignore_errors=True)
+
+
+class LimitedSource:
+    """An open file that a child reads.
+
+    Parameters
+    ----------
+    path, kind
+        The file and its format.
+    child
+        Who reads it.
+    memory
+        Bytes that it may take to read it.
+    seconds
+        How long it may take from one piece to the next.
+    """
+
+    def __init__(
+        self, path: Path, kind: FileFormat, child: Child, memory: int, seconds: float
+    ) -> None:
+        self._path, self._kind, self._child = path, kind, child
+        self._memory, self._seconds = memory, seconds
+        self._request = next(_numbers)
+        answer = self._answer({
+            "path": str(path), "folder": os.getcwd(), "memory": memory, "seconds": seconds,
+            "request": self._request,
+        })  # fmt: skip
+        found = [Column(*fields) for fields in answer["columns"]]
+        self.columns: Mapping[str, Column] = {column.name: column for column in found}
+
+    def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
+        """Return the numbers of some columns, piece by piece as the child sends them."""
+        answer = self._answer({"names": list(names)})
+        # Only now: what was never written is refused before there is room made for it.
+        columns = [np.empty(self.columns[name].length or 0) for name in names]
+        filled = [0] * len(names)
+        total = sum(column.size for column in columns)
+        while "end" not in answer:
+            k, begin, size = answer["column"], answer["begin"], answer["count"]
+            if begin != filled[k] or begin + size > columns[k].size:
+                raise self._torn(names[k], begin + size, columns[k].size)
+            with self._child.within(self._seconds):
+                if not fill(self._child.stream, columns[k][begin : begin + size]):
+                    raise self._ended(self._child.reason())
+            filled[k] += size
+            progress(f"reading {self._path.name}", sum(filled) / total)
+            answer = self._answer(None)
+        for name, column, size in zip(names, columns, filled, strict=True):
+            if size != column.size:
+                raise self._torn(name, size, column.size)
+        return dict(zip(names, columns, strict=True))
+
+    def place(self, name: str, row: int) -> str:
+        """Return where a number stands, as the format counts."""
+        word, first = self._kind.counts
+        return f"{word} {row + first}"
+
+    def _answer(self, question: Mapping[str, Any] | None) -> dict[str, Any]:
+        """Return the next message of the child, which waits for the next question after some."""
+        if question is not None:
+            self._child.ask(question)
+        self._child.state = "busy"
+        with self._child.within(self._seconds):
+            answer = receive(self._child.stream)
+            # How the child of an earlier file ended is of no interest any more.
+            while answer is not None and answer.get("request", self._request) != self._request:
+                answer = receive(self._child.stream)
+        if answer is None:
+            raise self._ended(self._child.reason())
+        if "column" not in answer and _IS_LINUX:
+            self._child.state = "open" if {"columns", "end"} & set(answer) else "idle"
+        if "error" in answer:
+            raise FileError(answer["error"])
+        if "memory" in answer:
+            raise FileError(
+                f"{self._path} takes more than {self._memory / 2**30:.3g} GiB of memory to read: "
+                "it is damaged or was made to exhaust it; where it is sound, choose fewer signals, "
+                "or write it again in smaller pieces"
+            )
+        if "ended" in answer:
+            raise self._ended(_ending(answer["ended"]))
+        return answer
+
+    def _ended(self, reason: str) -> FileError:
+        if not reason:
+            return FileError(
+                f"{self._path}: reading it took longer than {self._seconds:g} s without getting "
+                "further: it is damaged or was made to take so long; where it is sound, copy it to "
+                "a local disk or choose fewer signals"
+            )
+        return FileError(
+            f"{self._path}: the library that reads {self._kind.title} broke down on it ({reason}): "
+            f"it is damaged, or takes more than {self._memory / 2**30:.3g} GiB of memory: copy or "
+            "export it again"
+        )
+
+    def _torn(self, name: str, size: int, declared: int) -> FileError:
+        return FileError(
+            f"{self._path} is damaged: {name!r} has {declared} numbers as it says, and {size} were "
+            "read: copy it again, or export it again from where it was made"
+        )
+
+
+def _ending(status: int) -> str:
+    """Return how a process ended, in words; nothing where it used up its time."""
+    if status >= 0:
+        return f"exit status {status}"
+    with contextlib.suppress(ValueError):
+        name = signal.Signals(-status).name
+        return "" if name == "SIGXCPU" else name
+    return f"signal {-status}"
+
+
+@contextmanager
+def limited(
+    path: Path, kind: FileFormat, seconds: float | None = None
+) -> Iterator[LimitedSource]:
+    """Open a file in a child process.
+
+    Raises
+    ------
+    FileError
+        When the library is not installed, the file is damaged, or a limit is passed.
+    """
+    for name in kind.libraries:
+        library = name.partition(".")[0]
+        if find_spec(library) is None:
+            raise FileError(
+                f"{path}: {kind.title} needs the library {library}, which is not installed: "
+                f"{how_to_install('measurements')}"
+            )
+    memory = min(MOST_MEMORY, int(machine_memory() / 2))
+    if not _IS_LINUX:
+        warnings.warn(
+            f"on this system the memory that reading {kind.title} takes is not limited, only its "
+            "time: read files of strangers on Linux",
+            stacklevel=2,
+        )
+    module = kind.open.__module__
+    # The process is part of the key: one that was forked from this one must not share children.
+    idle = _idle.setdefault((os.getpid(), module), [])
+    child = idle.pop() if idle else Child(module)
+    try:
+        yield LimitedSource(path, kind, child, memory, seconds or SECONDS)
+    finally:
+        if child.state == "open":
+            child.ask({"names": []})
+            child.state = "idle"
+        if child.state == "idle":
+            idle.append(child)
+        else:
+            child.close()
+
+
+def _close_all() -> None:
+    for (process, _), children in _idle.items():
+        while children and process == os.getpid():
+            children.pop().close()
+
+
+atexit.register(_close_all)

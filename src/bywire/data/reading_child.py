@@ -1,0 +1,151 @@
+"""What runs in the child process: a library reads a measurement file, under limits.
+
+Libraries believe what a file says of itself: a damaged one, or one that was made to, has them
+crash, run without an end, or ask for all memory. Here that ends a child, and nothing else.
+
+Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
+lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds}``; the answer
+is ``{columns}``. It asks for ``{names}`` as often as it likes, and ends with none; the answers are
+pieces ``{column, begin, count}`` and ``{end}``. ``{error}`` and ``{memory}`` end it early.
+
+On Linux the process imports the library once and forks for each file, so that a file costs
+milliseconds, starts from a sound state and has its own limits. Elsewhere it reads one file.
+"""
+
+from __future__ import annotations
+
+import importlib
+import json
+import math
+import os
+import struct
+import sys
+import time
+from collections.abc import Mapping
+from dataclasses import astuple
+from io import RawIOBase
+from pathlib import Path
+from typing import IO, Any, cast
+
+import numpy as np
+
+from bywire.core.errors import FileError
+from bywire.data.file_format import FileFormat, PieceSource, ReadOptions
+
+_LENGTH = struct.Struct("<I")
+
+
+def send(stream: IO[bytes], message: Mapping[str, Any], numbers: Any = b"") -> None:
+    """Write a message, and numbers behind it."""
+    text = json.dumps(message).encode()
+    for part in (_LENGTH.pack(len(text)) + text, memoryview(numbers).cast("B")):
+        left = part
+        while left:
+            left = left[stream.write(left) :]
+
+
+def receive(stream: IO[bytes]) -> dict[str, Any] | None:
+    """Return the next message; None where the other side has ended."""
+    head = bytearray(_LENGTH.size)
+    if not fill(stream, head):
+        return None
+    text = bytearray(_LENGTH.unpack(head)[0])
+    return cast(dict[str, Any], json.loads(text)) if fill(stream, text) else None
+
+
+def fill(stream: IO[bytes], buffer: Any) -> bool:
+    """Read as many bytes as a buffer has; return whether they came."""
+    left = memoryview(buffer).cast("B")
+    while left:
+        count = cast(RawIOBase, stream).readinto(left)
+        if not count:
+            return False
+        left = left[count:]
+    return True
+
+
+def main(module: str, is_forking: bool) -> None:
+    """Read the files that are asked for, until nobody asks any more."""
+    requests, answers = open(0, "rb", buffering=0), open(os.dup(1), "wb", buffering=0)  # noqa: SIM115
+    os.dup2(2, 1)  # what a library prints is no message
+    kind: FileFormat = importlib.import_module(module).FORMAT
+    try:
+        for name in kind.libraries:
+            importlib.import_module(name)
+        missing = ""
+    except ImportError as error:
+        missing = str(error)
+    while (request := receive(requests)) is not None:
+        if missing:
+            what = f"{request['path']}: the library that reads {kind.title} does not load"
+            send(answers, {"error": f"{what} ({missing}): install it again"})
+        elif not is_forking:
+            _serve(kind, request, requests, answers)
+            return
+        else:
+            child = os.fork()
+            if not child:
+                try:
+                    _limit(request["memory"])
+                    _serve(kind, request, requests, answers)
+                finally:
+                    os._exit(0)
+            status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+            if status:
+                send(answers, {"ended": status, "request": request["request"]})
+
+
+def _serve(
+    kind: FileFormat, request: Mapping[str, Any], requests: IO[bytes], answers: IO[bytes]
+) -> None:
+    """Answer the questions about one file."""
+    path = Path(request["path"])
+    try:
+        os.chdir(request["folder"])
+        _allow(request["seconds"])
+        with kind.open(path, ReadOptions()) as opened:
+            source = cast(PieceSource, opened)
+            columns = source.columns
+            send(answers, {"columns": [astuple(column) for column in columns.values()]})
+            while names := (receive(requests) or {"names": []})["names"]:
+                for name, begin, part in source.pieces(names):
+                    _allow(request["seconds"])
+                    numbers = np.ascontiguousarray(part, dtype=np.float64)
+                    place = {"column": names.index(name), "begin": begin, "count": numbers.size}
+                    send(answers, place, numbers)
+                send(answers, {"end": True})
+    except FileError as error:
+        send(answers, {"error": str(error)})
+    except MemoryError:
+        send(answers, {"memory": True})
+    except Exception as error:  # libraries fail in as many ways as files can be damaged
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
+        if isinstance(error, LookupError) or not reason:
+            reason = "its parts do not fit together"
+        what = f"{path} is damaged, as {kind.title} it cannot be read ({reason})"
+        hint = "copy it again, or export it again from where it was made"
+        send(answers, {"error": f"{what}: {hint}"})
+
+
+def _limit(memory: int) -> None:
+    """Limit the memory of this process to what it has and some bytes, and files that it writes."""
+    import resource
+
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    most = pages * resource.getpagesize() + memory
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (memory, memory))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+
+
+def _allow(seconds: float) -> None:
+    """Allow the time of a processor up to the next piece, for a child whose reader is gone."""
+    if sys.platform == "linux":
+        import resource
+
+        hard = resource.getrlimit(resource.RLIMIT_CPU)[1]
+        resource.setrlimit(resource.RLIMIT_CPU, (math.ceil(time.process_time() + seconds), hard))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1], sys.argv[2] == "forks")

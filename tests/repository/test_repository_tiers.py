@@ -1,0 +1,54 @@
+"""Every test runs in some recipe of ``tasks.py``, and what is published can be made again."""
+
+from __future__ import annotations
+
+import re
+import runpy
+
+import pytest
+from repository_sources import PROJECT, ROOT
+
+TASKS = runpy.run_path(str(ROOT / "tasks.py"))
+MARKERS = [text.split(":")[0] for text in PROJECT["tool"]["pytest"]["ini_options"]["markers"]]
+TIERS = [*TASKS["CHECKS"].values(), *TASKS["TRUST"].values()]
+
+
+def runs(command: list[str], marker: str) -> bool:
+    """Return whether a command runs the tests of one marker, or with "" those of none."""
+    if command[0] != "pytest":
+        return False
+    if "-m" not in command:
+        return True
+    wanted = re.fullmatch(r"(not )?(\w+)", command[command.index("-m") + 1])
+    assert wanted, f"{command}: only NAME and not NAME are understood here"
+    return (wanted[2] == marker) != bool(wanted[1])
+
+
+@pytest.mark.parametrize("marker", ["", *MARKERS])
+def test_every_tier_is_run_by_one_recipe(marker: str) -> None:
+    assert sum(runs(command, marker) for command in TIERS) == 1
+
+
+def test_the_gate_of_tiers_can_fail() -> None:
+    assert not runs(["pytest", "-m", "not slow"], "slow")
+    assert not runs(["pytest", "-m", "slow"], "")
+    assert not runs(["ruff", "check"], "")
+    assert runs(["pytest", "-m", "not slow"], "")
+    assert runs(["pytest"], "slow")
+
+
+@pytest.mark.parametrize("marker", MARKERS)
+def test_every_marker_is_used(marker: str) -> None:
+    texts = (path.read_text(encoding="utf-8") for path in (ROOT / "tests").rglob("test_*.py"))
+    assert any(f"mark.{marker}" in text for text in texts)
+
+
+def test_recipe_holds_the_lints_that_tests_rely_on() -> None:
+    assert ["ruff", "check", "."] in TIERS
+    assert ["mypy"] in TIERS
+    assert ["lint-imports"] in TIERS
+
+
+def test_every_published_study_can_be_made_again() -> None:
+    published = {path.stem for path in (ROOT / "docs" / "trust").glob("*.json")}
+    assert published == set(TASKS["STUDIES"])
