@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.probe import states
 from bywire.contracts.start import Start
-from bywire.contracts.trial import LARGE, Trial, constants
+from bywire.contracts.trial import LARGE, Trial, constants, lanes
 from bywire.core.signals import signals_of
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
@@ -94,10 +94,10 @@ def has_agreeing_lanes(trial: Trial) -> Iterator[Evidence]:
     """Find whether an ensemble's lanes compute what the single run does."""
     if find_compiler() is None:
         raise NotCheckedError("there is no C compiler: install the extra bywire[compiler]")
-    run = trial.free_run
+    run = trial.large_run(frictions=True)
     name, value = next(iter(constants(run)))
-    lanes = trial.lanes({name: [value]})
-    yield from _agree(simulate(run).values, lanes[0], run.model.Output, "a lane", trial)
+    lane = lanes(run, {name: [value]})[0]
+    yield from _agree(simulate(run).values, lane, run.model.Output, "a lane", trial)
 
 
 def _duration(start: Start) -> float:

@@ -83,21 +83,16 @@ class Trial:
             for tick in ticks for k in range(tick.n_instructions())
         )  # fmt: skip
 
-    @cached_property
-    def free_run(self) -> Run:
-        """A large run from the start, with states and memory recorded.
+    def large_run(self, frictions: bool) -> Run:
+        """Return a large run from the start, with states and memory recorded.
 
-        Where a controller rounds, it is the run of the plant alone: nothing has derivatives there.
+        Where a controller rounds it is that of the plant alone: a last digit can change a code, and
+        nothing has derivatives.
         """
         if self.rounds:
-            return self.drive.run()
-        run = self.start.run(LARGE)
-        return replace(run, model=Probe(self.model, held=False))
-
-    def lanes(self, variations: Mapping[str, Sequence[float]]) -> Array:
-        """Return the recordings of that run for other parameters, shape (cases, rows, signals)."""
-        run = self.free_run
-        return simulate_ensemble(run, variations, run.model.Output._fields).values
+            return self.drive.run(frictions=frictions)
+        probe = Probe(self.model, held=False, frictions=frictions)
+        return replace(self.start.run(LARGE), model=probe)
 
     def place(self, *members: str) -> Place:
         """Return where the first of some members of the model is written, else its class."""
@@ -119,3 +114,8 @@ def constants(run: Run) -> Iterator[tuple[str, float]]:
                 continue
             if [task.period for task in run.model.tasks(moved)] == periods:
                 yield name, float(value)
+
+
+def lanes(run: Run, variations: Mapping[str, Sequence[float]]) -> Array:
+    """Return all signals of a run for other parameters, shape (cases, rows, signals)."""
+    return simulate_ensemble(run, variations, run.model.Output._fields).values
