@@ -20,6 +20,9 @@ if TYPE_CHECKING:
     from bywire.api.convert import Conversion, convert
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
+    from bywire.api.agreement import agreement
+    from bywire.api.frequency_response import frequency_response
+    from bywire.api.linearize import linearize
     from bywire.api.margins import margins
     from bywire.api.replay import Replay, replay
     from bywire.api.run import BenchResult, run
@@ -58,6 +61,9 @@ _HOMES = {
     "read_recording": "data.netcdf",
     "replay": "api.replay",
     "resample": "data.alignment",
+    "agreement": "api.agreement",
+    "frequency_response": "api.frequency_response",
+    "linearize": "api.linearize",
     "margins": "api.margins",
     "run": "api.run",
     "simulate": "simulation.run",
@@ -84,6 +90,9 @@ __all__ = [
     "check",
     "convert",
     "identify",
+    "agreement",
+    "frequency_response",
+    "linearize",
     "load",
     "margins",
     "parameters",

@@ -15,9 +15,9 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.locus import Border, Locus
 from bywire.analysis.loop_curves import Family, LoopCurve
 from bywire.analysis.margins import UNSTABLE, LoopMargins
+from bywire.api.agreement import agreement_table, verdict
 from bywire.api.margins import margins_table, worst_texts
 from bywire.core.errors import ParameterError
-from bywire.report.agreement_report import agreement_table, verdict
 from bywire.report.differences import differences
 from bywire.report.loop_gain import loop_gain
 from bywire.report.nichols import nichols

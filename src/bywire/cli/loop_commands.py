@@ -15,7 +15,6 @@ from bywire.cli.options import (
     OutFolder,
     Parameters,
     changes,
-    execute,
 )
 from bywire.cli.show import show
 
@@ -46,9 +45,14 @@ def linearize_command(
     json: JsonFlag = False,
 ) -> None:
     """Make the exact linear model of a closed loop, with its sampling, or of a plant."""
-    execute(
-        "linear_command", loop, parameters, at, changes(set_), locus, reduce, friction, speed,
-        dither, out, json,
+    from bywire.api.linearize import linearize
+
+    show(
+        lambda _: linearize(
+            loop, parameters, at, changes(set_), locus=locus, reduce=reduce, friction=friction,
+            speed=speed, dither=dither,
+        ),
+        out, json,
     )  # fmt: skip
 
 
@@ -69,9 +73,14 @@ def frequency_response_command(
     json: JsonFlag = False,
 ) -> None:
     """Measure a closed loop's response by amplitude: friction, limits and sampling included."""
-    execute(
-        "frequency_response_command", loop, parameters, at, changes(set_), frequencies,
-        amplitudes, excitation, over, out, json,
+    from bywire.api.frequency_response import frequency_response
+
+    show(
+        lambda progress: frequency_response(
+            loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
+            excitation=excitation, over=over, progress=progress,
+        ),
+        out, json,
     )  # fmt: skip
 
 
@@ -88,10 +97,15 @@ def agreement_command(
     json: JsonFlag = False,
 ) -> None:
     """Show what makes a loop nonlinear, cause by cause; exit status 1 when it does not add up."""
-    status = execute(
-        "agreement_command", loop, parameters, at, changes(set_), frequencies, amplitudes, out, json
-    )
-    raise typer.Exit(status)
+    from bywire.api.agreement import agreement
+
+    show(
+        lambda progress: agreement(
+            loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
+            progress=progress,
+        ),
+        out, json,
+    )  # fmt: skip
 
 
 def margins_command(

@@ -65,6 +65,8 @@ def show(
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
             raise typer.Exit(INTERRUPTED) from None
+    for text in document.heed:
+        output.message(text)
     others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
     for text in dict.fromkeys([*others, *answer.warnings]):
         output.message(f"warning: {text}")

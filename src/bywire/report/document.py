@@ -142,6 +142,8 @@ class Document:
         Files of data.
     record
         File of the output folder that keeps the JSON object; none where it is empty.
+    heed
+        Lines for standard error before the result: what was set or left out.
     remarks
         Lines for standard error after the result, such as requirements that are not met.
     file_notes
@@ -162,6 +164,7 @@ class Document:
     banner: Banner | None = None
     attachments: Sequence[Attachment] = ()
     record: str = ""
+    heed: Sequence[str] = ()
     remarks: Sequence[str] = ()
     file_notes: Sequence[str] = ()
     prepare: Callable[[Path], None] | None = None

@@ -8,7 +8,8 @@ import xarray as xr
 
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.reach import leaving
-from bywire.cli.response_warnings import purity, warnings
+from bywire.api.frequency_response import purity
+from bywire.api.frequency_response import response_warnings as warnings
 from bywire.core.catalog import main_set, parameters
 
 

@@ -1,4 +1,4 @@
-"""Bandwidths by amplitude, of one case or over a range, as text and as JSON."""
+"""Bandwidths by amplitude, of one case or over a range, as tables and as JSON."""
 
 from __future__ import annotations
 
@@ -11,16 +11,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.response.large_signal import Variant, narrowest
-from bywire.report.table_text import table_text
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
-
-SHARES = {
-    "share_stuck": "stuck", "share_sat_current": "at current limit",
-    "share_sat_duty": "at duty limit", "share_sat_rate": "at rate limit",
-}  # fmt: skip
-"""shares of the time that are shown, with their titles"""
-
 
 NOTE = (
     "bandwidth: -3 dB; crossover and phase margin of the loop gain's describing function; shares "
@@ -28,37 +20,44 @@ NOTE = (
 )
 
 
-def figures_text(found: xr.Dataset, unit: str) -> str:
-    """Return a table of the first variant with a word on what it shows."""
-    return f"{table_text(figures_table(found, unit))}\n{NOTE}"
+def shares(found: xr.Dataset) -> dict[str, str]:
+    """Return the shares of the time that a response tells, with the titles of their columns."""
+    names = [str(name) for name in found if str(name).startswith("share_")]
+    return {name: _title(name.removeprefix("share_")) for name in names}
+
+
+def _title(flag: str) -> str:
+    """Return a mode's title; ``sat_`` names a limit."""
+    if flag.startswith("sat_"):
+        return f"at {flag.removeprefix('sat_').replace('_', ' ')} limit"
+    return flag.replace("_", " ")
 
 
 def figures_table(found: xr.Dataset, unit: str) -> Table:
     """Return bandwidth, crossover and limits of the first variant by amplitude."""
-    known = {name: title for name, title in SHARES.items() if name in found}
+    known = shares(found)
     heading = ["amplitude", "bandwidth", "crossover", "phase margin", *known.values()]
     rows = []
     for j, size in enumerate(found["amplitude"].values):
-        one = found.isel(variant=0, amplitude=j)
-        most = [f"{100.0 * float(one[name].max()):.3g} %" for name in known]
-        margin = amount(float(one["phase_margin"]), "deg", 3)
-        rows.append([amount(float(size), unit, 3), _frequency(one, "bandwidth"),
-                     _frequency(one, "crossover"), margin, *most])  # fmt: skip
+        case = found.isel(variant=0, amplitude=j)
+        most = [f"{100.0 * float(case[name].max()):.3g} %" for name in known]
+        margin = amount(float(case["phase_margin"]), "deg", 3)
+        rows.append([amount(float(size), unit, 3), _frequency(case, "bandwidth"),
+                     _frequency(case, "crossover"), margin, *most])  # fmt: skip
     return text_table(heading, rows)
 
 
-def over_text(
+def worst_line(
     found: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> str:
-    """Return the table of a range, and the worst case of every amplitude; see `over_table`."""
-    lines = []
+    """Return the worst case of every amplitude over a range as a line; see `over_table`."""
+    texts = []
     for j, size in enumerate(found["amplitude"].values):
         k = narrowest(found, j)
         width = _frequency(found.isel(variant=k, amplitude=j), "bandwidth")
         at = f"{range_[0]} = {amount(variants[k].label, range_[1])}"
-        lines.append(f"{width} for {amount(float(size), unit, 3)} at {at}")
-    table = table_text(over_table(found, variants, range_, unit))
-    return f"bandwidth (-3 dB) by amplitude\n{table}\nworst: {'; '.join(lines)}"
+        texts.append(f"{width} for {amount(float(size), unit, 3)} at {at}")
+    return f"worst: {'; '.join(texts)}"
 
 
 def over_table(
@@ -79,9 +78,9 @@ def over_table(
     """
     sizes = [amount(float(size), unit, 3) for size in found["amplitude"].values]
     rows = [
-        [amount(one.label, range_[1]),
+        [amount(variant.label, range_[1]),
          *(_frequency(found.isel(variant=k, amplitude=j), "bandwidth") for j in range(len(sizes)))]
-        for k, one in enumerate(variants)
+        for k, variant in enumerate(variants)
     ]  # fmt: skip
     return text_table([range_[0], *sizes], rows)
 
@@ -90,11 +89,11 @@ def figures_object(found: xr.Dataset, variant: int) -> list[dict[str, Any]]:
     """Return the figures of a variant by amplitude; null beyond the measured frequencies."""
     rows = []
     for j, size in enumerate(found["amplitude"].values):
-        one = found.isel(variant=variant, amplitude=j)
+        case = found.isel(variant=variant, amplitude=j)
         row: dict[str, Any] = {"amplitude": float(size)}
-        row |= _bounded(one, "bandwidth") | _bounded(one, "crossover")
-        row["phase_margin"] = _or_none(float(one["phase_margin"]))
-        row |= {f"largest_{name}": float(one[name].max()) for name in SHARES if name in found}
+        row |= _bounded(case, "bandwidth") | _bounded(case, "crossover")
+        row["phase_margin"] = _or_none(float(case["phase_margin"]))
+        row |= {f"largest_{name}": float(case[name].max()) for name in shares(found)}
         rows.append(row)
     return rows
 
@@ -102,9 +101,9 @@ def figures_object(found: xr.Dataset, variant: int) -> list[dict[str, Any]]:
 def over_object(found: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
     """Return the figures of all cases of a range, and the worst of every amplitude."""
     cases = [
-        {name: one.label, "figures": figures_object(found, k),
+        {name: variant.label, "figures": figures_object(found, k),
          "gain": _listed(found["gain"].values[k]), "phase": _listed(found["phase"].values[k])}
-        for k, one in enumerate(variants)
+        for k, variant in enumerate(variants)
     ]  # fmt: skip
     worst = []
     for j, size in enumerate(found["amplitude"].values):
@@ -114,8 +113,8 @@ def over_object(found: xr.Dataset, variants: Sequence[Variant], name: str) -> di
     return {"over": name, "cases": cases, "worst": worst}
 
 
-def _frequency(one: xr.Dataset, name: str) -> str:
-    value, f = float(one[name]), one["frequency"].values
+def _frequency(case: xr.Dataset, name: str) -> str:
+    value, f = float(case[name]), case["frequency"].values
     if math.isnan(value):
         return "-"
     if math.isinf(value):
@@ -123,9 +122,9 @@ def _frequency(one: xr.Dataset, name: str) -> str:
     return f"< {amount(float(f[0]), 'Hz', 3)}" if value == 0.0 else amount(value, "Hz", 3)
 
 
-def _bounded(one: xr.Dataset, name: str) -> dict[str, float | None]:
+def _bounded(case: xr.Dataset, name: str) -> dict[str, float | None]:
     """Return a frequency, or null with the bound that is known."""
-    value, f = float(one[name]), one["frequency"].values
+    value, f = float(case[name]), case["frequency"].values
     if math.isinf(value):
         return {name: None, f"{name}_above": float(f[-1])}
     if value == 0.0:
@@ -138,4 +137,4 @@ def _or_none(value: float) -> float | None:
 
 
 def _listed(values: NDArray[np.float64]) -> list[list[float | None]]:
-    return [[_or_none(one) for one in row] for row in values.tolist()]
+    return [[_or_none(value) for value in row] for row in values.tolist()]

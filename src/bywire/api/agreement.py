@@ -1,0 +1,215 @@
+"""Nonlinear and linear response of a loop, cause by cause: what makes it nonlinear."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bywire.analysis import agreement as measuring
+from bywire.analysis.agreement import EVERYTHING, GAIN, LIMITS, NOTHING, PHASE, Agreement
+from bywire.analysis.response.frequency_response import require_stable
+from bywire.api.loop_case import LoopCase, loop_case, spread
+from bywire.bench.running import Progress
+from bywire.core.errors import ParameterError
+from bywire.core.signals import signals_of
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Banner, Document, FigureBlock, Paragraph, Section, TableBlock
+from bywire.report.tables import Table, text_table
+from bywire.report.wording import amount
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_POINTS = 6
+_WIDTH = 140  # characters of a line of the table
+
+LABELS = {NOTHING: "nothing, small amplitude", LIMITS: "limits", EVERYTHING: "everything"}
+"""what a reader calls what is left on"""
+STEP = "step (computed)"
+"""what a reader calls the error of the simulation's step"""
+LEGEND = (
+    "Nonlinear response less the exact linear one, by what is left on; all rows but the first "
+    "with the large amplitude, at which limits of currents, voltages and rates act too. "
+    "-: the output sticks or does not settle. Largest: what has no number, else the cause that "
+    "moves the response most, limits alone, others by what they add to the limits. "
+    "Step: linear model of the simulation's midpoint rule less the exact one."
+)
+"""how to read the table"""
+
+
+@dataclass(frozen=True)
+class LoopAgreement(Answer):
+    """How far the nonlinear response of a loop is from its exact linear one, by what is left on.
+
+    Parameters
+    ----------
+    case
+        The loop, its parameters and its operating point.
+    differences
+        Nonlinear less linear, by cause and frequency.
+    small, large
+        Amplitudes [``unit``]: everything off is measured with the small one, causes with the large.
+    unit
+        SI unit of the shaken input.
+    """
+
+    case: LoopCase
+    differences: Agreement
+    small: float
+    large: float
+    unit: str
+
+    @property
+    def holds(self) -> bool:
+        """Whether both responses agree with everything off."""
+        return self.differences.holds
+
+    def document(self) -> Document:
+        """Return table, verdict and figure."""
+        case, found = self.case, self.differences
+        table = TableBlock(agreement_table(found), width=_WIDTH)
+        legend, text = Paragraph(LEGEND), verdict(found)
+        small, large = amount(self.small, self.unit, 3), amount(self.large, self.unit, 3)
+        sizes = f"small amplitude {small}, large amplitude {large}"
+        figure = FigureBlock(
+            self._draw,
+            "Size of the differences from the exact linear response; of single causes, what they "
+            "add to the limits. Smaller ones than shown lie at the lower edge.",
+            f"{case.loop.name}-agreement",
+        )
+        head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
+        return Document(
+            f"Agreement of loop {case.loop.name}",
+            case.subject.line,
+            sections=[
+                Section("Differences", [figure, table, legend]),
+                case.subject.made(f"{sizes[0].upper()}{sizes[1:]}."),
+            ],
+            brief=[f"{head}: nonlinear less linear", sizes, table, legend, text],
+            data=self._data(),
+            banner=Banner(text[0].upper() + text[1:], "good" if found.holds else "bad"),
+        )
+
+    def _draw(self) -> Figure:
+        from bywire.report.differences import differences
+
+        found = self.differences
+        sizes = {
+            LABELS.get(cause, cause): (
+                (found.gain[cause], found.phase[cause])
+                if cause in LABELS
+                else found.beyond_limits(cause)
+            )
+            for cause in found.gain
+        }
+        return differences(found.frequencies, sizes, (GAIN, PHASE))
+
+    def _data(self) -> dict[str, Any]:
+        found = self.differences
+        names = {NOTHING: "nothing", EVERYTHING: "everything"}
+        return {
+            **self.case.heading,
+            "amplitudes": {"small": self.small, "large": self.large},
+            "frequency": found.frequencies.tolist(),
+            "differences": {
+                names.get(cause, cause): {
+                    "gain_dB": found.gain[cause].tolist(), "phase_deg": found.phase[cause].tolist(),
+                }
+                for cause in found.gain
+            },
+            "step": {"gain_dB": found.step_gain.tolist(), "phase_deg": found.step_phase.tolist()},
+            "largest": [cause or None for cause in found.largest],
+            "tolerance": {"gain_dB": GAIN, "phase_deg": PHASE},
+            "holds": found.holds,
+        }  # fmt: skip
+
+
+@use_case
+def agreement(
+    loop: str,
+    parameters: str = "",
+    at: str = "",
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    frequencies: str = "",
+    amplitudes: str = "",
+    progress: Progress | None = None,
+) -> LoopAgreement:
+    """Compare nonlinear and linear response of a loop, cause by cause.
+
+    Parameters
+    ----------
+    loop, parameters, at, overrides
+        As of `bywire.margins`.
+    frequencies
+        ``"1 Hz:150 Hz:20"``, or a list with commas; six over the loop's band by default.
+    amplitudes
+        A small and a large one, ``"0.001 rad, 1 rad"``; the loop's own by default.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, sets of another brake, unstable loops.
+    """
+    case = loop_case(loop, parameters, at, overrides)
+    point = case.loop.point(case.par, case.value)
+    unit = signals_of(point.model.Stimulus)[case.loop.inputs[0]].unit
+    small, large = _amplitudes(case, amplitudes, unit)
+    wanted = (
+        spread(frequencies, "Hz", "frequencies", logarithmic=True)
+        if frequencies
+        else [float(f) for f in np.geomspace(*case.loop.band, _POINTS)]
+    )
+    require_stable(case.loop.closed(case.par, case.value))
+    found = measuring.agreement(
+        case.loop, case.par, case.value, wanted, (small, large), progress=progress
+    )
+    return LoopAgreement(case, found, small, large, unit)
+
+
+def _amplitudes(case: LoopCase, text: str, unit: str) -> tuple[float, float]:
+    """Return the small and the large amplitude [SI]."""
+    if not text:
+        return case.loop.amplitudes[0], case.loop.amplitudes[-1]
+    sizes = spread(text, unit, "amplitudes")
+    if len(sizes) != 2 or not sizes[0] < sizes[1]:
+        raise ParameterError(
+            f"--amplitudes {text}: two are wanted, the small one first: everything off is "
+            "measured with it, every cause with the large one"
+        )
+    return sizes[0], sizes[1]
+
+
+def verdict(found: Agreement) -> str:
+    """Return whether the responses agree with everything off, as a text with the limits."""
+    state = "agree" if found.holds else "DO NOT agree"
+    gain = max(map(abs, found.gain[NOTHING].tolist()))
+    phase = max(map(abs, found.phase[NOTHING].tolist()))
+    return (
+        f"with everything off both responses {state}: largest differences {gain:.2g} dB and "
+        f"{phase:.2g}° (at most {GAIN:g} dB and {PHASE:g}°)"
+    )
+
+
+def agreement_table(found: Agreement) -> Table:
+    """Return the differences, a row for what is left on, and the largest cause by frequency."""
+    heading = ["left on", *(amount(float(f), "Hz", 3) for f in found.frequencies)]
+    rows = [
+        [LABELS.get(cause, cause), *map(_cell, found.gain[cause], found.phase[cause])]
+        for cause in found.gain
+    ]
+    rows.append([STEP, *map(_cell, found.step_gain, found.step_phase)])
+    return text_table(heading, [*rows, ["largest", *(one or "-" for one in found.largest)]])
+
+
+def _cell(gain: float, phase: float) -> str:
+    if not (math.isfinite(gain) and math.isfinite(phase)):
+        return "-"
+    return f"{round(gain, 3) + 0.0:+.3f} dB {round(phase, 2) + 0.0:+.2f}°"  # never -0

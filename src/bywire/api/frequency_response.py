@@ -1,0 +1,414 @@
+"""A closed loop's response by amplitude: friction, limits and sampling included."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.analysis.response import frequency_response as by_sines
+from bywire.analysis.response.broadband import Broadband, broadband_response
+from bywire.analysis.response.dataset import Sweep
+from bywire.analysis.response.frequency_response import require_stable
+from bywire.analysis.response.large_signal import Variant, variants_over, widths, with_widths
+from bywire.analysis.response.reach import leaving
+from bywire.api.bandwidth_tables import (
+    NOTE,
+    figures_object,
+    figures_table,
+    over_object,
+    over_table,
+    worst_line,
+)
+from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
+from bywire.bench.running import Progress
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.parameters import leaf_fields
+from bywire.core.signals import signals_of
+from bywire.core.units import shown
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import (
+    Attachment,
+    Block,
+    Document,
+    FigureBlock,
+    Flat,
+    Listing,
+    Section,
+    TableBlock,
+)
+from bywire.report.tables import Table, text_table
+from bywire.report.wording import amount
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_POINTS = 20
+_EXCITATIONS = ("sine", "multisine", "chirp")
+
+
+@dataclass(frozen=True)
+class FrequencyResponse(Answer):
+    """The measured response of a closed loop, beside the exact linear one.
+
+    Parameters
+    ----------
+    case
+        The loop, its parameters and its operating point.
+    data
+        Gain and phase over variant, amplitude and frequency, with bandwidths and shares of the
+        time in saturation; variables with ``units`` and ``long_name``.
+    linear
+        The linear response of the first variant, complex, shape (frequencies,).
+    variants
+        The cases of the range; a single one without.
+    range
+        Name and SI unit of what varies; an empty name without a range.
+    unit
+        SI unit of the amplitudes.
+    note
+        What was set so that the loop can be shaken for as long as it takes; empty for nothing.
+    tolerance
+        Share within which a window had to repeat the one before.
+    """
+
+    case: LoopCase
+    data: xr.Dataset
+    linear: NDArray[np.complex128]
+    variants: tuple[Variant, ...]
+    range: tuple[str, str]
+    unit: str
+    note: str
+    tolerance: float
+
+    @property
+    def warnings(self) -> list[str]:
+        """What left the brake's range, what stuck, and what never repeated."""
+        return response_warnings(self.data, self.variants, self.unit, self.tolerance)
+
+    def document(self) -> Document:
+        """Return gain and phase, bandwidths by amplitude, and the Bode plot."""
+        loop, found = self.case.loop, self.data
+        table = TableBlock(
+            _table(found, self.linear, self.unit), "Gain and phase by frequency and amplitude."
+        )
+        heed = [self.note, *self.warnings] if self.note else self.warnings
+        listing: list[Block] = [Listing(heed)] if heed else []
+        bode = FigureBlock(
+            self._bode,
+            "Closed loop: the exact linear response without friction, and the nonlinear ones.",
+            f"{loop.name}-frequency-response",
+        )
+        method = f"Excitation: {found.attrs['excitation']}. {purity(found)}."
+        return Document(
+            f"Frequency response of loop {loop.name}",
+            self.case.subject.line,
+            sections=lambda: [
+                Section("Response", [*listing, bode]),
+                Section("Bandwidth by amplitude", self._bandwidths()),
+                Section("Numbers", [table]),
+                self.case.subject.made(method),
+            ],
+            brief=self._brief(table),
+            data=self._data(),
+            attachments=[
+                Attachment(f"{loop.name}-frequency-response.nc", partial(_recorded, found))
+            ],
+            heed=[self.note] if self.note else [],
+        )
+
+    def _brief(self, table: TableBlock) -> list[str | Flat]:
+        case, found = self.case, self.data
+        head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
+        if self.range[0]:
+            over = TableBlock(over_table(found, self.variants, self.range, self.unit))
+            worst = worst_line(found, self.variants, self.range, self.unit)
+            return [f"{head}: bandwidth (-3 dB) by amplitude", over, worst]
+        excitation = found.attrs["excitation"]
+        peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
+        return [
+            f"{head}: gain and phase by amplitude", *(peaks if excitation != "sine" else []),
+            table, purity(found), "", TableBlock(figures_table(found, self.unit)), NOTE,
+        ]  # fmt: skip
+
+    def _bandwidths(self) -> list[Block]:
+        """Return what a page says of bandwidths."""
+        note = f"{NOTE[0].upper()}{NOTE[1:]}.{self._first(' Of the first case: ', '.')}"
+        blocks: list[Block] = [TableBlock(figures_table(self.data, self.unit), note)]
+        if not self.range[0]:
+            return blocks
+        caption = "Bandwidth over the range; rings: worst cases. All else shows the first case."
+        over = TableBlock(
+            over_table(self.data, self.variants, self.range, self.unit), "Bandwidth by amplitude."
+        )
+        name = f"{self.case.loop.name}-bandwidth"
+        return [*blocks, FigureBlock(self._over_range, caption, name), over]
+
+    def _first(self, before: str, after: str = "") -> str:
+        """Return which case of a range is shown where only one is; empty without a range."""
+        if not self.range[0]:
+            return ""
+        label = amount(self.variants[0].label, self.range[1])
+        return f"{before}{self.range[0]} = {label}{after}"
+
+    def _bode(self) -> Figure:
+        from bywire.report.bode import Response, bode
+
+        found = self.data
+        f = found["frequency"].values
+        lines = [Response(f"linear, without friction{self._first(', ')}", f, self.linear)]
+        for k, size in enumerate(found["amplitude"].values):
+            at = found.isel(variant=0, amplitude=k)
+            value = at["gain"].values * np.exp(1j * np.radians(at["phase"].values))
+            label = f"amplitude {amount(float(size), self.unit, 3)}"
+            lines.append(Response(label, f, value, measured=True))
+        return bode(lines)
+
+    def _over_range(self) -> Figure:
+        from bywire.report.bandwidth_range import bandwidth_range
+
+        return bandwidth_range(self.data, [v.label for v in self.variants], *self.range)
+
+    def _data(self) -> dict[str, Any]:
+        found, loop = self.data, self.case.loop
+        names = [str(name) for name in found if found[name].ndim == 3]
+        shown = {
+            **self.case.heading,
+            "excitation": found.attrs["excitation"],
+            "inputs": list(loop.inputs),
+            "output": loop.output,
+            "frequency": found["frequency"].values.tolist(),
+            "amplitude": found["amplitude"].values.tolist(),
+            **{name: found[name].values[0].tolist() for name in names},
+            "linear": {
+                "gain": np.abs(self.linear).tolist(),
+                "phase": np.degrees(np.unwrap(np.angle(self.linear))).tolist(),
+            },
+            "figures": figures_object(found, 0),
+        }
+        if self.range[0]:
+            shown |= over_object(found, self.variants, self.range[0])
+        return shown
+
+
+@use_case
+def frequency_response(
+    loop: str,
+    parameters: str = "",
+    at: str = "",
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    frequencies: str = "",
+    amplitudes: str = "",
+    excitation: str = "sine",
+    over: str = "",
+    progress: Progress | None = None,
+) -> FrequencyResponse:
+    """Measure a closed loop's response by amplitude on the nonlinear model.
+
+    Parameters
+    ----------
+    loop, parameters, at, overrides
+        As of `bywire.margins`.
+    frequencies
+        ``"1 Hz:150 Hz:20"``, or a list with commas; twenty over the loop's band by default.
+    amplitudes
+        With their unit and commas; the loop's own by default.
+    excitation
+        ``"sine"`` (one frequency at a time), ``"multisine"``, or ``"chirp"``.
+    over
+        Range for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, sets of another brake, unstable loops.
+    """
+    if excitation not in _EXCITATIONS:
+        raise unknown_name("excitation", excitation, _EXCITATIONS)
+    case = loop_case(loop, parameters, at, overrides)
+    point = case.loop.point(case.par, case.value)
+    unit = signals_of(point.model.Stimulus)[case.loop.inputs[0]].unit
+    wanted = (
+        spread(frequencies, "Hz", "frequencies", logarithmic=True)
+        if frequencies
+        else [float(f) for f in np.geomspace(*case.loop.band, _POINTS)]
+    )
+    sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else list(case.loop.amplitudes)
+    base, note = _sustained(case, overrides)
+    variants, varied = _variants(base, case, over)
+    point = variants[0].point
+    flags = [n for n in point.model.Output._fields if n == "stuck" or n.startswith("sat_")]
+    sweep = Sweep(
+        case.loop.inputs, case.loop.output, wanted, sizes, flags=flags,
+        whole=case.loop.whole(point.par), saturations=case.loop.saturations,
+    )  # fmt: skip
+    found = _measured(variants, sweep, excitation, progress or _silent)
+    found = with_widths(found, widths(variants, found))
+    linear = variants[0].linear(found["frequency"].values)
+    return FrequencyResponse(
+        case, found, linear, tuple(variants), varied, unit, note, sweep.tolerance
+    )
+
+
+def _silent(label: str, share: float) -> None:
+    """Show no progress."""
+
+
+def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str]:
+    """Return the loop such that it can be shaken for as long as it takes, and what that changed.
+
+    What the user set stays.
+    """
+    loop = case.loop
+    par = case.par.replace({k: v for k, v in loop.sustained.items() if k not in changes})
+    before, after = case.par.flat(), par.flat()
+    units = {name: leaf.unit.symbol for name, leaf in leaf_fields(type(case.par)).items()}
+    texts = [
+        f"{name} = {shown(value, units[name]) if name in units else value}"
+        for name, value in after.items()
+        if value != before[name]
+    ]
+    note = f"set for sines that last: {', '.join(texts)}; --set keeps another value"
+    return Variant(loop, par, case.value), note if texts else ""
+
+
+def _variants(
+    base: Variant, case: LoopCase, range_: str
+) -> tuple[list[Variant], tuple[str, str]]:
+    """Return the cases of a range, or the one without, and name and unit of what varies.
+
+    Raises
+    ------
+    ParameterError
+        When the linear loop is unstable in one of them.
+    """
+    if not range_:
+        require_stable(base.loop.closed(base.par, base.value))
+        return [base], ("", "1")
+    name, unit, values = over_range(range_, case)
+    variants = variants_over(base, name, values)
+    for variant in variants:
+        try:
+            require_stable(base.loop.closed(variant.par, variant.value))
+        except ParameterError as error:
+            raise ParameterError(f"{name} = {amount(variant.label, unit)}: {error}") from None
+    return variants, (name, unit)
+
+
+def _measured(
+    variants: Sequence[Variant],
+    sweep: Sweep,
+    excitation: str,
+    progress: Progress,
+) -> xr.Dataset:
+    """Return the response of all cases, each around its own operating point."""
+    points = [variant.point.run() for variant in variants]
+    if excitation == "sine":
+        found = by_sines.frequency_response(points[0], sweep, progress, points=points)
+        return found.assign_attrs(excitation=excitation)
+    kind = Broadband(cast(Any, excitation))
+    return broadband_response(points[0], sweep, kind, progress, points=points)
+
+
+def response_warnings(
+    found: xr.Dataset, variants: Sequence[Variant], unit: str, tolerance: float
+) -> list[str]:
+    """Return what left the brake's range, what stuck, and what never repeated.
+
+    Parameters
+    ----------
+    found
+        Response.
+    variants
+        Its cases.
+    unit
+        SI unit of the amplitudes.
+    tolerance
+        Share within which a window had to repeat the one before.
+    """
+    texts = []
+    for k, size in enumerate(found["amplitude"].values):
+        row = found.isel(amplitude=k)
+        label = f"amplitude {amount(float(size), unit, 3)}"
+        reasons = (leaving(case.loop, case.par, case.value, float(size)) for case in variants)
+        if reason := next(filter(None, reasons), ""):
+            texts.append(f"{label}: it asks for set points out of the brake's range: {reason}")
+        still, restless = np.isnan(row["gain"].values), row["settled"].values == 0
+        if still.any():
+            texts.append(f"{label}: the output sticks at {_cases(found, still)}: no gain")
+        shaken = restless & ~still
+        if shaken.any():
+            scatter = float(np.nanmax(row["scatter"].values[shaken]))
+            texts.append(
+                f"{label}: no window repeats the one before within {100 * tolerance:g} % at "
+                f"{_cases(found, shaken)} (a limit cycle, a drift, or the encoder's resolution): "
+                f"shown are means of the last windows; their root mean square distance from the "
+                f"mean is up to {amount(100 * scatter, 'percent', 2)}"
+            )
+    if found["unsettled_substeps"].values.any():
+        texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
+    return texts
+
+
+def purity(found: xr.Dataset) -> str:
+    """Return the least coherence by amplitude, as what the excitation makes of it.
+
+    Parameters
+    ----------
+    found
+        Response to sines or, then averaged over windows, to all frequencies at once.
+    """
+    lowest = found["coherence"].min(dim="frequency").values[0]
+    shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
+    if found.attrs["excitation"] == "sine":
+        return (
+            f"least share of the output's power at the sine: {shares} (harmonics, dither and "
+            "ripple are the rest)"
+        )
+    return f"lowest coherence of set point and output: {shares}"
+
+
+def _cases(found: xr.Dataset, which: NDArray[np.bool_]) -> str:
+    count = int(which.sum())
+    many = "frequency" if count == 1 else "frequencies"
+    return f"{count} {many}" + (" of all cases" if found.sizes["variant"] > 1 else "")
+
+
+def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
+
+    sizes = found["amplitude"].values
+    heading = ["frequency", "linear"]
+    heading += [amount(float(size), unit, 3) for size in sizes]
+    rows = []
+    phases = np.degrees(np.unwrap(np.angle(linear)))
+    for k, f in enumerate(found["frequency"].values):
+        row = [amount(float(f), "Hz", 4), _cell(float(np.abs(linear[k])), float(phases[k]))]
+        for j in range(len(sizes)):
+            at = found.isel(variant=0, amplitude=j, frequency=k)
+            row.append(_cell(float(at["gain"]), float(at["phase"])))
+        rows.append(row)
+    return text_table(heading, rows)
+
+
+def _cell(gain: float, phase: float) -> str:
+    if not math.isfinite(gain):
+        return "sticks"
+    decibel = round(20.0 * math.log10(gain), 2) + 0.0  # no negative zero
+    return f"{decibel:.2f} dB {phase:.1f}°"
+
+
+def _recorded(found: xr.Dataset, path: Path) -> Path:
+    from bywire.data.netcdf import write_recording
+
+    return write_recording(found, path)

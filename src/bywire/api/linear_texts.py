@@ -1,0 +1,230 @@
+"""What is said of linear models: their JSON objects, and lines on reductions, loci and dither."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.rates import rates
+from bywire.analysis.locus import Locus
+from bywire.analysis.periodic.averaged_map import PeriodicModel
+from bywire.analysis.reduction.error import ReductionError
+from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
+from bywire.bench.values import number
+from bywire.core.errors import ParameterError, quoted
+from bywire.core.signals import signals_of
+from bywire.report.document import Attachment, Flat, Paragraph, TableBlock
+from bywire.report.rate_table import left_out, rate_table
+from bywire.report.wording import amount
+
+_DIGITS = 9  # of an order: more is no order
+
+
+def poles_block(model: LinearModel, caption: str = "") -> list[Flat]:
+    """Return the table of a model's poles, and what it leaves out."""
+    return [TableBlock(rate_table(model), caption), *map(Paragraph, left_out(model))]
+
+
+def json_file(name: str, content: Mapping[str, Any]) -> Attachment:
+    """Return a file that holds a JSON object."""
+    return Attachment(name, partial(_write_json, content))
+
+
+def _write_json(content: Mapping[str, Any], path: Path) -> Path:
+    from bywire.report.files import write_bytes
+
+    return write_bytes(path, json.dumps(content, indent=1).encode())
+
+
+def matrices(model: LinearModel) -> dict[str, Any]:
+    """Return matrices, names and poles of a model, and zeros, poles and factor of each path."""
+    return {**state_space(model), "transfer_functions": transfers(model)}
+
+
+def state_space(model: LinearModel) -> dict[str, Any]:
+    """Return matrices, names, units and poles of a model."""
+    return {
+        "period": model.period,
+        "A": model.A.tolist(), "B": model.B.tolist(), "C": model.C.tolist(), "D": model.D.tolist(),
+        "states": list(model.states), "inputs": list(model.inputs), "outputs": list(model.outputs),
+        "state_units": list(model.state_units), "input_units": list(model.input_units),
+        "output_units": list(model.output_units),
+        "poles": pairs(model.poles()),
+    }  # fmt: skip
+
+
+def transfers(model: LinearModel) -> list[dict[str, Any]]:
+    """Return zeros, poles and factor of every path of a model."""
+    found = []
+    for output in model.outputs:
+        for input in model.inputs:
+            path = model.transfer(input, output)
+            found.append({
+                "input": input, "output": output, "unit": path.unit, "factor": path.factor,
+                "zeros": pairs(path.zeros), "poles": pairs(path.poles),
+            })  # fmt: skip
+    return found
+
+
+def pairs(values: Any) -> list[list[float]]:
+    """Return complex numbers as lists of two."""
+    return [[float(z.real), float(z.imag)] for z in np.asarray(values, dtype=complex)]
+
+
+def reduced(model: LinearModel, text: str, band: float | None = None) -> Reduced:
+    """Return the reduced model that a text asks for.
+
+    Parameters
+    ----------
+    model
+        Full model.
+    text
+        An order, ``"4"``, or a band, ``"150 Hz"``: as few states as 1 % of error allows there.
+    band
+        Frequency [Hz] up to which the error of an order is told; the model's own where None.
+
+    Raises
+    ------
+    ParameterError
+        When it is neither, or out of range.
+    UnitError
+        When the band has a wrong unit.
+    """
+    if _is_number(text):
+        if not text.strip().isdecimal() or not int(text):
+            raise ParameterError(
+                f"--reduce {quoted(text)}: an order is a whole number >= 1; with a unit, it is a "
+                "band, for instance '150 Hz'"
+            )
+        if len(text.strip()) > _DIGITS:
+            raise ParameterError(f"--reduce {quoted(text)}: no model has so many states")
+        return reduce(model, order=int(text), band=band)
+    return reduce(model, band=number(text, "Hz", "--reduce"), tolerance=TOLERANCE)
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
+
+
+def reduced_object(found: Reduced) -> dict[str, Any]:
+    """Return the JSON object of a reduced model."""
+    return {
+        **matrices(found.model),
+        "order": len(found.model.states),
+        "kept": found.kept,
+        "hankel": found.hankel.tolist(),
+        "bound": found.bound.tolist(),
+        "error": error_object(found.error),
+    }
+
+
+def reduced_line(found: Reduced) -> str:
+    """Return order and error of a reduced model as a line."""
+    kept = f", {found.kept} of them kept as they are not stable" if found.kept else ""
+    return f"reduced to {len(found.model.states)} states{kept}; {error_line(found.error)}"
+
+
+def error_object(error: ReductionError) -> dict[str, Any]:
+    """Return the JSON object of an error over a band."""
+    return {
+        "band_Hz": [error.low, error.high],
+        "relative": error.relative,
+        "gain_dB": error.gain,
+        "phase_deg": error.phase,
+        "at_Hz": error.at,
+        "output": error.channel[0],
+        "input": error.channel[1],
+        "poles": error.poles,
+    }
+
+
+def error_line(error: ReductionError) -> str:
+    """Return an error over a band as a line."""
+    return (
+        f"largest error up to {error.high:.4g} Hz: {_percent(error.relative)} "
+        f"({error.gain:.2g} dB, {error.phase:.2g} degrees), at {error.at:.3g} Hz"
+        + (f" in {error.channel[0]} by {error.channel[1]}" if error.channel[0] else "")
+        + ("" if math.isnan(error.poles) else f"; its poles there {_percent(error.poles)} off")
+    )
+
+
+def _percent(share: float) -> str:
+    return amount(100.0 * share, "percent", 2)
+
+
+def locus_object(found: Locus) -> dict[str, Any]:
+    """Return values, poles by value [real, imaginary], and where stability changes."""
+    return {
+        "over": found.name,
+        "unit": found.unit,
+        "values": found.values.tolist(),
+        "period": found.period,
+        "poles": [pairs(row) for row in found.poles],
+        "stable": [bool(stable) for stable in found.stable],
+        "borders": [
+            {"value": b.value, "rate": [b.rate.real, b.rate.imag], "stable_above": b.above}
+            for b in found.borders
+        ],
+    }
+
+
+def locus_lines(found: Locus) -> list[str]:
+    """Return where over its range a loop is stable, a text each."""
+    from bywire.report.root_locus import border_text
+
+    if not found.borders:
+        state = "stable" if found.stable.all() else "unstable"
+        return [f"{state} at all {len(found.values)} values"]
+    return [border_text(border, found.name, found.unit) for border in found.borders]
+
+
+def dithered_object(model: PeriodicModel) -> dict[str, Any]:
+    """Return the JSON object of the averaged map, and the motion that it is about."""
+    linear = model.averaged
+    shown = state_space(linear)
+    names = ("period", "A", "B", "C", "D", "states", "inputs", "outputs", "poles")
+    return {
+        **{name: shown[name] for name in names},
+        "rates": pairs(rates(linear)),
+        "stable": linear.is_stable,
+        "mean": model.mean,
+        "ripple": model.ripple,
+        "steady_gain": model.steady_gain,
+        "stuck": model.orbit.stuck,
+        "distance": model.orbit.distance,
+    }
+
+
+def dithered_line(model: PeriodicModel) -> str:
+    """Return the motion that the model is about as a line."""
+    linear = model.averaged
+    unit = signals_of(model.run.model.Output)[model.output].unit
+    stable = "stable" if linear.is_stable else "UNSTABLE"
+    return (
+        f"with friction and dither, averaged over {linear.period * 1e3:g} ms: {stable}; "
+        f"{model.output} = {amount(model.mean, unit)} in the mean, "
+        f"{amount(model.ripple, unit)} of ripple, stuck {100 * model.orbit.stuck:.3g} % of the "
+        f"time, steady gain {model.steady_gain:.4g}"
+    )
+
+
+def small_gains_line(model: PeriodicModel, band: tuple[float, float]) -> str:
+    """Return the gain to small sines at five frequencies of a band [Hz] as a line."""
+    highest = min(band[1], 0.5 / model.averaged.period)
+    frequencies = np.geomspace(band[0], highest, 5)
+    gains = ", ".join(
+        f"{abs(h):.3g} at {f:.3g} Hz"
+        for f, h in zip(frequencies, model.response(frequencies), strict=True)
+    )
+    return f"gain to small sines: {gains}"
