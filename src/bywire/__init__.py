@@ -21,12 +21,14 @@ if TYPE_CHECKING:
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
     from bywire.api.agreement import agreement
+    from bywire.api.design import design
     from bywire.api.frequency_response import frequency_response
     from bywire.api.linearize import linearize
     from bywire.api.margins import margins
     from bywire.api.replay import Replay, replay
     from bywire.api.run import BenchResult, run
     from bywire.api.trust import TrustStudy, trust
+    from bywire.api.study import study
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
     from bywire.core.catalog import parameters
@@ -64,6 +66,8 @@ _HOMES = {
     "agreement": "api.agreement",
     "frequency_response": "api.frequency_response",
     "linearize": "api.linearize",
+    "design": "api.design",
+    "study": "api.study",
     "margins": "api.margins",
     "run": "api.run",
     "simulate": "simulation.run",
@@ -91,6 +95,7 @@ __all__ = [
     "convert",
     "identify",
     "agreement",
+    "design",
     "frequency_response",
     "linearize",
     "load",
@@ -105,6 +110,7 @@ __all__ = [
     "simulate_ensemble",
     "simulate_with_sensitivities",
     "trust",
+    "study",
     "write_measurement",
     "write_recording",
 ]

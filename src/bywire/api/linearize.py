@@ -22,6 +22,7 @@ from bywire.analysis.reduction.reduce import Reduced
 from bywire.api import linear_texts as texts
 from bywire.api.linearize_plant import LinearizedPlant, PlantLocus, linearize_plant, plant_locus
 from bywire.api.loop_case import LoopCase, loop_case, over_range
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
@@ -262,9 +263,14 @@ def _dithered(case: LoopCase) -> PeriodicModel:
     if not case.loop.whole(case.par):
         raise ParameterError(
             f"--dither: loop {case.loop.name!r} of {case.name} has none; it takes a loop through "
-            "which a dither runs, switched on in the parameters of its ECU"
+            f"which a dither runs ({_dithered_loops()}), switched on in the parameters of its ECU"
         )
     return dithered_loop(case.loop, case.par, case.value)
+
+
+def _dithered_loops() -> str:
+    known = LOOPS.all().values()
+    return ", ".join(each.name for each in known if each.whole(parameters(main_set(each.assembly))))
 
 
 def _poles(model: LinearModel, width: float) -> Figure:

@@ -15,8 +15,8 @@ from bywire.cli.options import (
     OutFolder,
     Parameters,
     changes,
-    execute,
 )
+from bywire.cli.show import show
 
 
 def study_command(
@@ -34,7 +34,9 @@ def study_command(
     json: JsonFlag = False,
 ) -> None:
     """Compare designs of a brake at equal demands: the best, what limits it, at what price."""
-    execute("study_command", name, parameters, changes(set_), out, json)
+    from bywire.api.study import study
+
+    show(lambda progress: study(name, parameters, changes(set_), progress=progress), out, json)
 
 
 def design_command(
@@ -68,12 +70,13 @@ def design_command(
     json: JsonFlag = False,
 ) -> None:
     """Choose a loop's gains from requirements; exit status 1 when they cannot be met."""
-    from bywire.cli.design_inputs import Wanted
+    from bywire.api.design import design
 
-    wanted = Wanted(
-        requirements, require or [], over or [], amplitudes, schedule, linear_only, seed
-    )
-    status = execute(
-        "design_command", loop, parameters, at, changes(set_), wanted, out, json
+    show(
+        lambda progress: design(
+            loop, parameters, at, changes(set_), require=require or (), requirements=requirements,
+            over=over or (), amplitudes=amplitudes, schedule=schedule, linear_only=linear_only,
+            seed=seed, progress=progress,
+        ),
+        out, json,
     )  # fmt: skip
-    raise typer.Exit(status)

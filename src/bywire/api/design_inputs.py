@@ -1,10 +1,10 @@
-"""What a design on the command line starts from: requirements, what may be chosen, a trial."""
+"""What a design starts from: requirements, what may be chosen, a trial."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
@@ -17,26 +17,13 @@ from bywire.synthesis.trial import Trial
 Spans = Mapping[str, tuple[float, float]]
 
 
-@dataclass(frozen=True)
-class Wanted:
-    """What the command line asks for, as it stands there."""
-
-    requirements: Path | None
-    require: Sequence[str]
-    over: Sequence[str]
-    amplitudes: str
-    schedule: bool
-    linear_only: bool
-    seed: int
-
-
-def requirements_of(wanted: Wanted) -> tuple[Requirement, ...]:
-    """Return the requirements of a file and of the command line."""
-    return read([*_from_file(wanted.requirements), *wanted.require])
+def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Requirement, ...]:
+    """Return the requirements of a file and of texts such as ``"bandwidth >= 10 Hz"``."""
+    return read([*_from_file(None if file is None else Path(file)), *texts])
 
 
 def left_to_choose(
-    loop: str, own: Spans, changes: Mapping[str, str]
+    loop: str, own: Spans, changes: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
     """Return what may be chosen: what the user has set stays.
 
@@ -53,25 +40,22 @@ def left_to_choose(
     return left
 
 
-def tunables_of(chosen: LoopCase) -> Spans:
+def tunables_of(case: LoopCase) -> Spans:
     """Return the loop's tunables; with its schedule on, those of the operating point's region."""
-    schedule = chosen.loop.schedule
-    if schedule is None or not schedule.is_on(chosen.par):
-        return chosen.loop.tunables
-    return schedule.regions[schedule.region(chosen.par, chosen.value)]
+    schedule = case.loop.schedule
+    if schedule is None or not schedule.is_on(case.par):
+        return case.loop.tunables
+    return schedule.regions[schedule.region(case.par, case.value)]
 
 
-def trial_of(chosen: LoopCase, changes: Mapping[str, str], wanted: Wanted) -> Trial | None:
-    """Return what the design is tried on; None where the bench is left out."""
-    if wanted.linear_only:
-        return None
-    loop = chosen.loop
-    model = loop.point(chosen.par, chosen.value).model
+def trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
+    """Return what the design is tried on; ``amplitudes`` are those of the sines, with units."""
+    loop = case.loop
+    model = loop.point(case.par, case.value).model
     unit = signals_of(model.Stimulus)[loop.inputs[0]].unit
-    sizes = spread(wanted.amplitudes, unit, "amplitudes") if wanted.amplitudes else []
-    bench = Bench(loop.proof, chosen.name, changes) if loop.proof else None
-    amplitudes = tuple(sizes) or loop.amplitudes[1:]
-    return Trial(loop, chosen.par, chosen.value, amplitudes, bench)
+    sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
+    bench = Bench(loop.proof, case.name, changes) if loop.proof else None
+    return Trial(loop, case.par, case.value, tuple(sizes), bench)
 
 
 def _from_file(path: Path | None) -> list[str]:

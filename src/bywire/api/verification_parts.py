@@ -3,40 +3,37 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping
+from typing import Any
 
 from bywire.api.loop_case import LoopCase
+from bywire.core.signals import signals_of
+from bywire.report.tables import Table, text_table
+from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.candidate import Candidate
 from bywire.synthesis.requirement import FIGURES
 from bywire.synthesis.verification import Verification
 
-if TYPE_CHECKING:
-    from bywire.report.tables import Table
-
-    Part = str | Table
-
+Part = str | Table
+"""a sentence or a table of a result"""
 _PAIRS = 6
 
 
 def verification_parts(
-    chosen: LoopCase, nominal: Mapping[str, float], tried: Verification
+    case: LoopCase, nominal: Mapping[str, float], tried: Verification
 ) -> list[Part]:
     """Return tables and sentences on the linear design, and on the retuned gains, on the bench.
 
     ``nominal`` are the figures of the linear design's nominal model.
     """
-    from bywire.report.tables import text_table
-    from bywire.report.wording import amount
-
     columns = [("linear design", tried.linear)]
     if tried.tuning is not None:
         columns.append(("retuned", tried.tuning.best))
     shown = [one for _, one in columns]
-    rows = _figure_rows(chosen, "", [one.figures for one in shown])
+    rows = _figure_rows(case, "", [one.figures for one in shown])
     for label in tried.final.corners:
-        rows += _figure_rows(chosen, f" at {label}", [one.corners.get(label) for one in shown])
+        rows += _figure_rows(case, f" at {label}", [one.corners.get(label) for one in shown])
     for name in ("phase_margin", "gain_margin", "disk_margin"):
         both = [nominal, tried.nominal][: len(columns)]
         cells = [figure_text(name, one[name]) for one in both]
@@ -44,7 +41,7 @@ def verification_parts(
     parts: list[Part] = [text_table(["nonlinear bench", *(c for c, _ in columns)], rows)]
     if not tried.linear.figures.step and tried.kpis:
         kpis = [[one.name, amount(one.value, one.unit)] for one in tried.kpis]
-        parts.append(text_table([chosen.loop.proof, "final gains"], kpis))
+        parts.append(text_table([case.loop.proof, "final gains"], kpis))
     labels = tried.final.corners
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
@@ -66,17 +63,8 @@ def verification_parts(
     return parts
 
 
-def as_lines(parts: Sequence[Part]) -> str:
-    """Return tables and sentences as text for a terminal."""
-    from bywire.report.table_text import table_text
-
-    return "\n".join(one if isinstance(one, str) else table_text(one) for one in parts)
-
-
 def figure_text(name: str, value: float) -> str:
     """Return a figure with its unit; a gain margin as a factor and in dB."""
-    from bywire.report.wording import amount
-
     text = amount(value, FIGURES[name].unit, 3)
     if name == "gain_margin" and math.isfinite(value) and value > 0.0:
         text += f" ({20.0 * math.log10(value):.3g} dB)"
@@ -84,11 +72,9 @@ def figure_text(name: str, value: float) -> str:
 
 
 def _figure_rows(
-    chosen: LoopCase, where: str, found: list[BenchFigures | None]
+    case: LoopCase, where: str, found: list[BenchFigures | None]
 ) -> list[list[str]]:
     """Return rows of one trial: what the sines and the step show, a column for each design."""
-    from bywire.report.wording import amount
-
     def cell(one: BenchFigures | None, k: int, name: str) -> str:
         if one is None or not one.small:
             return "-"
@@ -96,7 +82,7 @@ def _figure_rows(
 
     sizes = next(([s.amplitude for s in one.small] for one in found if one and one.small), [])
     rows = [
-        [f"{name}, sine of {amount(size, _input_unit(chosen), 3)}{where}",
+        [f"{name}, sine of {amount(size, _input_unit(case), 3)}{where}",
          *(cell(one, k, name) for one in found)]
         for k, size in enumerate(sizes) for name in ("bandwidth", "phase_margin", "crossover")
     ]  # fmt: skip
@@ -105,12 +91,12 @@ def _figure_rows(
         cells = [
             amount(one.step.get(name) if one else None, FIGURES[name].unit, 3) for one in found
         ]
-        rows.append([f"{name}, {chosen.loop.proof}{where}", *cells])
+        rows.append([f"{name}, {case.loop.proof}{where}", *cells])
     return rows
 
 
-def verification_object(chosen: LoopCase, tried: Verification) -> dict[str, Any]:
-    """Return the same as plain data; null for what is infinite or not defined."""
+def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
+    """Return the same as plain data."""
     conflict = tried.conflict()
     return {
         "met": tried.met,
@@ -119,10 +105,10 @@ def verification_object(chosen: LoopCase, tried: Verification) -> dict[str, Any]
         "candidates": 0 if tried.tuning is None else tried.tuning.count,
         "linear_design": _candidate(tried.linear),
         "final": _candidate(tried.final),
-        "final_linear": finite(tried.nominal),
+        "final_linear": dict(tried.nominal),
         "kept": [one.text for one in tried.kept],
-        "experiment": chosen.loop.proof,
-        "kpis": {one.name: {"value": number(one.value), "unit": one.unit} for one in tried.kpis},
+        "experiment": case.loop.proof,
+        "kpis": {one.name: {"value": one.value, "unit": one.unit} for one in tried.kpis},
         "conflict": None if conflict is None else {
             "requirements": list(conflict[:2]),
             "slacks": [list(pair) for pair in conflict[2]],
@@ -135,34 +121,22 @@ def _candidate(one: Candidate) -> dict[str, Any]:
         "gains": dict(one.gains),
         **_figures(one.figures),
         "corners": {label: _figures(found) for label, found in one.corners.items()},
-        "slacks": {text: number(one.room(text)) for text in one.slacks},
+        "slacks": {text: one.room(text) for text in one.slacks},
     }
 
 
 def _figures(one: BenchFigures) -> dict[str, Any]:
     return {
         "sines": [
-            {"amplitude": s.amplitude, "bandwidth": number(s.bandwidth),
-             "phase_margin": number(s.phase_margin), "crossover": number(s.crossover),
-             "peak": number(s.peak), "settled": s.settled}
+            {"amplitude": s.amplitude, "bandwidth": s.bandwidth,
+             "phase_margin": s.phase_margin, "crossover": s.crossover,
+             "peak": s.peak, "settled": s.settled}
             for s in one.small
         ],
-        "step": finite(one.step),
+        "step": dict(one.step),
     }  # fmt: skip
 
 
-def number(value: float) -> float | None:
-    """Return a figure, or None for what is infinite or not defined."""
-    return float(value) if math.isfinite(value) else None
-
-
-def finite(values: Mapping[str, float]) -> dict[str, float | None]:
-    """Return figures by name, None for what is infinite or not defined."""
-    return {name: number(value) for name, value in values.items()}
-
-
-def _input_unit(chosen: LoopCase) -> str:
-    from bywire.core.signals import signals_of
-
-    model = chosen.loop.point(chosen.par, chosen.value).model
-    return signals_of(model.Stimulus)[chosen.loop.inputs[0]].unit
+def _input_unit(case: LoopCase) -> str:
+    model = case.loop.point(case.par, case.value).model
+    return signals_of(model.Stimulus)[case.loop.inputs[0]].unit

@@ -3,57 +3,52 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from bywire.api.design_parts import gain_text, kept_lines, unit_of
 from bywire.api.loop_case import LoopCase
-from bywire.cli.design_text import gain_text, kept_lines, unit_of
-from bywire.cli.verification_text import (
+from bywire.api.verification_parts import (
+    Part,
     figure_text,
-    finite,
-    number,
     verification_object,
     verification_parts,
 )
 from bywire.core.units import shown
+from bywire.report.tables import Table, text_table
+from bywire.report.wording import amount
 from bywire.synthesis.requirement import FIGURES, Requirement
 from bywire.synthesis.schedule_designer import scheduled
 from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
 from bywire.synthesis.verification import Verification
 
-if TYPE_CHECKING:
-    from bywire.cli.verification_text import Part
-    from bywire.report.tables import Table
-
 _SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin", "overshoot")
 
 
 def as_object(
-    chosen: LoopCase,
+    case: LoopCase,
     requirements: Sequence[Requirement],
     found: ScheduleDesign,
     tried: Verification | None,
     retuned: Sequence[Across],
-    files: Sequence[Path],
 ) -> dict[str, Any]:
-    """Return everything as plain data; null for what is infinite or not defined."""
+    """Return everything as plain data."""
     final = found.gains if tried is None else tried.final.gains
-    at = chosen.loop.at
+    at = case.loop.at
     return {
-        "loop": chosen.loop.name,
-        "parameters": chosen.name,
+        "loop": case.loop.name,
+        "parameters": case.name,
         "operating_points": {"unit": at.unit, **{k: list(v) for k, v in found.points.items()}},
-        "borders": {name: chosen.par.leaves()[name] for name in scheduled(chosen.loop).borders},
+        "borders": {name: case.par.leaves()[name] for name in scheduled(case.loop).borders},
         "requirements": [one.text for one in requirements],
         "status": found.status,
         "gains": dict(final),
-        "gain_units": {name: unit_of(chosen, name) for name in final},
+        "gain_units": {name: unit_of(case, name) for name in final},
         "regions": {
             region: {
-                "status": one.status, "gains": dict(one.gains), "slack": number(one.slack),
+                "status": one.status, "gains": dict(one.gains), "slack": one.slack,
                 "binding": [
-                    {"requirement": b.requirement.text, "at": b.case, "value": number(b.value),
-                     "slack": number(b.slack)}
+                    {"requirement": b.requirement.text, "at": b.case, "value": b.value,
+                     "slack": b.slack}
                     for b in one.binding
                 ],
             }
@@ -65,17 +60,16 @@ def as_object(
             "worst": _case(found.worst, at.name),
             "retuned": [_case(one, at.name) for one in retuned],
         },
-        "bench": None if tried is None else verification_object(chosen, tried),
-        "files": [str(path) for path in files],
+        "bench": None if tried is None else verification_object(case, tried),
     }  # fmt: skip
 
 
 def _case(one: Across, name: str) -> dict[str, Any]:
-    return {name: one.at, "region": one.region, "slack": number(one.slack), **finite(one.figures)}
+    return {name: one.at, "region": one.region, "slack": one.slack, **dict(one.figures)}
 
 
 def as_parts(
-    chosen: LoopCase,
+    case: LoopCase,
     found: ScheduleDesign,
     tried: Verification | None,
     retuned: Sequence[Across],
@@ -85,17 +79,15 @@ def as_parts(
     ``retuned`` is the loop across the regions with the gains of the bench; empty where these are
     the linear design's.
     """
-    from bywire.report.wording import amount
-
-    at, leaves = chosen.loop.at, chosen.par.leaves()
-    borders = " and ".join(shown(leaves[one], at.unit) for one in scheduled(chosen.loop).borders)
+    at, leaves = case.loop.at, case.par.leaves()
+    borders = " and ".join(shown(leaves[one], at.unit) for one in scheduled(case.loop).borders)
     parts: list[Part] = [
-        f"gain schedule of loop {chosen.loop.name} of {chosen.name}, borders at {at.name} = "
+        f"gain schedule of loop {case.loop.name} of {case.name}, borders at {at.name} = "
         f"{borders}: linear design {found.status}",
-        _gains(chosen, found, found.gains, "linear design"),
+        _gains(case, found, found.gains, "linear design"),
     ]
     if tried is not None and tried.tuning is not None:
-        parts.append(_gains(chosen, found, tried.final.gains, "retuned on the bench"))
+        parts.append(_gains(case, found, tried.final.gains, "retuned on the bench"))
     for region, one in found.regions.items():
         where = ", ".join(shown(point, at.unit) for point in found.points[region])
         bound = ", ".join(
@@ -112,16 +104,15 @@ def as_parts(
     for title, across in (("linear design", found.across), ("retuned gains", retuned)):
         if across:
             parts.append(f"{title}, gains frozen, linear model, room as a share of the limit:")
-            parts += _frozen(chosen, across)
+            parts += _frozen(case, across)
     if tried is not None:
-        parts += verification_parts(chosen, found.nominal, tried)
+        parts += verification_parts(case, found.nominal, tried)
     return parts
 
 
-def _frozen(chosen: LoopCase, across: Sequence[Across]) -> list[Part]:
-    from bywire.report.tables import text_table
+def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
 
-    at = chosen.loop.at
+    at = case.loop.at
     rows = [
         [
             f"{shown(one.at, at.unit)}", one.region,
@@ -139,18 +130,16 @@ def _frozen(chosen: LoopCase, across: Sequence[Across]) -> list[Part]:
 
 
 def _gains(
-    chosen: LoopCase, found: ScheduleDesign, gains: Mapping[str, float], title: str
+    case: LoopCase, found: ScheduleDesign, gains: Mapping[str, float], title: str
 ) -> Table:
     """Return a table of gains, a column for each region."""
-    from bywire.report.tables import text_table
-
-    regions = scheduled(chosen.loop).regions
+    regions = scheduled(case.loop).regions
     cells: dict[str, dict[str, str]] = {}
     for region, spans in regions.items():
         for name in spans:
             if name in gains:
                 cells.setdefault(name.rpartition(".")[2], {})[region] = gain_text(
-                    chosen, name, gains[name]
+                    case, name, gains[name]
                 )
     rows = [[name, *(row.get(region, "") for region in regions)] for name, row in cells.items()]
     return text_table([title, *regions], rows)

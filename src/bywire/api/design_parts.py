@@ -3,87 +3,79 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bywire.api.loop_case import LoopCase
-from bywire.cli.verification_text import (
+from bywire.api.verification_parts import (
+    Part,
     figure_text,
-    finite,
-    number,
     verification_object,
     verification_parts,
 )
 from bywire.core.parameters import leaf_fields
+from bywire.report.tables import text_table
+from bywire.report.wording import amount
 from bywire.synthesis.outcome import Design
 from bywire.synthesis.requirement import FIGURES, Requirement
 from bywire.synthesis.verification import Verification
 
-if TYPE_CHECKING:
-    from bywire.cli.verification_text import Part
-
 
 def as_object(
-    chosen: LoopCase,
+    case: LoopCase,
     requirements: Sequence[Requirement],
     found: Design,
     tried: Verification | None,
-    files: Sequence[Path],
 ) -> dict[str, Any]:
-    """Return everything as plain data; null for what is infinite or not defined."""
+    """Return everything as plain data."""
     final = found.gains if tried is None else tried.final.gains
     return {
-        "loop": chosen.loop.name,
-        "parameters": chosen.name,
-        "operating_point": {chosen.loop.at.name: chosen.value, "unit": chosen.loop.at.unit},
+        "loop": case.loop.name,
+        "parameters": case.name,
+        "operating_point": {case.loop.at.name: case.value, "unit": case.loop.at.unit},
         "requirements": [one.text for one in requirements],
         "status": found.status,
         "gains": dict(final),
-        "gain_units": {name: unit_of(chosen, name) for name in final},
+        "gain_units": {name: unit_of(case, name) for name in final},
         "linear": {
             "gains": dict(found.gains),
             "units": {name: kind.unit for name, kind in FIGURES.items()},
-            "nominal": finite(found.nominal),
-            "worst": {k: {"value": number(v), "at": at} for k, (v, at) in found.worst.items()},
-            "slack": number(found.slack),
+            "nominal": dict(found.nominal),
+            "worst": {k: {"value": v, "at": at} for k, (v, at) in found.worst.items()},
+            "slack": found.slack,
             "kept": [one.text for one in found.kept],
             "binding": [
                 {"requirement": one.requirement.text, "at": one.case,
-                 "value": number(one.value), "slack": number(one.slack)}
+                 "value": one.value, "slack": one.slack}
                 for one in found.binding
             ],
             "conflicts": [
-                {"requirement": one.wanted.text, "best": number(one.best), "with": one.kept.text,
+                {"requirement": one.wanted.text, "best": one.best, "with": one.kept.text,
                  "excluded": one.excludes}
                 for one in found.conflicts
             ],
         },
-        "bench": None if tried is None else verification_object(chosen, tried),
-        "files": [str(path) for path in files],
+        "bench": None if tried is None else verification_object(case, tried),
     }  # fmt: skip
 
 
 def as_parts(
-    chosen: LoopCase,
+    case: LoopCase,
     requirements: Sequence[Requirement],
     found: Design,
     tried: Verification | None,
 ) -> list[Part]:
     """Return what a person wants to know, in tables and sentences."""
-    from bywire.report.tables import text_table
-    from bywire.report.wording import amount
-
-    at = chosen.loop.at
-    point = f"{at.name} = {amount(chosen.value, at.unit)}"
+    at = case.loop.at
+    point = f"{at.name} = {amount(case.value, at.unit)}"
     parts: list[Part] = [
-        f"loop {chosen.loop.name} of {chosen.name} at {point}: linear design {found.status}"
+        f"loop {case.loop.name} of {case.name} at {point}: linear design {found.status}"
     ]
     final = found.gains if tried is None else tried.final.gains
     heading = ["gain", "linear design"]
-    rows = [[name, gain_text(chosen, name, value)] for name, value in found.gains.items()]
+    rows = [[name, gain_text(case, name, value)] for name, value in found.gains.items()]
     if tried is not None and tried.tuning is not None:
         heading.append("retuned on the bench")
-        rows = [[*row, gain_text(chosen, row[0], final[row[0]])] for row in rows]
+        rows = [[*row, gain_text(case, row[0], final[row[0]])] for row in rows]
     parts.append(text_table(heading, rows))
     wanted = {one.figure: one.text for one in (*requirements, *found.kept)}
     figures = [
@@ -108,7 +100,7 @@ def as_parts(
         for one in found.conflicts
     ]
     if tried is not None:
-        parts += verification_parts(chosen, found.nominal, tried)
+        parts += verification_parts(case, found.nominal, tried)
     return parts
 
 
@@ -120,13 +112,11 @@ def kept_lines(found: Design) -> list[str]:
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 
-def unit_of(chosen: LoopCase, name: str) -> str:
+def unit_of(case: LoopCase, name: str) -> str:
     """Return the unit of a gain."""
-    return leaf_fields(type(chosen.par))[name].unit.symbol
+    return leaf_fields(type(case.par))[name].unit.symbol
 
 
-def gain_text(chosen: LoopCase, name: str, value: float) -> str:
+def gain_text(case: LoopCase, name: str, value: float) -> str:
     """Return a gain with its unit."""
-    from bywire.report.wording import amount
-
-    return amount(value, unit_of(chosen, name))
+    return amount(value, unit_of(case, name))

@@ -1,0 +1,226 @@
+"""Designs of a brake compared at equal demands: the best, what limits it, at what price."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from bywire.api.parameter_choice import set_for
+from bywire.bench.running import Progress
+from bywire.bench.values import parsed
+from bywire.core.errors import unknown_name
+from bywire.core.parameters import ParameterSet
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import (
+    Attachment,
+    Details,
+    Document,
+    FigureBlock,
+    Flat,
+    Listing,
+    Section,
+    TableBlock,
+)
+from bywire.report.parameter_rows import parameter_rows
+from bywire.report.subject import Subject
+from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.wording import in_display_unit, unit_text
+from bywire.synthesis.study import STUDIES, Cut, Found, Map, Study
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_WIDTH = 140  # characters of a line of a table of designs
+
+
+@dataclass(frozen=True)
+class StudyResult(Answer):
+    """What a study found.
+
+    Parameters
+    ----------
+    definition
+        The study.
+    name, par
+        Name of the parameter set, and the values in use.
+    options
+        Options in use.
+    found
+        All designs as an xarray dataset, key figures, maps and tables.
+    """
+
+    definition: Study
+    name: str
+    par: ParameterSet
+    options: ParameterSet
+    found: Found
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know of the designs."""
+        return list(self.found.warnings)
+
+    def document(self) -> Document:
+        """Return key figures, limits, maps, tables and assumptions."""
+        study, found = self.definition, self.found
+        subject = Subject(study.name, study.summary, self.name, self.par)
+        kpis = TableBlock(kpi_table(self._rows()))
+        tables = [TableBlock(cut_table(cut), f"{cut.title}.", _WIDTH) for cut in found.cuts]
+        maps = [
+            FigureBlock(partial(_drawn, found.data, shown), shown.caption, f"{study.name}-{kind}")
+            for kind, shown in found.maps.items()
+        ]
+        warned = [Listing([f"Warning: {text}." for text in found.warnings])]
+        limits = Listing(found.limits)
+        options = TableBlock(parameter_table(parameter_rows(self.options)))
+        chosen = Details("Options of the study", [options])
+        brief_limits: list[str | Flat] = (
+            ["what limits the best design", limits, ""] if found.limits else []
+        )
+        brief_tables: list[str | Flat] = [
+            each for table in tables for each in (table.caption.rstrip("."), table, "")
+        ]  # fmt: skip
+        return Document(
+            f"Study {study.name}",
+            subject.line,
+            sections=lambda: [
+                Section("Key figures", [*(warned if found.warnings else []), kpis]),
+                *([Section("What limits the best design", [limits])] if found.limits else []),
+                *([Section("Maps", maps)] if maps else []),
+                *([Section("Tables", tables)] if tables else []),
+                Section("Assumptions", [Listing(found.assumptions), chosen]),
+                subject.made(),
+            ],
+            brief=[
+                f"study {study.name} of {self.name}: {study.summary}", "", kpis, "",
+                *brief_limits, *brief_tables, Listing(found.assumptions, "assumptions"),
+            ],
+            data=self._data(),
+            attachments=[Attachment(f"{study.name}.nc", partial(_recorded, found.data))],
+        )  # fmt: skip
+
+    def _rows(self) -> list[KpiRow]:
+        """Return the key figures as rows of a table, each with its note."""
+        return [
+            KpiRow(
+                kpi.name, kpi.value, kpi.unit,
+                f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
+            )
+            for kpi in self.found.kpis
+        ]  # fmt: skip
+
+    def _data(self) -> dict[str, Any]:
+        found = self.found
+        return {
+            "study": self.definition.name,
+            "parameters": self.name,
+            "options": self.options.model_dump(mode="json"),
+            "assumptions": list(found.assumptions),
+            "limits": list(found.limits),
+            "kpis": {
+                kpi.name: {
+                    "value": kpi.value, "unit": kpi.unit, "definition": kpi.definition,
+                    "note": kpi.note,
+                }
+                for kpi in found.kpis
+            },
+            "designs": {
+                str(name): {
+                    "dims": [str(dim) for dim in values.dims],
+                    "unit": values.attrs["units"],
+                    "values": np.asarray(values.values, dtype=float).tolist(),
+                }
+                for name, values in found.data.variables.items()
+            },
+            "figures": {name: shown.caption for name, shown in found.maps.items()},
+            "warnings": list(found.warnings),
+        }  # fmt: skip
+
+
+@use_case
+def study(
+    name: str,
+    parameters: str = "",
+    overrides: Mapping[str, Any] = MappingProxyType({}),
+    *,
+    progress: Progress | None = None,
+) -> StudyResult:
+    """Compare designs of a brake at equal demands.
+
+    Parameters
+    ----------
+    name
+        Name of the study.
+    parameters
+        Parameter set; the main one of the study's brake by default.
+    overrides
+        Changes: names with a dot are the brake's parameters, others the study's options; SI
+        numbers, or texts with units.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, and changes without effect.
+    """
+    definition = STUDIES.find(name)
+    cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)
+    par, options = _changed(definition, cited.parameters(), overrides)
+    found = definition.compute(par, options, progress or _silent)
+    return StudyResult(definition, cited.name, par, options, found)
+
+
+def _silent(label: str, share: float) -> None:
+    """Show no progress."""
+
+
+def _changed(
+    definition: Study, par: ParameterSet, overrides: Mapping[str, Any]
+) -> tuple[ParameterSet, ParameterSet]:
+    """Return parameters and options: names with a dot are the brake's, others the study's."""
+    of_study = {name: value for name, value in overrides.items() if "." not in name}
+    options = definition.defaults.flat()
+    for name in of_study:
+        if name not in options:
+            raise unknown_name("option", name, (*options, *par.flat()))
+    of_brake = {name: value for name, value in overrides.items() if "." in name}
+    definition.require_effect(of_brake)
+    return (
+        par.replace(parsed(type(par), of_brake, "parameter")),
+        definition.defaults.replace(parsed(definition.options, of_study, "option")),
+    )
+
+
+def cut_table(cut: Cut) -> Table:
+    """Return a cut of a study's designs as a table in display units."""
+    heading, columns = [], []
+    for name in cut.columns:
+        values = cut.data[name].values
+        if values.dtype.kind in "UO":  # words
+            heading.append(name)
+            columns.append([str(value) for value in values])
+            continue
+        factor, unit = in_display_unit(1.0, str(cut.data[name].attrs["units"]))
+        heading.append(f"{name} [{unit_text(unit) or '-'}]")
+        columns.append([f"{factor * float(value):.4g}" for value in values])
+    return text_table(heading, zip(*columns, strict=True))
+
+
+def _drawn(data: xr.Dataset, shown: Map) -> Figure:
+    from bywire.report.contour import contour
+
+    return contour(data, shown)
+
+
+def _recorded(data: xr.Dataset, path: Path) -> Path:
+    from bywire.data.netcdf import write_recording
+
+    return write_recording(data, path)
