@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
     from bywire.api.agreement import agreement
+    from bywire.api.check import Check, check
     from bywire.api.design import design
     from bywire.api.frequency_response import frequency_response
     from bywire.api.linearize import linearize
@@ -95,6 +96,7 @@ __all__ = [
     "convert",
     "identify",
     "agreement",
+    "check",
     "design",
     "frequency_response",
     "linearize",
