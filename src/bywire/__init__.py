@@ -16,20 +16,19 @@ from typing import TYPE_CHECKING, Any
 from bywire.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
-    from bywire.api.check import Check, check
-    from bywire.api.convert import Conversion, convert
-    from bywire.api.identification import Identification
-    from bywire.api.identify import identify
     from bywire.api.agreement import agreement
     from bywire.api.check import Check, check
+    from bywire.api.convert import Conversion, convert
     from bywire.api.design import design
     from bywire.api.frequency_response import frequency_response
+    from bywire.api.identification import Identification
+    from bywire.api.identify import identify
     from bywire.api.linearize import linearize
     from bywire.api.margins import margins
     from bywire.api.replay import Replay, replay
     from bywire.api.run import BenchResult, run
-    from bywire.api.trust import TrustStudy, trust
     from bywire.api.study import study
+    from bywire.api.trust import TrustStudy, trust
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
     from bywire.core.catalog import parameters
@@ -92,13 +91,12 @@ __all__ = [
     "Sensitivity",
     "Trajectory",
     "TrustStudy",
-    "check",
-    "convert",
-    "identify",
     "agreement",
     "check",
+    "convert",
     "design",
     "frequency_response",
+    "identify",
     "linearize",
     "load",
     "margins",
@@ -111,8 +109,8 @@ __all__ = [
     "simulate",
     "simulate_ensemble",
     "simulate_with_sensitivities",
-    "trust",
     "study",
+    "trust",
     "write_measurement",
     "write_recording",
 ]

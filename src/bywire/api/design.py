@@ -107,6 +107,11 @@ class DesignAnswer(Answer):
         return "interrupted" if tuning is not None and tuning.interrupted else self.linear.status
 
     @property
+    def partial(self) -> str:
+        """What an interrupted design still shows."""
+        return "what is shown is the best until then"
+
+    @property
     def holds(self) -> bool:
         """Whether the requirements are met, on the bench too where that was tried."""
         return self.linear.status == "met" and (self.tried is None or self.tried.met)
@@ -135,11 +140,9 @@ class DesignAnswer(Answer):
         )
 
     def _remarks(self) -> list[str]:
-        if self.status == "interrupted":
-            return ["interrupted: what is shown is the best until then"]
         if self.status == "infeasible":
             return ["no gains meet the requirements together: see what excludes what"]
-        if not self.holds:
+        if self.status == "met" and not self.holds:
             return ["the linear requirements are met, those on the nonlinear bench are not"]
         return []
 

@@ -82,7 +82,8 @@ def show(
         raise trouble
     interrupted = getattr(answer, "status", "") == "interrupted"
     if interrupted:
-        output.message("interrupted" + (f"; what was finished is in {out}" if out else ""))
+        kept = f"; what was finished is in {out}" if out else ""
+        output.message(f"interrupted{answer.partial and f': {answer.partial}'}{kept}")
     elif out is not None:
         written = [f"written: {path}" for path in files]
         for line in [f"report: {out / document.page_name}"] if document.is_paged else written:

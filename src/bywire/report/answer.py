@@ -44,6 +44,11 @@ class Answer(ABC):
         return []
 
     @property
+    def partial(self) -> str:
+        """What an interrupted result still shows; nothing to say by default."""
+        return ""
+
+    @property
     def holds(self) -> bool:
         """Whether all that was required, or checked, holds; commands exit with 1 where not."""
         return True
