@@ -18,7 +18,6 @@ from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.plant import State
 from bywire.brakes.wedge.start import memory_at, state_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
@@ -125,7 +124,7 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
     """
     at = point(par, F_N, speed)
     kinds: dict[str, Friction] = dict.fromkeys(WedgeBrake.frictions, friction)
-    if cast(State, at.state).Omega != 0.0 and friction == "stuck":
+    if cast(Any, at.state).Omega != 0.0 and friction == "stuck":
         kinds["Omega"] = "sliding"
     return linearize(
         at.model, at.par, at.state, at.memory,

@@ -7,8 +7,7 @@ from typing import cast
 
 from bywire.analysis.loop import Point
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs import screw_rig_plant as plant
-from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
+from bywire.brakes.wedge.rigs.screw_rig import Memory, ScrewRig, Stimulus, screws_compliance
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
@@ -26,11 +25,9 @@ def point(par: ParameterSet, value: float) -> Point:
     ParameterError
         When the drives cannot hold the force.
     """
-    own = cast(
-        WedgeParameters, par.replace({"rig.mode_1": "position", "rig.mode_2": "position"})
-    )
+    own = cast(WedgeParameters, par.replace({"rig.mode_1": "position", "rig.mode_2": "position"}))
     k = roller_screw.slope(own.screw)
-    rest = plant.line(zeros(plant.State), own)
+    rest = zeros(force_sensor.Input)._replace(c=screws_compliance(own))
     theta = 0.5 * value / (force_sensor.stiffness(rest, own.rig.sensor) * k)
     state: dict[str, float] = {"y_F": value}
     memory: dict[str, float] = {}
@@ -47,8 +44,8 @@ def point(par: ParameterSet, value: float) -> Point:
         memory |= {f"theta_{n}_ref": reference, f"last_{n}": sign * theta, f"i_{n}_ref": demand}
         stimulus |= {f"theta_{n}_set": reference}
     return Point(
-        ScrewRig(), own, zeros(plant.State)._replace(**state),
-        zeros(plant.Memory)._replace(**memory), zeros(plant.Stimulus)._replace(**stimulus),
+        ScrewRig(), own, zeros(ScrewRig.State)._replace(**state),
+        zeros(Memory)._replace(**memory), zeros(Stimulus)._replace(**stimulus),
     )  # fmt: skip
 
 

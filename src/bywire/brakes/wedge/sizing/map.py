@@ -86,8 +86,7 @@ def mapped(
 def _dataset(answers: Sequence[Answer], demand: Demand, shape: tuple[int, int, int]) -> xr.Dataset:
     plane, cube = ("tan_alpha", "lead"), ("tan_alpha", "lead", "mu_B")
     cases = {
-        name: np.array([getattr(one, name) for one in answers]).reshape(shape)
-        for name in _PER_CASE
+        name: np.array([getattr(one, name) for one in answers]).reshape(shape) for name in _PER_CASE
     }
     found = xr.Dataset({name: variable(cases[name], cube, *_PER_CASE[name]) for name in cases})
     slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
