@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.analysis.loop import Loop
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+from bywire.core.typing import Array, Complex, Progress
 
 _PATIENCE = 12  # windows granted to loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
@@ -143,7 +140,7 @@ def agreement(
     return Agreement(f, gain, phase, *_in_dB_and_degree(ratio[:, 0, 0]))
 
 
-def _difference(found: xr.Dataset, linear: NDArray[np.complex128]) -> tuple[Array, Array]:
+def _difference(found: xr.Dataset, linear: Complex) -> tuple[Array, Array]:
     one = found.isel(variant=0, amplitude=0)
     settled = one["settled"].values > 0
     gain = np.where(settled, one["gain"].values, np.nan)
@@ -151,7 +148,7 @@ def _difference(found: xr.Dataset, linear: NDArray[np.complex128]) -> tuple[Arra
     return _in_dB_and_degree(ratio)
 
 
-def _in_dB_and_degree(ratio: NDArray[np.complex128]) -> tuple[Array, Array]:
+def _in_dB_and_degree(ratio: Complex) -> tuple[Array, Array]:
     return 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
 
 

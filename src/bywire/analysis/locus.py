@@ -12,9 +12,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 _OUTSIDE = 1e-9  # by so much a pole must leave the unit circle: rounding of an integrator
 _AT_REST = 1e-6  # poles this close to 1 are integrators that the loop does not move

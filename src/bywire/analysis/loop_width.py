@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.bench.kpis.hysteresis import Loop
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 def widths(loop: Loop, levels: Array) -> Array:

@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, differential_evolution
 from scipy.stats import qmc
 
+from bywire.core.typing import Array, Progress
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.candidate import Candidate, judged, linear_slacks
 from bywire.synthesis.linear_case import NOMINAL
-from bywire.synthesis.optimizer import Problem, Progress
+from bywire.synthesis.optimizer import Problem
 
-Array = NDArray[np.float64]
 Measure = Callable[[Mapping[str, Sequence[float]]], Sequence[Mapping[str, BenchFigures]]]
 
 _ENOUGH = 0.02  # worst slack at which the search ends

@@ -10,20 +10,17 @@ at a kink of a figure itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from bywire.core.typing import Array, Progress
 from bywire.synthesis.linear_case import LinearCase, room, slack
 from bywire.synthesis.requirement import Requirement
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before its growth is counted"""

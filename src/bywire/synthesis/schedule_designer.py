@@ -13,13 +13,12 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Progress
 from bywire.core.units import shown
 from bywire.synthesis.designer import design
 from bywire.synthesis.linear_case import LinearCase, cases_of, room
-from bywire.synthesis.optimizer import Progress
-from bywire.synthesis.outcome import Design
+from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.requirement import FIGURES, Requirement
-from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
 
 _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15

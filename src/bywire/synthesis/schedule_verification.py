@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from bywire.core.typing import Progress
 from bywire.synthesis.bench_tuning import GENERATIONS, Tuning
 from bywire.synthesis.linear_case import LinearCase
-from bywire.synthesis.optimizer import Progress
+from bywire.synthesis.outcome import ScheduleDesign
 from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import scheduled, slack_of
-from bywire.synthesis.schedule_outcome import ScheduleDesign
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import Verification, verify
 

@@ -12,9 +12,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
-
-Progress = Callable[[str, float], None]
-"""called with a label and the finished share, 0 to 1"""
+from bywire.core.typing import Progress
 
 
 @dataclass(frozen=True)

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.bench_tuning import GENERATIONS, Tuning, standing, tune
 from bywire.synthesis.candidate import Candidate, judged, linear_slacks
-from bywire.synthesis.corners import corners_of, worst_of
 from bywire.synthesis.designer import largest_error
 from bywire.synthesis.floors import bench_floors, linear_floors
 from bywire.synthesis.linear_case import LinearCase
-from bywire.synthesis.optimizer import Problem, Progress
+from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.requirement import FIGURES, Requirement
-from bywire.synthesis.trial import Trial, measured
+from bywire.synthesis.trial import Trial, corners_of, measured, worst_of
 
 
 @dataclass(frozen=True)

@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.minimal import Realization
 from bywire.analysis.linear.transfer import Transfer
 from bywire.core.errors import ParameterError, unknown_name
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Complex
 
 _ON_BORDER = 1e-6  # poles this close to the border of stability are integrators
 _COUPLED = 1e-9  # of the largest entry of A: below it a dropped state does not act on the others
@@ -123,7 +121,7 @@ class LinearModel:
             self.period,
         )  # fmt: skip
 
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
         found = np.linalg.eigvals(self.A).astype(np.complex128)
         return found[np.argsort(np.abs(found))]
@@ -242,7 +240,7 @@ class LinearModel:
             period,
         )
 
-    def response(self, frequencies: Array) -> NDArray[np.complex128]:
+    def response(self, frequencies: Array) -> Complex:
         """Return the frequency response.
 
         Parameters

@@ -18,8 +18,7 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 Friction = Literal["removed", "sliding", "stuck"]
 _TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open

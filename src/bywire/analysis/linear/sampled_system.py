@@ -1,10 +1,10 @@
-"""Plant and controllers of a sampled system as Jacobians, frame by frame."""
+"""Plant and controllers of a sampled system as Jacobians, frame by frame, exact or as stepped."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple, cast
 
@@ -13,14 +13,14 @@ import numpy as np
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.linear.smooth_functions import smooth_functions, vector
-from bywire.analysis.linear.stepped import stepped
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, StepError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
 Jacobians = list[Any]
 """of the new memory by states, memory and inputs"""
+_WHOLE = 1e-9  # of a step: what a sample time may differ from a multiple
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,3 +141,43 @@ def _ticks(
         M_x, M_m, M_u = (np.array(value, dtype=float) for value in values)
         found.append([M_x[:, rows], M_m, M_u[:, columns]])
     return tuple(found)
+
+
+def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
+    r"""Return what the midpoint rule makes of a continuous model with held inputs.
+
+    .. math:: \begin{pmatrix} x_{k+1} \\ u \end{pmatrix} =
+        \left[(I - \tfrac{h}{2} W)^{-1} (I + \tfrac{h}{2} W)\right]^{T/h}
+        \begin{pmatrix} x_k \\ u \end{pmatrix}, \quad
+        W = \begin{pmatrix} A & B \\ 0 & 0 \end{pmatrix}
+
+    Where friction, limits and changes of contacts stay out, a run of a linear plant follows it to
+    rounding: what then still differs from the exact model is the error of the step.
+
+    Parameters
+    ----------
+    model
+        Continuous model.
+    period
+        Sample time T [s].
+    step
+        Substep h [s], which divides T.
+
+    Raises
+    ------
+    StepError
+        When it does not.
+    """
+    count = round(period / step)
+    if count < 1 or abs(count * step - period) > _WHOLE * step:
+        raise StepError(
+            f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us: "
+            f"take for instance {period * 1e6 / max(count, 1):.12g} us"
+        )
+    n, m = model.B.shape
+    W = np.zeros((n + m, n + m))
+    W[:n, :n], W[:n, n:] = model.A, model.B
+    half = 0.5 * step * W
+    one = np.linalg.solve(np.eye(n + m) - half, np.eye(n + m) + half)
+    whole = np.linalg.matrix_power(one, count)
+    return replace(model, A=whole[:n, :n], B=whole[:n, n:], period=period)

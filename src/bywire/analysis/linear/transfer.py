@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.minimal import Realization, minimal, zeros
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 _AT_REST = 1e-11  # of the largest pole: what counts as an integrator
 

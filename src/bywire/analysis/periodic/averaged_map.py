@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop, Point
@@ -22,11 +21,9 @@ from bywire.analysis.periodic.periodic_orbit import (
 from bywire.core.errors import SolverError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
 from bywire.simulation.stroboscope import Derivatives, Stroboscope
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 STEPS = (10e-6, 5e-6, 2.5e-6)
 """substeps [s], the next one where a motion does not repeat itself with the one before: the longer

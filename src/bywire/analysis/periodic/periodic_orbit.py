@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, SolverError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.simulation.run import Run
 from bywire.simulation.stroboscope import Stroboscope
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5
 """distance from the orbit that counts as none, over the usual magnitude of each signal; steps of

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array]
 Choice = Callable[[complex], bool]
 

@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _POINTS = 300
 _DECADES = 4.0  # below the band's end at which the search begins

@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.reduction.balancing import Choice, Matrices, balanced, lasting, split
 from bywire.analysis.reduction.error import ReductionError, natural, reduction_error
 from bywire.analysis.reduction.residualized import residualized
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Method = Literal["balanced", "modal"]
 
 _DEAD = 1e-12  # poles of sampled models below it are dead beats

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 
 from bywire.analysis.response.cases import Cases, cases_of
 from bywire.analysis.response.dataset import Sweep, as_dataset
-from bywire.analysis.response.window import interval, line_window, require_measurable
-from bywire.analysis.response.window_scatter import kept, spread_of
+from bywire.analysis.response.window import (
+    interval,
+    kept,
+    line_window,
+    require_measurable,
+    spread_of,
+)
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array, Complex, Progress
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 MOST = 12
 """windows after which a response is given up; they are long here"""
@@ -57,7 +60,7 @@ def broadband_response(
     run: Run,
     sweep: Sweep,
     excitation: Broadband,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     *,
     points: Sequence[Run] | None = None,
 ) -> xr.Dataset:

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.response.dataset import Sweep
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.simulation.engine import structure_of
 from bywire.simulation.run import Run
 from bywire.simulation.variations import case_matrix
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

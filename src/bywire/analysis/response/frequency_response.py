@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.response.cases import Cases, cases_of
 from bywire.analysis.response.dataset import Sweep, as_dataset
-from bywire.analysis.response.window import interval, require_measurable, sine_window
-from bywire.analysis.response.window_scatter import spread_of
+from bywire.analysis.response.window import interval, require_measurable, sine_window, spread_of
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex, Progress
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
@@ -52,7 +50,7 @@ def require_stable(closed: LinearModel) -> None:
 def frequency_response(
     run: Run,
     sweep: Sweep,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     *,
     points: Sequence[Run] | None = None,
     lanes: bool = True,
@@ -80,7 +78,7 @@ def frequency_response(
         Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
         input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
         (share of the output's power, its mean left out, at the excited line), ``scatter`` (of the
-        complex amplitude, see ``window_scatter``), ``windows``, ``settled`` (0 or 1), and
+        complex amplitude, see `spread_of`), ``windows``, ``settled`` (0 or 1), and
         ``share_FLAG`` for every flag and saturation. Gain and phase are NaN where the output does
         not move at all: what sticks has no gain. Where it never repeats, they are means of the
         last windows.
@@ -141,7 +139,7 @@ def _repeated(
     rows = round(own.duration / own.record)
     wave = 2j / rows * np.exp(-2j * math.pi * periods / rows * np.arange(rows))
 
-    def figures(window: Array) -> NDArray[np.complex128]:
+    def figures(window: Array) -> Complex:
         # A matrix product would start the threads of a linear algebra library within ours.
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,7 @@ from bywire.analysis.loop import Loop, Point
 from bywire.analysis.response.dataset import complex_values
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
 
 
@@ -136,3 +138,34 @@ def with_widths(found: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dat
 def narrowest(found: xr.Dataset, amplitude: int) -> int:
     """Return the variant with the smallest bandwidth at an amplitude; the first of several."""
     return int(np.argmin(found["bandwidth"].values[:, amplitude]))
+
+
+if TYPE_CHECKING:
+    from bywire.analysis.loop import Loop
+    from bywire.core.parameters import ParameterSet
+
+
+def leaving(loop: Loop, par: ParameterSet, value: float, amplitude: float) -> str:
+    """Return why a sine around an operating point leaves the brake's range; empty where it stays.
+
+    Parameters
+    ----------
+    loop, par, value
+        The loop and its operating point.
+    amplitude
+        Of the sine [SI unit of the first input].
+
+    Notes
+    -----
+    Only set points of the quantity that the operating point is given by can be judged: both
+    ends of the sine are tried as operating points.
+    """
+    stimulus = loop.point(par, value).model.Stimulus
+    if signals_of(stimulus)[loop.inputs[0]].unit != loop.at.unit:
+        return ""
+    for end in (value - amplitude, value + amplitude):
+        try:
+            loop.point(par, end)
+        except ParameterError as error:
+            return str(error)
+    return ""

@@ -7,15 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.dither.choice import least
 from bywire.brakes.motorcycle.dither.reach import needed_gain, reach
 from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, tried
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.typing import Array
 from bywire.synthesis.study import variable
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 Report = Callable[[float], None]
 

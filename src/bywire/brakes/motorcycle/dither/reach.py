@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.linear.control_laws import demand_filter
-from bywire.brakes.motorcycle.linear.current_loop import current_loop
+from bywire.brakes.motorcycle.linear.control_laws import current_loop
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import dither
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array, Complex
 from bywire.plant import seal_friction
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Par = MotorcycleParameters
 
 _LEAST = 4  # samples in a period: with fewer, a triangle is none

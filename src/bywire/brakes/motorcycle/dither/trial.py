@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.dither.reach import dead_band
 from bywire.brakes.motorcycle.ecu import Stimulus
@@ -14,10 +13,10 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.core.signals import zeros
+from bywire.core.typing import Array
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 FIGURES = {

@@ -7,19 +7,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.crossings import Margin, margin
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.rational import Rational
 from bywire.brakes.motorcycle.linear import control_laws
+from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.core.typing import Array, Complex
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 BAND = (0.02, 200.0)
 """frequencies over which margins are looked for [Hz]"""
 

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
+from bywire.core.typing import Array
 from bywire.plant import ball_screw_gear, brake_fluid, caliper, master_cylinder, pipeline
 from bywire.plant import seal_friction as seal
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 _POINTS = 721

@@ -6,13 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing.demand import Course, Motion, breakaway_current, geared, motion
+from bywire.core.typing import Array
 from bywire.synthesis.study import variable
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 SIZES = {

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.kpi import Kpi
@@ -13,10 +12,10 @@ from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing.demand import motion, sine
+from bywire.core.typing import Array
 from bywire.simulation.run import simulate
 
 Par = MotorcycleParameters
-Array = NDArray[np.float64]
 
 WITHOUT_DITHER = {"ecu.dither.waveform": "off"}
 _STEP = 20e-6

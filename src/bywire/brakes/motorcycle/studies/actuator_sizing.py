@@ -7,7 +7,6 @@ from typing import cast
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -24,9 +23,9 @@ from bywire.brakes.motorcycle.sizing.map import SIZES, mapped, sizes_of
 from bywire.brakes.motorcycle.sizing.options import ASSUMPTIONS, Options
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import ParameterError
-from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.study import Cut, Found, Map, Mark, Study
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 _BISECTIONS, _SECTIONS, _ROWS = 50, 60, 13

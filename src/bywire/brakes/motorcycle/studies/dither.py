@@ -13,15 +13,16 @@ from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate, best_of, ca
 from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
 from bywire.brakes.motorcycle.dither.map import Grid, figures_of, mapped
 from bywire.brakes.motorcycle.dither.options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.brakes.motorcycle.dither.ramp import area_ratios
+from bywire.brakes.motorcycle.dither.trial import area_ratios
 from bywire.brakes.motorcycle.dither.reach import admissible_frequencies
-from bywire.brakes.motorcycle.dither.tables import by_frequency, by_pressure, law
+from bywire.brakes.motorcycle.dither.map import by_frequency, by_pressure, law
 from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, tried
 from bywire.brakes.motorcycle.dither.waveforms import compared
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, ParameterError, RunError
-from bywire.synthesis.study import Found, Map, Mark, Progress, Study
+from bywire.core.typing import Progress
+from bywire.synthesis.study import Found, Map, Mark, Study
 
 Par = MotorcycleParameters
 

@@ -6,7 +6,7 @@ from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.loops.causes import DRIVE_TRAIN
-from bywire.brakes.wedge.loops.position_control import BAND, TUNABLES
+from bywire.brakes.wedge.loops.position import BAND, TUNABLES
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.shaft_rig import Memory, ShaftRig, Stimulus
 from bywire.core.parameters import ParameterSet

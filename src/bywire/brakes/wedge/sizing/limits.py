@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.map import HELD, LATE, LEFT
 from bywire.brakes.wedge.sizing.options import Options
+from bywire.core.typing import Array
 
 _AT = 0.99  # share of a limit from which on it counts as reached
 
@@ -109,5 +109,5 @@ def _where(values: xr.DataArray) -> float:
     return float(values["mu_B"].values[np.argmax(values.values)])
 
 
-def _listed(values: NDArray[np.float64]) -> str:
+def _listed(values: Array) -> str:
     return ", ".join(f"{float(one):g}" for one in values)

@@ -8,14 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.sizing.design import answer, redesigned
+from bywire.core.typing import Array
 from bywire.synthesis.study import variable
-
-Array = NDArray[np.float64]
 
 LATE = 1.02
 """share of the demanded time up to which a design answers equally fast"""

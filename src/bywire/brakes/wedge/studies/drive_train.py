@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
@@ -19,9 +18,8 @@ from bywire.brakes.wedge.sizing.design import answer
 from bywire.brakes.wedge.sizing.limits import active, around
 from bywire.brakes.wedge.sizing.map import mapped
 from bywire.brakes.wedge.sizing.options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.study import Cut, Found, Map, Mark, Study
 
 NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
 NEAR = 1.05

@@ -7,7 +7,6 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from bywire.bench.kpis.kpi import Kpi
@@ -18,9 +17,9 @@ from bywire.brakes.wedge.sizing.options import Count, Slope
 from bywire.brakes.wedge.stability import brake, controlled, moment_borders, motion, neutral
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
-from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study, variable
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.study import Cut, Found, Map, Mark, Study, variable
 
-Array = NDArray[np.float64]
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]
 Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 

@@ -1,11 +1,13 @@
-"""Operating points of the rig on which two motors push their screws against a force sensor."""
+"""Loops on the rig on which two motors push their screws against a force sensor."""
 
 from __future__ import annotations
 
 import math
 from typing import cast
 
-from bywire.analysis.loop import Point
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.brakes.wedge.loops.causes import DRIVE_LIMITS, DRIVE_TRAIN
+from bywire.brakes.wedge.loops.position import BAND, TUNABLES, two_motor_loop
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.screw_rig import Memory, ScrewRig, Stimulus, screws_compliance
 from bywire.core.errors import ParameterError
@@ -63,3 +65,32 @@ def _require_reachable(value: float, demand: float, par: WedgeParameters) -> Non
             f"force = {value:g} N needs {demand:.3g} A even without friction: it must be below "
             f"{name} = {most:g} A; ask for less"
         )
+
+
+_FORCE = Quantity("force", "N", 0.0)
+
+FORCE_FIGHT = two_motor_loop(
+    name="force-fight",
+    summary="position control of two motors on one reference, a force sensor between, 5 kHz",
+    at=_FORCE,
+    point=point,
+    causes=DRIVE_TRAIN,
+    proof="force-fight",
+)
+
+FORCE_AGAINST = Loop(
+    name="force-against",
+    assembly="wedge-brake",
+    summary="force between two motors, one shaken against the other that holds, 5 kHz",
+    at=_FORCE,
+    inputs=("theta_1_set",),
+    output="F",
+    cut="i_1_ref",
+    point=point,
+    causes=DRIVE_TRAIN,
+    band=BAND,
+    amplitudes=(1e-3, 0.05, 0.1, 0.2),
+    tunables=TUNABLES,
+    saturations=DRIVE_LIMITS,
+    single=False,  # the force answers, the angle is controlled
+)
