@@ -110,8 +110,6 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     return length, [math.floor(one * length + 0.5) for one in f]
 
 
-
-
 def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
     """Return the windows that count: the last two of what repeats, else all that are kept.
 

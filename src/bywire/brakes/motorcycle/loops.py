@@ -40,25 +40,26 @@ def _require_pressed(p: float) -> None:
 def current_point(par: ParameterSet, value: float) -> Point:
     """Return the brake held at a pressure [Pa] by its current."""
     _require_pressed(value)
-    own = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
-    state, memory = state_at(value, own), memory_at(value, own)
+    closed = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
+    state, memory = state_at(value, closed), memory_at(value, closed)
     stimulus = zeros(Stimulus)._replace(i_set=state.i)
-    return Point(MotorcycleBrake(), own, state, memory, stimulus, _STEP)
+    return Point(MotorcycleBrake(), closed, state, memory, stimulus, _STEP)
 
 
 def current_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
     """Return what the PI makes of set point and current, up to its duty cycle, at any pressure."""
-    own = cast(MotorcycleParameters, par)
-    pi = control_laws.current_control(own.ecu).response(frequencies)[:, 0, 0]
-    return pi, pi / (1.0 + 1j * frequencies / own.anti_alias.f_aa)
+    brake = cast(MotorcycleParameters, par)
+    pi = control_laws.current_control(brake.ecu).response(frequencies)[:, 0, 0]
+    return pi, pi / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 
 def pressure_point(par: ParameterSet, value: float) -> Point:
     """Return the brake in equilibrium at a pressure [Pa]."""
     _require_pressed(value)
-    own = cast(MotorcycleParameters, par.replace({"drive.mode": "pressure"}))
+    closed = cast(MotorcycleParameters, par.replace({"drive.mode": "pressure"}))
     stimulus = zeros(Stimulus)._replace(p_set=value)
-    return Point(MotorcycleBrake(), own, state_at(value, own), memory_at(value, own), stimulus)
+    state, memory = state_at(value, closed), memory_at(value, closed)
+    return Point(MotorcycleBrake(), closed, state, memory, stimulus)
 
 
 def dither_frequency(par: ParameterSet) -> Sequence[float]:
@@ -69,10 +70,10 @@ def dither_frequency(par: ParameterSet) -> Sequence[float]:
 
 def pressure_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
     """Return what the PID makes of set point and pressure at a pressure [Pa], up to its demand."""
-    own = cast(MotorcycleParameters, par)
-    demand = control_laws.pressure_demand(own.ecu, value).response(frequencies)[:, 0, 0]
-    feedback = control_laws.pressure_feedback(own.ecu, value).response(frequencies)[:, 0, 0]
-    return demand, feedback / (1.0 + 1j * frequencies / own.anti_alias.f_aa)
+    brake = cast(MotorcycleParameters, par)
+    demand = control_laws.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
+    feedback = control_laws.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
+    return demand, feedback / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 
 _GAINS = {"k_p": (5e-7, 1e-4), "k_i": (1e-6, 3e-3), "k_d": (1e-9, 3e-6)}

@@ -40,16 +40,16 @@ def linear(
         When the point does not exist.
     """
     changes: dict[str, Any] = {"drive.mode": mode}
-    own = cast(MotorcycleParameters, par.replace(changes))
+    driven = cast(MotorcycleParameters, par.replace(changes))
     # The holding current is proportional to the pressure.
-    p = at.value / holding_current(1.0, own) if at.quantity is _CURRENT else at.value
+    p = at.value / holding_current(1.0, driven) if at.quantity is _CURRENT else at.value
     if not p > 0.0:
         raise ParameterError(
             f"{at.quantity.name} = {at.value:g} {at.quantity.unit} is no operating point: it must "
             f"be > 0 {at.quantity.unit}"
         )
     try:
-        state = state_at(p, own)._replace(omega=at.speed)
+        state = state_at(p, driven)._replace(omega=at.speed)
     except ParameterError as error:
         if at.quantity is _PRESSURE:
             raise
@@ -57,7 +57,7 @@ def linear(
             f"current = {at.value:g} A is no operating point: {error}"
         ) from None
     return linearize(
-        MotorcycleBrake(), own, state, memory_at(p, own),
+        MotorcycleBrake(), driven, state, memory_at(p, driven),
         inputs=inputs, outputs=outputs, friction=at.friction,
     )  # fmt: skip
 

@@ -36,27 +36,27 @@ def whole(par: ParameterSet, at: PlantPoint) -> LinearModel:
     ParameterError
         When the point does not exist.
     """
-    own = cast(WedgeParameters, par)
+    brake = cast(WedgeParameters, par)
     if at.quantity is _CURRENT:
-        if not abs(at.value) < own.drive.i_max:
+        if not abs(at.value) < brake.drive.i_max:
             raise ParameterError(
                 f"current = {at.value:g} A is not admissible: its size must be < drive.i_max = "
-                f"{own.drive.i_max:g} A"
+                f"{brake.drive.i_max:g} A"
             )
-        F_N = force_for_current(at.value, own)
+        F_N = force_for_current(at.value, brake)
     elif at.quantity is _MOMENT:
         if not at.value > 0.0:
             raise ParameterError(
                 f"moment = {at.value:g} N*m is no operating point: it must be > 0 N*m, counted "
                 "against the disc's rotation whatever its direction"
             )
-        F_N = force_for(at.value, own)
+        F_N = force_for(at.value, brake)
     else:
         F_N = at.value
     if at.quantity is _FORCE:
-        return full(own, F_N, at.friction, at.speed)
+        return full(brake, F_N, at.friction, at.speed)
     try:
-        return full(own, F_N, at.friction, at.speed)
+        return full(brake, F_N, at.friction, at.speed)
     except ParameterError as error:
         given = f"{at.quantity.name} = {at.value:g} {at.quantity.unit}"
         raise ParameterError(f"{given} is no operating point: {error}") from None
@@ -74,8 +74,8 @@ def with_its_outputs(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 def rigid_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
     """Return two states: travel and velocity of the wedge; both motors are driven as one."""
-    own = rigid(mechanical(whole(par, at)), cast(WedgeParameters, par))
-    return own.together(INPUTS)
+    body = rigid(mechanical(whole(par, at)), cast(WedgeParameters, par))
+    return body.together(INPUTS)
 
 
 def driven_as_one(par: ParameterSet, at: PlantPoint) -> LinearModel:

@@ -71,11 +71,11 @@ def brake(
     known
         Whether the moment controller knows the friction coefficient too.
     """
-    own = redesigned(par, tan_alpha, par.screw.lead)
-    slope = own.control.moment.slope_hat
+    redesign = redesigned(par, tan_alpha, par.screw.lead)
+    slope = redesign.control.moment.slope_hat
     if known:
         slope *= mu_B / par.wedge.mu_B
-    return own.replace({"wedge.mu_B": mu_B, "control.moment.slope_hat": slope})
+    return redesign.replace({"wedge.mu_B": mu_B, "control.moment.slope_hat": slope})
 
 
 def motion(par: WedgeParameters, F_N: float) -> Motion:
@@ -159,5 +159,5 @@ def moment_borders(
     InputError
         When an operating point does not exist.
     """
-    values = [float(one) for one in np.geomspace(*between, count)]
+    values = [float(value) for value in np.geomspace(*between, count)]
     return locus(LOOP, par, moment, "wedge.mu_B", "1", values).borders

@@ -21,11 +21,11 @@ Law = Callable[[Any, Any], tuple[Any, Any]]
 
 def pressure_feedback(ecu: EcuParameters, p: float) -> LinearModel:
     """Return the PID at a pressure p from a fall of the measured one [Pa] to the demand [A]."""
-    own = ecu.pressure_at(p)
+    gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=0.0 * u, p_meas=-u)
-        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, gains)
         return state, out.i
 
     return _linear("pressure-feedback", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
@@ -33,11 +33,11 @@ def pressure_feedback(ecu: EcuParameters, p: float) -> LinearModel:
 
 def pressure_demand(ecu: EcuParameters, p: float) -> LinearModel:
     """Return the PID at a pressure p [Pa] from the set point [Pa] to the current demand [A]."""
-    own = ecu.pressure_at(p)
+    gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=u, p_meas=0.0 * u)
-        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, gains)
         return state, out.i
 
     return _linear("pressure-demand", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
@@ -45,11 +45,11 @@ def pressure_demand(ecu: EcuParameters, p: float) -> LinearModel:
 
 def pressure_control(ecu: EcuParameters, p: float) -> LinearModel:
     """Return the PID at a pressure p from set point and measured one [Pa] to the demand [A]."""
-    own = ecu.pressure_at(p)
+    gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=u[0], p_meas=u[1])
-        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, gains)
         return state, out.i
 
     units, inputs = ("Pa", "A"), ("p_ref", "p_meas")

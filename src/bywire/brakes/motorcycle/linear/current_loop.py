@@ -29,9 +29,9 @@ def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearMod
         ``"locked"``: no back-EMF, as where friction holds the shaft. ``"free"``: the shaft moves
         against the brake, without dry friction.
     """
-    own = par.replace({"drive.mode": "current-direct", "adc.law": "ideal"})
+    driven = par.replace({"drive.mode": "current-direct", "adc.law": "ideal"})
     return closed_loop(
-        MotorcycleBrake(), own, state_at(p, own), memory_at(p, own),
+        MotorcycleBrake(), driven, state_at(p, driven), memory_at(p, driven),
         inputs=("i_set",), outputs=("i", "i_meas"),
         locked=("theta", "omega", "p_mc", "p_pd", "y_p") if rotor == "locked" else (),
     )  # fmt: skip

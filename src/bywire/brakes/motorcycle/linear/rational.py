@@ -111,10 +111,11 @@ def first_orders(
     """
 
     def product(corners: tuple[float, ...]) -> Array:
-        found: Array = np.ones(1)
+        coefficients: Array = np.ones(1)
         for hertz in corners:
-            found = np.asarray(np.polymul(found, [1.0 / (2.0 * math.pi * hertz), 1.0]))
-        return found
+            factor = [1.0 / (2.0 * math.pi * hertz), 1.0]
+            coefficients = np.asarray(np.polymul(coefficients, factor))
+        return coefficients
 
     return Rational(
         name, tuple(float(v) for v in gain * product(zeros_hz)), tuple(product(poles_hz).tolist())
@@ -122,5 +123,5 @@ def first_orders(
 
 
 def _sorted_roots(coefficients: tuple[float, ...]) -> Complex:
-    found = np.roots(coefficients).astype(np.complex128)
-    return found[np.argsort(np.abs(found))]
+    roots = np.roots(coefficients).astype(np.complex128)
+    return roots[np.argsort(np.abs(roots))]

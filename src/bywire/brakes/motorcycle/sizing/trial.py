@@ -63,11 +63,11 @@ def braking_figures(label: str, par: Par, p_from: float, p_to: float) -> list[Kp
     following = {} if experiment.following is None else dict(experiment.following(par))
     options = experiment.defaults.replace({"p_from": p_from, "p_to": p_to, **following})
     (case,) = experiment.cases(par, options, None)
-    found = {one.name: one for one in experiment.judge({"run": _recorded(case)}, options)}
+    kpis = {kpi.name: kpi for kpi in experiment.judge({"run": _recorded(case)}, options)}
     wanted = ("rise_time", "overshoot", "peak_current", "peak_power", "share_sat_current")
     return [
-        Kpi(f"{label}_braking_{name}", found[name].value, found[name].unit,
-            f"Hard braking: {found[name].definition}", found[name].note)
+        Kpi(f"{label}_braking_{name}", kpis[name].value, kpis[name].unit,
+            f"Hard braking: {kpis[name].definition}", kpis[name].note)
         for name in wanted
     ]  # fmt: skip
 
@@ -90,13 +90,13 @@ def _fitted(run: xr.Dataset, f: float) -> tuple[float, float]:
     angle = 2.0 * np.pi * f * run["time"].values
     waves = [wave(n * angle) for n in range(1, _HARMONICS + 1) for wave in (np.sin, np.cos)]
     columns = np.column_stack([np.ones_like(angle), *waves])
-    found = np.linalg.lstsq(columns, run["p_mc"].values, rcond=None)[0]
-    return float(found[0]), float(np.hypot(found[1], found[2]))
+    coefficients = np.linalg.lstsq(columns, run["p_mc"].values, rcond=None)[0]
+    return float(coefficients[0]), float(np.hypot(coefficients[1], coefficients[2]))
 
 
 def _recorded(case: Case) -> xr.Dataset:
-    made = as_run(case, _STEP)
-    trajectory = simulate(made)
+    run = as_run(case, _STEP)
+    trajectory = simulate(run)
     if trajectory.status == "interrupted":
         raise KeyboardInterrupt
-    return record(made, trajectory, case.settle, case.keep, {})
+    return record(run, trajectory, case.settle, case.keep, {})

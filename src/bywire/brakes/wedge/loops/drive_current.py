@@ -25,15 +25,15 @@ def point(par: ParameterSet, value: float) -> Point:
         When the current is beyond the drive's limit, its voltage beyond the supply, or its
         torque beyond the clamp.
     """
-    own = cast(
+    clamped = cast(
         WedgeParameters,
         par.replace({
             "rig.mode_1": "current", "rig.load": "dummy", "rig.clamp": "closed",
             "control.T_fast": _SAMPLE,
         }),
     )  # fmt: skip
-    _require_reachable(value, own)
-    drive, motor = own.drive, own.motor_1
+    _require_reachable(value, clamped)
+    drive, motor = clamped.drive, clamped.motor_1
     held = value / drive.G_sense
     duty = servo_motor.resistance(motor) * held / drive.V_dc
     state = ShaftRig.state(
@@ -42,7 +42,7 @@ def point(par: ParameterSet, value: float) -> Point:
     )
     memory = zeros(Memory)._replace(i_1_ref=value)
     stimulus = zeros(Stimulus)._replace(i_1_set=value)
-    return Point(ShaftRig(), own, state, memory, stimulus, _STEP)
+    return Point(ShaftRig(), clamped, state, memory, stimulus, _STEP)
 
 
 def _require_reachable(value: float, par: WedgeParameters) -> None:

@@ -68,18 +68,18 @@ def point(par: ParameterSet, value: float) -> Point:
     ParameterError
         When the pads would press.
     """
-    own = cast(WedgeParameters, par.replace({"command.mode": "position"}))
-    free = min(travel_for(0.0, own), own.wedge.x_stop)
+    closed = cast(WedgeParameters, par.replace({"command.mode": "position"}))
+    free = min(travel_for(0.0, closed), closed.wedge.x_stop)
     if not abs(value) < free:
         raise ParameterError(
             f"wedge travel = {value * 1e3:g} mm is out of the clearance: it must be between "
             f"{-free * 1e3:.3g} and {free * 1e3:.3g} mm"
         )
-    memory = memory_at(value, own)
+    memory = memory_at(value, closed)
     stimulus = zeros(Stimulus)._replace(
         theta_1_set=memory.theta_1_ref, theta_2_set=memory.theta_2_ref
     )
-    return Point(WedgeBrake(), own, state_at(value, own), memory, stimulus)
+    return Point(WedgeBrake(), closed, state_at(value, closed), memory, stimulus)
 
 
 LOOP = two_motor_loop(

@@ -27,26 +27,26 @@ def point(par: ParameterSet, value: float) -> Point:
     ParameterError
         When the drives cannot hold the force.
     """
-    own = cast(WedgeParameters, par.replace({"rig.mode_1": "position", "rig.mode_2": "position"}))
-    k = roller_screw.slope(own.screw)
-    rest = zeros(force_sensor.Input)._replace(c=screws_compliance(own))
-    theta = 0.5 * value / (force_sensor.stiffness(rest, own.rig.sensor) * k)
+    rig = cast(WedgeParameters, par.replace({"rig.mode_1": "position", "rig.mode_2": "position"}))
+    k = roller_screw.slope(rig.screw)
+    rest = zeros(force_sensor.Input)._replace(c=screws_compliance(rig))
+    theta = 0.5 * value / (force_sensor.stiffness(rest, rig.rig.sensor) * k)
     state: dict[str, float] = {"y_F": value}
     memory: dict[str, float] = {}
     stimulus: dict[str, float] = {}
-    for n, sign, motor in ((1, 1.0, own.motor_1), (2, -1.0, own.motor_2)):
+    for n, sign, motor in ((1, 1.0, rig.motor_1), (2, -1.0, rig.motor_2)):
         i = sign * k * value / servo_motor.torque_constant(motor)
-        demand = own.drive.G_sense * i
-        reference = sign * theta + demand / _stiffness(own)
-        _require_reachable(value, abs(demand), own)
+        demand = rig.drive.G_sense * i
+        reference = sign * theta + demand / _stiffness(rig)
+        _require_reachable(value, abs(demand), rig)
         state |= {
             f"demand_{n}": demand, f"sensed_{n}": demand, f"i_{n}": i, f"theta_{n}": sign * theta,
-            f"integral_{n}": servo_motor.resistance(motor) * i / own.drive.V_dc,
+            f"integral_{n}": servo_motor.resistance(motor) * i / rig.drive.V_dc,
         }  # fmt: skip
         memory |= {f"theta_{n}_ref": reference, f"last_{n}": sign * theta, f"i_{n}_ref": demand}
         stimulus |= {f"theta_{n}_set": reference}
     return Point(
-        ScrewRig(), own, zeros(ScrewRig.State)._replace(**state),
+        ScrewRig(), rig, zeros(ScrewRig.State)._replace(**state),
         zeros(Memory)._replace(**memory), zeros(Stimulus)._replace(**stimulus),
     )  # fmt: skip
 
@@ -59,7 +59,7 @@ def _stiffness(par: WedgeParameters) -> float:
 
 def _require_reachable(value: float, demand: float, par: WedgeParameters) -> None:
     limits = {"control.position.i_max": par.control.position.i_max, "drive.i_max": par.drive.i_max}
-    name, most = min(limits.items(), key=lambda one: one[1])
+    name, most = min(limits.items(), key=lambda limit: limit[1])
     if not demand < most:
         raise ParameterError(
             f"force = {value:g} N needs {demand:.3g} A even without friction: it must be below "
