@@ -76,14 +76,14 @@ class Agreement:
         singles = [c for c in self.gain if c not in (NOTHING, LIMITS, EVERYTHING)]
         moves |= {cause: self.beyond_limits(cause) for cause in singles}
         sizes = {cause: _move(*by) for cause, by in moves.items()}
-        found = []
+        causes = []
         for k in range(len(self.frequencies)):
             here = {cause: float(size[k]) for cause, size in sizes.items()}
             lost = [cause for cause, size in here.items() if not math.isfinite(size)]
             most = max(here, key=lambda cause: here[cause])
             gain, phase = (abs(float(by[k])) for by in moves[most])
-            found.append(", ".join(lost) or ("" if gain <= GAIN and phase <= PHASE else most))
-        return found
+            causes.append(", ".join(lost) or ("" if gain <= GAIN and phase <= PHASE else most))
+        return causes
 
 
 def agreement(
@@ -123,28 +123,28 @@ def agreement(
     smooth = loop.smooth(par)
     left = {NOTHING: smooth, LIMITS: smooth, **{c: loop.smooth(par, c) for c in loop.causes},
             EVERYTHING: par}  # fmt: skip
-    found = xr.Dataset()
-    for k, (cause, own) in enumerate(left.items()):
+    f = np.zeros(0)
+    for k, (cause, variant) in enumerate(left.items()):
         sweep = Sweep(
             loop.inputs, loop.output, frequencies, (amplitudes[1 if cause else 0],), flags=(),
-            whole=loop.whole(own), tolerance=1e-3 if cause else 1e-4,
+            whole=loop.whole(variant), tolerance=1e-3 if cause else 1e-4,
             most=_PATIENCE if cause else 60,
         )  # fmt: skip
-        found = frequency_response(loop.point(own, value).run(step), sweep)
-        gain[cause], phase[cause] = _difference(found, linear.response(found["frequency"].values))
+        response = frequency_response(loop.point(variant, value).run(step), sweep)
+        f = response["frequency"].values
+        gain[cause], phase[cause] = _difference(response, linear.response(f))
         if progress is not None:
             progress(f"agreement of loop {loop.name}", (k + 1) / len(left))
-    f = found["frequency"].values
-    own_step = step or loop.point(par, value).step
-    ratio = loop.closed(par, value, own_step).response(f) / linear.response(f)
+    substep = step or loop.point(par, value).step
+    ratio = loop.closed(par, value, substep).response(f) / linear.response(f)
     return Agreement(f, gain, phase, *_in_dB_and_degree(ratio[:, 0, 0]))
 
 
-def _difference(found: xr.Dataset, linear: Complex) -> tuple[Array, Array]:
-    one = found.isel(variant=0, amplitude=0)
-    settled = one["settled"].values > 0
-    gain = np.where(settled, one["gain"].values, np.nan)
-    ratio = gain * np.exp(1j * np.radians(one["phase"].values)) / linear[:, 0, 0]
+def _difference(response: xr.Dataset, linear: Complex) -> tuple[Array, Array]:
+    part = response.isel(variant=0, amplitude=0)
+    settled = part["settled"].values > 0
+    gain = np.where(settled, part["gain"].values, np.nan)
+    ratio = gain * np.exp(1j * np.radians(part["phase"].values)) / linear[:, 0, 0]
     return _in_dB_and_degree(ratio)
 
 

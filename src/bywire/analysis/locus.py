@@ -73,9 +73,9 @@ class Locus:
         if not self.period:
             return self.poles
         alive = self.poles != 0.0
-        found = np.full(self.poles.shape, -np.inf, dtype=complex)
-        found[alive] = np.log(self.poles[alive]) / self.period
-        return found
+        continuous = np.full(self.poles.shape, -np.inf, dtype=complex)
+        continuous[alive] = np.log(self.poles[alive]) / self.period
+        return continuous
 
 
 def locus(
@@ -129,9 +129,9 @@ def locus_of(
         raise ParameterError(f"{name}: a locus needs two values or more, got {len(values)}")
     models = [model(at) for at in values]
     tracked = [models[0].poles()]
-    for one in models[1:]:
-        tracked.append(_followed(tracked[-1], one.poles()))
-    stable = np.array([_is_stable(one) for one in models])
+    for linear in models[1:]:
+        tracked.append(_followed(tracked[-1], linear.poles()))
+    stable = np.array([_is_stable(linear) for linear in models])
     borders = [
         _border(model, (values[k], values[k + 1]), bool(stable[k + 1]))
         for k in map(int, np.flatnonzero(stable[1:] != stable[:-1]))
@@ -142,12 +142,12 @@ def locus_of(
     )  # fmt: skip
 
 
-def _followed(before: Complex, found: Complex) -> Complex:
+def _followed(before: Complex, poles: Complex) -> Complex:
     """Return poles in the order of those before: the assignment that moves them least."""
     from scipy.optimize import linear_sum_assignment
 
-    _, columns = linear_sum_assignment(np.abs(before[:, None] - found))
-    return np.asarray(found[columns])
+    _, columns = linear_sum_assignment(np.abs(before[:, None] - poles))
+    return np.asarray(poles[columns])
 
 
 def _outermost(model: LinearModel) -> tuple[complex, float]:

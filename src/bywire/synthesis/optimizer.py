@@ -60,20 +60,20 @@ class Problem:
 
     def gains(self, z: Array) -> dict[str, float]:
         """Return gains by name for a point of the unit cube."""
-        found = {}
+        values = {}
         for share, (name, (low, high)) in zip(z, self.tunables.items(), strict=True):
             s = min(max(float(share), 0.0), 1.0)
-            found[name] = low * (high / low) ** s if low > 0 else low + (high - low) * s
-        return found
+            values[name] = low * (high / low) ** s if low > 0 else low + (high - low) * s
+        return values
 
     def point(self, gains: Mapping[str, float]) -> Array:
         """Return the point of the unit cube for gains, the nearest where they lie outside."""
-        found = []
+        shares = []
         for name, (low, high) in self.tunables.items():
             value = min(max(gains[name], low), high)
             share = math.log(value / low, high / low) if low > 0 else (value - low) / (high - low)
-            found.append(share)
-        return np.array(found)
+            shares.append(share)
+        return np.array(shares)
 
     def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
         """Return the slack of every requirement for some cases, shape (cases, requirements).
@@ -84,7 +84,7 @@ class Problem:
 
     def points_seen(self, cases: Sequence[int]) -> list[Array]:
         """Return all points that were computed for every one of some cases."""
-        keys = [{z for z, k in self._known if k == one} for one in cases]
+        keys = [{z for z, k in self._known if k == case} for case in cases]
         return [np.frombuffer(z) for z in sorted(set.intersection(*keys))]
 
     def _of(self, z: Array, k: int) -> tuple[Array, Array]:
@@ -170,10 +170,10 @@ class Search:
 
     def _judged(self, z: Array) -> float:
         """Return the worst wanted slack, or what is missing of the kept ones; note the best."""
-        found = self._slacks(z)
-        value = float(found[:, self._chosen()].min())
+        slacks = self._slacks(z)
+        value = float(slacks[:, self._chosen()].min())
         if self.kept:
-            missing = float(found[:, list(self.kept)].min())
+            missing = float(slacks[:, list(self.kept)].min())
             if missing < -1e-6:
                 value = KEPT_MISSED + missing
         self.seen.append((value, np.clip(z, 0.0, 1.0)))
@@ -186,9 +186,9 @@ class Search:
 
         def excess(v: Array) -> Array:
             self._judged(v[:n])
-            found = self._slacks(v[:n])
-            wanted = found[:, self._chosen()] - v[n]
-            return np.concatenate([wanted.ravel(), found[:, list(self.kept)].ravel()])
+            slacks = self._slacks(v[:n])
+            wanted = slacks[:, self._chosen()] - v[n]
+            return np.concatenate([wanted.ravel(), slacks[:, list(self.kept)].ravel()])
 
         def slope(v: Array) -> Array:
             here, columns = excess(v), []

@@ -193,12 +193,12 @@ class ScheduleDesign:
     @property
     def worst(self) -> Across:
         """Where the scheduled loop is worst off."""
-        return min(self.across, key=lambda one: one.slack)
+        return min(self.across, key=lambda point: point.slack)
 
     @property
     def status(self) -> Status:
         """Whether every region, and the loop between them, meets the requirements."""
-        found = [one.status for one in self.regions.values()]
-        if "interrupted" in found:
+        statuses = [design.status for design in self.regions.values()]
+        if "interrupted" in statuses:
             return "interrupted"
-        return "met" if {*found} == {"met"} and self.worst.slack >= MISSED else "infeasible"
+        return "met" if {*statuses} == {"met"} and self.worst.slack >= MISSED else "infeasible"

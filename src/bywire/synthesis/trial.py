@@ -56,9 +56,9 @@ class Trial:
         self, gains: Mapping[str, Sequence[float]], target: float, *, rough: bool = False
     ) -> tuple[BenchFigures, ...]:
         """Return the figures of sets of gains, see `bench_figures`."""
-        own = self.bench if self.bench is not None and has_step(self.bench) else None
+        bench = self.bench if self.bench is not None and has_step(self.bench) else None
         return bench_figures(
-            self.loop, self.par, self.value, self.amplitudes, gains, own, target, rough=rough
+            self.loop, self.par, self.value, self.amplitudes, gains, bench, target, rough=rough
         )  # fmt: skip
 
 
@@ -70,10 +70,10 @@ def measured(
     rough: bool = False,
 ) -> list[dict[str, BenchFigures]]:
     """Return the figures of every set of gains, by the label of each trial."""
-    found = [one.measure(gains, target, rough=rough) for one in trials]
+    figures = [trial.measure(gains, target, rough=rough) for trial in trials]
     return [
-        dict(zip((one.label for one in trials), row, strict=True))
-        for row in zip(*found, strict=True)
+        dict(zip((trial.label for trial in trials), row, strict=True))
+        for row in zip(*figures, strict=True)
     ]  # fmt: skip
 
 
@@ -95,14 +95,14 @@ def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]
         return []
     slacks = problem.slacks(problem.point(gains), range(1, len(problem.cases))).min(axis=1)
     order = [others[k] for k in slacks.argsort(kind="stable")]
-    values = [_coordinates(one) for one in others]
+    values = [_coordinates(case) for case in others]
     ends = {name: (min(row[name] for row in values), max(row[name] for row in values))
             for name in values[0]}  # fmt: skip
-    found = [
-        one for one in order
-        if one is order[0] or all(v in ends[name] for name, v in _coordinates(one).items())
+    corners = [
+        case for case in order
+        if case is order[0] or all(v in ends[name] for name, v in _coordinates(case).items())
     ]  # fmt: skip
-    return found[:MOST]
+    return corners[:MOST]
 
 
 def worst_of(
@@ -128,15 +128,15 @@ def worst_of(
     target
         Frequency around which is measured [Hz].
     """
-    trials = [trial.at(one) for one in corners]
+    trials = [trial.at(corner) for corner in corners]
     if not trials:
         return []
     (row,) = measured([trial, *trials], {name: [value] for name, value in gains.items()}, target)
     nominal = row[trial.label]
     slacks = []
-    for one in trials:
-        own = row[one.label]
-        alone = {NOMINAL: replace(own, step=own.step or nominal.step)}
+    for corner in trials:
+        figures = row[corner.label]
+        alone = {NOMINAL: replace(figures, step=figures.step or nominal.step)}
         slacks.append(judged(problem.requirements, gains, alone, linear).slack)
     return [trials[slacks.index(min(slacks))]]
 

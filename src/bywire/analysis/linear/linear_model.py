@@ -123,8 +123,8 @@ class LinearModel:
 
     def poles(self) -> Complex:
         """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
-        found = np.linalg.eigvals(self.A).astype(np.complex128)
-        return found[np.argsort(np.abs(found))]
+        eigenvalues = np.linalg.eigvals(self.A).astype(np.complex128)
+        return eigenvalues[np.argsort(np.abs(eigenvalues))]
 
     @property
     def nyquist(self) -> float:

@@ -143,8 +143,8 @@ def _stiffness(
     model: Model, functions: SmoothFunctions, state: NamedTuple, p: list[float]
 ) -> Array:
     """Return the stiffness of the contacts that are closed at a state, zero for open ones."""
-    found = functions.contacts(list(state), p)
-    *matrices, gaps = map(np.array, found if isinstance(found, tuple) else (found,))
+    values = functions.contacts(list(state), p)
+    *matrices, gaps = map(np.array, values if isinstance(values, tuple) else (values,))
     blocks, at = [], 0
     for C in matrices:
         d = gaps[at : at + len(C), 0]

@@ -118,8 +118,8 @@ def zeros(system: Realization) -> tuple[Complex, float]:
         factor *= size
         Q = _complement(row)
         A, b, c, d = Q.T @ A @ Q, Q.T @ b, row @ A @ Q, float(row @ b)
-    found = np.linalg.eigvals(A - np.outer(b, c) / d) if len(A) else np.zeros(0)
-    return np.asarray(found, dtype=complex), factor * d
+    roots = np.linalg.eigvals(A - np.outer(b, c) / d) if len(A) else np.zeros(0)
+    return np.asarray(roots, dtype=complex), factor * d
 
 
 def _reached(system: Realization) -> Realization:

@@ -131,8 +131,8 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
 def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
     """Return the one task of a list, which must run only once in the common period."""
     if len(tasks) != 1:
-        found = ", ".join(system.names[k] for k in tasks) or "none"
-        raise ParameterError(f"{refusal}, found {found}")
+        names = ", ".join(system.names[k] for k in tasks) or "none"
+        raise ParameterError(f"{refusal}, found {names}")
     (owner,) = tasks
     if system.every[owner] != system.common:
         often = system.common // system.every[owner]
@@ -183,14 +183,14 @@ def analog_gain(
         raise unknown_name("state", cut, model.State._fields)
     whole = linearize(model, par, state, memory, inputs=(), outputs=(cut,))
     kept = [name for name in whole.states if name not in locked]
-    own = whole.reduced(kept, held=bool(locked))
-    k = own.states.index(cut)
-    A, B = own.A.copy(), own.A[:, k : k + 1].copy()
+    plant = whole.reduced(kept, held=bool(locked))
+    k = plant.states.index(cut)
+    A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()
     B[k] = 0.0
     A[:, k] -= B[:, 0]
     if not B.any():
         raise ParameterError(f"{cut} cannot be cut: nothing in {model.name} reads it")
     return replace(
-        own, name=f"{model.name}, cut at {cut}", A=A, B=B, C=-own.C, D=np.zeros((1, 1)),
-        inputs=(cut,), input_units=own.output_units,
+        plant, name=f"{model.name}, cut at {cut}", A=A, B=B, C=-plant.C, D=np.zeros((1, 1)),
+        inputs=(cut,), input_units=plant.output_units,
     )  # fmt: skip

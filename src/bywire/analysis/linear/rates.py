@@ -34,5 +34,5 @@ def rates(model: LinearModel) -> Complex:
     poles = model.poles()
     if not model.period:
         return poles
-    found = np.log(poles[np.abs(poles) > DEAD]) / model.period
-    return np.asarray(found[np.argsort(np.abs(found))])
+    continuous = np.log(poles[np.abs(poles) > DEAD]) / model.period
+    return np.asarray(continuous[np.argsort(np.abs(continuous))])

@@ -118,8 +118,8 @@ def sampled_system(
 def _frames(periods: Sequence[float]) -> tuple[float, list[int]]:
     """Return the longest time that divides all periods, and how often each holds it."""
     exact = [Fraction(period).limit_denominator(10**9) for period in periods]
-    whole = math.lcm(*(one.denominator for one in exact))
-    ticks = [int(one * whole) for one in exact]
+    whole = math.lcm(*(period.denominator for period in exact))
+    ticks = [int(period * whole) for period in exact]
     frame = math.gcd(*ticks)
     return frame / whole, [tick // frame for tick in ticks]
 
@@ -135,12 +135,12 @@ def _ticks(
     rows = [model.State._fields.index(name) for name in kept]
     columns = [model.Stimulus._fields.index(name) for name in inputs]
     state, memory, stimulus = point
-    found = []
+    jacobians = []
     for tick in smooth_functions(model, par).ticks:
         values = tick(list(state), list(memory), list(stimulus), vector(par))
         M_x, M_m, M_u = (np.array(value, dtype=float) for value in values)
-        found.append([M_x[:, rows], M_m, M_u[:, columns]])
-    return tuple(found)
+        jacobians.append([M_x[:, rows], M_m, M_u[:, columns]])
+    return tuple(jacobians)
 
 
 def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
@@ -178,6 +178,6 @@ def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
     W = np.zeros((n + m, n + m))
     W[:n, :n], W[:n, n:] = model.A, model.B
     half = 0.5 * step * W
-    one = np.linalg.solve(np.eye(n + m) - half, np.eye(n + m) + half)
-    whole = np.linalg.matrix_power(one, count)
+    once = np.linalg.solve(np.eye(n + m) - half, np.eye(n + m) + half)
+    whole = np.linalg.matrix_power(once, count)
     return replace(model, A=whole[:n, :n], B=whole[:n, n:], period=period)

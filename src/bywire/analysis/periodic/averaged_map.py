@@ -128,13 +128,13 @@ class PeriodicModel:
         """
         d, T = self.derivatives, self.run.duration
         rows, ticks = d.D.shape[0], d.D.shape[2]
-        found = []
+        lines = []
         for f in np.asarray(frequencies, dtype=float):
             U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
             Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
             wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
-            found.append(wave @ (d.C[:, 0] @ Z + d.D[:, 0] @ U) / rows)
-        return np.array(found, dtype=np.complex128)
+            lines.append(wave @ (d.C[:, 0] @ Z + d.D[:, 0] @ U) / rows)
+        return np.array(lines, dtype=np.complex128)
 
 
 def periodic_model(
@@ -170,9 +170,9 @@ def periodic_model(
         When there is no compiler.
     """
     *trials, last = STEPS if step is None else (step,)
-    for one in trials:
+    for substep in trials:
         with suppress(SolverError):
-            return _about(point, inputs, output, whole, one)
+            return _about(point, inputs, output, whole, substep)
     return _about(point, inputs, output, whole, last)
 
 
@@ -206,12 +206,12 @@ def dithered_loop(
     InputError, SolverError, CompilerError
         As `periodic_model`, and when the operating point does not exist or all of it sticks.
     """
-    own = unrounded(loop, par)
-    found = periodic_model(
-        loop.point(own, value), loop.inputs, loop.output, loop.whole(own), step
+    ideal = unrounded(loop, par)
+    model = periodic_model(
+        loop.point(ideal, value), loop.inputs, loop.output, loop.whole(ideal), step
     )
-    require_moving(found)
-    return found
+    require_moving(model)
+    return model
 
 
 def require_moving(model: PeriodicModel) -> None:

@@ -101,17 +101,17 @@ def frequency_response(
 
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
-        own = replace(run, duration=window, record=interval(run))
-        found = _repeated(own, sweep, cases, periods, lanes, stop)
-        measured = _measured(found, cases.sizes, periods, least)
-        measured |= sweep.shares(found.values, cases.matrix, names)
+        windowed = replace(run, duration=window, record=interval(run))
+        repeated = _repeated(windowed, sweep, cases, periods, lanes, stop)
+        measured = _measured(repeated, cases.sizes, periods, least)
+        measured |= sweep.shares(repeated.values, cases.matrix, names)
         return {name: value.reshape(cases.shape) for name, value in measured.items()}
 
     done: list[dict[str, Array]] = []
     pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
     try:
-        for k, one in enumerate(pool.map(measure, plans)):
-            done.append(one)
+        for k, figures in enumerate(pool.map(measure, plans)):
+            done.append(figures)
             if progress is not None:
                 progress("frequency response", (k + 1) / len(plans))
     except KeyboardInterrupt:
@@ -123,12 +123,12 @@ def frequency_response(
 
 
 def _repeated(
-    own: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
+    windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
-    columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
-    schedule = own.schedule()
-    apart, f = schedule.stimulus_frames * schedule.frame, periods / own.duration
+    columns = [windowed.model.Stimulus._fields.index(name) for name in sweep.inputs]
+    schedule = windowed.schedule()
+    apart, f = schedule.stimulus_frames * schedule.frame, periods / windowed.duration
 
     def sines(which: NDArray[np.int64], first: int, last: int) -> Array:
         rows = np.repeat(cases.rest[which, None], last - first, axis=1)
@@ -136,7 +136,7 @@ def _repeated(
         rows[:, :, columns] += (cases.sizes[which, None] * wave)[:, :, None]
         return rows
 
-    rows = round(own.duration / own.record)
+    rows = round(windowed.duration / windowed.record)
     wave = 2j / rows * np.exp(-2j * math.pi * periods / rows * np.arange(rows))
 
     def figures(window: Array) -> Complex:
@@ -144,28 +144,28 @@ def _repeated(
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 
     return repeat(
-        own, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
+        windowed, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
         starts=cases.starts, lanes=lanes, stop=stop,
     )  # fmt: skip
 
 
-def _measured(found: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:
+def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:
     """Return the figures of all cases at one frequency, shape (cases,) each."""
-    outputs = found.values[:, :, 0]
+    outputs = repeated.values[:, :, 0]
     count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
     # The window holds whole periods: harmonics are lines of its Fourier transform.
     spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
     lines = 2.0 / outputs.shape[1] * spectrum
     moves = np.ptp(outputs, axis=1) > least
     last = np.where(moves, np.abs(lines[:, 0]), np.nan)
-    value, scatter = (one[:, 0] for one in spread_of(found.figures, found.repeats))
+    value, scatter = (column[:, 0] for column in spread_of(repeated.figures, repeated.repeats))
     return {
         "gain": np.where(moves, np.abs(value), np.nan) / sizes,
         "phase": np.where(moves, np.degrees(np.angle(value)), np.nan),
         "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / last,
         "coherence": 0.5 * last**2 / np.where(moves, np.var(outputs, axis=1), np.nan),
         "scatter": np.where(moves, scatter, np.nan),
-        "windows": found.windows.astype(float),
-        "settled": found.repeats.astype(float),
-        "unsettled_substeps": found.unsettled.astype(float),
+        "windows": repeated.windows.astype(float),
+        "settled": repeated.repeats.astype(float),
+        "unsettled_substeps": repeated.unsettled.astype(float),
     }

@@ -107,7 +107,7 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
     # Half a line more: rounded to lines, neighbors keep one between them.
     length = math.ceil(wanted * 1.25 / common) * common
-    return length, [math.floor(one * length + 0.5) for one in f]
+    return length, [math.floor(frequency * length + 0.5) for frequency in f]
 
 
 def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
