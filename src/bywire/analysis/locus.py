@@ -177,6 +177,7 @@ def _border(
     model: Callable[[float], LinearModel], between: tuple[float, float], above: bool
 ) -> Border:
     """Return where stability changes between two values, by bisection."""
+    # Bisection of a yes or no: near z = 1 a pole counts as an integrator, and its excess jumps.
     low, high = between
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

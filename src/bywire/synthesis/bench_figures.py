@@ -179,7 +179,7 @@ def _small(
         gain = loop_gain(loop, par, value, closed[moves], f[moves])
     if gain is not None:
         margin = measured_margin(f[moves], gain)
-    size = np.nan_to_num(response["gain"].values)
+    size = np.nan_to_num(response["gain"].values)  # what sticks answers with nothing
     before = np.append(size[f < target], np.interp(target, f, size))
     return Small(
         amplitude=float(response["amplitude"]),

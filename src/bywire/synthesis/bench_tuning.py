@@ -113,7 +113,7 @@ def tune(
     first = low + (high - low) * qmc.LatinHypercube(n, rng=np.random.default_rng(seed)).random(
         _MEMBERS
     )
-    first[0] = center
+    first[0] = center  # the linear design itself: the search cannot end worse than it
     tried: list[Candidate] = []
     count = [0]
 

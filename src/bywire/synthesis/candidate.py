@@ -80,6 +80,7 @@ def bench_slacks(
     slacks = {}
     for wanted in requirements:
         slack = _on_bench(wanted, figures)
+        # What the bench does not show, the linear model says; of a phase margin the worse counts.
         if math.isinf(slack) or wanted.figure == "phase_margin":
             slack = min(slack, linear[wanted.text])
         slacks[wanted.text] = max(slack, _LEAST)

@@ -148,6 +148,7 @@ class Search:
                 progress("design", (k + 1) / (len(starts) + 2))
         if self.best is None:
             return
+        # A figure such as an overshoot has kinks of its own: SQP stops there, a simplex goes on.
         n = self.best.size
         corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
                              * np.eye(n)])  # fmt: skip
@@ -190,6 +191,7 @@ class Search:
             wanted = slacks[:, self._chosen()] - v[n]
             return np.concatenate([wanted.ravel(), slacks[:, list(self.kept)].ravel()])
 
+        # Forward differences of our own: one loop per gain serves all requirements at once.
         def slope(v: Array) -> Array:
             here, columns = excess(v), []
             for k in range(n):
@@ -201,6 +203,7 @@ class Search:
             rate[: len(self.cases) * len(self._chosen())] = -1.0
             return np.column_stack([*columns, rate])
 
+        # The slack is a variable of its own (epigraph): smallest slacks have kinks, these do not.
         first = self._slacks(start)[:, self._chosen()].min()
         constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}

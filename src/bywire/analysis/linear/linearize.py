@@ -169,6 +169,7 @@ def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
         stiffness.
     """
     stiffness = C.diagonal()
+    # Closed contacts must press, open ones gap: the subset that satisfies both has positive slack.
     best: tuple[float, Array, Array] = (-math.inf, d, C)
     for closed in _subsets(len(d)):
         K = np.zeros_like(C)

@@ -66,12 +66,13 @@ def open_loop(
     size = len(states) + len(fields)
     A, B = np.eye(size), np.zeros((size, 1))
     for f in range(system.common):
-        tick = first
+        tick = first  # the input acts there alone: its controller runs once in the common period
         if f > 0:
             X, M, _ = system.in_a_row(system.due(f))
             tick = [X, M, np.zeros((len(fields), 1))]
         F, G = system.step(tick)
         A, B = F @ A, F @ B + G
+    # Minus: what comes back enters the closed loop with a plus, and margins count it negative.
     held = signals_of(model.Memory)
     unit = (signals_of(model.State) | held)[cut].unit
     return LinearModel(
@@ -93,7 +94,7 @@ def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobian
         read = np.zeros((n_m, 1))
         if k == owner:
             read, M_x = M_x[:, column : column + 1], M_x.copy()
-            M_x[:, column] = 0.0
+            M_x[:, column] = 0.0  # this one reads the input in place of the state, others the state
         X, M, U = M_x + M_m @ X, M_m @ M, M_m @ U + read
     row = np.zeros((1, n_x + n_m))
     row[0, column] = 1.0
@@ -121,6 +122,7 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     X, M, _ = system.in_a_row(system.due(0)[: owner + 1])
     written = np.concatenate([X[row], M[row]])[None]
     U = np.zeros((M.shape[0], 1))
+    # Whoever comes later at the same instant already takes the input.
     X[row], M[row], U[row] = 0.0, 0.0, 1.0
     for k in later:
         M_x, M_m, _ = system.ticks[k]
@@ -186,7 +188,7 @@ def analog_gain(
     plant = whole.reduced(kept, held=bool(locked))
     k = plant.states.index(cut)
     A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()
-    B[k] = 0.0
+    B[k] = 0.0  # the state's own decay is no feedback through the controller: it stays
     A[:, k] -= B[:, 0]
     if not B.any():
         raise ParameterError(f"{cut} cannot be cut: nothing in {model.name} reads it")

@@ -58,6 +58,7 @@ class SampledSystem:
         """Return the Jacobians of tasks that run one after the other at the same instant."""
         (n_m, n_x), n_u = self.ticks[0][0].shape, self.ticks[0][2].shape[1]
         X, M, U = np.zeros((n_m, n_x)), np.eye(n_m), np.zeros((n_m, n_u))
+        # All read the same plant; each reads what those before it at this instant have written.
         for M_x, M_m, M_u in (self.ticks[k] for k in tasks):
             X, M, U = M_x + M_m @ X, M_m @ M, M_u + M_m @ U
         return [X, M, U]
@@ -117,6 +118,7 @@ def sampled_system(
 
 def _frames(periods: Sequence[float]) -> tuple[float, list[int]]:
     """Return the longest time that divides all periods, and how often each holds it."""
+    # 0.2 ms and 1 ms are no multiples as floats: the nearest ratios of whole numbers are.
     exact = [Fraction(period).limit_denominator(10**9) for period in periods]
     whole = math.lcm(*(period.denominator for period in exact))
     ticks = [int(period * whole) for period in exact]

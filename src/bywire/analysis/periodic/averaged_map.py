@@ -130,6 +130,7 @@ class PeriodicModel:
         rows, ticks = d.D.shape[0], d.D.shape[2]
         lines = []
         for f in np.asarray(frequencies, dtype=float):
+            # A zero-order hold at the ticks, not the sine itself: that is what a controller reads.
             U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
             Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
             wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
@@ -225,7 +226,7 @@ def require_moving(model: PeriodicModel) -> None:
     if model.orbit.stuck == 1.0:
         raise SolverError(
             f"{model.run.model.name}: it sticks during the whole period, and answers to nothing "
-            "small: raise the dither's gain (ecu.dither.gain)"
+            "small: raise the dither's gain"
         )
 
 

@@ -58,7 +58,7 @@ class Variant:
         """Return the loop gain behind a measured closed response, both of shape (n,)."""
         T = self.linear(frequencies)
         L = self.loop.gain(self.par, self.value).response(frequencies)[:, 0, 0]
-        H = T * (1.0 + L) / L
+        H = T * (1.0 + L) / L  # the plant has dropped out: T = C_r P/(1 + L), L = C_y P
         return np.asarray(closed / (H - closed))
 
 

@@ -8,7 +8,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.equilibrium import equilibrium
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction, linearize
@@ -149,7 +148,7 @@ def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:
         States `MECHANICAL`, outputs `OUTPUTS`; the disc keeps its speed.
     """
     kept = tuple(name for name in whole.states if name not in (*_RECORDING, "Omega", "y_M"))
-    moving = with_channels(whole, outputs=OUTPUTS).reduced(kept, held=True)
+    moving = whole.channels(outputs=OUTPUTS).reduced(kept, held=True)
     slow = residualized(moving, MECHANICAL, corrected=corrected)
     return replace(slow, name="wedge, mechanical")
 
@@ -187,7 +186,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
     split = np.zeros((2, 6))
     for row, columns in ((0, [0, 2, 4]), (1, [1, 3, 5])):
         split[row, columns] = T[columns, row] * np.array(masses)[columns]
-    left = np.linalg.solve(split @ T, split)
+    left = np.linalg.solve(split @ T, split)  # inverse of T weighted by the masses
     return replace(
         mechanical, name="wedge, rigid",
         A=left @ mechanical.A @ T, B=left @ mechanical.B, C=mechanical.C @ T,

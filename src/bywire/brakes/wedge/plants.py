@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.plant import Plant, PlantPoint
 from bywire.analysis.loop import Quantity
@@ -69,7 +68,7 @@ def mechanical_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 def with_its_outputs(par: ParameterSet, at: PlantPoint) -> LinearModel:
     """Return the whole plant with the same outputs."""
-    return with_channels(whole(par, at), outputs=OUTPUTS)
+    return whole(par, at).channels(outputs=OUTPUTS)
 
 
 def rigid_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
@@ -80,7 +79,7 @@ def rigid_model(par: ParameterSet, at: PlantPoint) -> LinearModel:
 
 def driven_as_one(par: ParameterSet, at: PlantPoint) -> LinearModel:
     """Return the whole plant with the same input and outputs."""
-    return with_channels(whole(par, at), outputs=OUTPUTS).together(INPUTS)
+    return whole(par, at).channels(outputs=OUTPUTS).together(INPUTS)
 
 
 WHOLE = Plant(

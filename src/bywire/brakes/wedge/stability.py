@@ -91,6 +91,7 @@ def motion(par: WedgeParameters, F_N: float) -> Motion:
     acting = np.abs(whole.A).max(axis=0) > _FREE * np.abs(whole.A).max()
     bound = whole.reduced([n for n, acts in zip(whole.states, acting, strict=True) if acts],
                           held=True)  # fmt: skip
+    # The one that grows fastest; rounded, so that of a pair the upper one is taken every time.
     slow = max(bound.poles(), key=lambda s: (round(s.real, 9), s.imag))
     locked = whole.reduced(("x", "v"), held=True).poles()
     return Motion(

@@ -80,7 +80,7 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
         start = Point(MotorcycleBrake(), driven, state, memory, stimulus)
         model = periodic_model(start, ("i_set",), "p_mc", whole, step)
         require_moving(model)
-        gain = model.steady_gain
+        gain = model.steady_gain  # negative or zero: the orbit is not the one that attracts
         if not gain > 0.0:
             break
         if abs(model.mean - p) <= _CLOSE * p:

@@ -1,4 +1,4 @@
-"""The ECU's control laws as linear models, from the laws themselves.
+"""The ECU's control laws, and its current loop, as linear models: from the laws themselves.
 
 Where the gains are scheduled, a law is that of the gains frozen at a pressure: small motion about
 an equilibrium knows no other, because the schedule is bumpless.
@@ -7,15 +7,19 @@ an equilibrium knows no other, because the schedule is bumpless.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.brakes.motorcycle.parameters import EcuParameters
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import EcuParameters, MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.control import current_pi, low_pass_2, pressure_pid
 from bywire.core.signals import signals_of, zeros
 
+Rotor = Literal["locked", "free"]
 Law = Callable[[Any, Any], tuple[Any, Any]]
 
 
@@ -75,6 +79,30 @@ def demand_filter(ecu: EcuParameters) -> LinearModel:
         return state, out.y
 
     return _linear("demand-filter", law, low_pass_2.State, ecu.T_s, ("A", "A"))
+
+
+def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearModel:
+    """Return the loop from the set point ``i_set`` to the currents ``i`` and ``i_meas``.
+
+    PI at the ECU's sample time, battery and bridge, winding, anti-alias filter; the converter's
+    resolution is left out.
+
+    Parameters
+    ----------
+    par
+        Parameters; the drive mode does not matter.
+    p
+        Pressure of the operating point [Pa].
+    rotor
+        ``"locked"``: no back-EMF, as where friction holds the shaft. ``"free"``: the shaft moves
+        against the brake, without dry friction.
+    """
+    driven = par.replace({"drive.mode": "current-direct", "adc.law": "ideal"})
+    return closed_loop(
+        MotorcycleBrake(), driven, state_at(p, driven), memory_at(p, driven),
+        inputs=("i_set",), outputs=("i", "i_meas"),
+        locked=("theta", "omega", "p_mc", "p_pd", "y_p") if rotor == "locked" else (),
+    )  # fmt: skip
 
 
 def _linear(

@@ -32,6 +32,7 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
     """
     mean, swing = top - amplitude, amplitude
     run, reached = _sine_run(par, mean, swing, f), 0.0
+    # The fundamental is near proportional to the demand: two or three corrections are enough.
     for _ in range(_ROUNDS):
         run = _sine_run(par, mean, swing, f)
         middle, reached = _fitted(run, f)
