@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import xarray as xr
-from scipy.optimize import bisect, minimize_scalar
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -91,6 +90,7 @@ def _electrical(par: Par, options: Options) -> Array:
 
 def _best_ratio(par: Par, options: Options) -> float:
     """Return the gear ratio [m/rad] of least electrical power."""
+    from scipy.optimize import minimize_scalar
 
     def power(z: float) -> float:
         return _at(geared(par, math.exp(z)), options, options.bandwidth)["electrical"]
@@ -103,6 +103,7 @@ def _best_ratio(par: Par, options: Options) -> float:
 
 def fastest(par: Par, options: Options, demand: str) -> float:
     """Return the highest bandwidth [Hz] within current and voltage limit; NaN for none."""
+    from scipy.optimize import bisect
 
     def excess(z: float) -> float:
         sizes = _at(par, options, math.exp(z), demand)
