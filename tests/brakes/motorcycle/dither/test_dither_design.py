@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from bywire.brakes.motorcycle.dither.choice import best_of, candidates, crossing, least
-from bywire.brakes.motorcycle.dither.trial import area_ratios
 from bywire.brakes.motorcycle.dither.reach import (
     admissible_frequencies,
     attenuation,

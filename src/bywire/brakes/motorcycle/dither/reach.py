@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.brakes.motorcycle.linear.control_laws import demand_filter
-from bywire.brakes.motorcycle.linear.control_laws import current_loop
+from bywire.brakes.motorcycle.linear.control_laws import current_loop, demand_filter
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import dither
 from bywire.core.errors import ParameterError

@@ -19,10 +19,8 @@ from bywire.brakes.motorcycle.dither.map import (
     mapped,
 )
 from bywire.brakes.motorcycle.dither.options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.brakes.motorcycle.dither.trial import area_ratios
 from bywire.brakes.motorcycle.dither.reach import admissible_frequencies
-from bywire.brakes.motorcycle.dither.map import by_frequency, by_pressure, law
-from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, tried
+from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, area_ratios, tried
 from bywire.brakes.motorcycle.dither.waveforms import compared
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
