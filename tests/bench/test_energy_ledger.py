@@ -8,7 +8,8 @@ import xarray as xr
 
 from bywire.api.run import energy_table, run
 from bywire.bench.bench import Bench
-from bywire.bench.energy_ledger import actuator_ledger, disc_ledger
+from bywire.bench.energy_ledger import actuator_ledger, further_ledgers, role_attributes
+from bywire.core.signals import Role
 
 T = np.linspace(0.0, 1.0, 5)
 
@@ -42,8 +43,7 @@ def test_books_of_both_brakes_close(braking):
 def test_disc_gives_what_the_pads_turn_into_heat(braking):
     """Heat is the friction force times the slip: of both pads, one of them moving."""
     one = braking.recordings["run"].sel(time=slice(-1e-9, None))
-    books = disc_ledger(one)
-    assert books is not None
+    books = further_ledgers(one)["with disc"]
     sinks = by_name(books.sinks)
     par = braking.bench.par.flat()
     slip = 2.0 * par["caliper.r_B"] * one["Omega"].values - one["v"].values
@@ -66,7 +66,10 @@ def test_standby_and_both_kinds_of_copper_stand_for_the_whole(braking):
 
 
 def test_copper_counts_as_holding_while_all_stuck():
-    books = actuator_ledger(recording(E_source=5.0, E_copper=4.0, E_stored=1.0, t_stuck=0.25))
+    one = recording(E_source=5.0, E_copper=4.0, E_stored=1.0, t_stuck=0.25)
+    one["E_copper"].attrs |= role_attributes(Role("sink", "copper", split=True))
+    one["t_stuck"].attrs |= role_attributes(Role("standstill"))
+    books = actuator_ledger(one)
     sinks = by_name(books.sinks)
     assert sinks["E_copper_holding"] == pytest.approx(1.0)
     assert books.closing_error == pytest.approx(0.0, abs=1e-12)
@@ -78,7 +81,7 @@ def test_what_is_missing_and_what_others_call_their_losses():
     books = actuator_ledger(one)
     assert books.closing_error == pytest.approx(1.0)
     assert [p.label for p in books.sinks] == ["stored", "slip of the clutch"]
-    assert disc_ledger(one) is None
+    assert further_ledgers(one) == {}
     texts = [[cell.text for cell in row] for row in energy_table(books).rows]
     assert texts[-1] == ["", "closing error", "1 J", "20 %"]
 

@@ -13,7 +13,7 @@ import xarray as xr
 
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
-from bywire.bench.energy_ledger import Ledger, actuator_ledger, disc_ledger
+from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.result import Result
 from bywire.bench.running import Progress
 from bywire.core.catalog import PARAMETER_SETS
@@ -64,7 +64,7 @@ class BenchResult(Result, Answer):
         ]  # fmt: skip
 
     def ledgers(self) -> dict[str, Ledger]:
-        """Return the books of every run from time zero on, those with the disc apart, by label."""
+        """Return the books of every run from time zero on, further ones apart, by label."""
         found = {}
         for label, recording in self.recordings.items():
             if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
@@ -73,9 +73,8 @@ class BenchResult(Result, Answer):
             if after.sizes["time"] < 2:
                 continue
             found[label] = actuator_ledger(after)
-            with_disc = disc_ledger(after)
-            if with_disc is not None:
-                found[f"{label}, with disc"] = with_disc
+            further = further_ledgers(after)
+            found |= {f"{label}, {book}": books for book, books in further.items()}
         return found
 
     def document(self) -> Document:

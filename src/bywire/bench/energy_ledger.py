@@ -1,59 +1,21 @@
-"""Where the energy of a run came from and where it went, from its recording."""
+"""Where the energy of a run came from and where it went, from its recording.
+
+What an energy is in the books its signal says (``core.signals.Role``); recordings carry it in the
+attributes of their variables. Where nothing is said, ``E_source`` is given, ``E_stored`` and every
+other ``E_...`` is taken.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import xarray as xr
 
-BRAKE_SOURCES = {"E_source": "source"}
-BRAKE_SINKS = {
-    "E_copper_moving": "copper, moving",
-    "E_copper_holding": "copper, holding",
-    "E_copper": "copper",
-    "E_gear": "gear and screw",
-    "E_seal": "seal friction",
-    "E_damping": "fluid damping",
-    "E_pipeline": "pipeline",
-    "E_supply": "supply",
-    "E_stop": "end stops",
-    "E_port": "reservoir port",
-    "E_stored": "stored",
-}
-"""energies of the motorcycle brake: integrals over the run, and what is stored"""
+from bywire.core.signals import Role
 
-WEDGE_SOURCES = {
-    "W_supply": "supply",
-    "W_electric": "electrical",
-    "W_disc": "disc on wedge",
-    "W_runout": "run-out",
-}
-WEDGE_SINKS = {
-    "E_standby": "standby of the drives",
-    "E_copper_moving": "copper, moving",
-    "E_copper_holding": "copper, holding",
-    "E_copper": "copper",
-    "E_shaft": "bearings and screws",
-    "E_wedge": "friction on the wedge",
-    "E_damping": "motor damping",
-    "E_heart": "brake heart",
-    "E_caliper": "caliper damping",
-    "E_line": "damping of screws and sensor",
-    "E_stop": "end stops",
-    "E_stored": "stored",
-}
-"""energies of the wedge brake and its rigs; of a whole, the parts count where they are known"""
-
-DISC_SOURCES = {"W_brake": "disc", "W_supply": "supply", "W_runout": "run-out"}
-DISC_SINKS = {"E_pads": "heat of pads and disc"} | WEDGE_SINKS
-"""the wedge brake with its disc: nearly everything becomes heat where the pads rub"""
-
-_PARTS = {
-    "E_copper": ("E_copper_moving", "E_copper_holding"),
-    "W_electric": ("W_supply",),
-}  # what counts in place of a whole
+_PREFIX = "energy_"
 
 
 @dataclass(frozen=True)
@@ -83,14 +45,22 @@ class Ledger:
     @property
     def turnover(self) -> float:
         """Energy that was given by all that gave [J]."""
-        given = sum(max(one.energy, 0.0) for one in self.sources)
-        return given + sum(max(-one.energy, 0.0) for one in self.sinks)
+        given = sum(max(posting.energy, 0.0) for posting in self.sources)
+        return given + sum(max(-posting.energy, 0.0) for posting in self.sinks)
 
     @property
     def closing_error(self) -> float:
         """What the sources gave less what the sinks took [J]: the error of the books."""
-        given = sum(one.energy for one in self.sources)
-        return given - sum(one.energy for one in self.sinks)
+        given = sum(posting.energy for posting in self.sources)
+        return given - sum(posting.energy for posting in self.sinks)
+
+
+def role_attributes(role: Role | None) -> dict[str, str]:
+    """Return a role as attributes of a variable; none where there is no role."""
+    if role is None:
+        return {}
+    values = {each.name: getattr(role, each.name) for each in fields(Role)}
+    return {f"{_PREFIX}{name}": str(value) for name, value in values.items() if value}
 
 
 def actuator_ledger(recording: xr.Dataset) -> Ledger:
@@ -99,28 +69,22 @@ def actuator_ledger(recording: xr.Dataset) -> Ledger:
     Parameters
     ----------
     recording
-        Recording with energies [J]; losses that no brake of ours has keep their own labels.
+        Recording with energies [J].
     """
-    is_wedge = "E_shaft" in recording.data_vars
-    sources = WEDGE_SOURCES if "W_disc" in recording.data_vars else BRAKE_SOURCES
-    sinks = WEDGE_SINKS if is_wedge else BRAKE_SINKS
-    return ledger(recording, sources, sinks | _others(recording, sinks))
+    return _ledger(recording, "")
 
 
-def disc_ledger(recording: xr.Dataset) -> Ledger | None:
-    """Return the books of brake and disc together; None where no disc is braked.
+def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
+    """Return the books beyond the actuator's own that its signals name, by name.
 
-    The disc loses the braking moment's work; what the pad that moves with the wedge hands on to
-    it is no heat, so that the pads and the disc keep the rest.
+    In such a book a source stands in the place of one of the actuator's, and what it gives more is
+    taken by a sink: of a disc that is braked, the heat of the pads.
     """
-    if "W_brake" not in recording.data_vars:
-        return None
-    return ledger(recording, DISC_SOURCES, DISC_SINKS)
+    names = dict.fromkeys(role.book for role in _roles(recording).values() if role.book)
+    return {name: _ledger(recording, name) for name in names}
 
 
-def ledger(
-    recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]
-) -> Ledger:
+def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]) -> Ledger:
     """Return the books of some variables.
 
     Parameters
@@ -128,47 +92,89 @@ def ledger(
     recording
         Recording with energies [J]; of each the difference between end and start counts.
     sources, sinks
-        Label by variable. What a recording lacks is left out, and a whole whose parts are there.
+        Label by variable. What a recording lacks is left out, and a sink whose parts, moving and
+        holding, are named too.
     """
+    changes = _changes(recording) | _split(recording)
+    given, taken = (
+        [Posting(name, label, changes[name]) for name, label in wanted.items() if name in changes]
+        for wanted in (sources, sinks)
+    )
+    names = {posting.name for posting in taken}
+    parts = [p for p in taken if not {f"{p.name}_moving", f"{p.name}_holding"} <= names]
+    return Ledger(tuple(given), tuple(parts))
+
+
+def _ledger(recording: xr.Dataset, book: str) -> Ledger:
+    changes, roles = _changes(recording), _roles(recording)
+    known = {name: role for name, role in roles.items() if role.book in ("", book)}
+    sources = {name: role for name, role in known.items() if role.side == "source"}
+    instead = {role.whole: name for name, role in sources.items() if role.whole in sources}
+    given = [
+        Posting(name, sources[name].label, changes[name])
+        for name in (instead.get(each, each) for each in sources if each not in instead.values())
+    ]
+    taken = [
+        Posting(role.rest, role.rest_label, changes[name] - changes[role.whole])
+        for name, role in sources.items()
+        if role.rest and role.whole in sources
+    ]
+    split = _split(recording)
+    for name, role in known.items():
+        if role.side == "sink":
+            kinds = [kind for kind in ("moving", "holding") if f"{name}_{kind}" in split]
+            taken += [
+                Posting(f"{name}_{kind}", f"{role.label}, {kind}", split[f"{name}_{kind}"])
+                for kind in kinds
+            ] or [Posting(name, role.label, changes[name])]
+    return Ledger(tuple(given), tuple(taken))
+
+
+def _roles(recording: xr.Dataset) -> dict[str, Role]:
+    """Return what every energy is in the books: what is declared first, then what names say."""
     changes = _changes(recording)
+    said = {name: _role_of(recording[name]) for name in changes}
+    roles = {name: role for name, role in said.items() if role is not None}
+    if "E_source" in changes and not any(role.side == "source" for role in roles.values()):
+        roles["E_source"] = Role("source", "source")
+    for name in sorted(changes, key=lambda name: name != "E_stored"):
+        if name.startswith("E_") and name != "E_source" and name not in roles:
+            label = str(recording[name].attrs.get("long_name", name))
+            roles[name] = Role("sink", "stored" if name == "E_stored" else label)
+    return roles
 
-    def posted(wanted: Mapping[str, str]) -> tuple[Posting, ...]:
-        known = [name for name in wanted if name in changes]
-        whole = [name for name in known if all(part in known for part in _PARTS.get(name, ("",)))]
-        return tuple(
-            Posting(name, wanted[name], changes[name]) for name in known if name not in whole
-        )
 
-    return Ledger(posted(sources), posted(sinks))
-
-
-def _others(recording: xr.Dataset, sinks: Mapping[str, str]) -> dict[str, str]:
-    """Return the losses of other actuators, as their recording calls them."""
-    known = {*sinks, *BRAKE_SOURCES}
-    names = [str(key) for key in recording.data_vars]
-    found = [name for name in names if name.startswith("E_") and name not in known]
-    return {name: str(recording[name].attrs.get("long_name", name)) for name in found}
+def _role_of(variable: xr.DataArray) -> Role | None:
+    said = {
+        each.name: variable.attrs[_PREFIX + each.name]
+        for each in fields(Role)
+        if _PREFIX + each.name in variable.attrs
+    }
+    return Role(**{**said, "split": bool(said.get("split"))}) if "side" in said else None
 
 
 def _changes(recording: xr.Dataset) -> dict[str, float]:
-    """Return what every energy grew by [J], with those that follow from others."""
+    """Return what every energy grew by [J]."""
     found = {}
     for key in recording.data_vars:
         name, values = str(key), recording[key].values
         if name.startswith(("E_", "W_")) and values.ndim == 1:
             found[name] = float(values[-1] - values[0])
-    if {"W_supply", "W_electric"} <= found.keys():
-        found["E_standby"] = found["W_supply"] - found["W_electric"]
-    if {"W_brake", "W_disc"} <= found.keys():
-        found["E_pads"] = found["W_brake"] - found["W_disc"]
-    if "E_copper" in found and "t_stuck" in recording:
-        found["E_copper_holding"] = _while_stuck(recording, "E_copper")
-        found["E_copper_moving"] = found["E_copper"] - found["E_copper_holding"]
     return found
 
 
-def _while_stuck(recording: xr.Dataset, name: str) -> float:
-    """Return how much an energy grew while all stuck [J]: evenly within each recorded interval."""
-    names = (name, "t_stuck", "time")
-    energy, stuck, time = (np.diff(recording[one].values) for one in names)
-    return float(np.sum(energy * np.clip(stuck / time, 0.0, 1.0)))
+def _split(recording: xr.Dataset) -> dict[str, float]:
+    """Return what the sinks that are booked in two parts took, moving and holding [J].
+
+    Holding is what an energy grew by while all stood still: evenly within each recorded interval.
+    """
+    every = {str(key): _role_of(recording[key]) for key in recording.data_vars}
+    still = next((name for name, role in every.items() if role and role.side == "standstill"), "")
+    found: dict[str, float] = {}
+    for name in (name for name, role in every.items() if role and role.split and still):
+        names = (name, still, "time")
+        energy, stuck, time = (np.diff(recording[each].values) for each in names)
+        holding = float(np.sum(energy * np.clip(stuck / time, 0.0, 1.0)))
+        whole = float(recording[name].values[-1] - recording[name].values[0])
+        found |= {f"{name}_moving": whole - holding, f"{name}_holding": holding}
+    return found

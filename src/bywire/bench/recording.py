@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
+from bywire.bench.energy_ledger import role_attributes
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
@@ -73,7 +74,8 @@ def record(
 
 def _attributes(signal: Signal) -> dict[str, str]:
     found = {"units": signal.unit, "long_name": signal.label}
-    return found | ({"set_point_of": signal.set_point_of} if signal.set_point_of else {})
+    found |= {"set_point_of": signal.set_point_of} if signal.set_point_of else {}
+    return found | role_attributes(signal.role)
 
 
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import xarray as xr
 from matplotlib.figure import Figure
 
-from bywire.bench.energy_ledger import actuator_ledger, disc_ledger
+from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.kpis import sine_sweep
 from bywire.bench.result import Result
 from bywire.core.errors import ParameterError
@@ -118,16 +118,13 @@ def _energy_balance(result: Result) -> list[Shown]:
     for label, recording in result.recordings.items():
         suffix = f"-{label}" if len(result.recordings) > 1 else ""
         after = recording.sel(time=slice(-1e-9, None))
-        books = {
-            "energy-balance": (actuator_ledger(after),
-                "Where the actuator's energy came from and where it went, from time zero on."),
-            "energy-with-disc": (disc_ledger(after),
-                "The same with what the disc gives and what the pads turn into heat."),
-        }  # fmt: skip
-        for name, (own, caption) in books.items():
+        caption = "Where the actuator's energy came from and where it went, from time zero on."
+        books = {"energy-balance": (actuator_ledger(after), caption)}
+        for book, further in further_ledgers(after).items():
+            books[f"energy-{book.replace(' ', '-')}"] = (further, f"The same {book}.")
+        for name, (postings, caption) in books.items():
             with contextlib.suppress(ParameterError):  # a brake at rest turns over no energy
-                if own is not None:
-                    shown.append(Shown(name + suffix, ledger_bars(own), caption))
+                shown.append(Shown(name + suffix, ledger_bars(postings), caption))
     return shown
 
 
