@@ -31,7 +31,8 @@ if TYPE_CHECKING:
     from bywire.api.trust import TrustStudy, trust
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
-    from bywire.core.catalog import parameters
+    from bywire.core.brake import Brake, load_system
+    from bywire.core.catalog import CitedSet, parameters
     from bywire.core.errors import BywireError
     from bywire.data.alignment import resample
     from bywire.data.measurement import read_measurement
@@ -43,6 +44,8 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "Bench": "bench.bench",
+    "Brake": "core.brake",
+    "CitedSet": "core.catalog",
     "BywireError": "core.errors",
     "Conversion": "api.convert",
     "Ensemble": "simulation.ensemble",
@@ -58,6 +61,7 @@ _HOMES = {
     "convert": "api.convert",
     "identify": "api.identify",
     "load": "bench.bench_file",
+    "load_system": "core.brake",
     "parameters": "core.catalog",
     "read_measurement": "data.measurement",
     "read_recording": "data.netcdf",
@@ -81,8 +85,10 @@ _HOMES = {
 __all__ = [
     "Bench",
     "BenchResult",
+    "Brake",
     "BywireError",
     "Check",
+    "CitedSet",
     "Conversion",
     "Ensemble",
     "Identification",
@@ -99,6 +105,7 @@ __all__ = [
     "identify",
     "linearize",
     "load",
+    "load_system",
     "margins",
     "parameters",
     "read_measurement",

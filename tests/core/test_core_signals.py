@@ -9,7 +9,7 @@ import pytest
 from pydantic import TypeAdapter, ValidationError
 
 from bywire.core import errors, quantities, signals, units
-from bywire.core.errors import BywireError, UnknownNameError, quoted, unknown_name
+from bywire.core.errors import BywireError, ModelError, UnknownNameError, quoted, unknown_name
 from bywire.core.signals import Signal, signals_of, zeros
 
 QUANTITIES = {
@@ -47,7 +47,7 @@ def test_signals_come_in_the_order_of_the_fields():
 
 
 def test_field_without_a_signal_is_refused():
-    with pytest.raises(TypeError, match=r"Half\.q has no Signal annotation"):
+    with pytest.raises(ModelError, match=r"Half\.q has no Signal annotation"):
         signals_of(Half)
 
 

@@ -14,15 +14,22 @@ SPRING_AXIS = Path(__file__).with_name("spring_axis.py")
 
 
 @contextmanager
-def loaded(path: Path) -> Iterator[Brake]:
-    """Have a brake known by its names, and forget it and its modules afterward."""
-    brakes, modules = dict(registry._loaded), set(sys.modules)
+def forgotten() -> Iterator[None]:
+    """Forget the brakes that are loaded meanwhile, and their modules."""
+    before = dict(registry._loaded)
     try:
-        yield load_system(path)
+        yield
     finally:
+        roots = {brake.module for name, brake in registry._loaded.items() if name not in before}
         registry._loaded.clear()
-        registry._loaded.update(brakes)
-        stem = path.stem
-        for name in set(sys.modules) - modules:
-            if name == stem or name.startswith(f"{stem}."):
+        registry._loaded.update(before)
+        for name in list(sys.modules):
+            if name.partition(".")[0] in roots:
                 del sys.modules[name]
+
+
+@contextmanager
+def loaded(path: Path) -> Iterator[Brake]:
+    """Have a brake known by its names for a while."""
+    with forgotten():
+        yield load_system(path)

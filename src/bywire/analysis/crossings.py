@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from bywire.core.typing import Array, Complex
 
@@ -199,7 +200,6 @@ def _passing(frequencies: Array, values: Array, k: int) -> float:
 
 def _solved(response: Response, level: float, low: float, high: float) -> float:
     """Return the frequency between two others at which a magnitude passes a level."""
-    from scipy.optimize import brentq
 
     def excess(f: float) -> float:
         return float(np.abs(response(np.array([f])))[0]) - level

@@ -23,7 +23,7 @@ from bywire.api import linear_texts as texts
 from bywire.api.linearize_plant import LinearizedPlant, PlantLocus, linearize_plant, plant_locus
 from bywire.api.loop_case import LoopCase, loop_case, over_range
 from bywire.core.catalog import main_set, parameters
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Attachment,
@@ -229,7 +229,7 @@ def linearize(
             return plant_locus(name, parameters, at, overrides, friction, speed, locus)
         return linearize_plant(name, parameters, at, overrides, friction, speed, reduce)
     if name not in LOOPS.all():
-        raise unknown_name("loop or plant", name, (*LOOPS.all(), *PLANTS.all()))
+        raise LOOPS.unknown(name, PLANTS)
     for option, given in (("--friction", friction), ("--speed", speed)):
         if given:
             raise ParameterError(

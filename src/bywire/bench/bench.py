@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment, as_run
 from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
@@ -15,7 +17,7 @@ from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
 from bywire.bench.stimulus_file import with_nodes
 from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import pick
@@ -171,6 +173,8 @@ class Bench:
     def _made(self, make: Cases) -> tuple[Case, ...]:
         """Return cases, or refuse overrides without effect and steps that do not divide."""
         found = self.cases_with(self.par, self.chosen_options, make)
+        for case in found:
+            _check_driven(case, self.definition)
         wanted, made = self.par.flat(), [case.par.flat() for case in found]
         for name in self.overrides:
             if made and all(values[name] != wanted[name] for values in made):
@@ -240,6 +244,17 @@ def stimulus_sections(stimulus: Mapping[str, Any]) -> dict[str, Mapping[str, Any
     plain = {key: value for key, value in stimulus.items() if not isinstance(value, Mapping)}
     further = {key: value for key, value in stimulus.items() if isinstance(value, Mapping)}
     return ({"": plain} if plain else {}) | further
+
+
+def _check_driven(case: Case, experiment: Experiment) -> None:
+    """Refuse an experiment that drives what its model has no stimulus for."""
+    known = case.model.Stimulus._fields
+    for name in case.stimulus(np.zeros(1)):
+        if name not in known:
+            error = unknown_name(f"stimulus of {case.model.name}", name, known)
+            raise ModelError(
+                f"{place_of(experiment.cases)}: experiment {experiment.name!r}: {error}"
+            )
 
 
 def _stimulus(section: Mapping[str, Any], unit: str, name: str) -> Stimulus:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import sys
 import traceback
-from typing import Annotated
+import warnings
+from collections.abc import Iterator, Sequence
+from contextlib import redirect_stdout
+from typing import Annotated, Any
 
 import typer
 
@@ -25,7 +29,7 @@ from bywire.cli.loop_commands import (
 from bywire.cli.options import INTERRUPTED
 from bywire.cli.output import flush, message, open_streams, result
 from bywire.cli.sizing_commands import design_command, study_command
-from bywire.core.errors import BywireError
+from bywire.core.errors import BywireError, ModelError, ParameterError
 
 FAILED = 3
 
@@ -56,13 +60,30 @@ app.command("check")(check_command)
 
 @app.callback(invoke_without_command=True)
 def _root(
+    context: typer.Context,
     version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
-) -> None:
+    system: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--system", metavar="PATH",
+            help="Load a brake of your own, a file or a package; its code is run. "
+            "Before or behind the command.",
+        ),
+    ] = None,
+) -> None:  # fmt: skip
     if version:
         from bywire.core.version import __version__
 
         result(__version__)
         raise typer.Exit
+    if system:
+        from bywire.core.brake import load_system
+
+        with redirect_stdout(sys.stderr):  # what its code prints is no result
+            for path in system:
+                load_system(path)
+        if context.invoked_subcommand is None:
+            result(context.get_help())
 
 
 def main() -> None:
@@ -73,9 +94,60 @@ def main() -> None:
     raise SystemExit(status)
 
 
+def _foreign_line(error: Exception) -> str:
+    """Return an error with its line if it is one of a brake that is not ours; else nothing."""
+    from bywire.core.brake import foreign_line
+
+    return foreign_line(error)
+
+
+def _path_of(rest: Iterator[str]) -> str:
+    path = next(rest, "")
+    if not path:
+        raise ParameterError("--system needs a PATH: a Python file, or a folder with __init__.py")
+    return path
+
+
+def systems_first(arguments: Sequence[str]) -> list[str]:
+    """Return arguments with every ``--system PATH`` in front of the command.
+
+    Examples
+    --------
+    >>> systems_first(["run", "step", "--system", "axis.py", "--json"])
+    ['--system', 'axis.py', 'run', 'step', '--json']
+    """
+    front: list[str] = []
+    behind: list[str] = []
+    rest = iter(arguments)
+    for each in rest:
+        if each == "--":
+            return [*front, *behind, each, *rest]
+        if each == "--system":
+            front += [each, _path_of(rest)]
+        elif each.startswith("--system="):
+            front.append(each)
+        else:
+            behind.append(each)
+    return [*front, *behind]
+
+
 def _status() -> int | str | None:
+    with warnings.catch_warnings():
+        show_otherwise = warnings.showwarning
+
+        def show(text: Warning | str, category: type[Warning], *place: Any) -> None:
+            if category.__name__ == "BrakeWarning":  # its module is loaded only where brakes are
+                message(f"warning: {text}")
+            else:
+                show_otherwise(text, category, *place)
+
+        setattr(warnings, "showwarning", show)  # noqa: B010 - its type wants the very names
+        return _run(sys.argv[1:])
+
+
+def _run(arguments: Sequence[str]) -> int | str | None:
     try:
-        app()
+        app(systems_first(arguments))
     except SystemExit as done:
         return done.code
     except BywireError as error:
@@ -87,7 +159,11 @@ def _status() -> int | str | None:
     except OSError as error:
         message(f"error: {error}")
         return FAILED
-    except Exception:
+    except Exception as error:
+        foreign = _foreign_line(error)
+        if foreign:
+            message(f"error: {foreign}")
+            return ModelError.exit_status
         # Python's own status for this, 1, would read as a requirement that is not met.
         traceback.print_exc()
         message("error: this is a defect of bywire; please report it with the lines above")

@@ -18,11 +18,11 @@ import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 
-from bywire.core.errors import FileError, ModelError
+from bywire.core.errors import BywireError, FileError, ModelError
 
 GROUP = "bywire.brakes"
 """entry points whose values name modules with a ``BRAKE``"""
@@ -68,7 +68,12 @@ def brakes() -> Mapping[str, Brake]:
 @cache
 def _installed() -> Mapping[str, Brake]:
     found: dict[str, Brake] = {}
-    for point in sorted(entry_points(group=GROUP), key=lambda each: each.name):
+
+    def order(point: EntryPoint) -> tuple[bool, str]:
+        """Ours first, so that what takes one of our names is what is left out."""
+        return not point.module.startswith("bywire."), point.name
+
+    for point in sorted(entry_points(group=GROUP), key=order):
         try:
             brake = _declared(importlib.import_module(point.module), point.value)
             _require_new(brake, found)
@@ -81,6 +86,32 @@ def _installed() -> Mapping[str, Brake]:
         else:
             found[brake.name] = brake
     return found
+
+
+def is_foreign(brake: Brake) -> bool:
+    """Return whether a brake was installed by somebody else: what it breaks is left out."""
+    return brake.name not in _loaded and brake.module.partition(".")[0] != "bywire"
+
+
+def foreign_line(error: BaseException) -> str:
+    """Return an error with file and line if a brake that is not ours raised it; else nothing.
+
+    The innermost frame counts: what our own code raises for it is told as our own.
+    """
+    folders = [
+        str(Path(brake.file).parent if is_package(brake) else brake.file)
+        for brake in brakes().values()
+        if brake.module.partition(".")[0] != "bywire"
+    ]
+    frames = traceback.extract_tb(error.__traceback__)
+    if not any(frame.filename.startswith(folder) for folder in folders for frame in frames):
+        return ""
+    return _place(error, *folders)
+
+
+def is_package(brake: Brake) -> bool:
+    """Return whether a brake is a package and not a single file."""
+    return hasattr(importlib.import_module(brake.module), "__path__")
 
 
 def load_system(path: str | Path) -> Brake:
@@ -125,7 +156,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
         there = ModuleType(name)
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
         raise ModelError(
-            f"{place}: a module {name!r} exists already beside it: give the file another name"
+            f"{place}: there is a module {name!r} already ({_origin(there)}): give it another name"
         )
     spec = importlib.util.spec_from_file_location(
         name, source, submodule_search_locations=[str(place)] if place.is_dir() else None
@@ -141,7 +172,8 @@ def _imported(place: Path, source: Path) -> ModuleType:
             del sys.modules[loaded]
         if not isinstance(error, (Exception, SystemExit)):
             raise
-        raise ModelError(f"{_place(error, str(source))}; mend it and load it again") from error
+        told = _place(error, str(source.parent) if place.is_dir() else str(source))
+        raise ModelError(f"{told}; mend it and load it again") from error
     return module
 
 
@@ -169,18 +201,22 @@ def _require_new(brake: Brake, known: Mapping[str, Brake]) -> None:
         )
 
 
-def _place(error: BaseException, inside: str) -> str:
-    """Return an error with the innermost line of the user's files at which it happened."""
-    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+def _origin(module: ModuleType) -> str:
+    return getattr(module, "__file__", None) or "of Python itself"
+
+
+def _place(error: BaseException, *inside: str) -> str:
+    """Return an error with the innermost line at which it happened in files of these folders."""
     if isinstance(error, SyntaxError) and error.filename:
         return f"{error.filename}, line {error.lineno}: {type(error).__name__}: {error.msg}"
-    folder = str(Path(inside).parent) if inside else ""
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    text = str(error) if isinstance(error, BywireError) else text
     lines = [
         (frame.filename, frame.lineno)
         for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename.startswith(folder) and not frame.filename.startswith("<")
+        if frame.filename.startswith(inside) and not frame.filename.startswith("<")
     ]
-    return f"{lines[-1][0]}, line {lines[-1][1]}: {text}" if lines else f"{inside}: {text}"
+    return f"{lines[-1][0]}, line {lines[-1][1]}: {text}" if lines else text
 
 
 def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
@@ -226,9 +262,9 @@ def modules_below(name: str) -> Iterator[ModuleType]:
 def _attempted(name: str) -> ModuleType:
     try:
         return importlib.import_module(name)
-    except ModelError:
-        raise
     except Exception as error:
-        if name.partition(".")[0] == "bywire":
+        root = name.partition(".")[0]
+        if root == "bywire":
             raise
-        raise ModelError(_place(error, "")) from error
+        folder = Path(getattr(sys.modules.get(root), "__file__", None) or "").parent
+        raise ModelError(_place(error, str(folder))) from error

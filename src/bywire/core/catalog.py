@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.core.errors import ModelError
-from bywire.core.parameters import ParameterSet
+from bywire.core.parameters import ParameterSet, require_units
 from bywire.core.provenance import Cited, chosen
 from bywire.core.registry import Kind, instances
 
@@ -40,6 +40,7 @@ class CitedSet:
     values: Mapping[str, Any]
 
     def __post_init__(self) -> None:
+        require_units(self.parameter_class)
         plain = {k: v for k, v in self.values.items() if not isinstance(v, Cited)}
         cited = {k: chosen(v, "") for k, v in plain.items()}
         object.__setattr__(self, "values", {**self.values, **cited})
@@ -50,7 +51,7 @@ class CitedSet:
         return self.parameter_class.create({k: c.value for k, c in self.values.items()})
 
 
-PARAMETER_SETS = Kind("parameter set", ("sets",), instances(CitedSet))
+PARAMETER_SETS = Kind("parameter set", ("sets",), instances(CitedSet), declared="a CitedSet")
 """every parameter set of every brake"""
 
 

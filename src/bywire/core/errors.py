@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from difflib import get_close_matches
+from typing import Any
 
 _SHOWN = 60  # characters of a value in a message
 
@@ -69,6 +70,16 @@ class SolverError(RunError):
 
 class CompilerError(RunError):
     """A compiler that failed on a generated kernel."""
+
+
+def place_of(thing: Any) -> str:
+    """Return file and line of a class or a function, or its name where nobody knows."""
+    from inspect import getsourcefile, getsourcelines
+
+    try:
+        return f"{getsourcefile(thing)}, line {getsourcelines(thing)[1]}"
+    except (OSError, TypeError):  # typed into a console
+        return str(getattr(thing, "__qualname__", thing))
 
 
 def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:

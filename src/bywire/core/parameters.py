@@ -18,7 +18,7 @@ from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ModelError, ParameterError, place_of, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import Unit
 from bywire.core.refusals import refusals
@@ -127,6 +127,26 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
         elif not any(isinstance(m, Unit) for m in info.metadata):
             found.append(dotted)
     return tuple(found)
+
+
+def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
+    """Refuse a class with numbers that have no unit: they would count as structural choices.
+
+    Raises
+    ------
+    ModelError
+        Naming the first one, and its place.
+    """
+    for name, info in cls.model_fields.items():
+        inner = info.annotation
+        if isinstance(inner, type) and issubclass(inner, ParameterSet):
+            require_units(inner, f"{prefix}{name}.")
+        elif inner in (float, int) and not any(isinstance(m, Unit) for m in info.metadata):
+            raise ModelError(
+                f"{place_of(cls)}: {cls.__qualname__}.{name} is a number without a unit: write "
+                f"{name}: Annotated[float, Unit(\"kg\")], \"1\" for a pure number, or a quantity "
+                "of core.quantities"
+            )
 
 
 def _leaf(dotted: str, unit: Unit, info: FieldInfo) -> Leaf:

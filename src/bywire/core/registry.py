@@ -10,14 +10,22 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
-from bywire.core.brake import Brake, brakes, modules_below, modules_of
-from bywire.core.errors import ModelError, unknown_name
+from bywire.core.brake import (
+    Brake,
+    BrakeWarning,
+    brakes,
+    is_foreign,
+    modules_below,
+    modules_of,
+)
+from bywire.core.errors import ModelError, UnknownNameError, unknown_name
 
 
 class Named(Protocol):
@@ -47,12 +55,16 @@ class Kind(Generic[T]):
         ``read(module)``: those that a module declares.
     home
         Dotted name of the package of general ones; empty where all belong to a brake.
+    declared
+        How a brake declares one, for instance ``"a Loop"``: said where a name is unknown and a
+        brake has none of them.
     """
 
     name: str
     folders: tuple[str, ...]
     read: Callable[[ModuleType], Iterable[T]]
     home: str = ""
+    declared: str = ""
 
     def all(self) -> Mapping[str, T]:
         """Return every thing of this kind by its name: the general ones, then brake by brake."""
@@ -67,25 +79,47 @@ class Kind(Generic[T]):
             With the nearest known names.
         """
         guess = self.guess(name)
-        return guess if guess is not None else pick(self.all(), name, self.name)
+        if guess is not None:
+            return guess
+        known = self.all()
+        if name not in known:
+            raise self.unknown(name)
+        return known[name]
+
+    def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
+        """Return the error of a name that nothing of this kind, nor of the others, answers to.
+
+        It names the nearest known ones, and the brakes that declare none, with how that is done.
+        """
+        kinds = (self, *others)
+        title = " or ".join(kind.name for kind in kinds)
+        error = unknown_name(title, name, [n for kind in kinds for n in kind.all()])
+        hints = [
+            f"the brake {brake.name!r} declares no {title}: that takes {self.declared} in a module "
+            f"or folder {' or '.join(self.folders)} of its package, or in its file, see "
+            "docs/modeling.md"
+            for brake in brakes().values()
+            if self.declared and not any(kind.of(brake.module) for kind in kinds)
+        ]
+        return UnknownNameError("; ".join([str(error), *hints]))
 
     def guess(self, name: str) -> T | None:
-        """Return the thing of a name if the file of that name, or of its kind, declares it.
-
-        No folder is loaded for it: that takes a second where there are many things.
-        """
+        """Return the thing of a name if a file of that name declares it: loads no other."""
         stem = name.replace("-", "_")
         if not stem.isidentifier():
             return None
-        homes = [home for home in (self.home, *(f"{brake.module}.{folder}"
-                 for brake in brakes().values() for folder in self.folders)) if home]  # fmt: skip
-        files = [f"{home}.{stem}" for home in homes if _is_folder(home) is True]
-        files += [home for home in homes if _is_folder(home) is False]
-        for file in files:
-            for module in modules_below(file) if _is_folder(file) is not None else ():
-                for thing in self.read(module):
-                    if thing.name == name:
-                        return thing
+        homes = [f"{brake.module}.{folder}" for brake in brakes().values()
+                 for folder in self.folders]  # fmt: skip
+        for home in (self.home, *homes):
+            try:
+                spec = importlib.util.find_spec(f"{home}.{stem}") if home else None
+            except (ImportError, ValueError, AttributeError):
+                continue  # no such folder
+            if spec is not None:
+                for module in modules_below(f"{home}.{stem}"):
+                    for thing in self.read(module):
+                        if thing.name == name:
+                            return thing
         return None
 
     def of(self, module: str) -> Mapping[str, T]:
@@ -96,15 +130,6 @@ class Kind(Generic[T]):
     def owner(self, name: str) -> str:
         """Return the module of the brake that brings a thing; empty for a general one."""
         return next((owner for thing, owner in _all(self) if thing.name == name), "")
-
-
-def _is_folder(module: str) -> bool | None:
-    """Tell whether a module is a package; None where there is none of that name."""
-    try:
-        spec = importlib.util.find_spec(module)
-    except (ImportError, ValueError, AttributeError):
-        return None
-    return None if spec is None else spec.submodule_search_locations is not None
 
 
 def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:
@@ -135,15 +160,33 @@ def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
 def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str], ...]:
     places: dict[str, tuple[Any, str, str]] = {}
     for owner in (None, *known):
-        for thing, file in _declared(kind, owner):
-            module = owner.module if owner is not None else ""
-            first, _, place = places.setdefault(thing.name, (thing, module, file))
-            if first is not thing:
-                raise ModelError(
-                    f"{file} declares the {kind.name} {thing.name!r}, and so does {place}: give "
-                    "it another name"
-                )
+        try:
+            new = _declared(kind, owner)
+            _require_new(kind, new, places)
+        except ModelError as error:
+            if owner is None or not is_foreign(owner):
+                raise
+            text = f"the {kind.name} of the installed brake {owner.name!r} is left out: {error}"
+            warnings.warn(text, BrakeWarning, stacklevel=2)
+            continue
+        module = owner.module if owner is not None else ""
+        for thing, file in new:
+            places.setdefault(thing.name, (thing, module, file))
     return tuple((thing, module) for thing, module, _ in places.values())
+
+
+def _require_new(
+    kind: Kind[Any], new: tuple[tuple[Any, str], ...], known: Mapping[str, tuple[Any, str, str]]
+) -> None:
+    """Refuse things whose name another one has, in the same brake or in an earlier one."""
+    seen: dict[str, tuple[Any, str]] = {name: (thing, f) for name, (thing, _, f) in known.items()}
+    for thing, file in new:
+        first, place = seen.setdefault(thing.name, (thing, file))
+        if first is not thing:
+            where = " twice" if place == file else f", and so does {place}"
+            raise ModelError(
+                f"{file} declares the {kind.name} {thing.name!r}{where}: give it another name"
+            )
 
 
 @cache

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
 
+from bywire.core.errors import ModelError, place_of
+
 T = TypeVar("T", bound=tuple[Any, ...])
 
 
@@ -92,7 +94,10 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
     for name in tuple_type._fields:
         signal = signal_in(hints[name])
         if signal is None:
-            raise TypeError(f"{tuple_type.__qualname__}.{name} has no Signal annotation")
+            raise ModelError(
+                f"{place_of(tuple_type)}: {tuple_type.__qualname__}.{name} has no Signal annotation"
+                f": write {name}: Annotated[float, Signal(\"m\", \"what it is\")]"
+            )
         found[name] = signal
     return found
 

@@ -146,13 +146,11 @@ def _check_contacts(model: AnyAssembly, at: _Operands) -> None:
     matrices = at.evaluated("compliance", model.compliance, at.par)
     forces = iter(at.contact)
     for group, rows in zip(gaps, matrices, strict=True):
-        for overlap, row in zip(group, rows, strict=True):
-            force = next(forces)
-            wanted = next((c * force for c in row if isinstance(c, Dimension)), overlap)
-            if isinstance(overlap, Dimension) and not fits(overlap, str(wanted)):
+        for overlap, row, force in zip(group, rows, forces, strict=False):
+            if not fits(overlap, str(row[0] * force)) and isinstance(overlap, Dimension):
                 raise ModelError(
                     f"{_place(model)}: an overlap in {overlap} meets a compliance times a force in "
-                    f"{wanted}: they must be alike"
+                    f"{row[0] * force}: they must be alike"
                 )
 
 

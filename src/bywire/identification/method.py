@@ -207,5 +207,6 @@ class Method:
                 raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
 
 
-METHODS = Kind("method", ("methods",), instances(Method), "bywire.identification.methods")
+METHODS = Kind("method", ("methods",), instances(Method), "bywire.identification.methods",
+               declared="a Method")  # fmt: skip
 """every method that needs no bench"""

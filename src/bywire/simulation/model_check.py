@@ -47,8 +47,8 @@ def check_model(model: Model, par: ParameterSet) -> None:
 def _annotated(model: Model, part: str) -> None:
     try:
         signals_of(getattr(model, part))
-    except TypeError as error:
-        raise ModelError(f"{model.name}: {error}: annotate it with core.signals.Signal") from None
+    except ModelError as error:
+        raise ModelError(f"{model.name}: {error}") from None
 
 
 def _check_equations(model: Model, par: ParameterSet) -> None:

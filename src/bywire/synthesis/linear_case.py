@@ -16,7 +16,7 @@ from bywire.core.errors import InputError, ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
-from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.requirement import Requirement
 
 NOMINAL = "nominal"
 """label of the model at the operating point itself"""
@@ -47,11 +47,6 @@ class LinearCase:
         """Return the figures of the loop with some gains, see `LoopFigures`."""
         with interrupts_deferred():  # CasADi would swallow them
             return LoopFigures(*self.build(gains), points)
-
-
-def values_of(figures: LoopFigures) -> dict[str, float]:
-    """Return every figure that can be required, by name."""
-    return {name: float(getattr(figures, name)) for name in FIGURES}
 
 
 def room(figures: LoopFigures, requirement: Requirement) -> float:
@@ -101,17 +96,17 @@ def cases_of(
         raise ParameterError(
             f"the ranges have {len(combinations)} combinations: {_MOST} at most, take fewer values"
         )
-    cases = [_case(loop, NOMINAL, par, {}, value)]
-    for combination in combinations:
-        values = dict(zip(over, combination, strict=True))
+    found = [_case(loop, NOMINAL, par, {}, value)]
+    for one in combinations:
+        values = dict(zip(over, one, strict=True))
         label = ", ".join(_shown(loop, par, name, number) for name, number in values.items())
         at = values.pop(loop.at.name, value)
         try:
             loop.point(par.replace(values), at)
         except InputError as error:
             raise ParameterError(f"{label}: {error}") from None
-        cases.append(_case(loop, label, par, values, at))
-    return tuple(cases)
+        found.append(_case(loop, label, par, values, at))
+    return tuple(found)
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
@@ -123,8 +118,7 @@ def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
 
 
 def _scheduled(loop: Loop, name: str) -> bool:
-    regions = loop.schedule.regions.values() if loop.schedule is not None else ()
-    return any(name in region for region in regions)
+    return loop.schedule is not None and any(name in own for own in loop.schedule.regions.values())
 
 
 def _case(
@@ -133,7 +127,7 @@ def _case(
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        tuned = base.replace(gains)
-        return loop.gain(tuned, value), loop.closed(tuned, value)
+        own = base.replace(gains)
+        return loop.gain(own, value), loop.closed(own, value)
 
     return LinearCase(label, build, changes, value)

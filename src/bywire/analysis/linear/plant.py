@@ -68,5 +68,5 @@ class Plant:
         return PlantPoint(self.at[0], self.at[0].default)
 
 
-PLANTS = Kind("plant", ("plants",), instances(Plant))
+PLANTS = Kind("plant", ("plants",), instances(Plant), declared="a Plant")
 """every plant and simplified model of one"""

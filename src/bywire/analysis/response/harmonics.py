@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bywire.core.typing import Array, Complex
+Array = NDArray[np.float64]
 
 
-def amplitudes(t: Array, y: Array, f: float, count: int) -> Complex:
+def amplitudes(t: Array, y: Array, f: float, count: int) -> NDArray[np.complex128]:
     """Return the complex amplitudes of the first harmonics, sine phase.
 
     Parameters

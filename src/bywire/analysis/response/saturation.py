@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bywire.core.typing import Array
+Array = NDArray[np.float64]
 
 _ROUNDING = 1e-12  # share of a limit by which a demand clipped to it may differ
 

@@ -70,17 +70,16 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
         When no motion repeats itself, or none has this mean pressure: where the dither leaves
         the piston stuck, pressure does not follow the current.
     """
-    driven = par.replace({"drive.mode": "current", "adc.law": "ideal"})
-    dither = driven.ecu.dither
+    own = par.replace({"drive.mode": "current", "adc.law": "ideal"})
+    dither = own.ecu.dither
     whole = () if dither.waveform == "off" else (dither.f_dit,)
-    i = holding_current(p, driven)
+    i = holding_current(p, own)
     for _ in range(_ROUNDS):
         stimulus = zeros(Stimulus)._replace(i_set=i)
-        state, memory = state_at(p, driven), memory_at(p, driven)
-        start = Point(MotorcycleBrake(), driven, state, memory, stimulus)
+        start = Point(MotorcycleBrake(), own, state_at(p, own), memory_at(p, own), stimulus)
         model = periodic_model(start, ("i_set",), "p_mc", whole, step)
         require_moving(model)
-        gain = model.steady_gain  # negative or zero: the orbit is not the one that attracts
+        gain = model.steady_gain
         if not gain > 0.0:
             break
         if abs(model.mean - p) <= _CLOSE * p:

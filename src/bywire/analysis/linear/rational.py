@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from bywire.core.typing import Array, Complex
-
+Array = NDArray[np.float64]
 _BAR = 1e5
 
 
@@ -40,12 +40,12 @@ class Rational:
         return self.gain / _BAR
 
     @property
-    def zeros(self) -> Complex:
+    def zeros(self) -> NDArray[np.complex128]:
         """Zeros [rad/s], the slowest first."""
         return _sorted_roots(self.num)
 
     @property
-    def poles(self) -> Complex:
+    def poles(self) -> NDArray[np.complex128]:
         """Poles [rad/s], the slowest first."""
         return _sorted_roots(self.den)
 
@@ -59,7 +59,7 @@ class Rational:
         """Frequencies of the poles [Hz], the slowest first."""
         return np.abs(self.poles) / (2.0 * math.pi)
 
-    def response(self, frequencies: Array) -> Complex:
+    def response(self, frequencies: Array) -> NDArray[np.complex128]:
         """Return the frequency response [Pa/A] at frequencies [Hz], shape (n,)."""
         s = 2j * math.pi * np.asarray(frequencies, dtype=float)
         return np.asarray(np.polyval(self.num, s) / np.polyval(self.den, s))
@@ -111,17 +111,16 @@ def first_orders(
     """
 
     def product(corners: tuple[float, ...]) -> Array:
-        coefficients: Array = np.ones(1)
+        found: Array = np.ones(1)
         for hertz in corners:
-            factor = [1.0 / (2.0 * math.pi * hertz), 1.0]
-            coefficients = np.asarray(np.polymul(coefficients, factor))
-        return coefficients
+            found = np.asarray(np.polymul(found, [1.0 / (2.0 * math.pi * hertz), 1.0]))
+        return found
 
     return Rational(
         name, tuple(float(v) for v in gain * product(zeros_hz)), tuple(product(poles_hz).tolist())
     )
 
 
-def _sorted_roots(coefficients: tuple[float, ...]) -> Complex:
-    roots = np.roots(coefficients).astype(np.complex128)
-    return roots[np.argsort(np.abs(roots))]
+def _sorted_roots(coefficients: tuple[float, ...]) -> NDArray[np.complex128]:
+    found = np.roots(coefficients).astype(np.complex128)
+    return found[np.argsort(np.abs(found))]

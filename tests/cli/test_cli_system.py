@@ -1,0 +1,153 @@
+"""``--system PATH``: a user's brake in one file has every command, before and behind its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from command_line import Outcome, refused
+
+from systems.loading import SPRING_AXIS, forgotten
+
+Bywire = Callable[..., Outcome]
+SYSTEM = ("--system", SPRING_AXIS)
+STEP = ("--set", "parameters=spring-axis-one", "--set", "options.input=F_set",
+        "--set", "options.output=x")  # fmt: skip
+
+OWN_EXPERIMENT = """
+from bywire.bench.experiment import Case, Experiment
+from bywire.core.signals import zeros
+from bywire.core.parameters import ParameterSet
+import numpy as np
+
+
+class Options(ParameterSet):
+    pass
+
+
+def cases(par, options, _=None):
+    return (Case("run", SpringAxis(), par, zeros(State), zeros(Memory),
+                 lambda t: {"@STIMULUS@": np.full(t.shape, 10.0)}, 0.01),)
+
+
+def judge(recordings, options):
+    recordings["run"]["@SIGNAL@"]
+    return ()
+
+
+PUSH = Experiment("push", "spring-axis", "a push", Options, Options(), cases, judge, {},
+                  ("time-traces",))
+"""
+
+
+@pytest.fixture(autouse=True)
+def _forgotten() -> Iterator[None]:
+    """Forget what a command loads."""
+    with forgotten():
+        yield
+
+
+def test_list_knows_it(bywire: Bywire) -> None:
+    found = bywire("list", *SYSTEM, "--json").object
+    assert "spring-axis" in found["assemblies"]
+    assert "spring-axis-one" in found["parameter_sets"]
+    assert "step" in found["generic_experiments"]
+    for name in ("spring-axis", "spring-axis-one", "F_set", "k_c", "sine-sweep"):
+        assert name in bywire(*SYSTEM, "list", name).out
+
+
+@pytest.mark.parametrize("front", [True, False], ids=["before", "behind"])
+def test_run_with_requirements_and_a_report(bywire: Bywire, tmp_path: Path, front: bool) -> None:
+    command = ("run", "step", *STEP, "--set", "requirements.overshoot=<= 1 %", "--json",
+               "--out", tmp_path / "out")  # fmt: skip
+    done = bywire(*SYSTEM, *command) if front else bywire(*command, *SYSTEM)
+    assert done.status == 1  # it overshoots, as it must
+    assert done.object["kpis"]["overshoot"]["value"] > 1.0
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert "a mass on a spring" not in page.partition("<body")[0]
+    assert (tmp_path / "out" / "time-traces.png").is_file()
+    assert (tmp_path / "out" / "run.nc").is_file()
+
+
+def test_a_bench_file_names_it_and_never_loads_it(bywire: Bywire, tmp_path: Path) -> None:
+    path = tmp_path / "axis.toml"
+    path.write_text('experiment = "step"\nparameters = "spring-axis-one"\n'
+                    '[options]\ninput = "F_set"\nend = "150 N"\n')  # fmt: skip
+    refused(bywire("run", path), "unknown parameter set 'spring-axis-one'")
+    assert bywire("run", path, *SYSTEM).status == 0
+    path.write_text(f'system = "{SPRING_AXIS}"\n{path.read_text()}')
+    refused(bywire("run", path), "unknown key 'system'")
+
+
+def test_output_error_finds_its_parameters(bywire: Bywire, tmp_path: Path) -> None:
+    bench = tmp_path / "axis.toml"
+    bench.write_text(
+        'experiment = "open-loop"\nparameters = "spring-axis-one"\n'
+        '[options]\ninput = "F_set"\noutput = "x"\nrecord = "1 ms"\nduration = "0.5 s"\n'
+        '[stimulus]\nkind = "multisine"\nmean = 0\namplitude = "60 N"\nf_base = "2 Hz"\nn = 12\n'
+        "t_start = 0\n[set]\nF_c = 0\nk_c = \"0.001 N/m\"\n"
+    )
+    out = tmp_path / "out"
+    other = ("--set", "k=9000 N/m", "--set", "d=50 N*s/m")
+    assert bywire("run", bench, "--out", out, *other, *SYSTEM).status == 0
+    on_bench = ("--bench", bench, "--input", "F_set=F_set")
+    done = bywire(
+        "identify", "output-error", out / "run.nc", *on_bench, "--output", "x=1 um",
+        "--unknown", "k=8000 N/m..12000 N/m", "--unknown", "d=30 N*s/m..90 N*s/m", "--json",
+        *SYSTEM,
+    )  # fmt: skip
+    assert done.status == 0, done.err
+    assert done.object["parameters"] == pytest.approx({"k": 9000.0, "d": 50.0}, rel=1e-6)
+    beside = bywire("replay", out / "run.nc", *on_bench, *other, "--json", *SYSTEM)
+    assert beside.status == 0, beside.err
+
+
+def test_what_it_does_not_declare_is_said(bywire: Bywire) -> None:
+    refused(bywire("margins", "travel", *SYSTEM), "declares no loop", "docs/modeling.md")
+    refused(bywire("linearize", "travel", *SYSTEM), "declares no loop or plant")
+    refused(bywire("study", "travel", *SYSTEM), "declares no study")
+    refused(bywire("run", "step", *SYSTEM), "is for any brake: say for which", "spring-axis-one")
+
+
+def test_what_the_option_itself_lacks_is_said(bywire: Bywire, tmp_path: Path) -> None:
+    refused(bywire("list", "--system"), "--system needs a PATH")
+    refused(bywire("list", "--system", tmp_path / "none.py"), "none.py is no brake")
+    assert "list" in bywire(*SYSTEM).out  # the help
+
+
+def written(folder: Path, name: str, text: str) -> Path:
+    path = folder / f"{name}.py"
+    path.write_text(SPRING_AXIS.read_text() + text)
+    return path
+
+
+def test_what_it_prints_is_no_result(bywire: Bywire, tmp_path: Path) -> None:
+    path = written(tmp_path, "prints_a_lot", "\nprint('hello')\n")
+    done = bywire("list", "--system", path, "--json")
+    assert "spring-axis" in done.object["assemblies"]
+    assert "hello" in done.err
+
+
+@pytest.mark.parametrize(
+    ("stem", "stimulus", "signal", "parts"),
+    [
+        ("wrong_stimulus", "F_sett", "x",
+         ["wrong_stimulus.py, line 1", "experiment 'push': unknown stimulus of spring-axis "
+          "'F_sett': did you mean 'F_set'?"]),
+        ("wrong_signal", "F_set", "xx", ["wrong_signal.py, line 1", "xx"]),
+    ],
+)  # fmt: skip
+def test_an_experiment_that_names_what_the_model_lacks(
+    bywire: Bywire, tmp_path: Path, stem: str, stimulus: str, signal: str, parts: list[str]
+) -> None:
+    text = OWN_EXPERIMENT.replace("@STIMULUS@", stimulus).replace("@SIGNAL@", signal)
+    path = written(tmp_path, stem, text)
+    refused(bywire("run", "push", "--system", path), *parts)
+
+
+def test_its_own_experiment_runs_by_its_name(bywire: Bywire, tmp_path: Path) -> None:
+    text = OWN_EXPERIMENT.replace("@STIMULUS@", "F_set").replace("@SIGNAL@", "x")
+    path = written(tmp_path, "own_experiment", text)
+    assert bywire("run", "push", "--system", path, "--out", tmp_path / "out").status == 0
+    assert (tmp_path / "out" / "time-traces.png").is_file()

@@ -1,0 +1,227 @@
+"""Brakes of users: loaded from files and packages, found by entry points; what is wrong is said."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.metadata import EntryPoint
+from pathlib import Path
+
+import pytest
+
+from bywire.analysis.loop import LOOPS
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.core import brake as brakes_module
+from bywire.core.brake import BrakeWarning, brakes, load_system
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import FileError, InputError, ModelError, UnknownNameError
+from bywire.core.model import ASSEMBLIES
+from systems.loading import SPRING_AXIS, forgotten
+
+HEAD = "from bywire.core.brake import Brake\n"
+OURS = {"motorcycle", "wedge"}
+
+Write = Callable[[str, str], Path]
+
+
+@pytest.fixture(autouse=True)
+def _forgotten() -> Iterator[None]:
+    """Forget what a test loads."""
+    with forgotten():
+        yield
+
+
+@pytest.fixture
+def write(tmp_path: Path) -> Write:
+    """Return a function that writes a file into a folder."""
+
+    def write(name: str, text: str) -> Path:
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text)
+        return path
+
+    return write
+
+
+def declared(name: str) -> str:
+    return f'{HEAD}BRAKE = Brake("{name}", "of a test", __name__)\n'
+
+
+def test_a_file_is_a_brake_with_the_standing_of_ours() -> None:
+    brake = load_system(SPRING_AXIS)
+    assert set(brakes()) == OURS | {"spring-axis"}
+    assert load_system(SPRING_AXIS) is brake
+    assert ASSEMBLIES.find("spring-axis").name == "spring-axis"
+    assert PARAMETER_SETS.owner("spring-axis-one") == brake.module
+    assert set(PARAMETER_SETS.of(brake.module)) == {"spring-axis-one"}
+    cited = PARAMETER_SETS.find("spring-axis-one").values["m"]
+    assert (cited.value, cited.kind) == (2.0, "chosen")
+
+
+def test_a_package_keeps_each_kind_in_its_own_module(write: Write) -> None:
+    write("axis_package/__init__.py", declared("axis-package"))
+    text = SPRING_AXIS.read_text().replace("spring-axis", "packed-axis")
+    write("axis_package/model.py", text.partition("VALUES =")[0])
+    sets = write(
+        "axis_package/sets.py",
+        "from bywire.core.catalog import CitedSet\nfrom .model import Parameters\n"
+        'SET = CitedSet("packed", "packed-axis", "", "a set", Parameters, dict(\n'
+        "    m=2.0, k=1e4, d=60.0, F_c=5.0, k_c=200.0, T_s=1e-3))\n",
+    )
+    load_system(sets.parent)
+    assert PARAMETER_SETS.find("packed").parameters().leaves()["k"] == 1e4
+    assert "packed-axis" in ASSEMBLIES.all()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "error", "parts"),
+    [
+        ("raises.py", f"{HEAD}x = 3\ny = x / 0\n", ModelError,
+         ["raises.py, line 3: ZeroDivisionError: division by zero", "mend it and load it again"]),
+        ("deep.py", f"{HEAD}import math\n\ndef f():\n    return math.sqrt('a')\n\nf()\n",
+         ModelError, ["deep.py, line 5: TypeError"]),
+        ("syntax.py", "BRAKE = (\n", ModelError, ["syntax.py, line 1: SyntaxError"]),
+        ("leaves.py", "raise SystemExit(3)\n", ModelError, ["leaves.py, line 1: SystemExit: 3"]),
+        ("imports.py", "import no_such_module_at_all\n", ModelError,
+         ["imports.py, line 1: ModuleNotFoundError", "no_such_module_at_all"]),
+        ("nothing.py", "x = 1\n", ModelError,
+         ["declares no BRAKE", "BRAKE = bywire.Brake(name, summary, __name__)"]),
+        ("other.py", "BRAKE = 'mine'\n", ModelError, ["declares a BRAKE that is a str"]),
+        ("wrong_module.py", f'{HEAD}BRAKE = Brake("wrong-module", "", "elsewhere")\n', ModelError,
+         ["BRAKE is declared for the module 'elsewhere'", "Brake('wrong-module', ..., __name__)"]),
+        ("taken.py", declared("motorcycle"), ModelError,
+         ["taken.py declares a brake 'motorcycle', and so does", "give it another name"]),
+        ("json.py", declared("json"), ModelError,
+         ["there is a module 'json' already", "give it another name"]),
+        ("numpy.py", declared("numpy"), ModelError, ["there is a module 'numpy' already"]),
+        ("my-brake.py", declared("my-brake"), ModelError, ["must be one that Python can import"]),
+        ("brake.txt", declared("txt"), FileError, ["is no brake: give a Python file"]),
+        ("half_typed.py", f"{HEAD}from typing import NamedTuple\nfrom bywire.core.signals import "
+         "signals_of\n\n\nclass State(NamedTuple):\n    x: float\n\n\nsignals_of(State)\n",
+         ModelError, ["half_typed.py, line 6: State.x has no Signal annotation",
+                      'write x: Annotated[float, Signal("m", "what it is")]']),
+        ("unitless.py", f"{HEAD}from bywire.core.parameters import ParameterSet\n"
+         "from bywire.core.catalog import CitedSet\n\n\nclass Parameters(ParameterSet):\n"
+         '    m: float\n\n\nSET = CitedSet("u", "u", "", "", Parameters, {"m": 1.0})\n',
+         ModelError, ["unitless.py, line 6: Parameters.m is a number without a unit",
+                      'm: Annotated[float, Unit("kg")]']),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_file_is_said_with_its_line(
+    write: Write, name: str, text: str, error: type[InputError], parts: list[str]
+) -> None:
+    path = write(name, text)
+    with pytest.raises(error) as caught:
+        load_system(path)
+    for part in parts:
+        assert part in str(caught.value)
+    assert set(brakes()) == OURS  # nothing of it is left
+
+
+def test_what_is_not_there_is_said() -> None:
+    with pytest.raises(FileError, match=r"nowhere\.py is no brake"):
+        load_system("nowhere.py")
+
+
+def test_a_file_that_was_mended_loads(write: Write) -> None:
+    path = write("mended.py", "1 / 0\n")
+    with pytest.raises(ModelError, match="ZeroDivisionError"):
+        load_system(path)
+    path.write_text(declared("mended"))
+    assert load_system(path).name == "mended"
+
+
+@pytest.mark.parametrize(
+    ("stem", "line", "kind", "text"),
+    [
+        ("same_set", 'S = CitedSet("roberts2003", "a", "", "", ParameterSet, {})', PARAMETER_SETS,
+         r"same_set.py declares the parameter set 'roberts2003', and so does .*roberts2003.py"),
+        ("twice", 'S = CitedSet("s", "a", "", "", ParameterSet, {})\n'
+         'T = CitedSet("s", "b", "", "", ParameterSet, {})', PARAMETER_SETS,
+         r"twice.py declares the parameter set 's' twice: give it another name"),
+        ("same_test", 'E = Experiment("hard-braking", "a", "", ParameterSet, ParameterSet(), '
+         "None, None, {}, ())", EXPERIMENTS,
+         r"same_test.py declares the experiment 'hard-braking', and so does .*hard_braking.py"),
+    ],
+)  # fmt: skip
+def test_a_name_that_is_taken_is_refused(
+    write: Write, stem: str, line: str, kind: object, text: str
+) -> None:
+    imports = (
+        "from bywire.core.catalog import CitedSet\n"
+        "from bywire.core.parameters import ParameterSet\n"
+        "from bywire.bench.experiment import Experiment\n"
+    )
+    load_system(write(f"{stem}.py", f"{declared(stem)}{imports}{line}\n"))
+    with pytest.raises(ModelError, match=text):
+        kind.all()  # type: ignore[attr-defined]
+
+
+def test_a_module_of_a_package_that_fails_is_named(write: Write) -> None:
+    package = write("broken_loops/__init__.py", declared("broken-loops")).parent
+    write("broken_loops/loops.py", "\n\nx = {}['no']\n")
+    load_system(package)
+    with pytest.raises(ModelError, match=r"broken_loops.loops.py, line 3: KeyError: 'no'"):
+        LOOPS.all()
+
+
+def test_what_a_brake_does_not_declare_is_said_with_how_it_is_declared() -> None:
+    load_system(SPRING_AXIS)
+    with pytest.raises(UnknownNameError) as caught:
+        LOOPS.find("travel")
+    assert "the brake 'spring-axis' declares no loop: that takes a Loop in a module or folder " in (
+        str(caught.value)
+    )
+    assert "docs/modeling.md" in str(caught.value)
+
+
+@pytest.fixture
+def installed(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> Iterator[Callable[[str, str], None]]:
+    """Return a function that installs a brake of one file beside ours."""
+    real = brakes_module.entry_points(group=brakes_module.GROUP)
+    added: list[EntryPoint] = []
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def install(name: str, text: str) -> None:
+        (tmp_path / f"{name}.py").write_text(text)
+        added.append(EntryPoint(name, name, brakes_module.GROUP))
+        brakes_module._installed.cache_clear()
+
+    monkeypatch.setattr(brakes_module, "entry_points", lambda group: [*real, *added])
+    yield install
+    brakes_module._installed.cache_clear()
+
+
+@pytest.mark.parametrize(
+    ("name", "text", "reason"),
+    [
+        ("broken_at_import", "x = 1\nx.no\n", r"broken_at_import.py, line 2: AttributeError"),
+        ("without_declaration", "x = 1\n", "declares no BRAKE"),
+        ("with_our_name", declared("wedge"), "declares a brake 'wedge', and so does"),
+    ],
+)
+def test_a_broken_entry_point_is_reported_once_and_left_out(
+    installed: Callable[[str, str], None], name: str, text: str, reason: str
+) -> None:
+    installed(name, text)
+    with pytest.warns(BrakeWarning, match=reason) as caught:
+        first = set(brakes())
+    assert first == set(brakes()) == OURS
+    assert len(caught) == 1
+
+
+def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
+    installed: Callable[[str, str], None],
+) -> None:
+    installed(
+        "clashing",
+        f"{declared('clashing')}from bywire.core.catalog import CitedSet\n"
+        "from bywire.core.parameters import ParameterSet\n"
+        'SETS = (CitedSet("roberts2003", "a", "", "", ParameterSet, {}),)\n',
+    )
+    with pytest.warns(BrakeWarning, match=r"'clashing' is left out: .*'roberts2003'"):
+        known = PARAMETER_SETS.all()
+    assert known["roberts2003"].assembly == "wedge-brake"
+    assert set(brakes()) == OURS | {"clashing"}
