@@ -46,7 +46,7 @@ STUDIES = {  # row of docs/trust.md -> what ``bywire identify`` is asked
     },
     "braking-dynamics": ["braking-dynamics", "--option", "plant=eq-22", "--option", "model=eq-22"],
     "output-error": HARD_BRAKING.split(),
-    "output-error-ideal": [*HARD_BRAKING.split(), "--set", "ecu.adc.law=ideal"],
+    "output-error-ideal": [*HARD_BRAKING.split(), "--set", "adc.law=ideal"],
 }  # fmt: skip
 
 

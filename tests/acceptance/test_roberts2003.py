@@ -6,14 +6,13 @@ import copy
 import json
 import math
 import re
-import time
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from bywire.brakes.wedge.paper.roberts2003 import PARTS, reproduce
+from bywire.brakes.wedge.paper.roberts2003 import PARTS
 from bywire.reproduction.reproduction import Reproduction
 from bywire.reproduction.results import as_json, write
 
@@ -56,21 +55,13 @@ DISAGREEMENTS = {
 }
 BY_CONSTRUCTION = re.compile(r"fig9\.power|fig7\.standby|efficiency\.driving")
 """tuned to the statement, or an input: no evidence"""
-STAGES: list[tuple[str, float]] = []
 LONGEST = 60.0
 """time that all of it may take [s]"""
 
 
 @pytest.fixture(scope="module")
-def timed() -> tuple[Reproduction, float]:
-    begin = time.process_time()
-    found = reproduce(lambda label, share: STAGES.append((label, share)))
-    return found, time.process_time() - begin
-
-
-@pytest.fixture(scope="module")
-def reproduction(timed: tuple[Reproduction, float]) -> Reproduction:
-    return timed[0]
+def reproduction(wedge_paper: Any) -> Reproduction:
+    return wedge_paper.reproduction  # type: ignore[no-any-return]
 
 
 @pytest.fixture(scope="module")
@@ -208,12 +199,12 @@ def test_what_the_paper_explains_changes_when_its_cause_does(items: Items) -> No
     assert items["fig7.ripple_without_runout"]["computed"] < 5.0
 
 
-def test_it_is_quick_enough(timed: tuple[Reproduction, float]) -> None:
-    assert timed[1] < LONGEST
+def test_it_is_quick_enough(wedge_paper: Any) -> None:
+    assert wedge_paper.seconds < LONGEST
 
 
 def test_report_opens_with_causes_and_shows_every_figure(
-    reproduction: Reproduction, tmp_path: Path
+    reproduction: Reproduction, wedge_paper: Any, tmp_path: Path
 ) -> None:
     names = {exhibit.name for exhibit in reproduction.figures}
     assert names >= {"fig5", "fig6", "fig7", "fig8", "fig9"}
@@ -223,4 +214,4 @@ def test_report_opens_with_causes_and_shows_every_figure(
     assert html.count("<figcaption>Figure") == len(reproduction.figures)
     assert html.index("leaves friction out") < html.index("<figcaption>Figure")
     assert json.loads(paths[1].read_text()) == as_json(reproduction)
-    assert [label for label, share in STAGES if share == 1.0] == list(PARTS)
+    assert [label for label, share in wedge_paper.stages if share == 1.0] == list(PARTS)

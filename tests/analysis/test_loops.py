@@ -11,11 +11,15 @@ import pytest
 
 from bywire.analysis.agreement import agreement
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.margins import margins, over, worst
+from bywire.analysis.margins import margins, worst
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, StepError, UnknownNameError
 
 NAMES = sorted(LOOPS.all())
+
+
+def over(loop, par, value, name, values):
+    return [margins(loop, *case) for case in loop.varied(par, value, name, values)]
 
 
 def of(name: str):

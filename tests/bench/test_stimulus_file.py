@@ -6,9 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import bywire
-from bywire.core.errors import FileError, InputError, ParameterError
+from bywire.bench.bench_text import bench_text
+from bywire.core.errors import FileError, InputError, ParameterError, UnitError
+from bywire.data.writing import write_measurement
 
 BENCH = """
 experiment = "open-loop"
@@ -40,7 +43,7 @@ def test_nodes_come_from_the_file_and_time_from_its_first_row(tmp_path: Path) ->
     ("table", "more", "kind", "words"),
     [
         ("time [s],a [A],b [A]\n0,1,2\n1,1,2\n", "", FileError, "several columns"),
-        ("time [s],a [V]\n0,1\n0.1,1\n", "", FileError, "drives A"),
+        ("time [s],a [V]\n0,1\n0.1,1\n", "", UnitError, "it cannot be A"),
         ("time [s],a [A]\n0,1\n0.1,1\n", 'times = "0 s"', ParameterError, "either file, or"),
         ("time [s],a [A]\n0,1\n0.1,1\n", 'column = "b"', InputError, "b"),
     ],
@@ -50,3 +53,40 @@ def test_what_does_not_fit_is_refused(
 ) -> None:
     with pytest.raises(kind, match=words):
         bywire.load(written(tmp_path, table, more))
+
+
+def test_nodes_come_from_any_measurement_file(tmp_path: Path) -> None:
+    columns = {
+        "clock": ("time", [0.0, 100.0, 200.0], {"units": "ms"}),
+        "motor": ("time", [0.0, 2.5, 2.5]),
+    }
+    numbers = xr.Dataset(columns, coords={"time": [0.0, 1.0, 2.0]})
+    write_measurement(numbers, tmp_path / "run.nc")
+    path = written(tmp_path, "")
+    more = 'column = "MOTOR"\nunit = "A"\nscale = 0.2\nmax_gap = "1 s"\n'
+    more += 'time = "clock"\ntime_unit = "ms"\n'
+    path.write_text(BENCH.replace("current.csv", "run.nc") + more)
+    bench = bywire.load(path)
+    stimulus = bench.chosen_stimulus
+    assert stimulus is not None
+    level = stimulus.sample(np.array([0.0, 0.05, 0.1, 0.3]))
+    np.testing.assert_allclose(level, [0.0, 0.25, 0.5, 0.5])
+    path.write_text(bench_text(bench))
+    again = bywire.load(path).chosen_stimulus
+    assert again is not None
+    assert again.parameters == stimulus.parameters
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ('unit = "bra"', "stimulus.unit = 'bra' is no known unit"),
+        ("column = true", "stimulus.column"),
+        ('rate = "5 ms"', "rate = '5 ms' has the wrong unit"),
+        ('tme = "t"', "tme"),
+        ('column = "a"\nunit = "V"', "the file says 'A' and the mapping 'V'"),
+    ],
+)
+def test_a_choice_that_makes_no_sense_is_refused(tmp_path: Path, more: str, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        bywire.load(written(tmp_path, "time [s],a [A]\n0,1\n0.1,1\n", more))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
+import xarray as xr
 from command_line import PEDAL, refused
 
 import bywire as package
@@ -44,10 +46,10 @@ def test_absolute_path_is_taken_as_it_is(bywire, bench, ride, tmp_path):
 @pytest.mark.parametrize(
     ("text", "texts"),
     [
-        ("", ["is empty", "a first row such as"]),
+        ("", ["is empty (0 bytes)"]),
         (HEADER, ["too few rows", "two at least"]),
         (HEADER + "0,9\n", ["too few rows", "two at least"]),
-        (HEADER + "0,9\n0.01,fast\n", ["line 3, column 'pedal'", "'fast' is not a number"]),
+        (HEADER + "0,9\n0.01,fast\n", ["line 3, column 'pedal'", "'fast' is no finite number"]),
         (HEADER + "0,9\n0.01,\n", ["line 3, column 'pedal'", "blank"]),
         (HEADER + "0,9\n0.01,nan\n", ["line 3, column 'pedal'", "no measured value"]),
         (HEADER + "0,9\n0.02,9\n0.01,9\n", ["line 4", "comes after", "sort the rows"]),
@@ -55,11 +57,11 @@ def test_absolute_path_is_taken_as_it_is(bywire, bench, ride, tmp_path):
         (HEADER + "0,9\n0.01,9\n0.02,9\n2,9\n", ["line 5", "a gap of 1.98 s", "max_gap"]),
         ("time [s],pedal\n0,9\n1,9\n", ["column 'pedal'", "has no unit"]),
         ("time [s],pedal [bar]\n0,9\n0.01,9\n", ["column 'pedal'", "'bar'", "cannot be m"]),
-        ("time [s],lever [mm]\n0,9\n0.01,9\n", ["none of its columns 'time, lever'", "pedal [mm]"]),
-        ("clock [s],pedal [mm]\n0,9\n0.01,9\n", ["no column 'time'"]),
-        ("0,9\n0.01,9\n", ["no names and units"]),
+        ("time [s],lever [mm]\n0,9\n0.01,9\n", ["none of its columns 'lever'", "pedal [mm]"]),
+        ("clock [s],pedal [mm]\n0,9\n0.01,9\n", ["does not say when", "'time [s]'"]),
+        ("0,9\n0.01,9\n", ["none of its columns '1, 2'", "add a first row"]),
         (b"\xff\xfe\x00\x01", ["line 1", "not UTF-8"]),
-        (bytes(200), ["none of its columns", "pedal [mm]"]),
+        (bytes(200), ["holds something else"]),
         (HEADER + '0,"9\n0.01,9\n', ["quotation marks"]),
         ("time [s],pedal [mm]," + "x" * 200_000, ["line 1", "field limit"]),
     ],
@@ -117,3 +119,14 @@ def test_ride_up_to_the_stop_is_a_run_like_any_other(bywire, ride, tmp_path):
 
 def test_bench_file_given_as_a_trace(bywire, ride):
     refused(bywire("run", ride(PEDAL, name="other.toml")), "none of its columns")
+
+
+def test_a_mapping_file_says_which_column_of_which_file_is_the_pedal(bywire, bench, tmp_path):
+    travel = ("time", np.linspace(0.9, 2.4, 60), {"units": "1"})
+    run = xr.Dataset({"lever": travel}, coords={"time": np.arange(60) * 5e-3})
+    package.write_measurement(run, tmp_path / "ride.nc")
+    (tmp_path / "map.toml").write_text('[signals.pedal]\ncolumn = "lever"\nscale = 10\nunit = "mm"')
+    options = '[options]\ntrace = "ride.nc"\n'
+    refused(bywire("run", bench(PEDAL + options)), "none of its columns 'lever'", "trace_map")
+    outcome = bywire("run", bench(f'{PEDAL}{options}trace_map = "map.toml"\n'), "--json")
+    assert outcome.status == 0, outcome.err

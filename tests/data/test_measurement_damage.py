@@ -71,6 +71,21 @@ def test_a_table_that_ends_within_a_number(tmp_path, number, mark, lost, text):
     assert read_measurement(path)["y"].size == 40
 
 
+def test_a_cut_shows_beside_a_number_that_is_as_short(tmp_path):
+    """A few short ones, as where a ride begins at rest, do not hide it; many do."""
+    path, rng = tmp_path / "a.csv", np.random.default_rng(2)
+    for number, text in ((lambda v: repr(float(v)), "are longer"),
+                         ("{:.4f}".format, "have more decimals")):  # fmt: skip
+        cells = ["0", "0", *(number(0.1 + 0.1 * v) for v in rng.uniform(size=70))]
+        rows = [f"{0.01 * k:.2f},{cell}" for k, cell in enumerate([*cells, "0.12"])]
+        path.write_text("\n".join(["time [s],y [m]", *rows]))
+        with pytest.raises(FileError, match=rf"line 74: .*'0.12' .*all but 1 numbers .* {text}"):
+            read_measurement(path)
+    rows = [f"{0.01 * k:.2f},{0.5 * k:g}" for k in range(60)]
+    path.write_text("\n".join(["time [s],y [m]", *rows, "0.60,30"]))
+    assert read_measurement(path)["y"].size == 61
+
+
 def test_flipped_bytes(tmp_path, name):
     path = file_of(tmp_path, name, measurement(60))
     whole = path.read_bytes()

@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 import pytest
+from measurement_files import FORMATS, NEEDS, file_of, measurement
 
 from bywire.core.errors import FileError, ParameterError, UnitError
-from bywire.data.trace import read_trace
+from bywire.data.trace import read_trace, trace_names
 
 HEADER = "time [s], pedal [mm]\n"
 ROWS = "".join(f"{k / 100:.2f},1\n" for k in range(20))
@@ -32,7 +33,7 @@ def test_the_same_trace_in_three_dialects(tmp_path, content):
     np.testing.assert_allclose(trace["pedal"], [0.0015, 0.0025])
     assert trace["pedal"].dtype == np.float64
     assert (trace["pedal"].attrs["units"], trace["time"].attrs["units"]) == ("m", "s")
-    assert trace.attrs == {"source": "pedal.csv"}
+    assert trace.attrs == {"source": "pedal.csv", "format": "csv"}
 
 
 def test_without_names_every_column_comes_in_si(tmp_path):
@@ -54,23 +55,23 @@ def test_without_names_every_column_comes_in_si(tmp_path):
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        ("", "is empty: it needs a first row"),
-        ("0,1\n1,2\n", "line 1: '0,1' holds no names .* add a first row"),
-        (HEADER + "0,1\n0.01,fast\n", "line 3, column 'pedal': 'fast' is not a number"),
-        (HEADER + "0,1\n0.01,1_000\n", "line 3, column 'pedal': '1_000' is not a number"),
-        (HEADER + "0,1\n0.01,1e999\n", "line 3, column 'pedal': '1e999' is not a number"),
-        (HEADER + "0,1\n\n0.01,NaN\n", "line 4, column 'pedal': 'NaN' is no measured value"),
-        (HEADER + "0,1\n0.01,\n0.02,1\n", "line 3, column 'pedal': the cell is blank"),
-        (HEADER + "0,1\n0.02,1\n0.01,1\n", "line 4, column 'time': 0.01 s comes after 0.02 s"),
-        (HEADER + "0,1\n0.02,1\n0.02,1\n", "line 4, column 'time': 0.02 s is repeated in line 3"),
-        (HEADER + "0,1,5\n", "line 2: 3 cells, but the header has 2 .* semicolons"),
+        ("", r"is empty \(0 bytes\)"),
+        ("0,1\n1,2\n", "no column 'pedal' .*its columns are 1, 2"),
+        (HEADER + "0,1\n0.01,fast\n", "line 3, column 'pedal': 'fast' is no finite number"),
+        (HEADER + "0,1\n0.01,1_000\n", "line 3, column 'pedal': '1_000' is no finite number"),
+        (HEADER + "0,1\n0.01,1e999\n", "line 3, column 'pedal': '1e999' is no finite number"),
+        (HEADER + "0,1\n\n0.01,NaN\n", "line 4, column 'pedal': .*NaN is no measured value"),
+        (HEADER + "0,1\n0.01,\n0.02,1\n", "line 3, column 'pedal': blank .*: fill it in"),
+        (HEADER + "0,1\n0.02,1\n0.01,1\n", "column 'time', line 4: 0.01 s comes after 0.02: "),
+        (HEADER + "0,1\n0.02,1\n0.02,1\n", "column 'time', line 4: 0.02 s is repeated"),
+        (HEADER + "0,1,5\n", "line 2: 3 cells, but the first row has 2 .* semicolons"),
         (HEADER + '0,"1\n0.01,2\n', "line 2: .* quotation marks"),
-        (HEADER + "0,1\n", "too few rows of numbers, 1"),
+        (HEADER + "0,1\n", "too few rows, 1"),
         ("time [s];pedal [mm]\n0;1,5\n0.1;2\n", "line 3, column 'time': '0.1' mixes decimal"),
-        ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* is it 'pedl'.*'pedal \[mm\]'"),
-        ("clock [s], pedal [mm]\n0,1\n1,2\n", r"no column 'time' among .* add 'time \[s\]'"),
-        ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "'Pedal': the name stands twice"),
-        (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: the byte 0xb5 is not UTF-8: save"),
+        ("time [s], pedl [mm]\n0,1\n1,2\n", r"no column 'pedal'.* is it 'pedl'"),
+        ("clock [s], pedal [mm]\n0,1\n1,2\n", r"does not say when .*: call a column 'time \[s\]'"),
+        ("time [s], pedal [mm], Pedal [mm]\n0,1,1\n1,2,1\n", "'pedal': the name stands twice"),
+        (b"time [s], pedal [mm]\n0,1\n1,2 \xb5\n", "line 3: it is not UTF-8: save"),
     ],
 )
 def test_refused_files(tmp_path, content, text):
@@ -83,7 +84,7 @@ def test_refused_files(tmp_path, content, text):
 @pytest.mark.parametrize(
     ("title", "text"),
     [
-        ("pedal", r"'pedal': it has no unit: write for instance 'pedal \[mm\]'"),
+        ("pedal", r"'pedal': it has no unit: write it behind the title, as 'pedal \[mm\]'"),
         ("pedal [N]", "'N' has the wrong unit, it cannot be m"),
         ("pedal [furlongs per beat]", "is no known unit"),
         ("pedal [9**9**9**9]", "is no known unit"),
@@ -91,7 +92,7 @@ def test_refused_files(tmp_path, content, text):
 )
 def test_refused_units(tmp_path, title, text):
     path = written(tmp_path, f"time [s], {title}\n0,1\n0.01,2\n")
-    with pytest.raises(UnitError, match=f"line 1, column .*{text}"):
+    with pytest.raises(UnitError, match=f"pedal.csv, column .*{text}"):
         read_trace(path, {"pedal": "m"})
 
 
@@ -106,7 +107,7 @@ def test_a_gap_is_refused_until_it_is_allowed(tmp_path):
     with pytest.raises(FileError) as caught:
         read_trace(path)
     message = str(caught.value)
-    assert "line 22, column 'time': a gap of 0.61 s after 0.19 s" in message
+    assert "line 22: a gap of 0.61 s after 0.19 s" in message
     allowed = message.rpartition('max_gap="')[2].rstrip('"')
     assert read_trace(path, max_gap=allowed).sizes["time"] == 22
     with pytest.raises(ParameterError, match="max_gap"):
@@ -124,3 +125,38 @@ def test_what_is_no_file(tmp_path):
         read_trace(tmp_path / "none.csv")
     with pytest.raises(FileError, match="is not a file"):
         read_trace(tmp_path)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_trace_may_be_any_measurement_file(tmp_path, name):
+    if name in NEEDS:
+        pytest.importorskip(NEEDS[name])
+    whole = measurement().isel(time=slice(20, None))
+    path = file_of(tmp_path, name, whole)
+    assert trace_names(path) == ("p_mc", "x_mc")
+    trace = read_trace(path, {"X_MC": "m"})
+    np.testing.assert_array_equal(trace["X_MC"], whole["x_mc"])
+    np.testing.assert_array_equal(trace["time"], whole["time"])
+    mapping = {"signals": {"push": {"column": "p_mc", "sign": -1, "delay": "10 ms"}}}
+    pushed = read_trace(path, {"push": "Pa"}, mapping=mapping)
+    np.testing.assert_array_equal(pushed["push"], -whole["p_mc"])
+    np.testing.assert_allclose(pushed["time"], whole["time"] - 0.01)
+    with pytest.raises(UnitError, match="'p_mc': 'Pa' has the wrong unit, it cannot be m"):
+        read_trace(path, {"p_mc": "m"})
+    holes = file_of(tmp_path, name)
+    with pytest.raises(FileError, match=r"(line|row|index|record) \d+, column 'p_mc': blank"):
+        read_trace(holes, {"p_mc": "Pa"})
+
+
+def test_a_text_table_is_one_whatever_its_name_ends_with(tmp_path):
+    path = tmp_path / "pedal.dat"
+    path.write_text(HEADER + ROWS)
+    assert read_trace(path)["pedal"].size == 20
+
+
+def test_columns_that_are_not_read_may_hold_what_they_like(tmp_path):
+    rows = "".join(f"{k / 100:.2f};1;1.5 of {k};{k}\n".replace(".", ",", 1) for k in range(20))
+    path = written(tmp_path, f"time [s];pedal [mm];note;\n{rows}")
+    assert read_trace(path, {"pedal": "m"})["pedal"].size == 20
+    versions = written(tmp_path, f"time [s];pedal [mm];version;\n{rows}".replace("1.5 of", "1."))
+    assert read_trace(versions, {"pedal": "m"})["pedal"].size == 20

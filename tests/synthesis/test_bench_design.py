@@ -19,11 +19,11 @@ from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
 from bywire.core.catalog import main_set, parameters
 from bywire.synthesis.bench_figures import BenchFigures, Small, bench_figures, loop_gain
-from bywire.synthesis.bench_text import bench_text
 from bywire.synthesis.bench_tuning import Tuning
 from bywire.synthesis.candidate import Candidate, bench_slacks, linear_slacks
 from bywire.synthesis.linear_case import cases_of
 from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.outcome import bench_text
 from bywire.synthesis.requirement import read
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import verify

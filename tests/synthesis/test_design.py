@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import margins
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.motorcycle.linear.rational import first_orders
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
 from bywire.simulation.run import simulate

@@ -14,14 +14,13 @@ from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.synthesis.bench_figures import BenchFigures, bench_figures
 from bywire.synthesis.candidate import judged
-from bywire.synthesis.corners import MOST, corners_of
 from bywire.synthesis.linear_case import cases_of
 from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.outcome import ScheduleDesign
 from bywire.synthesis.requirement import read
 from bywire.synthesis.schedule_designer import design_schedule, points_by_region
-from bywire.synthesis.schedule_outcome import ScheduleDesign
 from bywire.synthesis.schedule_verification import verify_schedule
-from bywire.synthesis.trial import Trial
+from bywire.synthesis.trial import MOST, Trial, corners_of
 from bywire.synthesis.verification import verify
 
 ON = {"ecu.schedule.law": "regions"}

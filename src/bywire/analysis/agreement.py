@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.analysis.loop import Loop
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+from bywire.core.typing import Array, Complex, Progress
 
 _PATIENCE = 12  # windows granted to loops with friction, which may never repeat exactly
 GAIN, PHASE = 0.01, 0.1
@@ -79,14 +76,14 @@ class Agreement:
         singles = [c for c in self.gain if c not in (NOTHING, LIMITS, EVERYTHING)]
         moves |= {cause: self.beyond_limits(cause) for cause in singles}
         sizes = {cause: _move(*by) for cause, by in moves.items()}
-        found = []
+        causes = []
         for k in range(len(self.frequencies)):
             here = {cause: float(size[k]) for cause, size in sizes.items()}
             lost = [cause for cause, size in here.items() if not math.isfinite(size)]
             most = max(here, key=lambda cause: here[cause])
             gain, phase = (abs(float(by[k])) for by in moves[most])
-            found.append(", ".join(lost) or ("" if gain <= GAIN and phase <= PHASE else most))
-        return found
+            causes.append(", ".join(lost) or ("" if gain <= GAIN and phase <= PHASE else most))
+        return causes
 
 
 def agreement(
@@ -126,32 +123,32 @@ def agreement(
     smooth = loop.smooth(par)
     left = {NOTHING: smooth, LIMITS: smooth, **{c: loop.smooth(par, c) for c in loop.causes},
             EVERYTHING: par}  # fmt: skip
-    found = xr.Dataset()
-    for k, (cause, own) in enumerate(left.items()):
+    f = np.zeros(0)
+    for k, (cause, variant) in enumerate(left.items()):
         sweep = Sweep(
             loop.inputs, loop.output, frequencies, (amplitudes[1 if cause else 0],), flags=(),
-            whole=loop.whole(own), tolerance=1e-3 if cause else 1e-4,
+            whole=loop.whole(variant), tolerance=1e-3 if cause else 1e-4,
             most=_PATIENCE if cause else 60,
         )  # fmt: skip
-        found = frequency_response(loop.point(own, value).run(step), sweep)
-        gain[cause], phase[cause] = _difference(found, linear.response(found["frequency"].values))
+        response = frequency_response(loop.point(variant, value).run(step), sweep)
+        f = response["frequency"].values
+        gain[cause], phase[cause] = _difference(response, linear.response(f))
         if progress is not None:
             progress(f"agreement of loop {loop.name}", (k + 1) / len(left))
-    f = found["frequency"].values
-    own_step = step or loop.point(par, value).step
-    ratio = loop.closed(par, value, own_step).response(f) / linear.response(f)
+    substep = step or loop.point(par, value).step
+    ratio = loop.closed(par, value, substep).response(f) / linear.response(f)
     return Agreement(f, gain, phase, *_in_dB_and_degree(ratio[:, 0, 0]))
 
 
-def _difference(found: xr.Dataset, linear: NDArray[np.complex128]) -> tuple[Array, Array]:
-    one = found.isel(variant=0, amplitude=0)
-    settled = one["settled"].values > 0
-    gain = np.where(settled, one["gain"].values, np.nan)
-    ratio = gain * np.exp(1j * np.radians(one["phase"].values)) / linear[:, 0, 0]
+def _difference(response: xr.Dataset, linear: Complex) -> tuple[Array, Array]:
+    part = response.isel(variant=0, amplitude=0)
+    settled = part["settled"].values > 0
+    gain = np.where(settled, part["gain"].values, np.nan)
+    ratio = gain * np.exp(1j * np.radians(part["phase"].values)) / linear[:, 0, 0]
     return _in_dB_and_degree(ratio)
 
 
-def _in_dB_and_degree(ratio: NDArray[np.complex128]) -> tuple[Array, Array]:
+def _in_dB_and_degree(ratio: Complex) -> tuple[Array, Array]:
     return 20.0 * np.log10(np.abs(ratio)), np.degrees(np.angle(ratio))
 
 

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from bywire.core.typing import Array, Complex
 
@@ -200,6 +199,7 @@ def _passing(frequencies: Array, values: Array, k: int) -> float:
 
 def _solved(response: Response, level: float, low: float, high: float) -> float:
     """Return the frequency between two others at which a magnitude passes a level."""
+    from scipy.optimize import brentq
 
     def excess(f: float) -> float:
         return float(np.abs(response(np.array([f])))[0]) - level

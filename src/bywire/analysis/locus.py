@@ -12,9 +12,7 @@ from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 _OUTSIDE = 1e-9  # by so much a pole must leave the unit circle: rounding of an integrator
 _AT_REST = 1e-6  # poles this close to 1 are integrators that the loop does not move
@@ -75,9 +73,9 @@ class Locus:
         if not self.period:
             return self.poles
         alive = self.poles != 0.0
-        found = np.full(self.poles.shape, -np.inf, dtype=complex)
-        found[alive] = np.log(self.poles[alive]) / self.period
-        return found
+        continuous = np.full(self.poles.shape, -np.inf, dtype=complex)
+        continuous[alive] = np.log(self.poles[alive]) / self.period
+        return continuous
 
 
 def locus(
@@ -131,9 +129,9 @@ def locus_of(
         raise ParameterError(f"{name}: a locus needs two values or more, got {len(values)}")
     models = [model(at) for at in values]
     tracked = [models[0].poles()]
-    for one in models[1:]:
-        tracked.append(_followed(tracked[-1], one.poles()))
-    stable = np.array([_is_stable(one) for one in models])
+    for linear in models[1:]:
+        tracked.append(_followed(tracked[-1], linear.poles()))
+    stable = np.array([_is_stable(linear) for linear in models])
     borders = [
         _border(model, (values[k], values[k + 1]), bool(stable[k + 1]))
         for k in map(int, np.flatnonzero(stable[1:] != stable[:-1]))
@@ -144,12 +142,12 @@ def locus_of(
     )  # fmt: skip
 
 
-def _followed(before: Complex, found: Complex) -> Complex:
+def _followed(before: Complex, poles: Complex) -> Complex:
     """Return poles in the order of those before: the assignment that moves them least."""
     from scipy.optimize import linear_sum_assignment
 
-    _, columns = linear_sum_assignment(np.abs(before[:, None] - found))
-    return np.asarray(found[columns])
+    _, columns = linear_sum_assignment(np.abs(before[:, None] - poles))
+    return np.asarray(poles[columns])
 
 
 def _outermost(model: LinearModel) -> tuple[complex, float]:
@@ -179,6 +177,7 @@ def _border(
     model: Callable[[float], LinearModel], between: tuple[float, float], above: bool
 ) -> Border:
     """Return where stability changes between two values, by bisection."""
+    # Bisection of a yes or no: near z = 1 a pole counts as an integrator, and its excess jumps.
     low, high = between
     for _ in range(_HALVINGS):
         middle = 0.5 * (low + high)

@@ -7,22 +7,18 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bywire.analysis.linear.analog_gain import analog_gain
 from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.open_loop import open_loop
+from bywire.analysis.linear.open_loop import analog_gain, open_loop
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.errors import unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
+from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

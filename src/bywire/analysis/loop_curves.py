@@ -122,7 +122,7 @@ def disk(margin: float) -> Disk:
     if not 0.0 < margin <= 2.0:
         raise ParameterError(f"disk margin = {margin:g}: it must be > 0 and <= 2")
     a = 0.5 * margin
-    if a == 1.0:
+    if a == 1.0:  # |S - T| = 1 at the imaginary axis: the circle has become a line
         return Disk(-math.inf, math.inf)
     return Disk(-(1.0 + a * a) / (1.0 - a * a), 2.0 * a / (1.0 - a * a))
 

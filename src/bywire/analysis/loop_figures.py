@@ -151,6 +151,7 @@ class LoopFigures:
         """
         if not self.gain.period:
             return math.nan
+        # White noise of samples has a flat spectrum: midpoints of even bands are its quadrature.
         f = (np.arange(_NOISE_POINTS) + 0.5) / _NOISE_POINTS * self.gain.nyquist
         L = self._gain_at(f)
         return float(np.sqrt(np.mean(np.abs(L / (1.0 + L)) ** 2)))
@@ -161,7 +162,7 @@ class LoopFigures:
 
         By doubling, A^n B for n < 2m follows from those for n < m with one product of matrices.
         """
-        rate = max(1.0 - self.growth, 1e-12)
+        rate = max(1.0 - self.growth, 1e-12)  # of the slowest mode, per sample
         count = min(max(-math.log(_SETTLED) / rate, 64.0), _MOST)
         kept = self.closed.effective()
         A, power = self.closed.A[np.ix_(kept, kept)], self.closed.B[kept]

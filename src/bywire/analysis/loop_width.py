@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.bench.kpis.hysteresis import Loop
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 def widths(loop: Loop, levels: Array) -> Array:
@@ -50,9 +48,9 @@ def closed_above(loop: Loop, width: float, levels: Array) -> float:
         The lowest level that is closed with all above it: the lowest one crossed where the loop
         is closed everywhere, NaN where it is open at its top.
     """
-    found = widths(loop, levels)
-    crossed = np.isfinite(found)
-    wide = np.flatnonzero(crossed & (np.abs(found) > width))
+    gaps = widths(loop, levels)
+    crossed = np.isfinite(gaps)
+    wide = np.flatnonzero(crossed & (np.abs(gaps) > width))
     first = wide[-1] + 1 if wide.size else 0
     closed = np.flatnonzero(crossed[first:])
     return float(levels[first + closed[0]]) if closed.size else float("nan")

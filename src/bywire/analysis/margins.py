@@ -81,6 +81,7 @@ def margins_of(figures: LoopFigures) -> LoopMargins:
     """Return the margins of a loop by its figures."""
     if not figures.is_stable:
         return UNSTABLE
+    # Signed, where a design takes the distance from -1: below 0 the phase is beyond -180.
     margin = margin_of(figures.crossings)
     return LoopMargins(
         gain=figures.gain_margin,
@@ -99,19 +100,6 @@ def margins_of(figures: LoopFigures) -> LoopMargins:
 def margins(loop: Loop, par: ParameterSet, value: float) -> LoopMargins:
     """Return the margins of a loop at an operating point, see `figures_at`."""
     return margins_of(figures_at(loop, par, value))
-
-
-def over(
-    loop: Loop, par: ParameterSet, value: float, name: str, values: Sequence[float]
-) -> list[LoopMargins]:
-    """Return the margins for several values of a parameter, or of the operating point.
-
-    Parameters
-    ----------
-    name, values
-        See `Loop.varied`.
-    """
-    return [margins(loop, *case) for case in loop.varied(par, value, name, values)]
 
 
 def worst(

@@ -34,9 +34,8 @@ from bywire.report.document import (
     TableBlock,
 )
 from bywire.synthesis import designer
-from bywire.synthesis.bench_text import bench_text
 from bywire.synthesis.linear_case import cases_of
-from bywire.synthesis.outcome import Design, Status
+from bywire.synthesis.outcome import Across, Design, ScheduleDesign, Status, bench_text
 from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import (
     design_schedule,
@@ -44,7 +43,6 @@ from bywire.synthesis.schedule_designer import (
     points_by_region,
     scheduled,
 )
-from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
 from bywire.synthesis.schedule_verification import verify_schedule
 from bywire.synthesis.verification import Verification, verify
 

@@ -18,8 +18,13 @@ from bywire.analysis.response import frequency_response as by_sines
 from bywire.analysis.response.broadband import Broadband, broadband_response
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import require_stable
-from bywire.analysis.response.large_signal import Variant, variants_over, widths, with_widths
-from bywire.analysis.response.reach import leaving
+from bywire.analysis.response.large_signal import (
+    Variant,
+    leaving,
+    variants_over,
+    widths,
+    with_widths,
+)
 from bywire.api.bandwidth_tables import (
     NOTE,
     figures_object,

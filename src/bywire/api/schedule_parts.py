@@ -16,9 +16,9 @@ from bywire.api.verification_parts import (
 from bywire.core.units import shown
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
+from bywire.synthesis.outcome import Across, ScheduleDesign
 from bywire.synthesis.requirement import FIGURES, Requirement
 from bywire.synthesis.schedule_designer import scheduled
-from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
 from bywire.synthesis.verification import Verification
 
 _SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin", "overshoot")

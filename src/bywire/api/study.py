@@ -32,7 +32,7 @@ from bywire.report.parameter_rows import parameter_rows
 from bywire.report.subject import Subject
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import in_display_unit, unit_text
-from bywire.synthesis.study import STUDIES, Cut, Found, Map, Study
+from bywire.synthesis.study import STUDIES, Cut, Findings, Map, Study
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,7 +60,7 @@ class StudyResult(Answer):
     name: str
     par: ParameterSet
     options: ParameterSet
-    found: Found
+    found: Findings
 
     @property
     def warnings(self) -> list[str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench, experiment_of, stimulus_sections
+from bywire.bench.bench_text import PATHS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.stimuli.registry import STIMULI
@@ -74,10 +75,10 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
         if key not in content:
             raise ParameterError(f"{key} is missing: write {key} = \"...\" (see 'bywire list')")
     _require_units(content)
-    options = _located(flattened(content.get("options", {})), "trace", folder)
+    options = _located(flattened(content.get("options", {})), folder)
     stimulus = {
-        key: _located(value, "file", folder) if isinstance(value, Mapping) else value
-        for key, value in _located(content.get("stimulus", {}), "file", folder).items()
+        key: _located(value, folder) if isinstance(value, Mapping) else value
+        for key, value in _located(content.get("stimulus", {}), folder).items()
     }
     return Bench(
         experiment=content["experiment"],
@@ -92,12 +93,12 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
     )
 
 
-def _located(values: Mapping[str, Any], key: str, folder: Path) -> dict[str, Any]:
-    """Return values whose path under a key starts at a folder, unless it is absolute."""
-    path = values.get(key)
-    if not path or not isinstance(path, str):
-        return dict(values)
-    return {**values, key: str(folder / path)}
+def _located(values: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return values whose paths start at a folder, unless they are absolute."""
+    return {
+        key: str(folder / value) if key in PATHS and value and isinstance(value, str) else value
+        for key, value in values.items()
+    }
 
 
 def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:

@@ -11,7 +11,8 @@ from bywire.bench.bench import Bench, stimulus_sections
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.parameters import ParameterSet, leaf_fields
 
-_PATHS = ("trace", "file")  # keys that name files: they must hold from any folder
+PATHS = ("trace", "trace_map", "file")
+"""keys of options and stimuli that name files: written down, they must hold from any folder"""
 
 
 def bench_text(bench: Bench, comment: str = "") -> str:
@@ -79,7 +80,7 @@ def _key(name: str) -> str:
 
 def _text(name: str, value: Any, symbol: str) -> str:
     if isinstance(value, (str, Path)):
-        path = name in _PATHS and str(value)
+        path = name in PATHS and str(value)
         return json.dumps(str(Path(path).resolve()) if path else str(value), ensure_ascii=False)
     if isinstance(value, bool):
         return str(value).lower()

@@ -1,4 +1,4 @@
-"""Stimuli from measured files: the nodes of a table out of a CSV or TSV file."""
+"""Stimuli from measured files: the nodes of a table out of any measurement file."""
 
 from __future__ import annotations
 
@@ -6,9 +6,13 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.core.errors import FileError, ParameterError, quoted
-from bywire.data.trace import read_trace
+from bywire.data.trace import read_trace, trace_names
 
-_KEYS = ("file", "column", "max_gap")
+_FILE = ("format", "rate", "start", "decimal", "skip_lines")
+_CLOCK = {"time": "column", "time_unit": "unit"}  # a table of a stimulus would be another one
+_SIGNAL = ("column", "unit", "scale", "sign", "offset", "delay")
+_NAME = "stimulus"
+_SHOWN = 12
 
 
 def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
@@ -18,41 +22,45 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     ----------
     values
         Parameters of the stimulus. ``file``: path of the file; ``column``: name of the column,
-        needed where there are several besides time; ``max_gap``: longest pause that is bridged.
-        Time starts at the first row; ``between`` is ``"linear"`` unless given.
+        needed where there are several besides time; ``unit``, ``scale``, ``sign``, ``offset``,
+        ``delay``, ``rate``, ``start``, ``format``, ``decimal`` and ``skip_lines`` as in a mapping,
+        and ``time`` and ``time_unit`` for the column of the instants, where the file does not say
+        them; ``max_gap``: longest pause that is bridged. Time starts at the first instant;
+        ``between`` is ``"linear"`` unless given.
     level_unit
         SI unit of the driven signal.
 
     Raises
     ------
-    FileError
-        When the file cannot be used.
-    ParameterError
-        When ``times`` or ``values`` are given beside a file.
+    InputError
+        When the file cannot be used, or ``times`` or ``values`` are given beside it.
     """
-    rest = {key: value for key, value in values.items() if key not in _KEYS}
     if "file" not in values:
         return dict(values)
+    keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
+    rest = {key: value for key, value in values.items() if key not in keys}
     if "times" in rest or "values" in rest:
         raise ParameterError("stimulus 'table': give either file, or times and values")
-    for key in ("file", "column"):
-        if not isinstance(values.get(key, ""), str):
-            raise ParameterError(f"stimulus.{key}: it must be a text, got {quoted(values[key])}")
-    path, column = values["file"], values.get("column")
-    wanted = None if column is None else {column: level_unit}
-    trace = read_trace(path, wanted, max_gap=values.get("max_gap", 0.1))
-    names = [str(name) for name in trace.data_vars]
-    if len(names) != 1:
-        raise FileError(
-            f"{path} has several columns besides time: name one of them with column "
-            f"({', '.join(names)})"
-        )
-    signal = trace[names[0]]
-    if signal.attrs["units"] != level_unit:
-        raise FileError(
-            f"{path}: column {names[0]!r} is in {signal.attrs['units']}, but the stimulus drives "
-            f"{level_unit}"
-        )
+    path = values["file"]
+    if not isinstance(path, str):
+        raise ParameterError(f"stimulus.file: it must be a text, got {quoted(path)}")
+    whole = {key: values[key] for key in _FILE if key in values}
+    clock = {inner: values[key] for key, inner in _CLOCK.items() if key in values}
+    whole |= {"time": clock} if clock else {}
+    signal = {key: values[key] for key in _SIGNAL if key in values}
+    if "column" not in signal:
+        names = trace_names(path, whole)
+        if len(names) != 1:
+            more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
+            raise FileError(
+                f"{path} has several columns besides time: name one of them with column "
+                f"({', '.join(names[:_SHOWN])}{more})"
+            )
+        signal["column"] = names[0]
+    trace = read_trace(
+        path, {_NAME: level_unit}, max_gap=values.get("max_gap", 0.1),
+        mapping={**whole, "signals": {_NAME: signal}},
+    )  # fmt: skip
     time = trace["time"].values
-    nodes = {"times": (time - time[0]).tolist(), "values": signal.values.tolist()}
+    nodes = {"times": (time - time[0]).tolist(), "values": trace[_NAME].values.tolist()}
     return {"between": "linear", **rest, **nodes}

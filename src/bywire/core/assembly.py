@@ -244,9 +244,22 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         values |= instant_of(w, "wire").wires
         values |= dict(_part_values(w, self.Output._fields))
         if "E_stored" in self.Output._fields:
-            values["E_stored"] = stored(w)
+            values["E_stored"] = self.stored(w)
         values |= _known(self, "record", self.record(w), self.Output._fields)
         return _filled(self, "record", self.Output, values)
+
+    def stored(self, w: Self) -> Any:
+        """Return the energy that the parts store at an instant [J]; contacts are added up apart."""
+        sums: list[Any] = []
+        for wanted in (False, True):
+            values = [
+                _wired(w, part).call(part.element.energy)
+                for part in self.parts.values()
+                if part.has("energy") and not part.outside and part.has("Forces") == wanted
+            ]
+            if values:
+                sums.append(sum(values[1:], values[0]))
+        return sum(sums[1:], sums[0]) if sums else 0.0
 
     @classmethod
     def state(cls, **parts: NamedTuple) -> Any:
@@ -289,20 +302,6 @@ class Assembly(Model, Generic[ParT, MemoryT]):
     def _nothing(self) -> Any:
         """Return a memory that is not known: where it does not count, nobody must see it."""
         return self.Memory._make(_NAN for _ in self.Memory._fields)
-
-
-def stored(w: Assembly[Any, Any]) -> Any:
-    """Return the energy that the parts store at an instant [J]; contacts are added up apart."""
-    sums: list[Any] = []
-    for wanted in (False, True):
-        values = [
-            _wired(w, part).call(part.element.energy)
-            for part in w.parts.values()
-            if part.has("energy") and not part.outside and part.has("Forces") == wanted
-        ]
-        if values:
-            sums.append(sum(values[1:], values[0]))
-    return sum(sums[1:], sums[0]) if sums else 0.0
 
 
 def _part_values(w: Assembly[Any, Any], wanted: tuple[str, ...]) -> Iterator[tuple[str, Any]]:

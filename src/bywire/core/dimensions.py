@@ -31,7 +31,7 @@ class DimensionError(UnitError):
 class Dimension:
     """A quantity of which only the dimension is known.
 
-    Plain zero goes with every dimension; a plain NaN is a quantity of which nothing is known.
+    Plain zero goes with every dimension, times whatever; of a plain NaN nothing is known.
 
     Parameters
     ----------
@@ -169,6 +169,10 @@ def _alike(verb: str, left: Any, right: Any) -> Any:
 def _product(left: Any, right: Any, sign: int) -> Any:
     if _unknown(left) or _unknown(right):
         return math.nan
+    if not isinstance(left, Dimension) and left == 0:
+        return left
+    if not isinstance(right, Dimension) and right == 0 and sign > 0:
+        return right
     pairs = zip(_dimension(left).powers, _dimension(right).powers, strict=True)
     return Dimension(tuple(a + sign * b for a, b in pairs))
 

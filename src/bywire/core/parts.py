@@ -77,8 +77,8 @@ class Wired(Generic[X, U, F, P]):
 
     @property
     def x(self) -> X:
-        """State; those that are declared as fixed are value-only."""
-        return self._part.state_at(self._instant, self._part.fixed)  # type: ignore[no-any-return]
+        """State."""
+        return self._part.state_at(self._instant, ())  # type: ignore[no-any-return]
 
     @property
     def xe(self) -> X:
@@ -137,7 +137,9 @@ class Wired(Generic[X, U, F, P]):
         ))  # fmt: skip
 
     def _argument(self, name: str, function: Callable[..., Any]) -> Any:
-        if name in ("x", "xe", "u", "f", "par"):
+        if name == "x":
+            return self._part.state_at(self._instant, self._part.fixed)
+        if name in ("xe", "u", "f", "par"):
             return getattr(self, name)
         if name in self._instant.shared:
             return getattr(self._instant.par, name)
@@ -197,7 +199,7 @@ class PartOptions(TypedDict, total=False):
     labels
         Labels of its states, where they are others.
     fixed
-        States that enter its equations value-only: periodic terms and slow geometry.
+        States that enter the element's own equations value-only: periodic terms, slow geometry.
     output
         Its outputs and contact forces that are signals of the assembly, by their names there; or
         the names alone, where they are the same.

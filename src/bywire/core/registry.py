@@ -104,22 +104,22 @@ class Kind(Generic[T]):
         return UnknownNameError("; ".join([str(error), *hints]))
 
     def guess(self, name: str) -> T | None:
-        """Return the thing of a name if a file of that name declares it: loads no other."""
+        """Return the thing of a name if the file of that name, or of its kind, declares it.
+
+        No folder is loaded for it: that takes a second where there are many things.
+        """
         stem = name.replace("-", "_")
         if not stem.isidentifier():
             return None
-        homes = [f"{brake.module}.{folder}" for brake in brakes().values()
-                 for folder in self.folders]  # fmt: skip
-        for home in (self.home, *homes):
-            try:
-                spec = importlib.util.find_spec(f"{home}.{stem}") if home else None
-            except (ImportError, ValueError, AttributeError):
-                continue  # no such folder
-            if spec is not None:
-                for module in modules_below(f"{home}.{stem}"):
-                    for thing in self.read(module):
-                        if thing.name == name:
-                            return thing
+        homes = [home for home in (self.home, *(f"{brake.module}.{folder}"
+                 for brake in brakes().values() for folder in self.folders)) if home]  # fmt: skip
+        files = [f"{home}.{stem}" for home in homes if _is_folder(home) is True]
+        files += [home for home in homes if _is_folder(home) is False]
+        for file in files:
+            for module in modules_below(file) if _is_folder(file) is not None else ():
+                for thing in self.read(module):
+                    if thing.name == name:
+                        return thing
         return None
 
     def of(self, module: str) -> Mapping[str, T]:
@@ -130,6 +130,15 @@ class Kind(Generic[T]):
     def owner(self, name: str) -> str:
         """Return the module of the brake that brings a thing; empty for a general one."""
         return next((owner for thing, owner in _all(self) if thing.name == name), "")
+
+
+def _is_folder(module: str) -> bool | None:
+    """Tell whether a module is a package; None where there is none of that name."""
+    try:
+        spec = importlib.util.find_spec(module)
+    except (ImportError, ValueError, AttributeError):
+        return None
+    return None if spec is None else spec.submodule_search_locations is not None
 
 
 def instances(kind: type[Thing]) -> Callable[[ModuleType], Iterable[Thing]]:

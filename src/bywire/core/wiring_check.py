@@ -146,11 +146,13 @@ def _check_contacts(model: AnyAssembly, at: _Operands) -> None:
     matrices = at.evaluated("compliance", model.compliance, at.par)
     forces = iter(at.contact)
     for group, rows in zip(gaps, matrices, strict=True):
-        for overlap, row, force in zip(group, rows, forces, strict=False):
-            if not fits(overlap, str(row[0] * force)) and isinstance(overlap, Dimension):
+        for overlap, row in zip(group, rows, strict=True):
+            force = next(forces)
+            wanted = next((c * force for c in row if isinstance(c, Dimension)), overlap)
+            if isinstance(overlap, Dimension) and not fits(overlap, str(wanted)):
                 raise ModelError(
                     f"{_place(model)}: an overlap in {overlap} meets a compliance times a force in "
-                    f"{row[0] * force}: they must be alike"
+                    f"{wanted}: they must be alike"
                 )
 
 

@@ -94,7 +94,7 @@ def choose(
     UnitError
         When a unit is missing, unknown or contradicts that of the file.
     """
-    wanted = dict(meaning.signals) or _own(file, source, meaning)
+    wanted = dict(meaning.signals) or every_signal(file, source, meaning)
     if signals is not None:
         for name in signals:
             if name not in wanted:
@@ -105,7 +105,9 @@ def choose(
     return [_chosen(file, source, meaning, one) for one in wanted.values()]
 
 
-def _own(file: Path, source: Source, meaning: MeasurementMapping) -> dict[str, SignalMapping]:
+def every_signal(
+    file: Path, source: Source, meaning: MeasurementMapping
+) -> dict[str, SignalMapping]:
     """Return every column that is no clock under its own name."""
     clocks = {c.clock for c in source.columns.values()}
     if meaning.clock is not None and meaning.clock.column:
@@ -125,8 +127,8 @@ def _chosen(
     where = f"{file}, column {quoted(column.name)}"
     if not unit:
         raise UnitError(
-            f"{where}: it has no unit: write one in a mapping, as "
-            f"[signals.{one.name}] unit = 'bar', or '1' for none"
+            f"{where}: it has no unit: write it behind the title, as '{one.name} [mm]', or in a "
+            f"mapping, as [signals.{one.name}] unit = 'bar', or '1' for none"
         )
     found = _known_unit(unit, where)
     if one.unit and column.unit and one.scale is None:
@@ -182,7 +184,8 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
                 "; where other lines stand before the table, a mapping's skip_lines tells how many"
             )
             raise FileError(
-                f"{file} does not say when it was measured: write in a mapping "
+                f"{file} does not say when it was measured: call a column 'time [s]', or write in "
+                "a mapping "
                 'time = { column = "t", unit = "ms" } or rate = "1 kHz"; '
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 else "")

@@ -33,7 +33,7 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
         When there is no such format.
     """
     wanted = [FORMATS.find(name)] if name else _of_ending(path)
-    head = _head(path)
+    head = head_of(path)
     if not head:
         raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
     holds = [one for one in FORMATS.all().values() if one.recognizes(head)]
@@ -77,7 +77,14 @@ def _names() -> str:
     return ", ".join(FORMATS.all())
 
 
-def _head(path: Path) -> bytes:
+def head_of(path: Path) -> bytes:
+    """Return the first bytes of a file, by which formats are told.
+
+    Raises
+    ------
+    FileError
+        When it is no file or cannot be read.
+    """
     try:
         if path.exists() and not path.is_file():
             raise FileError(f"{path} is not a file: give the path of a measurement file")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError, InputError, ParameterError, quoted
 from bywire.data.column_choice import Chosen, choose
-from bywire.data.file_format import FileFormat, Progress, ReadOptions, Source, no_progress
+from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
 from bywire.data.format_registry import format_to_read
 from bywire.data.limited_source import limited
 from bywire.data.mapping import MeasurementMapping
@@ -74,13 +74,43 @@ def read_measurement(
         When an entry of the mapping is not admissible.
     """
     file = Path(path)
-    meaning = _mapping(mapping)
+    meaning = mapping_of(mapping)
+    with opened(file, meaning) as source:
+        return dataset_of(
+            file, source, meaning, signals, progress, room() if largest is None else largest
+        )
+
+
+def dataset_of(
+    file: Path, source: Source, meaning: MeasurementMapping, signals: Sequence[str] | None,
+    progress: Progress, largest: int,
+) -> xr.Dataset:  # fmt: skip
+    """Read signals of an open measurement file, as `read_measurement` does."""
+    chosen = choose(file, source, meaning, signals)
+    _require_room(file, source, chosen, largest)
+    dataset = _dataset(file, source, chosen, progress)
+    dataset.attrs = {"source": file.name, "format": format_to_read(file, meaning.format).name}
+    return dataset
+
+
+@contextmanager
+def opened(file: Path, meaning: MeasurementMapping) -> Iterator[Source]:
+    """Open a measurement file, in a child process where a library reads it.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read, is damaged, or is not what its name says; also of what is
+        done with it as long as it is open.
+    """
     kind = format_to_read(file, meaning.format)
     try:
-        with opened(file, kind, meaning) as source:
-            chosen = choose(file, source, meaning, signals)
-            _require_room(file, source, chosen, room() if largest is None else largest)
-            dataset = _dataset(file, source, chosen, progress)
+        if kind.libraries:
+            with limited(file, kind) as source:
+                yield source
+        else:
+            with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as plain:
+                yield cast(Source, plain)
     except InputError:
         raise
     except MemoryError:
@@ -88,24 +118,12 @@ def read_measurement(
     except OSError as error:
         reason = error.strerror or str(error)
         raise FileError(f"{file} cannot be read ({reason}): it may be damaged or cut") from None
-    dataset.attrs = {"source": file.name, "format": kind.name}
-    return dataset
 
 
-@contextmanager
-def opened(file: Path, kind: FileFormat, meaning: MeasurementMapping) -> Iterator[Source]:
-    """Open a file, in a child process where a library reads it."""
-    if kind.libraries:
-        with limited(file, kind) as source:
-            yield source
-    else:
-        with kind.open(file, ReadOptions(meaning.decimal, meaning.skip_lines)) as plain:
-            yield cast(Source, plain)
-
-
-def _mapping(
+def mapping_of(
     mapping: MeasurementMapping | Mapping[str, Any] | str | Path | None,
 ) -> MeasurementMapping:
+    """Return the mapping that is meant: itself, of its tables, or of a mapping file."""
     if isinstance(mapping, MeasurementMapping):
         return mapping
     if isinstance(mapping, Mapping):

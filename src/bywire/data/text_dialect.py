@@ -6,19 +6,23 @@ import codecs
 import csv
 import io
 import re
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from bywire.core.errors import FileError, quoted
 from bywire.data.column_units import split_title, unit_of
-from bywire.data.text_table import SEPARATORS, separator_of
+
+SEPARATORS = {"\t": "tab", ";": "semicolon", ",": "comma"}
+"""what may stand between two cells, in the order in which it is looked for"""
 
 HEAD = 1 << 18
 """bytes that are looked at; a header must end before"""
 
 _ROWS = 200  # rows that are looked at for the decimal mark
 _NUMBER = re.compile(r"[+-]?([0-9]+([.,][0-9]*)?|[.,][0-9]+)([eE][+-]?[0-9]+)?")
-_MISSING = ("", "nan", "NaN")
+MISSING = ("", "nan", "NaN")
+"""cells of what was not measured"""
 
 
 @dataclass(frozen=True)
@@ -30,7 +34,7 @@ class Dialect:
     separator
         What stands between two cells.
     decimal
-        ``"."`` or ``","``.
+        ``"."`` or ``","``; empty where the cells tell it, see `with_mark`.
     titles
         Titles of the columns; empty where there is no header.
     units
@@ -41,6 +45,8 @@ class Dialect:
         Line of the first row of numbers, counted from 1.
     start
         Its first byte in the file.
+    rows
+        First rows of numbers.
     """
 
     separator: str
@@ -50,6 +56,11 @@ class Dialect:
     width: int
     first_line: int
     start: int
+    rows: tuple[str, ...]
+
+    def label(self, column: int) -> str:
+        """Return what errors call a column, counted from 0."""
+        return self.titles[column] if self.titles else str(column + 1)
 
 
 def dialect_of(path: Path, head: bytes, decimal: str, skip_lines: int) -> Dialect:
@@ -97,8 +108,9 @@ def dialect_of(path: Path, head: bytes, decimal: str, skip_lines: int) -> Dialec
     start = sum(len(line) for line in _raw_lines(head)[:at])
     if not start and head.startswith(codecs.BOM_UTF8):
         start = len(codecs.BOM_UTF8)
-    mark = decimal or _decimal(path, lines[at : at + _ROWS], separator)
-    return Dialect(separator, mark, titles, tuple(units), width, at + 1, start)
+    mark = "." if separator == "," else decimal
+    rows = tuple(lines[at : at + _ROWS])
+    return Dialect(separator, mark, titles, tuple(units), width, at + 1, start, rows)
 
 
 def _raw_lines(head: bytes) -> list[bytes]:
@@ -133,7 +145,9 @@ def _is_text(line: bytes) -> bool:
 
 def _cells(path: Path, line: str, separator: str, number: int) -> list[str]:
     try:
-        found = list(csv.reader(io.StringIO(line), delimiter=separator, strict=True))
+        found = list(csv.reader(
+            io.StringIO(line), delimiter=separator, strict=True, skipinitialspace=True
+        ))
     except csv.Error as error:
         raise FileError(f"{path}, line {number}: {error}: check its quotation marks") from None
     return [cell.strip() for cell in found[0]] if found else []
@@ -141,7 +155,7 @@ def _cells(path: Path, line: str, separator: str, number: int) -> list[str]:
 
 def _are_numbers(cells: list[str]) -> bool:
     """Return whether a row is one of measured values: numbers and blanks, one number at least."""
-    plain = [cell for cell in cells if cell not in _MISSING]
+    plain = [cell for cell in cells if cell not in MISSING]
     return bool(plain) and all(_NUMBER.fullmatch(cell) for cell in plain)
 
 
@@ -162,18 +176,35 @@ def _is_unit(text: str) -> bool:
     return True
 
 
-def _decimal(path: Path, lines: list[str], separator: str) -> str:
-    """Return the decimal mark of the first rows."""
-    if separator == ",":
-        return "."
-    cells = [cell.strip().strip('"') for line in lines for cell in line.split(separator)]
-    numbers = [cell for cell in cells if _NUMBER.fullmatch(cell)]
-    marks = {mark for mark in ",." if any(mark in cell for cell in numbers)}
-    if len(marks) == 2:
-        mixed = [next(c for c in numbers if mark in c) for mark in ",."]
+def with_mark(path: Path, dialect: Dialect, indices: Sequence[int]) -> Dialect:
+    """Return a dialect with the decimal mark of the first rows of some columns.
+
+    Raises
+    ------
+    FileError
+        When they have both: one may be a mark of thousands.
+    """
+    if dialect.decimal:
+        return dialect
+    first: dict[str, tuple[int, int, str]] = {}
+    for number, line in enumerate(dialect.rows, dialect.first_line):
+        cells = [cell.strip().strip('"') for cell in line.split(dialect.separator)]
+        for k, cell in ((k, cells[k]) for k in indices if k < len(cells)):
+            for mark in ",.":
+                if mark in cell and _NUMBER.fullmatch(cell):
+                    first.setdefault(mark, (number, k, cell))
+    if len(first) == 2:
+        before, (number, k, cell) = sorted(first.values())
         raise FileError(
-            f"{path} mixes decimal comma and decimal point ({quoted(mixed[0])}, "
-            f"{quoted(mixed[1])}), columns separated by {SEPARATORS[separator]}: write all numbers "
-            "with one of them, and none with a separator of thousands"
+            f"{path}, line {number}, column {quoted(dialect.label(k))}: {quoted(cell)} mixes "
+            f"decimal comma and decimal point ({quoted(before[2])} in line {before[0]}), columns "
+            f"separated by {SEPARATORS[dialect.separator]}: write all numbers with one of them, "
+            "and none with a separator of thousands"
         )
-    return marks.pop() if marks else "."
+    return replace(dialect, decimal=next(iter(first), "."))
+
+
+def separator_of(first: str) -> str:
+    """Return the separator of a table's first line; what stands in quotes does not count."""
+    bare = re.sub(r'"[^"]*"', "", first)
+    return next((mark for mark in SEPARATORS if mark in bare), ",")

@@ -48,7 +48,7 @@ class State(NamedTuple):
 
     demand: Annotated[float, Signal("A", "filtered current demand", 5.0)]
     sensed: Annotated[float, Signal("A", "sensed current", 5.0)]
-    integral: Annotated[float, Signal("1", "integral part of the drive", 0.1)]
+    integral: Annotated[float, Signal("1", "integral part of drive", 0.1)]
 
 
 class Rate(NamedTuple):

@@ -43,7 +43,7 @@ class State(NamedTuple):
     """Speed and angle of the disc."""
 
     Omega: Annotated[float, Signal("rad/s", "disc speed", 60.0)]
-    phi: Annotated[float, Signal("rad", "disc angle", 3.0)]
+    phi: Annotated[float, Signal("rad", "disc angle", 10.0)]
 
 
 class Factors(NamedTuple):

@@ -56,7 +56,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Current, shaft angle and speed; positive toward clamping."""
 
-    i: Annotated[float, Signal("A", "motor current", 5.0)]
+    i: Annotated[float, Signal("A", "current", 5.0)]
     theta: Annotated[float, Signal("rad", "motor angle", 3.0)]
     omega: Annotated[float, Signal("rad/s", "motor speed", 50.0)]
 

@@ -128,15 +128,15 @@ def bench_figures(
         flags=(), whole=whole, least=_LEAST, tolerance=_ROUGH if rough else 1e-3,
         most=_ROUGH_WINDOWS if rough else _WINDOWS,
     )  # fmt: skip
-    found = frequency_response(run, sweep)
+    responses = frequency_response(run, sweep)
     steps = _steps(bench, gains) if bench is not None else None
-    sets = found.sizes["variant"]
+    sets = responses.sizes["variant"]
     rows = []
     for k in range(sets):
-        own = par.replace({name: float(values[k]) for name, values in gains.items()})
+        tuned = par.replace({name: float(values[k]) for name, values in gains.items()})
         small = tuple(
-            _small(loop, own, value, found.isel(variant=k, amplitude=j), target)
-            for j in range(found.sizes["amplitude"])
+            _small(loop, tuned, value, responses.isel(variant=k, amplitude=j), target)
+            for j in range(responses.sizes["amplitude"])
         )  # fmt: skip
         rows.append(BenchFigures(small, {} if steps is None else steps[k]))
     return tuple(rows)
@@ -151,16 +151,16 @@ def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]
     common = common_interval(run, whole)
     limit = nyquist(run)
     wanted = np.geomspace(target / _BELOW, min(_ABOVE * target, 0.9 * limit), _POINTS)
-    found = set()
+    frequencies = set()
     for f in wanted:
         choices = [(n, max(round(n / f / common), 1)) for n in range(_LEAST, _LEAST + 3)]
         n, m = min(
             ((n, m) for n, m in choices if math.gcd(n, m) == 1),
-            key=lambda one: abs(one[0] / (one[1] * common * f) - 1.0),
+            key=lambda candidate: abs(candidate[0] / (candidate[1] * common * f) - 1.0),
             default=choices[0],
         )
-        found.add(n / (m * common))
-    return sorted(one for one in found if one < limit)
+        frequencies.add(n / (m * common))
+    return sorted(candidate for candidate in frequencies if candidate < limit)
 
 
 def has_step(bench: Bench) -> bool:
@@ -179,7 +179,7 @@ def _small(
         gain = loop_gain(loop, par, value, closed[moves], f[moves])
     if gain is not None:
         margin = measured_margin(f[moves], gain)
-    size = np.nan_to_num(response["gain"].values)
+    size = np.nan_to_num(response["gain"].values)  # what sticks answers with nothing
     before = np.append(size[f < target], np.interp(target, f, size))
     return Small(
         amplitude=float(response["amplitude"]),
@@ -224,14 +224,14 @@ def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str,
     setting = definition.step(bench.chosen_options)
     run = as_run(case, bench.step, seed=(bench.seed, 0))
     kept = {name: np.asarray(values, dtype=float) for name, values in gains.items()}
-    found = simulate_ensemble(run, kept, [setting.signal])
+    ensemble = simulate_ensemble(run, kept, [setting.signal])
     unit = signals_of(case.model.Output)[setting.signal].unit
     height = abs((setting.end or 0.0) - (setting.start or 0.0))
     rows = []
-    for values in found[setting.signal]:
+    for values in ensemble[setting.signal]:
         recording = xr.Dataset(
             {setting.signal: ("time", values, {"units": unit})},
-            coords={"time": ("time", found.time - case.settle, {"units": "s"})},
+            coords={"time": ("time", ensemble.time - case.settle, {"units": "s"})},
         )
         kpis = evaluate("step_response", recording, setting)
         row = {name: kpis[name].value for name in STEP_FIGURES}

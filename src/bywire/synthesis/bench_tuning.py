@@ -11,16 +11,15 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import OptimizeResult, differential_evolution
 from scipy.stats import qmc
 
+from bywire.core.typing import Array, Progress
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.candidate import Candidate, judged, linear_slacks
 from bywire.synthesis.linear_case import NOMINAL
-from bywire.synthesis.optimizer import Problem, Progress
+from bywire.synthesis.optimizer import Problem
 
-Array = NDArray[np.float64]
 Measure = Callable[[Mapping[str, Sequence[float]]], Sequence[Mapping[str, BenchFigures]]]
 
 _ENOUGH = 0.02  # worst slack at which the search ends
@@ -58,12 +57,12 @@ class Tuning:
         """Candidates that ran."""
         return len(self.tried) + self.untold
 
-    def curve(self, one: str, other: str) -> list[tuple[float, float]]:
+    def curve(self, first: str, second: str) -> list[tuple[float, float]]:
         """Return the edge of what was reached in two figures while the rest was met.
 
         Parameters
         ----------
-        one, other
+        first, second
             Texts of two requirements.
 
         Returns
@@ -72,14 +71,14 @@ class Tuning:
             Pairs of distances from the limits, none better in both than another, by the first.
         """
         pairs = sorted(
-            ((c.room(one), c.room(other)) for c in self.tried
-             if all(s >= 0.0 for text, s in c.slacks.items() if text not in (one, other))),
+            ((c.room(first), c.room(second)) for c in self.tried
+             if all(s >= 0.0 for text, s in c.slacks.items() if text not in (first, second))),
             reverse=True,
         )  # fmt: skip
         edge: list[tuple[float, float]] = []
-        for first, second in pairs:
-            if not edge or second > edge[-1][1]:
-                edge.append((first, second))
+        for room_1, room_2 in pairs:
+            if not edge or room_2 > edge[-1][1]:
+                edge.append((room_1, room_2))
         return edge[::-1]
 
 
@@ -114,7 +113,7 @@ def tune(
     first = low + (high - low) * qmc.LatinHypercube(n, rng=np.random.default_rng(seed)).random(
         _MEMBERS
     )
-    first[0] = center
+    first[0] = center  # the linear design itself: the search cannot end worse than it
     tried: list[Candidate] = []
     count = [0]
 
@@ -122,7 +121,7 @@ def tune(
         rows = [problem.gains(z) for z in np.atleast_2d(points.T)]
         new = _candidates(problem, rows, measure)
         tried.extend(new)
-        return -np.array([one.slack for one in new])
+        return -np.array([candidate.slack for candidate in new])
 
     def passed(intermediate_result: OptimizeResult) -> bool:
         count[0] += 1
@@ -145,9 +144,9 @@ def tune(
     return Tuning(max(tried, key=standing), tuple(tried), interrupted)
 
 
-def standing(one: Candidate) -> tuple[float, float]:
+def standing(candidate: Candidate) -> tuple[float, float]:
     """Return what a search prefers gains by, see `Candidate.standing`."""
-    return one.standing(_ENOUGH)
+    return candidate.standing(_ENOUGH)
 
 
 def _candidates(
@@ -155,13 +154,13 @@ def _candidates(
 ) -> list[Candidate]:
     """Return candidates; those that a linear model says are unstable are not run."""
     linear = [linear_slacks(problem, row) for row in rows]
-    alive = [k for k, one in enumerate(linear) if min(one.values()) > -10.0]
+    alive = [k for k, slacks in enumerate(linear) if min(slacks.values()) > -10.0]
     nothing: Mapping[str, BenchFigures] = {NOMINAL: BenchFigures((), {})}
-    found = dict.fromkeys(range(len(rows)), nothing)
+    figures = dict.fromkeys(range(len(rows)), nothing)
     if alive:
         names = rows[0].keys()
         measured = measure({name: [rows[k][name] for k in alive] for name in names})
-        found |= dict(zip(alive, measured, strict=True))
+        figures |= dict(zip(alive, measured, strict=True))
     return [
-        judged(problem.requirements, row, found[k], linear[k]) for k, row in enumerate(rows)
+        judged(problem.requirements, row, figures[k], linear[k]) for k, row in enumerate(rows)
     ]

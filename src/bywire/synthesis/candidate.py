@@ -60,7 +60,7 @@ class Candidate:
 
 
 def bench_slacks(
-    requirements: Sequence[Requirement], found: BenchFigures, linear: Mapping[str, float]
+    requirements: Sequence[Requirement], figures: BenchFigures, linear: Mapping[str, float]
 ) -> dict[str, float]:
     """Return how far each requirement is met on the bench.
 
@@ -72,24 +72,25 @@ def bench_slacks(
     ----------
     requirements
         What is required.
-    found
+    figures
         Figures on the bench.
     linear
         Slack in the linear models by requirement's text.
     """
     slacks = {}
-    for one in requirements:
-        slack = _on_bench(one, found)
-        if math.isinf(slack) or one.figure == "phase_margin":
-            slack = min(slack, linear[one.text])
-        slacks[one.text] = max(slack, _LEAST)
+    for wanted in requirements:
+        slack = _on_bench(wanted, figures)
+        # What the bench does not show, the linear model says; of a phase margin the worse counts.
+        if math.isinf(slack) or wanted.figure == "phase_margin":
+            slack = min(slack, linear[wanted.text])
+        slacks[wanted.text] = max(slack, _LEAST)
     return slacks
 
 
 def judged(
     requirements: Sequence[Requirement],
     gains: Mapping[str, float],
-    found: Mapping[str, BenchFigures],
+    trials: Mapping[str, BenchFigures],
     linear: Mapping[str, float],
 ) -> Candidate:
     """Return gains with what they showed, judged by the worst of several trials.
@@ -100,44 +101,45 @@ def judged(
         As in `bench_slacks`.
     gains
         By dotted name [SI].
-    found
+    trials
         Figures by the trial's label, that of the nominal point among them.
     """
     # A trial without a step has the parameters of the nominal one: so is its step.
-    steps = [replace(one, step=one.step or found[NOMINAL].step) for one in found.values()]
-    rows = [bench_slacks(requirements, one, linear) for one in steps]
-    slacks = {one.text: min(row[one.text] for row in rows) for one in requirements}
-    corners = {label: one for label, one in found.items() if label != NOMINAL}
-    rooms = {one.text: _room(one, steps, slacks[one.text]) for one in requirements
-             if one.figure == "bandwidth" and one.sense > 0}  # fmt: skip
-    return Candidate(dict(gains), found[NOMINAL], slacks, corners, rooms)
+    nominal = trials[NOMINAL]
+    each = [replace(figures, step=figures.step or nominal.step) for figures in trials.values()]
+    rows = [bench_slacks(requirements, figures, linear) for figures in each]
+    slacks = {wanted.text: min(row[wanted.text] for row in rows) for wanted in requirements}
+    corners = {label: figures for label, figures in trials.items() if label != NOMINAL}
+    rooms = {wanted.text: _room(wanted, each, slacks[wanted.text]) for wanted in requirements
+             if wanted.figure == "bandwidth" and wanted.sense > 0}  # fmt: skip
+    return Candidate(dict(gains), nominal, slacks, corners, rooms)
 
 
-def _room(one: Requirement, found: Sequence[BenchFigures], slack: float) -> float:
+def _room(wanted: Requirement, rows: Sequence[BenchFigures], slack: float) -> float:
     """Return the distance of the worst bandwidth from its limit, of the same sign as its slack."""
-    values = [s.bandwidth for row in found for s in row.small]
+    values = [s.bandwidth for row in rows for s in row.small]
     if not values:
         return slack
-    room = one.slack(min(values))
+    room = wanted.slack(min(values))
     return max(room, 0.0) if slack >= 0.0 else min(room, slack * 1e-3)
 
 
-def _on_bench(one: Requirement, found: BenchFigures) -> float:
+def _on_bench(wanted: Requirement, figures: BenchFigures) -> float:
     """Return the slack of what the bench measures; infinity for what it does not."""
-    if one.figure == "bandwidth" and one.sense > 0:
-        return min((s.least / math.sqrt(0.5) - 1.0 for s in found.small), default=math.inf)
-    if one.figure == "phase_margin":
-        seen = [s for s in found.small if not math.isnan(s.crossover)]
-        return min((one.slack(s.phase_margin) for s in seen), default=math.inf)
-    if one.figure in ("bandwidth", "crossover"):
-        values = [getattr(s, one.figure) for s in found.small]
-        return min((one.slack(v) for v in values if not math.isnan(v)), default=math.inf)
-    if one.figure not in STEP_FIGURES or not found.step:
+    if wanted.figure == "bandwidth" and wanted.sense > 0:
+        return min((s.least / math.sqrt(0.5) - 1.0 for s in figures.small), default=math.inf)
+    if wanted.figure == "phase_margin":
+        seen = [s for s in figures.small if not math.isnan(s.crossover)]
+        return min((wanted.slack(s.phase_margin) for s in seen), default=math.inf)
+    if wanted.figure in ("bandwidth", "crossover"):
+        values = [getattr(s, wanted.figure) for s in figures.small]
+        return min((wanted.slack(v) for v in values if not math.isnan(v)), default=math.inf)
+    if wanted.figure not in STEP_FIGURES or not figures.step:
         return math.inf
-    return one.slack(found.step[one.figure])
+    return wanted.slack(figures.step[wanted.figure])
 
 
 def linear_slacks(problem: Problem, gains: Mapping[str, float]) -> dict[str, float]:
     """Return the slack of every requirement for the worst model, by its text."""
     slacks = problem.slacks(problem.point(gains), range(len(problem.cases))).min(axis=0)
-    return {one.text: float(s) for one, s in zip(problem.requirements, slacks, strict=True)}
+    return {wanted.text: float(s) for wanted, s in zip(problem.requirements, slacks, strict=True)}

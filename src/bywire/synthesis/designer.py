@@ -10,7 +10,7 @@ import numpy as np
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.floors import linear_floors
-from bywire.synthesis.linear_case import LinearCase, room, slack
+from bywire.synthesis.linear_case import LinearCase, room, slack, values_of
 from bywire.synthesis.optimizer import KEPT_MISSED, UNSTABLE, Problem, Search, starts_of
 from bywire.synthesis.outcome import MISSED, Binding, Conflict, Design, Status
 from bywire.synthesis.requirement import FIGURES, Requirement
@@ -77,23 +77,23 @@ def design(
     except KeyboardInterrupt:
         status = status if status == "infeasible" else "interrupted"
     z = first if search.best is None else search.best
-    made = _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)
-    return replace(made, kept=floors)
+    outcome = _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)
+    return replace(outcome, kept=floors)
 
 
 def largest_error(cases: Sequence[LinearCase], gains: Mapping[str, float]) -> float:
     """Return the largest steady-state error over some models [%]; NaN where one is unstable."""
-    found = [case.figures(gains) for case in cases]
-    return max((one.steady_state_error if one.is_stable else np.nan for one in found),
+    every = [case.figures(gains) for case in cases]
+    return max((figures.steady_state_error if figures.is_stable else np.nan for figures in every),
                key=lambda error: np.inf if np.isnan(error) else error)  # fmt: skip
 
 
 def _require_sampled(problem: Problem, start: Mapping[str, float]) -> None:
     period = problem.cases[0].figures(start).closed.period
-    for one in problem.requirements:
-        if one.unit == "Hz" and one.sense > 0 and one.limit >= 0.5 / period:
+    for wanted in problem.requirements:
+        if wanted.unit == "Hz" and wanted.sense > 0 and wanted.limit >= 0.5 / period:
             raise ParameterError(
-                f"requirement {one.text!r}: the loop is sampled every {period * 1e3:g} ms; ask "
+                f"requirement {wanted.text!r}: the loop is sampled every {period * 1e3:g} ms; ask "
                 f"for less than {0.5 / period:g} Hz"
             )
 
@@ -118,11 +118,11 @@ def _over_all(
 
 def _by_figures(search: Search, progress: Progress | None) -> Search:
     """Return a search by the figures themselves, from the best point seen."""
-    own = Search(search.problem, search.cases, plain=True)
-    best = own.recall()
+    by_room = Search(search.problem, search.cases, plain=True)
+    best = by_room.recall()
     if best is not None:
-        own.run([best], progress)
-    return own
+        by_room.run([best], progress)
+    return by_room
 
 
 def _confirmed(search: Search) -> Array:
@@ -200,21 +200,21 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
         return ()
     slacks = problem.slacks(search.best, search.cases, plain=True).min(axis=0)
     bound = [int(k) for k in np.argsort(slacks) if slacks[k] <= slacks.min() + 5 * _BINDS]
-    found = []
+    conflicts = []
     for a in bound[:_PAIRED]:
         for b in bound[:_PAIRED]:
             if a == b:
                 continue
-            own = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
-            seen = own.recall()
-            own.run([search.best if seen is None else seen], progress)
+            pushed = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
+            seen = pushed.recall()
+            pushed.run([search.best if seen is None else seen], progress)
             wanted, kept = problem.requirements[a], problem.requirements[b]
-            best = _confirmed_by_figures(own, wanted, kept)
+            best = _confirmed_by_figures(pushed, wanted, kept)
             if best is not None:
                 gains = problem.gains(best)
                 value = _extreme(problem, gains, wanted, search.cases)
-                found.append(Conflict(wanted, kept, value, gains))
-    return tuple(found)
+                conflicts.append(Conflict(wanted, kept, value, gains))
+    return tuple(conflicts)
 
 
 def _extreme(
@@ -229,28 +229,26 @@ def _judged(
 ) -> Design:
     """Return the design of a point, all models computed anew on the fine grid."""
     gains = problem.gains(z)
-    found = {case.label: case.figures(gains, _FINE) for case in problem.cases}
-    rows = {
-        label: {name: float(getattr(one, name)) for name in FIGURES} for label, one in found.items()
-    }
-    stable = all(one.is_stable for one in found.values())
+    every = {case.label: case.figures(gains, _FINE) for case in problem.cases}
+    rows = {label: values_of(figures) for label, figures in every.items()}
+    stable = all(figures.is_stable for figures in every.values())
     bindings = [
-        Binding(one, label, rows[label][one.figure], room(found[label], one))
-        for label in rows for one in problem.requirements
+        Binding(wanted, label, rows[label][wanted.figure], room(every[label], wanted))
+        for label in rows for wanted in problem.requirements
     ]  # fmt: skip
-    bindings.sort(key=lambda one: one.slack)
+    bindings.sort(key=lambda binding: binding.slack)
     slack = bindings[0].slack if stable else -np.inf
     worst = {}
     for name in FIGURES:
         sign = -1.0 if name.endswith(("peak", "error", "time", "overshoot", "noise_gain")) else 1.0
-        label = min(rows, key=lambda one: sign * rows[one][name])
+        label = min(rows, key=lambda case: sign * rows[case][name])
         worst[name] = (rows[label][name], label)
     return Design(
         gains=gains,
         status=status or ("met" if slack >= MISSED else "infeasible"),
         nominal=next(iter(rows.values())),
         worst=worst,
-        binding=tuple(one for one in bindings if one.slack <= bindings[0].slack + _BINDS),
+        binding=tuple(b for b in bindings if b.slack <= bindings[0].slack + _BINDS),
         conflicts=conflicts,
         slack=float(slack),
         evaluations=problem.evaluations,

@@ -39,9 +39,9 @@ def linear_floors(requirements: Sequence[Requirement], error: float) -> tuple[Re
         than `ERROR` may grow by half; one of a loop that does not track is not kept.
     """
     texts = []
-    named = {one.figure for one in requirements}
+    named = {wanted.figure for wanted in requirements}
     if "disk_margin" not in named:
-        disk = min([DISK, *(_implied(one) for one in requirements)])
+        disk = min([DISK, *(_implied(wanted) for wanted in requirements)])
         texts.append(f"disk_margin >= {disk:.3g}")
     if "steady_state_error" not in named and not error > _TRACKS:
         limit = ERROR if math.isnan(error) else max(ERROR, _WORSE * error)
@@ -52,7 +52,7 @@ def linear_floors(requirements: Sequence[Requirement], error: float) -> tuple[Re
 def bench_floors(
     requirements: Sequence[Requirement],
     floors: Sequence[Requirement],
-    found: Iterable[BenchFigures],
+    trials: Iterable[BenchFigures],
 ) -> tuple[Requirement, ...]:
     """Return what retuned gains keep of the linear design's: floors, and how its step settled.
 
@@ -62,34 +62,34 @@ def bench_floors(
         The user's.
     floors
         See `linear_floors`.
-    found
+    trials
         The linear design on the bench, in every trial.
     """
-    steps = [one.step for one in found if one.step]
+    steps = [figures.step for figures in trials if figures.step]
     kept = list(floors)
-    named = {one.figure for one in requirements}
+    named = {wanted.figure for wanted in requirements}
     errors = [step["steady_state_error"] for step in steps]
     if errors and "steady_state_error" not in named:
-        kept = [one for one in kept if one.figure != "steady_state_error"]
-        if all(one <= _TRACKS for one in errors):  # NaN is not
+        kept = [floor for floor in kept if floor.figure != "steady_state_error"]
+        if all(error <= _TRACKS for error in errors):  # NaN is not
             kept += read([f"steady_state_error <= {max(ERROR, _WORSE * max(errors)):.3g} %"])
     times = [step["settling_time"] for step in steps]
-    if times and "settling_time" not in named and all(0.0 < one < math.inf for one in times):
+    if times and "settling_time" not in named and all(0.0 < time < math.inf for time in times):
         kept += read([f"settling_time <= {_WORSE * max(times):.3g} s"])
     return tuple(kept)
 
 
-def _implied(one: Requirement) -> float:
+def _implied(wanted: Requirement) -> float:
     """Return the disk margin that guarantees a required margin; infinity for other figures.
 
     Half of it where the margin must not be larger.
     """
-    if one.figure == "phase_margin":
-        found = 2.0 * math.tan(math.radians(0.5 * one.limit))
-    elif one.figure == "gain_margin":
-        found = 2.0 * (one.limit - 1.0) / (one.limit + 1.0)
-    elif one.figure == "sensitivity_peak":  # |S - T| = |2 S - 1| <= 2 max|S| + 1
-        return (1.0 if one.sense < 0 else 0.5) * 2.0 / (2.0 * one.limit + 1.0)
+    if wanted.figure == "phase_margin":
+        disk = 2.0 * math.tan(math.radians(0.5 * wanted.limit))
+    elif wanted.figure == "gain_margin":
+        disk = 2.0 * (wanted.limit - 1.0) / (wanted.limit + 1.0)
+    elif wanted.figure == "sensitivity_peak":  # |S - T| = |2 S - 1| <= 2 max|S| + 1
+        return (1.0 if wanted.sense < 0 else 0.5) * 2.0 / (2.0 * wanted.limit + 1.0)
     else:
         return math.inf
-    return max(found * (1.0 if one.sense > 0 else 0.5), 1e-3)
+    return max(disk * (1.0 if wanted.sense > 0 else 0.5), 1e-3)

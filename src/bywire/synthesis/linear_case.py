@@ -16,7 +16,7 @@ from bywire.core.errors import InputError, ParameterError
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.units import shown
-from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.requirement import FIGURES, Requirement
 
 NOMINAL = "nominal"
 """label of the model at the operating point itself"""
@@ -47,6 +47,11 @@ class LinearCase:
         """Return the figures of the loop with some gains, see `LoopFigures`."""
         with interrupts_deferred():  # CasADi would swallow them
             return LoopFigures(*self.build(gains), points)
+
+
+def values_of(figures: LoopFigures) -> dict[str, float]:
+    """Return every figure that can be required, by name."""
+    return {name: float(getattr(figures, name)) for name in FIGURES}
 
 
 def room(figures: LoopFigures, requirement: Requirement) -> float:
@@ -96,17 +101,17 @@ def cases_of(
         raise ParameterError(
             f"the ranges have {len(combinations)} combinations: {_MOST} at most, take fewer values"
         )
-    found = [_case(loop, NOMINAL, par, {}, value)]
-    for one in combinations:
-        values = dict(zip(over, one, strict=True))
+    cases = [_case(loop, NOMINAL, par, {}, value)]
+    for combination in combinations:
+        values = dict(zip(over, combination, strict=True))
         label = ", ".join(_shown(loop, par, name, number) for name, number in values.items())
         at = values.pop(loop.at.name, value)
         try:
             loop.point(par.replace(values), at)
         except InputError as error:
             raise ParameterError(f"{label}: {error}") from None
-        found.append(_case(loop, label, par, values, at))
-    return tuple(found)
+        cases.append(_case(loop, label, par, values, at))
+    return tuple(cases)
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
@@ -118,7 +123,8 @@ def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
 
 
 def _scheduled(loop: Loop, name: str) -> bool:
-    return loop.schedule is not None and any(name in own for own in loop.schedule.regions.values())
+    regions = loop.schedule.regions.values() if loop.schedule is not None else ()
+    return any(name in region for region in regions)
 
 
 def _case(
@@ -127,7 +133,7 @@ def _case(
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        own = base.replace(gains)
-        return loop.gain(own, value), loop.closed(own, value)
+        tuned = base.replace(gains)
+        return loop.gain(tuned, value), loop.closed(tuned, value)
 
     return LinearCase(label, build, changes, value)

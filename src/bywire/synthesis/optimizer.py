@@ -10,20 +10,17 @@ at a kink of a figure itself.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from bywire.core.typing import Array, Progress
 from bywire.synthesis.linear_case import LinearCase, room, slack
 from bywire.synthesis.requirement import Requirement
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before its growth is counted"""
@@ -63,20 +60,20 @@ class Problem:
 
     def gains(self, z: Array) -> dict[str, float]:
         """Return gains by name for a point of the unit cube."""
-        found = {}
+        values = {}
         for share, (name, (low, high)) in zip(z, self.tunables.items(), strict=True):
             s = min(max(float(share), 0.0), 1.0)
-            found[name] = low * (high / low) ** s if low > 0 else low + (high - low) * s
-        return found
+            values[name] = low * (high / low) ** s if low > 0 else low + (high - low) * s
+        return values
 
     def point(self, gains: Mapping[str, float]) -> Array:
         """Return the point of the unit cube for gains, the nearest where they lie outside."""
-        found = []
+        shares = []
         for name, (low, high) in self.tunables.items():
             value = min(max(gains[name], low), high)
             share = math.log(value / low, high / low) if low > 0 else (value - low) / (high - low)
-            found.append(share)
-        return np.array(found)
+            shares.append(share)
+        return np.array(shares)
 
     def slacks(self, z: Array, cases: Sequence[int], *, plain: bool = False) -> Array:
         """Return the slack of every requirement for some cases, shape (cases, requirements).
@@ -87,7 +84,7 @@ class Problem:
 
     def points_seen(self, cases: Sequence[int]) -> list[Array]:
         """Return all points that were computed for every one of some cases."""
-        keys = [{z for z, k in self._known if k == one} for one in cases]
+        keys = [{z for z, k in self._known if k == case} for case in cases]
         return [np.frombuffer(z) for z in sorted(set.intersection(*keys))]
 
     def _of(self, z: Array, k: int) -> tuple[Array, Array]:
@@ -151,6 +148,7 @@ class Search:
                 progress("design", (k + 1) / (len(starts) + 2))
         if self.best is None:
             return
+        # A figure such as an overshoot has kinks of its own: SQP stops there, a simplex goes on.
         n = self.best.size
         corners = np.vstack([self.best, self.best + 0.04 * np.where(self.best < 0.5, 1, -1)
                              * np.eye(n)])  # fmt: skip
@@ -173,10 +171,10 @@ class Search:
 
     def _judged(self, z: Array) -> float:
         """Return the worst wanted slack, or what is missing of the kept ones; note the best."""
-        found = self._slacks(z)
-        value = float(found[:, self._chosen()].min())
+        slacks = self._slacks(z)
+        value = float(slacks[:, self._chosen()].min())
         if self.kept:
-            missing = float(found[:, list(self.kept)].min())
+            missing = float(slacks[:, list(self.kept)].min())
             if missing < -1e-6:
                 value = KEPT_MISSED + missing
         self.seen.append((value, np.clip(z, 0.0, 1.0)))
@@ -189,10 +187,11 @@ class Search:
 
         def excess(v: Array) -> Array:
             self._judged(v[:n])
-            found = self._slacks(v[:n])
-            wanted = found[:, self._chosen()] - v[n]
-            return np.concatenate([wanted.ravel(), found[:, list(self.kept)].ravel()])
+            slacks = self._slacks(v[:n])
+            wanted = slacks[:, self._chosen()] - v[n]
+            return np.concatenate([wanted.ravel(), slacks[:, list(self.kept)].ravel()])
 
+        # Forward differences of our own: one loop per gain serves all requirements at once.
         def slope(v: Array) -> Array:
             here, columns = excess(v), []
             for k in range(n):
@@ -204,6 +203,7 @@ class Search:
             rate[: len(self.cases) * len(self._chosen())] = -1.0
             return np.column_stack([*columns, rate])
 
+        # The slack is a variable of its own (epigraph): smallest slacks have kinks, these do not.
         first = self._slacks(start)[:, self._chosen()].min()
         constraints: Any = [{"type": "ineq", "fun": excess, "jac": slope}]
         options: Any = {"maxiter": _ITERATIONS, "ftol": 1e-5}

@@ -1,4 +1,4 @@
-"""What a design gives: gains, figures, what binds, what excludes what."""
+"""What the design of a loop, or of its gain schedule, gives; and its gains as a bench file."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.synthesis.linear_case import LinearCase
 from bywire.synthesis.requirement import Requirement
 
 Status = Literal["met", "infeasible", "interrupted"]
@@ -98,3 +100,105 @@ class Design:
     def binds(self) -> bool:
         """Whether what is worst off leaves no room worth having."""
         return self.slack < ROOMY
+
+
+def bench_text(
+    title: str,
+    experiment: str,
+    parameters: str,
+    changes: Mapping[str, str],
+    par: ParameterSet,
+    gains: Mapping[str, float],
+) -> str:
+    """Return the text of a bench file with the gains in its section ``[set]``.
+
+    Parameters
+    ----------
+    title
+        Comment at the top.
+    experiment
+        What it runs; empty for a loop without experiment of its own: the section alone.
+    parameters, changes
+        Name of the parameter set, and what the user changed in it, as texts.
+    par
+        Any parameters of that class, for the units.
+    gains
+        By dotted name [SI].
+    """
+    leaves = leaf_fields(type(par))
+    lines = [f"# {title}"]
+    if experiment:
+        lines += [f'experiment = "{experiment}"', f'parameters = "{parameters}"']
+    lines += ["", "[set]"]
+    lines += [f"{name} = {_quoted(text)}" for name, text in changes.items() if name not in gains]
+    for name, value in gains.items():
+        unit = leaves[name].unit.symbol
+        lines.append(f"{name} = {_quoted(f'{value:.9g}' + ('' if unit == '1' else f' {unit}'))}")
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+
+
+@dataclass(frozen=True)
+class Across:
+    """The scheduled loop with its gains frozen at an operating point.
+
+    Parameters
+    ----------
+    label, at, region
+        The model, its operating point [SI], and the region that it belongs to.
+    figures
+        All figures of the linear model.
+    slack
+        Of the requirement that is worst off there; negative infinity where it is unstable.
+    """
+
+    label: str
+    at: float
+    region: str
+    figures: Mapping[str, float]
+    slack: float
+
+
+@dataclass(frozen=True)
+class ScheduleDesign:
+    """A gain schedule and what it gives.
+
+    Parameters
+    ----------
+    regions
+        Design of each region, by ascending operating point, where anything was left to choose;
+        each sees its own models alone.
+    points
+        Operating points [SI] for which each region was designed.
+    gains
+        Of all regions together, by dotted name [SI].
+    nominal
+        All figures of the nominal model.
+    cases
+        Models of the scheduled loop: the nominal one, and those of all points and ranges.
+    across
+        The scheduled loop from the lowest to the highest point and across the borders.
+    """
+
+    regions: Mapping[str, Design]
+    points: Mapping[str, tuple[float, ...]]
+    gains: Mapping[str, float]
+    nominal: Mapping[str, float]
+    cases: tuple[LinearCase, ...]
+    across: tuple[Across, ...]
+
+    @property
+    def worst(self) -> Across:
+        """Where the scheduled loop is worst off."""
+        return min(self.across, key=lambda point: point.slack)
+
+    @property
+    def status(self) -> Status:
+        """Whether every region, and the loop between them, meets the requirements."""
+        statuses = [design.status for design in self.regions.values()]
+        if "interrupted" in statuses:
+            return "interrupted"
+        return "met" if {*statuses} == {"met"} and self.worst.slack >= MISSED else "infeasible"

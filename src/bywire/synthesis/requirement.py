@@ -89,8 +89,8 @@ class Requirement:
     def slack(self, value: float) -> float:
         """Return how far a value is on the right side, as a share of the limit; NaN is not."""
         limit = self.limit or (STEADY if self.figure == "steady_state_error" else _ZERO)
-        found = self.sense * (value - limit) / limit
-        return -math.inf if math.isnan(found) else found
+        share = self.sense * (value - limit) / limit
+        return -math.inf if math.isnan(share) else share
 
 
 def read(texts: Sequence[str]) -> tuple[Requirement, ...]:
@@ -113,10 +113,10 @@ def read(texts: Sequence[str]) -> tuple[Requirement, ...]:
     """
     if not texts:
         raise ParameterError("no requirement is given: write for instance 'bandwidth >= 10 Hz'")
-    found = tuple(_read(text) for text in texts)
-    for one, other in combinations(found, 2):
-        _require_compatible(one, other)
-    return found
+    requirements = tuple(_read(text) for text in texts)
+    for first, second in combinations(requirements, 2):
+        _require_compatible(first, second)
+    return requirements
 
 
 def _read(text: str) -> Requirement:
@@ -156,14 +156,15 @@ def _limit(text: str, figure: str, kind: Kind) -> float:
     return units.parse(text, kind.unit, name)
 
 
-def _require_compatible(one: Requirement, other: Requirement) -> None:
-    if one.figure != other.figure:
+def _require_compatible(first: Requirement, second: Requirement) -> None:
+    if first.figure != second.figure:
         return
-    if one.sense == other.sense:
+    if first.sense == second.sense:
         raise ParameterError(
-            f"{one.figure} is required twice, {one.text!r} and {other.text!r}: leave one of them"
+            f"{first.figure} is required twice, {first.text!r} and {second.text!r}: "
+            "leave one of them"
         )
-    low, high = (one, other) if one.sense > 0 else (other, one)
+    low, high = (first, second) if first.sense > 0 else (second, first)
     if low.limit > high.limit:
         raise ParameterError(
             f"{low.text!r} and {high.text!r} contradict each other: no loop meets both; "

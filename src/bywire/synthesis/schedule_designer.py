@@ -13,13 +13,12 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Progress
 from bywire.core.units import shown
 from bywire.synthesis.designer import design
-from bywire.synthesis.linear_case import LinearCase, cases_of, room
-from bywire.synthesis.optimizer import Progress
-from bywire.synthesis.outcome import Design
-from bywire.synthesis.requirement import FIGURES, Requirement
-from bywire.synthesis.schedule_outcome import Across, ScheduleDesign
+from bywire.synthesis.linear_case import LinearCase, cases_of, room, values_of
+from bywire.synthesis.outcome import Across, Design, ScheduleDesign
+from bywire.synthesis.requirement import Requirement
 
 _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15
@@ -56,20 +55,20 @@ def points_by_region(
         When a region has none.
     """
     schedule, at = scheduled(loop), loop.at
-    found: dict[str, list[float]] = {name: [] for name in schedule.regions}
+    by_region: dict[str, list[float]] = {name: [] for name in schedule.regions}
     for value in points or schedule.points:
-        found[schedule.region(par, value)].append(value)
-    for name, own in found.items():
-        if not own:
+        by_region[schedule.region(par, value)].append(value)
+    for name, inside in by_region.items():
+        if not inside:
             leaves = par.leaves()
-            borders = " and ".join(shown(leaves[one], at.unit) for one in schedule.borders)
-            given = ", ".join(shown(one, at.unit) for one in points or schedule.points)
+            borders = " and ".join(shown(leaves[each], at.unit) for each in schedule.borders)
+            given = ", ".join(shown(each, at.unit) for each in points or schedule.points)
             raise ParameterError(
                 f"no operating point lies in the region {name!r}: the borders are {borders}, the "
                 f"points {given}; give one {at.name} in each region with --at, or move the borders "
                 f"({', '.join(schedule.borders)})"
             )
-    return {name: tuple(sorted(own)) for name, own in found.items()}
+    return {name: tuple(sorted(inside)) for name, inside in by_region.items()}
 
 
 def design_schedule(
@@ -115,34 +114,34 @@ def design_schedule(
     order = [schedule.main, *(name for name in schedule.regions if name != schedule.main)]
     order = [name for name in order if tunables[name]]
     gains: dict[str, float] = {}
-    found: dict[str, Design] = {}
+    designs: dict[str, Design] = {}
     for region in order:
-        own = par.replace(gains)
-        cases = cases_of(loop, own, points[region][0], _ranges(loop, points[region], over or {}))
-        start = _start(own, schedule, region, tunables[region])
-        found[region] = design(
+        tuned = par.replace(gains)
+        cases = cases_of(loop, tuned, points[region][0], _ranges(loop, points[region], over or {}))
+        start = _start(tuned, schedule, region, tunables[region])
+        designs[region] = design(
             tunables[region], requirements, cases, start, seed=seed,
             progress=_named(progress, region),
         )  # fmt: skip
-        gains |= found[region].gains
-        if found[region].status == "interrupted":
-            rest = [name for name in order if name not in found]
+        gains |= designs[region].gains
+        if designs[region].status == "interrupted":
+            rest = [name for name in order if name not in designs]
             gains |= {k: v for r in rest for k, v in _start(par.replace(gains), schedule, r,
                                                             tunables[r]).items()}  # fmt: skip
             break
-    return _seen_whole(loop, par, requirements, (points, found, gains), over or {})
+    return _seen_whole(loop, par, requirements, (points, designs, gains), over or {})
 
 
 def _seen_whole(
     loop: Loop,
     par: ParameterSet,
     requirements: Sequence[Requirement],
-    made: tuple[Mapping[str, Sequence[float]], Mapping[str, Design], Mapping[str, float]],
+    designed: tuple[Mapping[str, Sequence[float]], Mapping[str, Design], Mapping[str, float]],
     over: Mapping[str, Sequence[float]],
 ) -> ScheduleDesign:
-    points, designs, gains = made
+    points, designs, gains = designed
     schedule = scheduled(loop)
-    every = [one for name in schedule.regions for one in points[name]]
+    every = [point for name in schedule.regions for point in points[name]]
     middle = points[schedule.main][0]
     cases = cases_of(loop, par, middle, _ranges(loop, every, over))
     nominal = cases[0].figures(gains, _FINE)
@@ -150,7 +149,7 @@ def _seen_whole(
         {name: designs[name] for name in schedule.regions if name in designs},
         {name: tuple(points[name]) for name in schedule.regions},
         gains,
-        {name: float(getattr(nominal, name)) for name in FIGURES},
+        values_of(nominal),
         cases,
         frozen(loop, par, every, gains, requirements),
     )
@@ -178,16 +177,16 @@ def frozen(
     values = _between(par, schedule, points)
     dense = cases_of(loop, par, points[0], {loop.at.name: values})[1:]
     return tuple(
-        _across(one, schedule.region(par, one.at or 0.0), requirements, gains) for one in dense
+        _across(case, schedule.region(par, case.at or 0.0), requirements, gains) for case in dense
     )
 
 
 def _across(
     case: LinearCase, region: str, requirements: Sequence[Requirement], gains: Mapping[str, float]
 ) -> Across:
-    found = case.figures(gains, _FINE)
-    row = {name: float(getattr(found, name)) for name in FIGURES}
-    return Across(case.label, case.at or 0.0, region, row, slack_of(found, requirements))
+    figures = case.figures(gains, _FINE)
+    slack = slack_of(figures, requirements)
+    return Across(case.label, case.at or 0.0, region, values_of(figures), slack)
 
 
 def slack_of(figures: LoopFigures, requirements: Sequence[Requirement]) -> float:

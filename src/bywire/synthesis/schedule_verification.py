@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
+from bywire.core.typing import Progress
 from bywire.synthesis.bench_tuning import GENERATIONS, Tuning
 from bywire.synthesis.linear_case import LinearCase
-from bywire.synthesis.optimizer import Progress
+from bywire.synthesis.outcome import ScheduleDesign
 from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import scheduled, slack_of
-from bywire.synthesis.schedule_outcome import ScheduleDesign
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import Verification, verify
 
@@ -18,7 +18,7 @@ Spans = Mapping[str, tuple[float, float]]
 
 
 def verify_schedule(
-    found: ScheduleDesign,
+    design: ScheduleDesign,
     requirements: Sequence[Requirement],
     tunables: Mapping[str, Spans],
     trial: Trial,
@@ -36,7 +36,7 @@ def verify_schedule(
 
     Parameters
     ----------
-    found, tunables
+    design, tunables
         The schedule, and what may be chosen in each region.
     requirements
         As in `design_schedule`.
@@ -45,35 +45,35 @@ def verify_schedule(
     seed, generations, progress
         See `verification.verify`; generations of each region.
     """
-    spans = {name: span for own in tunables.values() for name, span in own.items()}
-    corners = _corners(found, requirements, trial)
+    spans = {name: span for regional in tunables.values() for name, span in regional.items()}
+    corners = _corners(design, requirements, trial)
 
     def whole(
         gains: Mapping[str, float], kept: Sequence[Requirement] | None = None
     ) -> Verification:
         return verify(
-            gains, requirements, spans, found.cases, trial, corners=corners, kept=kept,
+            gains, requirements, spans, design.cases, trial, corners=corners, kept=kept,
             generations=0, progress=progress,
         )  # fmt: skip
 
-    first = whole(found.gains)
+    first = whole(design.gains)
     if first.met or generations == 0:
         return first
-    gains, count, stopped = dict(found.gains), 0, False
+    gains, count, stopped = dict(design.gains), 0, False
     schedule = scheduled(trial.loop)
     for region in sorted(tunables, key=lambda name: name != schedule.main):
         if not tunables[region] or stopped:
             continue
-        own, models = _in_region(found, region, gains, trial)
+        regional, models = _in_region(design, region, gains, trial)
         start = {name: gains[name] for name in tunables[region]}
-        made = verify(
-            start, requirements, tunables[region], models, own,
-            corners=[c for c in models[1:] if c.at != own.value or c.changes], kept=first.kept,
+        retuned = verify(
+            start, requirements, tunables[region], models, regional,
+            corners=[c for c in models[1:] if c.at != regional.value or c.changes], kept=first.kept,
             seed=seed, generations=generations, progress=progress,
         )  # fmt: skip
-        gains |= made.final.gains
-        if made.tuning is not None:
-            count, stopped = count + made.tuning.count, made.tuning.interrupted
+        gains |= retuned.final.gains
+        if retuned.tuning is not None:
+            count, stopped = count + retuned.tuning.count, retuned.tuning.interrupted
     last = whole(gains, first.kept)
     return replace(
         first, tuning=Tuning(last.linear, (), stopped, count), kpis=last.kpis, nominal=last.nominal
@@ -81,29 +81,29 @@ def verify_schedule(
 
 
 def _corners(
-    found: ScheduleDesign, requirements: Sequence[Requirement], trial: Trial
+    design: ScheduleDesign, requirements: Sequence[Requirement], trial: Trial
 ) -> list[LinearCase]:
     worst: dict[float | None, tuple[float, LinearCase]] = {}
-    for case in found.cases[1:]:
+    for case in design.cases[1:]:
         if case.at == trial.value and not case.changes:
             continue
-        slack = slack_of(case.figures(found.gains), requirements)
+        slack = slack_of(case.figures(design.gains), requirements)
         if case.at not in worst or slack < worst[case.at][0]:
             worst[case.at] = (slack, case)
     return [case for _, case in worst.values()]
 
 
 def _in_region(
-    found: ScheduleDesign, region: str, gains: Mapping[str, float], trial: Trial
+    design: ScheduleDesign, region: str, gains: Mapping[str, float], trial: Trial
 ) -> tuple[Trial, tuple[LinearCase, ...]]:
     """Return trial and models at a region's points, the gains of the other regions held."""
     bench = None if trial.bench is None else trial.bench.with_overrides(dict(gains))
-    value = found.points[region][0]
-    own = replace(trial, par=trial.par.replace(gains), value=value, bench=bench)
+    value = design.points[region][0]
+    regional = replace(trial, par=trial.par.replace(gains), value=value, bench=bench)
 
     def held(case: LinearCase) -> LinearCase:
         return replace(case, build=lambda new: case.build({**gains, **new}))
 
-    there = [case for case in found.cases if case.at in found.points[region]]
+    there = [case for case in design.cases if case.at in design.points[region]]
     first = next(case for case in there if case.at == value and not case.changes)
-    return own, tuple(held(case) for case in [first, *(c for c in there if c is not first)])
+    return regional, tuple(held(case) for case in [first, *(c for c in there if c is not first)])

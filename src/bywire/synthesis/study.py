@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,9 +13,8 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
-
-Progress = Callable[[str, float], None]
-"""called with a label and the finished share, 0 to 1"""
+from bywire.core.typing import Progress
+from bywire.core.units import shown
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ class Cut:
 
 
 @dataclass(frozen=True)
-class Found:
+class Findings:
     """What a study found.
 
     Parameters
@@ -129,7 +129,7 @@ class Study:
     defaults
         Options unless others are given.
     compute
-        ``compute(par, options, progress) -> Found``.
+        ``compute(par, options, progress) -> Findings``.
     ruled
         Parameters, or groups of them, without effect on the study -> what rules them instead.
     """
@@ -139,7 +139,7 @@ class Study:
     summary: str
     options: type[ParameterSet]
     defaults: ParameterSet
-    compute: Callable[[Any, Any, Progress], Found]
+    compute: Callable[[Any, Any, Progress], Findings]
     ruled: Mapping[str, str] = field(default_factory=dict)
 
     def require_effect(self, names: Iterable[str]) -> None:
@@ -161,6 +161,52 @@ class Study:
 def variable(values: Any, dims: tuple[str, ...], unit: str, label: str) -> xr.Variable:
     """Return a variable with its unit and label."""
     return xr.Variable(dims, values, {"units": unit, "long_name": label})
+
+
+def variables(
+    values: Mapping[str, Any], dims: tuple[str, ...], labels: Mapping[str, tuple[str, str]]
+) -> dict[str, xr.Variable]:
+    """Return variables over the same dimensions, by name, with the unit and label of each."""
+    return {name: variable(array, dims, *labels[name]) for name, array in values.items()}
+
+
+def require_ranges(options: ParameterSet, ranges: Iterable[tuple[str, str, str]]) -> None:
+    """Refuse options of which a lower end is not below the upper one.
+
+    Parameters
+    ----------
+    ranges
+        Names of both ends and their SI unit.
+
+    Raises
+    ------
+    ValueError
+        As a validator of the options wants it.
+    """
+    for low, high, unit in ranges:
+        a, b = getattr(options, low), getattr(options, high)
+        if not a < b:
+            raise ValueError(f"{low} = {shown(a, unit)} must be below {high} = {shown(b, unit)}")
+
+
+def edge_warnings(
+    name: str, value: float, ends: tuple[float, float], unit: str, within: float = 1e-9
+) -> tuple[str, ...]:
+    """Return a warning where an optimum lies at an end of what was compared.
+
+    Parameters
+    ----------
+    name, value, unit
+        What was chosen, its value [SI] and SI unit.
+    ends
+        Ends of the range.
+    within
+        Share of an end by which the value may miss it.
+    """
+    return tuple(
+        f"the optimum lies at the edge of the designs, {name} = {shown(end, unit)}: widen the range"
+        for end in ends if math.isclose(value, end, rel_tol=within)
+    )  # fmt: skip
 
 
 STUDIES = Kind("study", ("studies",), instances(Study), declared="a Study")

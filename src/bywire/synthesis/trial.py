@@ -1,15 +1,20 @@
-"""What a design is tried on: the nonlinear bench at the nominal point, and at others beside it."""
+"""What a design is tried on: the nonlinear bench at the nominal point, and at worst corners."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from bywire.analysis.loop import Loop
 from bywire.bench.bench import Bench
 from bywire.core.parameters import ParameterSet
 from bywire.synthesis.bench_figures import BenchFigures, bench_figures, has_step
+from bywire.synthesis.candidate import judged
 from bywire.synthesis.linear_case import NOMINAL, LinearCase
+from bywire.synthesis.optimizer import Problem
+
+MOST = 8
+"""corners that are tried, at most"""
 
 
 @dataclass(frozen=True)
@@ -51,9 +56,9 @@ class Trial:
         self, gains: Mapping[str, Sequence[float]], target: float, *, rough: bool = False
     ) -> tuple[BenchFigures, ...]:
         """Return the figures of sets of gains, see `bench_figures`."""
-        own = self.bench if self.bench is not None and has_step(self.bench) else None
+        bench = self.bench if self.bench is not None and has_step(self.bench) else None
         return bench_figures(
-            self.loop, self.par, self.value, self.amplitudes, gains, own, target, rough=rough
+            self.loop, self.par, self.value, self.amplitudes, gains, bench, target, rough=rough
         )  # fmt: skip
 
 
@@ -65,8 +70,76 @@ def measured(
     rough: bool = False,
 ) -> list[dict[str, BenchFigures]]:
     """Return the figures of every set of gains, by the label of each trial."""
-    found = [one.measure(gains, target, rough=rough) for one in trials]
+    figures = [trial.measure(gains, target, rough=rough) for trial in trials]
     return [
-        dict(zip((one.label for one in trials), row, strict=True))
-        for row in zip(*found, strict=True)
+        dict(zip((trial.label for trial in trials), row, strict=True))
+        for row in zip(*figures, strict=True)
     ]  # fmt: skip
+
+
+def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]:
+    """Return the models at the ends of all ranges, and the one that is worst off among all.
+
+    Of more than `MOST`, those that the linear models say are worst. Where these do not tell
+    corners apart (dry friction is not in them), the bench does.
+
+    Parameters
+    ----------
+    problem
+        Its cases, the nominal one first.
+    gains
+        By dotted name [SI].
+    """
+    others = problem.cases[1:]
+    if not others:
+        return []
+    slacks = problem.slacks(problem.point(gains), range(1, len(problem.cases))).min(axis=1)
+    order = [others[k] for k in slacks.argsort(kind="stable")]
+    values = [_coordinates(case) for case in others]
+    ends = {name: (min(row[name] for row in values), max(row[name] for row in values))
+            for name in values[0]}  # fmt: skip
+    corners = [
+        case for case in order
+        if case is order[0] or all(v in ends[name] for name, v in _coordinates(case).items())
+    ]  # fmt: skip
+    return corners[:MOST]
+
+
+def worst_of(
+    trial: Trial,
+    corners: Sequence[LinearCase],
+    problem: Problem,
+    gains: Mapping[str, float],
+    linear: Mapping[str, float],
+    target: float,
+) -> list[Trial]:
+    """Return the trial, at one of several corners, in which gains are worst off; none of none.
+
+    Parameters
+    ----------
+    trial
+        At the nominal point.
+    corners
+        See `corners_of`.
+    problem, gains
+        As there.
+    linear
+        Slack in the linear models, see `candidate.linear_slacks`.
+    target
+        Frequency around which is measured [Hz].
+    """
+    trials = [trial.at(corner) for corner in corners]
+    if not trials:
+        return []
+    (row,) = measured([trial, *trials], {name: [value] for name, value in gains.items()}, target)
+    nominal = row[trial.label]
+    slacks = []
+    for corner in trials:
+        figures = row[corner.label]
+        alone = {NOMINAL: replace(figures, step=figures.step or nominal.step)}
+        slacks.append(judged(problem.requirements, gains, alone, linear).slack)
+    return [trials[slacks.index(min(slacks))]]
+
+
+def _coordinates(case: LinearCase) -> dict[str, float]:
+    return {**case.changes, "": case.at or 0.0}

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Progress
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.bench_tuning import GENERATIONS, Tuning, standing, tune
 from bywire.synthesis.candidate import Candidate, judged, linear_slacks
-from bywire.synthesis.corners import corners_of, worst_of
 from bywire.synthesis.designer import largest_error
 from bywire.synthesis.floors import bench_floors, linear_floors
-from bywire.synthesis.linear_case import LinearCase
-from bywire.synthesis.optimizer import Problem, Progress
-from bywire.synthesis.requirement import FIGURES, Requirement
-from bywire.synthesis.trial import Trial, measured
+from bywire.synthesis.linear_case import LinearCase, values_of
+from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.trial import Trial, corners_of, measured, worst_of
 
 
 @dataclass(frozen=True)
@@ -67,8 +67,8 @@ class Verification:
         order = sorted(self.final.slacks, key=self.final.room)
         if len(order) < 2:
             return None
-        one, other = order[:2]
-        return one, other, self.tuning.curve(one, other)
+        first, second = order[:2]
+        return first, second, self.tuning.curve(first, second)
 
 
 def verify(
@@ -115,25 +115,25 @@ def verify(
     problem = Problem(tunables, tuple(requirements), tuple(cases))
     floors = tuple(kept or ())
     target = _target(requirements, cases[0], gains)
-    trials = [trial, *(trial.at(one) for one in corners)]
-    looked = () if corners else corners_of(problem, gains)
+    trials = [trial, *(trial.at(corner) for corner in corners)]
+    unseen = () if corners else corners_of(problem, gains)
 
-    def tried(own: Mapping[str, float]) -> dict[str, BenchFigures]:
-        linear = linear_slacks(problem, own)
-        known = {one.label for one in trials}
-        worst = worst_of(trial, looked, problem, own, linear, target)
-        trials.extend(one for one in worst if one.label not in known)
-        (found,) = measured(trials, {name: [value] for name, value in own.items()}, target)
-        return found
+    def on_bench(chosen: Mapping[str, float]) -> dict[str, BenchFigures]:
+        linear = linear_slacks(problem, chosen)
+        known = {trial.label for trial in trials}
+        worst = worst_of(trial, unseen, problem, chosen, linear, target)
+        trials.extend(corner for corner in worst if corner.label not in known)
+        (row,) = measured(trials, {name: [value] for name, value in chosen.items()}, target)
+        return row
 
     if progress is not None:
         progress("trial on the bench", 0.0)
-    found = tried(gains)
+    figures = on_bench(gains)
     if kept is None:
         linear = linear_floors(requirements, largest_error(cases, gains))
-        floors = bench_floors(requirements, linear, found.values())
+        floors = bench_floors(requirements, linear, figures.values())
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))
-    first = judged(problem.requirements, gains, found, linear_slacks(problem, gains))
+    first = judged(problem.requirements, gains, figures, linear_slacks(problem, gains))
     if progress is not None:
         progress("trial on the bench", 1.0)
     tuning = None
@@ -143,15 +143,14 @@ def verify(
             generations=generations, progress=progress,
         )  # fmt: skip
         best = tuning.best.gains
-        again = judged(problem.requirements, best, tried(best), linear_slacks(problem, best))
+        again = judged(problem.requirements, best, on_bench(best), linear_slacks(problem, best))
         tuning = replace(tuning, best=max(first, again, key=standing))
     final = gains if tuning is None else tuning.best.gains
     kpis: tuple[Kpi, ...] = ()
     if trial.bench is not None:
         kpis = run(trial.bench.with_overrides(dict(final))).kpis
-    loop = cases[0].figures(final, 4000)
-    nominal = {name: float(getattr(loop, name)) for name in FIGURES}
-    return Verification(first, tuning, kpis, nominal, len(corners) or len(looked), floors)
+    nominal = values_of(cases[0].figures(final, 4000))
+    return Verification(first, tuning, kpis, nominal, len(corners) or len(unseen), floors)
 
 
 def _target(
@@ -159,7 +158,7 @@ def _target(
 ) -> float:
     """Return the frequency around which to measure: that required, or that of the linear loop."""
     for figure in ("bandwidth", "crossover"):
-        wanted = [one.limit for one in requirements if one.figure == figure and one.sense > 0]
-        if wanted:
-            return wanted[0]
+        limits = [w.limit for w in requirements if w.figure == figure and w.sense > 0]
+        if limits:
+            return limits[0]
     return case.figures(gains).crossover

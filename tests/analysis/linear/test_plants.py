@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.reduction.error import reduction_error
@@ -150,7 +149,7 @@ def test_a_small_step_of_one_current_moves_the_nonlinear_wedge_as_the_linear_one
         i_1_set=at.memory.i_1_ref, i_2_set=at.memory.i_2_ref + height
     )  # fmt: skip
     run = simulate(replace(replace(at, stimulus=stimulus).run(), duration=0.3), signals=("F_N",))
-    linear = with_channels(full(par, 3e3), inputs=("i_2_ref",), outputs=("F_N",))
+    linear = full(par, 3e3).channels(inputs=("i_2_ref",), outputs=("F_N",))
     step, x, expected = linear.sampled(1e-3), np.zeros(len(linear.states)), []
     for _ in run.time:
         expected.append(float((step.C @ x)[0]))

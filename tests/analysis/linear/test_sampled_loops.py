@@ -9,14 +9,14 @@ from scipy.signal import cont2discrete
 
 from bywire.analysis.crossings import fall
 from bywire.analysis.linear.closed_loop import closed_loop
-from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.case import case_from_rest
-from bywire.brakes.motorcycle.linear.current_loop import current_loop
+from bywire.brakes.motorcycle.linear.control_laws import current_loop
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop, cancelling_pi
+from bywire.brakes.motorcycle.linear.rational import first_orders
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at

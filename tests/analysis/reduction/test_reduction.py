@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from analysis.small_linear_models import model_of
-from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.reduction.error import reduction_error
@@ -22,7 +21,7 @@ from bywire.core.errors import ParameterError, UnknownNameError
 
 def wedge(mu_B: float = 0.35) -> LinearModel:
     par = parameters("roberts2003").replace({"wedge.mu_B": mu_B})
-    return with_channels(full(par, 2e3), outputs=("F_N", "x", "M_B"))
+    return full(par, 2e3).channels(outputs=("F_N", "x", "M_B"))
 
 
 def moment_loop() -> LinearModel:

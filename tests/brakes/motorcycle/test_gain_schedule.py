@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from bywire.analysis.linear.closed_loop import closed_loop
-from bywire.analysis.linear.rational import first_orders
 from bywire.analysis.loop import LOOPS
 from bywire.bench.bench import Bench
 from bywire.bench.running import run
 from bywire.brakes.motorcycle import ecu as motorcycle_ecu
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
+from bywire.brakes.motorcycle.linear.rational import first_orders
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import gain_schedule, pressure_pid

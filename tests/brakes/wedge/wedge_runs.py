@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.plant import State
 from bywire.brakes.wedge.start import memory_at, state_at
 from bywire.core.catalog import parameters
 from bywire.simulation.run import Run, Trajectory, simulate
@@ -49,7 +48,7 @@ def drive(
     duration: float,
     step: float = 20e-6,
     record: float = 1e-3,
-    state: State | None = None,
+    state: Any | None = None,
     **stimulus: Callable[[Array], Array],
 ) -> Trajectory:
     """Return a run from the parking position, or from a state, under some stimuli of time."""

@@ -75,6 +75,7 @@ def equilibrium(
         J = np.hstack([A[np.ix_(still, free)], at.B[still]]) * size
         weight = np.maximum(np.abs(J).max(axis=1), np.finfo(float).tiny)
         left = at.rate[still] / weight
+        # Least norm: rigid motions (a preload without friction) have no equilibrium of their own.
         change = np.linalg.lstsq(J / weight[:, None], -left, rcond=1e-12)[0]
         if np.abs(change).max() < _SETTLED:
             break

@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.minimal import Realization
 from bywire.analysis.linear.transfer import Transfer
 from bywire.core.errors import ParameterError, unknown_name
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Complex
 
 _ON_BORDER = 1e-6  # poles this close to the border of stability are integrators
 _COUPLED = 1e-9  # of the largest entry of A: below it a dropped state does not act on the others
@@ -111,8 +109,8 @@ class LinearModel:
         UnknownNameError
             When a name is unknown.
         """
-        j = _index("input", input, self.inputs)
-        i = _index("output", output, self.outputs)
+        j = _places("input", [input or self.inputs[0]], self.inputs)[0]
+        i = _places("output", [output or self.outputs[0]], self.outputs)[0]
         kept = replace(self, B=self.B[:, j : j + 1], C=self.C[i : i + 1]).effective()
         path = Realization(
             self.A[np.ix_(kept, kept)], self.B[kept, j], self.C[i, kept], float(self.D[i, j])
@@ -123,10 +121,10 @@ class LinearModel:
             self.period,
         )  # fmt: skip
 
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Return the eigenvalues of A, the slowest first; [rad/s] for a continuous model."""
-        found = np.linalg.eigvals(self.A).astype(np.complex128)
-        return found[np.argsort(np.abs(found))]
+        eigenvalues = np.linalg.eigvals(self.A).astype(np.complex128)
+        return eigenvalues[np.argsort(np.abs(eigenvalues))]
 
     @property
     def nyquist(self) -> float:
@@ -163,10 +161,7 @@ class LinearModel:
         ParameterError
             When a dropped state acts on what is kept.
         """
-        for name in states:
-            if name not in self.states:
-                raise unknown_name("state", name, self.states)
-        kept = [self.states.index(name) for name in states]
+        kept = _places("state", states, self.states)
         dropped = [k for k in range(len(self.states)) if k not in kept]
         coupled = (
             np.max(np.abs(self.A[np.ix_(kept, dropped)]), initial=0.0)
@@ -178,21 +173,38 @@ class LinearModel:
                 f"{self.name}: the dropped states ({names}) act on what is kept: keep them, or "
                 "hold them with held=True"
             )
-        return LinearModel(
-            self.name,
-            self.A[np.ix_(kept, kept)],
-            self.B[kept],
-            self.C[:, kept],
-            self.D,
-            tuple(states),
-            self.inputs,
-            self.outputs,
-            tuple(self.state_units[k] for k in kept),
-            self.input_units,
-            self.output_units,
-            self.rate[kept],
-            self.period,
-        )
+        return replace(
+            self,
+            A=self.A[np.ix_(kept, kept)], B=self.B[kept], C=self.C[:, kept],
+            states=tuple(states), state_units=tuple(self.state_units[k] for k in kept),
+            rate=self.rate[kept],
+        )  # fmt: skip
+
+    def channels(
+        self, *, inputs: Sequence[str] = (), outputs: Sequence[str] = ()
+    ) -> LinearModel:
+        """Return the model with some of its inputs and outputs, in the order given.
+
+        Parameters
+        ----------
+        inputs, outputs
+            Names; all where none is given.
+
+        Raises
+        ------
+        UnknownNameError
+            When a name is unknown.
+        """
+        columns = _places("input", inputs or self.inputs, self.inputs)
+        rows = _places("output", outputs or self.outputs, self.outputs)
+        return replace(
+            self,
+            B=self.B[:, columns], C=self.C[rows], D=self.D[rows][:, columns],
+            inputs=tuple(self.inputs[k] for k in columns),
+            outputs=tuple(self.outputs[k] for k in rows),
+            input_units=tuple(self.input_units[k] for k in columns),
+            output_units=tuple(self.output_units[k] for k in rows),
+        )  # fmt: skip
 
     def together(self, inputs: Sequence[str]) -> LinearModel:
         """Return the model with some inputs moving as one, named after the first of them."""
@@ -222,27 +234,14 @@ class LinearModel:
         acting = np.flatnonzero(self.B.any(axis=0))  # an exponential's cost is that of all columns
         size = n + acting.size
         whole = np.zeros((size, size))
+        # Van Loan: the exponential of [[A, B], [0, 0]] holds both integrals, A singular or not.
         whole[:n, :n], whole[:n, n:] = self.A, self.B[:, acting]
         step = expm(whole * period)
         B = np.zeros_like(self.B)
         B[:, acting] = step[:n, n:]
-        return LinearModel(
-            self.name,
-            step[:n, :n],
-            B,
-            self.C,
-            self.D,
-            self.states,
-            self.inputs,
-            self.outputs,
-            self.state_units,
-            self.input_units,
-            self.output_units,
-            self.rate,
-            period,
-        )
+        return replace(self, A=step[:n, :n], B=B, period=period)
 
-    def response(self, frequencies: Array) -> NDArray[np.complex128]:
+    def response(self, frequencies: Array) -> Complex:
         """Return the frequency response.
 
         Parameters
@@ -272,7 +271,8 @@ class LinearModel:
         return np.flatnonzero(forward & backward).tolist()
 
 
-def _index(kind: str, name: str, known: tuple[str, ...]) -> int:
-    if name and name not in known:
-        raise unknown_name(kind, name, known)
-    return known.index(name) if name else 0
+def _places(kind: str, names: Sequence[str], known: tuple[str, ...]) -> list[int]:
+    for name in names:
+        if name not in known:
+            raise unknown_name(kind, name, known)
+    return [known.index(name) for name in names]

@@ -18,8 +18,7 @@ from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 Friction = Literal["removed", "sliding", "stuck"]
 _TOUCH = 1e-12  # overlap or gap [m] below which a contact counts as neither closed nor open
@@ -144,8 +143,8 @@ def _stiffness(
     model: Model, functions: SmoothFunctions, state: NamedTuple, p: list[float]
 ) -> Array:
     """Return the stiffness of the contacts that are closed at a state, zero for open ones."""
-    found = functions.contacts(list(state), p)
-    *matrices, gaps = map(np.array, found if isinstance(found, tuple) else (found,))
+    values = functions.contacts(list(state), p)
+    *matrices, gaps = map(np.array, values if isinstance(values, tuple) else (values,))
     blocks, at = [], 0
     for C in matrices:
         d = gaps[at : at + len(C), 0]
@@ -170,6 +169,7 @@ def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
         stiffness.
     """
     stiffness = C.diagonal()
+    # Closed contacts must press, open ones gap: the subset that satisfies both has positive slack.
     best: tuple[float, Array, Array] = (-math.inf, d, C)
     for closed in _subsets(len(d)):
         K = np.zeros_like(C)

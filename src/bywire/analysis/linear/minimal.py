@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Complex
 
 _ROUNDING = 100.0 * float(np.finfo(float).eps)  # of the largest entry: what counts as zero
 
@@ -88,7 +87,7 @@ def state_scale(A: Array, B: Array, C: Array) -> Array:
     return np.asarray(scale[:n] / scale[n])
 
 
-def zeros(system: Realization) -> tuple[NDArray[np.complex128], float]:
+def zeros(system: Realization) -> tuple[Complex, float]:
     r"""Return the finite zeros, and the factor k in front of the products.
 
     .. math:: c (sI - A)^{-1} b + d = k \prod_j (s - z_j) / \prod_i (s - \lambda_i)
@@ -119,8 +118,8 @@ def zeros(system: Realization) -> tuple[NDArray[np.complex128], float]:
         factor *= size
         Q = _complement(row)
         A, b, c, d = Q.T @ A @ Q, Q.T @ b, row @ A @ Q, float(row @ b)
-    found = np.linalg.eigvals(A - np.outer(b, c) / d) if len(A) else np.zeros(0)
-    return np.asarray(found, dtype=complex), factor * d
+    roots = np.linalg.eigvals(A - np.outer(b, c) / d) if len(A) else np.zeros(0)
+    return np.asarray(roots, dtype=complex), factor * d
 
 
 def _reached(system: Realization) -> Realization:

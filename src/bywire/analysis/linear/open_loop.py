@@ -1,12 +1,15 @@
-"""Exact linear models of sampled loops, cut open at what a controller reads or hands on."""
+"""Exact linear models of loops that are cut open: at a controller, or within the plant."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.linear.sampled_system import Jacobians, SampledSystem, sampled_system
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
@@ -63,12 +66,13 @@ def open_loop(
     size = len(states) + len(fields)
     A, B = np.eye(size), np.zeros((size, 1))
     for f in range(system.common):
-        tick = first
+        tick = first  # the input acts there alone: its controller runs once in the common period
         if f > 0:
             X, M, _ = system.in_a_row(system.due(f))
             tick = [X, M, np.zeros((len(fields), 1))]
         F, G = system.step(tick)
         A, B = F @ A, F @ B + G
+    # Minus: what comes back enters the closed loop with a plus, and margins count it negative.
     held = signals_of(model.Memory)
     unit = (signals_of(model.State) | held)[cut].unit
     return LinearModel(
@@ -90,7 +94,7 @@ def _cut_reading(system: SampledSystem, column: int, cut: str) -> tuple[Jacobian
         read = np.zeros((n_m, 1))
         if k == owner:
             read, M_x = M_x[:, column : column + 1], M_x.copy()
-            M_x[:, column] = 0.0
+            M_x[:, column] = 0.0  # this one reads the input in place of the state, others the state
         X, M, U = M_x + M_m @ X, M_m @ M, M_m @ U + read
     row = np.zeros((1, n_x + n_m))
     row[0, column] = 1.0
@@ -118,6 +122,7 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
     X, M, _ = system.in_a_row(system.due(0)[: owner + 1])
     written = np.concatenate([X[row], M[row]])[None]
     U = np.zeros((M.shape[0], 1))
+    # Whoever comes later at the same instant already takes the input.
     X[row], M[row], U[row] = 0.0, 0.0, 1.0
     for k in later:
         M_x, M_m, _ = system.ticks[k]
@@ -128,8 +133,8 @@ def _cut_writing(system: SampledSystem, row: int, cut: str) -> tuple[Jacobians, 
 def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
     """Return the one task of a list, which must run only once in the common period."""
     if len(tasks) != 1:
-        found = ", ".join(system.names[k] for k in tasks) or "none"
-        raise ParameterError(f"{refusal}, found {found}")
+        names = ", ".join(system.names[k] for k in tasks) or "none"
+        raise ParameterError(f"{refusal}, found {names}")
     (owner,) = tasks
     if system.every[owner] != system.common:
         often = system.common // system.every[owner]
@@ -138,3 +143,56 @@ def _alone(system: SampledSystem, tasks: list[int], refusal: str) -> int:
             "times while the slowest one runs once"
         )
     return owner
+
+
+def analog_gain(
+    model: Model,
+    par: ParameterSet,
+    state: NamedTuple,
+    memory: NamedTuple,
+    *,
+    cut: str,
+    locked: Sequence[str] = (),
+) -> LinearModel:
+    r"""Return the exact gain of a loop that is cut open at a state; sampled controllers hold.
+
+    With the state :math:`x_c` and all others :math:`x_o`, whatever reads the state is handed an
+    input u in its place:
+
+    .. math:: \dot x_o = A_{oo} x_o + A_{oc} u, \quad \dot x_c = A_{co} x_o + A_{cc} x_c, \quad
+        L = -x_c / u
+
+    Parameters
+    ----------
+    model, par, state, memory, locked
+        As in ``closed_loop``; dry friction is removed.
+    cut
+        Field of State, for instance what an analog controller's sensor shows.
+
+    Returns
+    -------
+    LinearModel
+        Continuous; one input and one output, both ``cut``. The closed loop has 1 + L.
+
+    Raises
+    ------
+    UnknownNameError
+        When the field is unknown.
+    ParameterError
+        When nothing reads the state.
+    """
+    if cut not in model.State._fields:
+        raise unknown_name("state", cut, model.State._fields)
+    whole = linearize(model, par, state, memory, inputs=(), outputs=(cut,))
+    kept = [name for name in whole.states if name not in locked]
+    plant = whole.reduced(kept, held=bool(locked))
+    k = plant.states.index(cut)
+    A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()
+    B[k] = 0.0  # the state's own decay is no feedback through the controller: it stays
+    A[:, k] -= B[:, 0]
+    if not B.any():
+        raise ParameterError(f"{cut} cannot be cut: nothing in {model.name} reads it")
+    return replace(
+        plant, name=f"{model.name}, cut at {cut}", A=A, B=B, C=-plant.C, D=np.zeros((1, 1)),
+        inputs=(cut,), input_units=plant.output_units,
+    )  # fmt: skip

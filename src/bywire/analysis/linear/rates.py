@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.core.typing import Complex
 
 DEAD = 1e-9
 """poles of less than this size are dead beats: their motion is over within a sample"""
@@ -13,7 +13,7 @@ STILL = 1e-6
 """rates of less than this size [1/s] are those of what does not move: integrators at rest"""
 
 
-def rates(model: LinearModel) -> NDArray[np.complex128]:
+def rates(model: LinearModel) -> Complex:
     r"""Return the poles as rates [1/s] of continuous motions, slowest first.
 
     .. math:: s = \ln(z) / T
@@ -34,5 +34,5 @@ def rates(model: LinearModel) -> NDArray[np.complex128]:
     poles = model.poles()
     if not model.period:
         return poles
-    found = np.log(poles[np.abs(poles) > DEAD]) / model.period
-    return np.asarray(found[np.argsort(np.abs(found))])
+    continuous = np.log(poles[np.abs(poles) > DEAD]) / model.period
+    return np.asarray(continuous[np.argsort(np.abs(continuous))])

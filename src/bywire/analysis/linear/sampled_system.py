@@ -1,10 +1,10 @@
-"""Plant and controllers of a sampled system as Jacobians, frame by frame."""
+"""Plant and controllers of a sampled system as Jacobians, frame by frame, exact or as stepped."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any, NamedTuple, cast
 
@@ -13,14 +13,14 @@ import numpy as np
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.linear.smooth_functions import smooth_functions, vector
-from bywire.analysis.linear.stepped import stepped
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, StepError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
 Jacobians = list[Any]
 """of the new memory by states, memory and inputs"""
+_WHOLE = 1e-9  # of a step: what a sample time may differ from a multiple
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +58,7 @@ class SampledSystem:
         """Return the Jacobians of tasks that run one after the other at the same instant."""
         (n_m, n_x), n_u = self.ticks[0][0].shape, self.ticks[0][2].shape[1]
         X, M, U = np.zeros((n_m, n_x)), np.eye(n_m), np.zeros((n_m, n_u))
+        # All read the same plant; each reads what those before it at this instant have written.
         for M_x, M_m, M_u in (self.ticks[k] for k in tasks):
             X, M, U = M_x + M_m @ X, M_m @ M, M_u + M_m @ U
         return [X, M, U]
@@ -117,9 +118,10 @@ def sampled_system(
 
 def _frames(periods: Sequence[float]) -> tuple[float, list[int]]:
     """Return the longest time that divides all periods, and how often each holds it."""
+    # 0.2 ms and 1 ms are no multiples as floats: the nearest ratios of whole numbers are.
     exact = [Fraction(period).limit_denominator(10**9) for period in periods]
-    whole = math.lcm(*(one.denominator for one in exact))
-    ticks = [int(one * whole) for one in exact]
+    whole = math.lcm(*(period.denominator for period in exact))
+    ticks = [int(period * whole) for period in exact]
     frame = math.gcd(*ticks)
     return frame / whole, [tick // frame for tick in ticks]
 
@@ -135,9 +137,49 @@ def _ticks(
     rows = [model.State._fields.index(name) for name in kept]
     columns = [model.Stimulus._fields.index(name) for name in inputs]
     state, memory, stimulus = point
-    found = []
+    jacobians = []
     for tick in smooth_functions(model, par).ticks:
         values = tick(list(state), list(memory), list(stimulus), vector(par))
         M_x, M_m, M_u = (np.array(value, dtype=float) for value in values)
-        found.append([M_x[:, rows], M_m, M_u[:, columns]])
-    return tuple(found)
+        jacobians.append([M_x[:, rows], M_m, M_u[:, columns]])
+    return tuple(jacobians)
+
+
+def stepped(model: LinearModel, period: float, step: float) -> LinearModel:
+    r"""Return what the midpoint rule makes of a continuous model with held inputs.
+
+    .. math:: \begin{pmatrix} x_{k+1} \\ u \end{pmatrix} =
+        \left[(I - \tfrac{h}{2} W)^{-1} (I + \tfrac{h}{2} W)\right]^{T/h}
+        \begin{pmatrix} x_k \\ u \end{pmatrix}, \quad
+        W = \begin{pmatrix} A & B \\ 0 & 0 \end{pmatrix}
+
+    Where friction, limits and changes of contacts stay out, a run of a linear plant follows it to
+    rounding: what then still differs from the exact model is the error of the step.
+
+    Parameters
+    ----------
+    model
+        Continuous model.
+    period
+        Sample time T [s].
+    step
+        Substep h [s], which divides T.
+
+    Raises
+    ------
+    StepError
+        When it does not.
+    """
+    count = round(period / step)
+    if count < 1 or abs(count * step - period) > _WHOLE * step:
+        raise StepError(
+            f"step = {step * 1e6:g} us does not divide the sample time of {period * 1e6:g} us: "
+            f"take for instance {period * 1e6 / max(count, 1):.12g} us"
+        )
+    n, m = model.B.shape
+    W = np.zeros((n + m, n + m))
+    W[:n, :n], W[:n, n:] = model.A, model.B
+    half = 0.5 * step * W
+    once = np.linalg.solve(np.eye(n + m) - half, np.eye(n + m) + half)
+    whole = np.linalg.matrix_power(once, count)
+    return replace(model, A=whole[:n, :n], B=whole[:n, n:], period=period)

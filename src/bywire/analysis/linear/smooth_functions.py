@@ -52,7 +52,7 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
 
     names = tuple(par.leaves())
     p = ca.SX.sym("p", len(names))
-    own = par.with_leaves(dict(zip(names, ca.vertsplit(p), strict=True)))
+    symbolic = par.with_leaves(dict(zip(names, ca.vertsplit(p), strict=True)))
     x = ca.SX.sym("x", len(model.State._fields))
     m = ca.SX.sym("m", len(model.Memory._fields))
     u = ca.SX.sym("u", len(model.Stimulus._fields))
@@ -60,15 +60,15 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
     ticks = []
     for k, task in enumerate(model.tasks(par)):
         stimulus = cast(Any, model.Stimulus)(*_split(u))
-        renewed = ca.vertcat(*task.tick(at, held, stimulus, own))
+        renewed = ca.vertcat(*task.tick(at, held, stimulus, symbolic))
         parts = [ca.jacobian(renewed, by) for by in (x, m, u)]
         ticks.append(ca.Function(f"tick_{k}", [x, m, u, p], parts))
-    groups = model.compliance(own)
-    gap = _column([d for group in model.gap(at, at, own) for d in group])
+    groups = model.compliance(symbolic)
+    gap = _column([d for group in model.gap(at, at, symbolic) for d in group])
     matrices = [ca.SX(ca.vertcat(*(ca.horzcat(*row) for row in C))) for C in groups]
     return SmoothFunctions(
         contacts=ca.Function("contacts", [x, p], [*matrices, gap]),
-        plant=_plant(model, own, (x, m, p), at, held, gap),
+        plant=_plant(model, symbolic, (x, m, p), at, held, gap),
         ticks=tuple(ticks),
     )
 

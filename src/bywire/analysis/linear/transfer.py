@@ -7,13 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.minimal import Realization, minimal, zeros
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
+from bywire.core.typing import Array, Complex
 
 _AT_REST = 1e-11  # of the largest pole: what counts as an integrator
 
@@ -88,22 +85,22 @@ class Transfer:
         """
         import control
 
-        found = control.tf(
+        system = control.tf(
             np.atleast_1d(self.factor * np.real(np.poly(self.zeros))),
             np.atleast_1d(np.real(np.poly(self.poles))),
             self.period, inputs=[self.input], outputs=[self.output], name=self.name,
         )  # fmt: skip
         f = self._range()
-        own = control.frequency_response(found, 2.0 * np.pi * f).complex.reshape(-1)
+        rounded = control.frequency_response(system, 2.0 * np.pi * f).complex.reshape(-1)
         exact = self.response(f)
         seen = exact != 0.0
-        error = float(np.max(np.abs(own[seen] / exact[seen] - 1.0), initial=0.0))
+        error = float(np.max(np.abs(rounded[seen] / exact[seen] - 1.0), initial=0.0))
         if not error <= tolerance:
             raise ParameterError(
                 f"{self.name}: polynomials of degree {len(self.poles)} in z would be {error:.1g} "
                 f"off, {tolerance:g} is admissible: use zeros, poles and factor, or state_space()"
             )
-        return found
+        return system
 
     def _range(self) -> Array:
         """Return frequencies [Hz] at which polynomials are compared."""
@@ -117,13 +114,13 @@ class Transfer:
 
     def _at(self, s: Complex) -> Complex:
         """Return the values; poles and zeros take turns, so that nothing overflows."""
-        found = np.full(s.shape, self.factor, dtype=complex)
+        values = np.full(s.shape, self.factor, dtype=complex)
         for k in range(max(len(self.zeros), len(self.poles))):
             if k < len(self.zeros):
-                found *= s - self.zeros[-1 - k]
+                values *= s - self.zeros[-1 - k]
             if k < len(self.poles):
-                found /= s - self.poles[-1 - k]
-        return found
+                values /= s - self.poles[-1 - k]
+        return values
 
     @classmethod
     def of_path(
@@ -143,15 +140,15 @@ class Transfer:
         period
             Sample time [s]; 0 for a continuous one.
         """
-        own = minimal(path)
-        found, factor = zeros(own)
-        poles = np.linalg.eigvals(own.A) if len(own.A) and factor else np.zeros(0)
+        least = minimal(path)
+        roots, factor = zeros(least)
+        poles = np.linalg.eigvals(least.A) if len(least.A) and factor else np.zeros(0)
         return cls(
-            name, input[0], output[0], input[1], output[1], _sorted(found), _sorted(poles),
+            name, input[0], output[0], input[1], output[1], _sorted(roots), _sorted(poles),
             factor, period,
         )  # fmt: skip
 
 
-def _sorted(found: Any) -> Complex:
-    values = np.asarray(found, dtype=complex)
+def _sorted(roots: Any) -> Complex:
+    values = np.asarray(roots, dtype=complex)
     return values[np.lexsort((values.imag, np.abs(values).round(12)))]

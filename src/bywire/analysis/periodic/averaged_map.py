@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.loop import Loop, Point
@@ -22,11 +21,9 @@ from bywire.analysis.periodic.periodic_orbit import (
 from bywire.core.errors import SolverError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
 from bywire.simulation.run import Run
 from bywire.simulation.stroboscope import Derivatives, Stroboscope
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 STEPS = (10e-6, 5e-6, 2.5e-6)
 """substeps [s], the next one where a motion does not repeat itself with the one before: the longer
@@ -131,13 +128,14 @@ class PeriodicModel:
         """
         d, T = self.derivatives, self.run.duration
         rows, ticks = d.D.shape[0], d.D.shape[2]
-        found = []
+        lines = []
         for f in np.asarray(frequencies, dtype=float):
+            # A zero-order hold at the ticks, not the sine itself: that is what a controller reads.
             U = np.exp(2j * np.pi * f * T / ticks * np.arange(ticks))
             Z = np.linalg.solve(np.exp(2j * np.pi * f * T) * np.eye(len(d.A)) - d.A, d.B @ U)
             wave = np.exp(-2j * np.pi * f * T / rows * np.arange(rows))
-            found.append(wave @ (d.C[:, 0] @ Z + d.D[:, 0] @ U) / rows)
-        return np.array(found, dtype=np.complex128)
+            lines.append(wave @ (d.C[:, 0] @ Z + d.D[:, 0] @ U) / rows)
+        return np.array(lines, dtype=np.complex128)
 
 
 def periodic_model(
@@ -173,9 +171,9 @@ def periodic_model(
         When there is no compiler.
     """
     *trials, last = STEPS if step is None else (step,)
-    for one in trials:
+    for substep in trials:
         with suppress(SolverError):
-            return _about(point, inputs, output, whole, one)
+            return _about(point, inputs, output, whole, substep)
     return _about(point, inputs, output, whole, last)
 
 
@@ -209,12 +207,12 @@ def dithered_loop(
     InputError, SolverError, CompilerError
         As `periodic_model`, and when the operating point does not exist or all of it sticks.
     """
-    own = unrounded(loop, par)
-    found = periodic_model(
-        loop.point(own, value), loop.inputs, loop.output, loop.whole(own), step
+    ideal = unrounded(loop, par)
+    model = periodic_model(
+        loop.point(ideal, value), loop.inputs, loop.output, loop.whole(ideal), step
     )
-    require_moving(found)
-    return found
+    require_moving(model)
+    return model
 
 
 def require_moving(model: PeriodicModel) -> None:
@@ -228,7 +226,7 @@ def require_moving(model: PeriodicModel) -> None:
     if model.orbit.stuck == 1.0:
         raise SolverError(
             f"{model.run.model.name}: it sticks during the whole period, and answers to nothing "
-            "small: raise the dither's gain (ecu.dither.gain)"
+            "small: raise the dither's gain"
         )
 
 

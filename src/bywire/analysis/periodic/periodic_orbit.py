@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, SolverError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.simulation.run import Run
 from bywire.simulation.stroboscope import Stroboscope
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-5
 """distance from the orbit that counts as none, over the usual magnitude of each signal; steps of
@@ -76,7 +74,7 @@ def period_of(frequencies: Sequence[float], intervals: Sequence[float], step: fl
         When a frequency's period is no whole number of substeps.
     """
     wanted = [*intervals, *(1.0 / f for f in frequencies)]
-    counts = [round(one / step) for one in wanted]
+    counts = [round(interval / step) for interval in wanted]
     for f in frequencies:
         count = 1.0 / (f * step)
         if abs(count - round(count)) > 1e-6 * count:
@@ -117,15 +115,15 @@ def find_orbit(stroboscope: Stroboscope, run: Run) -> PeriodicOrbit:
     for _ in range(_ROUNDS):
         for _ in range(_SETTLE):
             z = stroboscope.advance(z).end
-        found = _polished(stroboscope, z, scale)
-        periods += _SETTLE + found.periods
-        z = found.start
-        if found.distance <= TOLERANCE and found.drift <= DRIFT:
+        candidate = _polished(stroboscope, z, scale)
+        periods += _SETTLE + candidate.periods
+        z = candidate.start
+        if candidate.distance <= TOLERANCE and candidate.drift <= DRIFT:
             rows = stroboscope.advance(z).rows
             v = stroboscope.velocities(z)
             stuck = float(np.mean((v == 0.0).all(axis=1))) if v.size else 0.0
             return PeriodicOrbit(
-                stroboscope, z, rows, found.distance, found.drift, stuck, periods
+                stroboscope, z, rows, candidate.distance, candidate.drift, stuck, periods
             )
     apart = np.abs((stroboscope.advance(z).end - z) / scale)
     raise SolverError(
@@ -153,11 +151,11 @@ def _polished(stroboscope: Stroboscope, z: Array, scale: Array) -> _Tried:
     for taken in range(_NEWTON):
         if distance <= 1e-2 * TOLERANCE:
             return _Tried(z, distance, drift, taken)
-        tried = _judged(stroboscope, z + step, scale)
-        if not tried[0] < 0.5 * distance:  # no number fails, too
+        moved = _judged(stroboscope, z + step, scale)
+        if not moved[0] < 0.5 * distance:  # no number fails, too
             return _Tried(z, distance, drift, taken + 1)
         z = z + step
-        distance, drift, step = tried
+        distance, drift, step = moved
     return _Tried(z, distance, drift, _NEWTON)
 
 
@@ -187,8 +185,8 @@ def restored(A: Array, residual: Array, scale: Array) -> Array:
     moving = np.flatnonzero((eye != A).any(axis=1))  # the others keep their value for ever
     gap = (eye - A)[np.ix_(moving, moving)] * scale[moving] / scale[moving, None]
     step = np.zeros(n)
-    found = np.linalg.lstsq(gap, residual[moving] / scale[moving], rcond=_NEUTRAL)[0]
-    step[moving] = found * scale[moving]
+    scaled = np.linalg.lstsq(gap, residual[moving] / scale[moving], rcond=_NEUTRAL)[0]
+    step[moving] = scaled * scale[moving]
     return step
 
 

@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Matrices = tuple[Array, Array, Array]
 Choice = Callable[[complex], bool]
 
@@ -75,7 +74,7 @@ def split(model: LinearModel, first: Choice) -> Parts:
     T, Q, count = ordered(A, output="real", sort=lambda x, y=0.0: first(complex(x, y)))
     B, C = Q.T @ B, C @ Q
     n = len(T)
-    X = np.zeros((count, n - count))
+    X = np.zeros((count, n - count))  # T_11 X - X T_22 = -T_12: then both parts are apart
     if 0 < count < n:
         X = solve_sylvester(T[:count, :count], -T[count:, count:], -T[:count, count:])
     return Parts(

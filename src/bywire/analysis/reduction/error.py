@@ -6,13 +6,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.rates import rates
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _POINTS = 300
 _DECADES = 4.0  # below the band's end at which the search begins
@@ -119,8 +117,8 @@ def frequencies(full: LinearModel, reduced: LinearModel, high: float) -> Array:
 
 def _pole_error(full: LinearModel, reduced: LinearModel, low: float, high: float) -> float:
     """Return the largest relative distance of the poles in a band [Hz]."""
-    known, own = rates(full), rates(reduced)
-    inside = own[np.abs(own) <= 2.0 * math.pi * high]
+    known, kept = rates(full), rates(reduced)
+    inside = kept[np.abs(kept) <= 2.0 * math.pi * high]
     if not inside.size or not known.size:
         return math.nan
     distance = np.abs(inside[:, None] - known).min(axis=1)

@@ -8,15 +8,14 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.reduction.balancing import Choice, Matrices, balanced, lasting, split
 from bywire.analysis.reduction.error import ReductionError, natural, reduction_error
 from bywire.analysis.reduction.residualized import residualized
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Method = Literal["balanced", "modal"]
 
 _DEAD = 1e-12  # poles of sampled models below it are dead beats
@@ -95,33 +94,33 @@ def reduce(
     """
     # What no input moves stays at the operating point; what no output sees may go.
     acting = [model.states[k] for k in model.effective()]
-    own = model.reduced(acting, held=True)
-    high, n = _band(own, band), len(acting)
+    full = model.reduced(acting, held=True)
+    high, n = _band(full, band), len(acting)
     if not acting:
         raise ParameterError(
-            f"{own.name}: no input reaches an output (what sticks does not move): there is "
+            f"{full.name}: no input reaches an output (what sticks does not move): there is "
             "nothing to reduce"
         )
-    lasts = lasting(own)
-    kept = sum(lasts(pole) for pole in own.poles())
+    lasts = lasting(full)
+    kept = sum(lasts(pole) for pole in full.poles())
     least = max(kept, 1)
     if order is not None and not least <= order <= n:
         raise ParameterError(
-            f"order = {order} is not admissible: {own.name} has {n} states that act, {kept} of "
+            f"order = {order} is not admissible: {full.name} has {n} states that act, {kept} of "
             f"them unstable or on the border of stability: it must be >= {least} and <= {n}"
         )
     if not 0.0 < tolerance < 1.0:
         raise ParameterError(f"tolerance = {tolerance:g} is not admissible: it must be > 0 and < 1")
-    rungs = _balanced(own) if method == "balanced" else _modal(own)
+    rungs = _balanced(full) if method == "balanced" else _modal(full)
     best = math.inf
     for size in range(least, n + 1) if order is None else (order,):
         rung = rungs(size)
-        error = reduction_error(own, rung.model, high)
+        error = reduction_error(full, rung.model, high)
         if order is not None or error.relative <= tolerance:
             return Reduced(rung.model, error, kept, rung.hankel, rung.bound)
         best = min(best, error.relative)
     raise ParameterError(
-        f"{own.name}: no order is within {100.0 * tolerance:g} % up to {high:g} Hz, the best is "
+        f"{full.name}: no order is within {100.0 * tolerance:g} % up to {high:g} Hz, the best is "
         f"{100.0 * best:.2g} % off; allow more, or take a lower band"
     )
 
@@ -135,59 +134,59 @@ class _Rung:
     bound: Array
 
 
-def _balanced(own: LinearModel) -> Callable[[int], _Rung]:
+def _balanced(full: LinearModel) -> Callable[[int], _Rung]:
     """Return the balanced reduction to any order."""
-    parts = split(own, lasting(own))
+    parts = split(full, lasting(full))
     fixed = len(parts.first[0])
     A, B, C = parts.second
-    rows, columns = _peaks(parts.second, own)
-    found = balanced((A, B / columns, C / rows[:, None]), own.period)
-    second = (found.A, found.B * columns, found.C * rows[:, None])
-    whole = _joined(own, parts.first, second)
+    rows, columns = _peaks(parts.second, full)
+    realization = balanced((A, B / columns, C / rows[:, None]), full.period)
+    second = (realization.A, realization.B * columns, realization.C * rows[:, None])
+    whole = _joined(full, parts.first, second)
 
     def at(order: int) -> _Rung:
-        made = residualized(whole, whole.states[:order])
-        tail = found.hankel[max(order - fixed, 0) :]
+        reduced = residualized(whole, whole.states[:order])
+        tail = realization.hankel[max(order - fixed, 0) :]
         bound = 2.0 * float(tail.sum()) * np.outer(rows, columns)
-        return _Rung(made, found.hankel, bound)
+        return _Rung(reduced, realization.hankel, bound)
 
     return at
 
 
-def _modal(own: LinearModel) -> Callable[[int], _Rung]:
+def _modal(full: LinearModel) -> Callable[[int], _Rung]:
     """Return the reduction to the slowest modes, pairs whole, the others at rest."""
-    lasts = lasting(own)
-    sizes = np.sort([_rate(pole, own, lasts) for pole in own.poles()])
+    lasts = lasting(full)
+    sizes = np.sort([_rate(pole, full, lasts) for pole in full.poles()])
 
     def at(order: int) -> _Rung:
         limit = (1.0 + 1e-9) * sizes[order - 1]
-        parts = split(own, lambda pole: _rate(pole, own, lasts) <= limit)
-        whole = _joined(own, parts.first, parts.second)
-        made = residualized(whole, whole.states[: len(parts.first[0])])
-        return _Rung(made, np.zeros(0), np.full(own.D.shape, np.nan))
+        parts = split(full, lambda pole: _rate(pole, full, lasts) <= limit)
+        whole = _joined(full, parts.first, parts.second)
+        reduced = residualized(whole, whole.states[: len(parts.first[0])])
+        return _Rung(reduced, np.zeros(0), np.full(full.D.shape, np.nan))
 
     return at
 
 
-def _rate(pole: complex, own: LinearModel, lasts: Choice) -> float:
+def _rate(pole: complex, full: LinearModel, lasts: Choice) -> float:
     """Return how fast a mode is [1/s]; 0 for what must be kept."""
     if lasts(pole):
         return 0.0
-    if not own.period:
+    if not full.period:
         return abs(pole)
-    return abs(np.log(complex(pole))) / own.period if abs(pole) > _DEAD else math.inf
+    return abs(np.log(complex(pole))) / full.period if abs(pole) > _DEAD else math.inf
 
 
-def _peaks(part: Matrices, own: LinearModel) -> tuple[Array, Array]:
+def _peaks(part: Matrices, full: LinearModel) -> tuple[Array, Array]:
     """Return units of outputs and inputs in which the largest response of each is about 1."""
     A, B, C = part
     n = len(A)
     labels = tuple(map(str, range(n)))
     stable = replace(
-        own, A=A, B=B, C=C, D=0.0 * own.D, states=labels, state_units=labels, rate=np.zeros(n)
+        full, A=A, B=B, C=C, D=0.0 * full.D, states=labels, state_units=labels, rate=np.zeros(n)
     )
     corners = natural(stable)
-    nyquist = 0.5 / own.period if own.period else math.inf
+    nyquist = 0.5 / full.period if full.period else math.inf
     f = np.unique(np.append(corners[(corners > 0.0) & (corners < nyquist)], _NEAR_REST))
     size = np.abs(stable.response(f)).max(axis=0)
     rows = size.max(axis=1)
@@ -197,14 +196,14 @@ def _peaks(part: Matrices, own: LinearModel) -> tuple[Array, Array]:
     return rows, columns
 
 
-def _joined(own: LinearModel, first: Matrices, second: Matrices) -> LinearModel:
+def _joined(full: LinearModel, first: Matrices, second: Matrices) -> LinearModel:
     """Return both parts side by side, their states without a meaning of their own."""
     from scipy.linalg import block_diag
 
     n = len(first[0]) + len(second[0])
     A = block_diag(*(part[0] for part in (first, second) if len(part[0])))
     return replace(
-        own,
+        full,
         A=A, B=np.vstack([first[1], second[1]]), C=np.hstack([first[2], second[2]]),
         states=tuple(f"z_{k + 1}" for k in range(n)), state_units=("1",) * n, rate=np.zeros(n),
     )  # fmt: skip

@@ -51,31 +51,32 @@ def residualized(
     for name in keep:
         if name not in model.states:
             raise unknown_name("state", name, model.states)
-    one = [model.states.index(name) for name in keep]
-    two = [k for k in range(len(model.states)) if k not in one]
-    inner = np.eye(len(two)) * (1.0 if model.period else 0.0) - model.A[np.ix_(two, two)]
+    first = [model.states.index(name) for name in keep]
+    second = [k for k in range(len(model.states)) if k not in first]
+    inner = np.eye(len(second)) * (1.0 if model.period else 0.0) - model.A[np.ix_(second, second)]
     size = np.abs(inner).max(axis=1, initial=0.0)
-    if two and (np.any(size == 0.0) or np.linalg.cond(inner / size[:, None]) > _NO_REST):
-        names = ", ".join(model.states[k] for k in two)
+    if second and (np.any(size == 0.0) or np.linalg.cond(inner / size[:, None]) > _NO_REST):
+        names = ", ".join(model.states[k] for k in second)
         raise ParameterError(
             f"{model.name}: the states left out ({names}) have no rest of their own: one of them "
             "integrates; keep it"
         )
     if corrected and model.period:
         raise ParameterError(f"{model.name}: only continuous models are corrected, this is sampled")
-    A21, A12, C2 = model.A[np.ix_(two, one)], model.A[np.ix_(one, two)], model.C[:, two]
-    drift = model.rate[two, None]
-    rest = np.linalg.solve(inner, np.hstack([A21, model.B[two], drift]))
-    by_x, by_u, by_1 = np.split(rest, [len(one), len(one) + model.B.shape[1]], axis=1)
-    A, B = model.A[np.ix_(one, one)] + A12 @ by_x, model.B[one] + A12 @ by_u
-    rate = model.rate[one] + (A12 @ by_1)[:, 0]
-    C, D = model.C[:, one] + C2 @ by_x, model.D + C2 @ by_u
+    A21, A12 = model.A[np.ix_(second, first)], model.A[np.ix_(first, second)]
+    C2 = model.C[:, second]
+    drift = model.rate[second, None]
+    rest = np.linalg.solve(inner, np.hstack([A21, model.B[second], drift]))
+    by_x, by_u, by_1 = np.split(rest, [len(first), len(first) + model.B.shape[1]], axis=1)
+    A, B = model.A[np.ix_(first, first)] + A12 @ by_x, model.B[first] + A12 @ by_u
+    rate = model.rate[first] + (A12 @ by_1)[:, 0]
+    C, D = model.C[:, first] + C2 @ by_x, model.D + C2 @ by_u
     if corrected:
         lag = np.linalg.solve(inner, by_x)
-        body = np.eye(len(one)) + A12 @ lag
+        body = np.eye(len(first)) + A12 @ lag
         A, B, rate = (np.linalg.solve(body, M) for M in (A, B, rate))
         C, D = C - C2 @ lag @ A, D - C2 @ lag @ B
     return replace(
         model, A=A, B=B, C=C, D=D, rate=rate,
-        states=tuple(keep), state_units=tuple(model.state_units[k] for k in one),
+        states=tuple(keep), state_units=tuple(model.state_units[k] for k in first),
     )  # fmt: skip

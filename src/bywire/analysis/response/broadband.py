@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
@@ -14,14 +14,17 @@ from numpy.typing import NDArray
 
 from bywire.analysis.response.cases import Cases, cases_of
 from bywire.analysis.response.dataset import Sweep, as_dataset
-from bywire.analysis.response.window import interval, line_window, require_measurable
-from bywire.analysis.response.window_scatter import kept, spread_of
+from bywire.analysis.response.window import (
+    interval,
+    kept,
+    line_window,
+    require_measurable,
+    spread_of,
+)
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array, Complex, Progress
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 
 MOST = 12
 """windows after which a response is given up; they are long here"""
@@ -57,7 +60,7 @@ def broadband_response(
     run: Run,
     sweep: Sweep,
     excitation: Broadband,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     *,
     points: Sequence[Run] | None = None,
 ) -> xr.Dataset:
@@ -109,17 +112,17 @@ def broadband_response(
     if progress is not None:
         progress("frequency response", 0.0)
     length, lines = line_window(run, sweep)
-    own = replace(run, duration=length, record=interval(run))
-    shapes = _excitations(own, lines, excitation)
-    cases = cases_of(own, sweep, points)
-    found = _repeated(own, sweep, cases, shapes, lines)
+    windowed = replace(run, duration=length, record=interval(run))
+    shapes = _excitations(windowed, lines, excitation)
+    cases = cases_of(windowed, sweep, points)
+    repeated = _repeated(windowed, sweep, cases, shapes, lines)
     shape = (*cases.shape, len(shapes))
-    measured = _measured(found, shapes, lines, shape, np.asarray(sweep.amplitudes, dtype=float))
+    measured = _measured(repeated, shapes, lines, shape, np.asarray(sweep.amplitudes, dtype=float))
     if excitation.kind == "chirp":
         measured["distortion"] = np.full_like(measured["distortion"], np.nan)
     matrix = np.repeat(cases.matrix, len(shapes), axis=1)
-    shares = sweep.shares(found.values, matrix, list(run.par.leaves()))
-    measured |= _of_runs(found, shares, shape, len(lines))
+    shares = sweep.shares(repeated.values, matrix, list(run.par.leaves()))
+    measured |= _of_runs(repeated, shares, shape, len(lines))
     if progress is not None:
         progress("frequency response", 1.0)
     done = [{k: v[:, :, j] for k, v in measured.items()} for j in range(len(lines))]
@@ -130,18 +133,18 @@ def broadband_response(
     )  # fmt: skip
 
 
-def _excitations(own: Run, lines: list[int], excitation: Broadband) -> Array:
+def _excitations(windowed: Run, lines: list[int], excitation: Broadband) -> Array:
     """Return excitations of one root mean square and peak 1, shape (realizations, samples)."""
-    t = own.schedule().stimulus_times[:-1]
+    t = windowed.schedule().stimulus_times[:-1]
     if excitation.kind == "chirp":
-        return _chirp(t / own.duration, lines)[None]
+        return _chirp(t / windowed.duration, lines)[None]
     draw = np.random.default_rng(excitation.seed)
-    found = np.empty((excitation.count, t.size))
-    for one in found:
+    shapes = np.empty((excitation.count, t.size))
+    for shape in shapes:
         spectrum = np.zeros(t.size // 2 + 1, dtype=np.complex128)
         spectrum[lines] = np.exp(2j * math.pi * draw.random(len(lines)))
-        one[:] = np.fft.irfft(spectrum, t.size)
-    return np.asarray(found / np.abs(found).max())
+        shape[:] = np.fft.irfft(spectrum, t.size)
+    return np.asarray(shapes / np.abs(shapes).max())
 
 
 def _chirp(share: Array, lines: list[int]) -> Array:
@@ -159,10 +162,10 @@ def _chirp(share: Array, lines: list[int]) -> Array:
 
 
 def _repeated(
-    own: Run, sweep: Sweep, cases: Cases, shapes: Array, lines: list[int]
+    windowed: Run, sweep: Sweep, cases: Cases, shapes: Array, lines: list[int]
 ) -> Repeated:
     """Run all variants, amplitudes and realizations, in this order, until they repeat."""
-    columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
+    columns = [windowed.model.Stimulus._fields.index(name) for name in sweep.inputs]
     n = len(shapes)
 
     def excited(which: NDArray[np.int64], first: int, last: int) -> Array:
@@ -175,40 +178,41 @@ def _repeated(
         return np.asarray(np.fft.rfft(window[:, :, 0], axis=1)[:, lines])
 
     return repeat(
-        own, np.repeat(cases.matrix, n, axis=1), excited, sweep.recorded, figures, sweep.tolerance,
-        min(sweep.most, MOST), starts=[one for one in cases.starts for _ in range(n)],
+        windowed, np.repeat(cases.matrix, n, axis=1), excited, sweep.recorded, figures,
+        sweep.tolerance, min(sweep.most, MOST),
+        starts=[start for start in cases.starts for _ in range(n)],
     )  # fmt: skip
 
 
 def _measured(
-    found: Repeated, shapes: Array, lines: list[int], shape: tuple[int, int, int], sizes: Array
+    repeated: Repeated, shapes: Array, lines: list[int], shape: tuple[int, int, int], sizes: Array
 ) -> dict[str, Array]:
     """Return the figures at the lines, shape (variants, amplitudes, lines) each."""
     U = sizes[:, None, None] * np.fft.rfft(shapes, axis=1)[:, lines]
-    windows = kept(found.figures, found.repeats)
+    windows = kept(repeated.figures, repeated.repeats)
     Y = windows.reshape(*shape, *windows.shape[1:])
     over = (2, 3)  # realizations and windows
     cross = np.ma.sum(Y * U[None, :, :, None].conj(), axis=over)
     put = np.ma.sum(np.abs(U[None, :, :, None]) ** 2 * ~np.ma.getmaskarray(Y), axis=over)
     power = np.ma.sum(np.abs(Y) ** 2, axis=over)
-    moves = (np.ptp(found.values[:, :, 0], axis=1) > 0).reshape(shape).any(axis=2)[:, :, None]
+    moves = (np.ptp(repeated.values[:, :, 0], axis=1) > 0).reshape(shape).any(axis=2)[:, :, None]
     with np.errstate(invalid="ignore", divide="ignore"):
         G = np.where(moves, np.ma.filled(cross / put, np.nan), np.nan)
         coherence = np.ma.filled(np.abs(cross) ** 2 / (put * power), np.nan)
-        _, scatter = spread_of(found.figures, found.repeats)
+        _, scatter = spread_of(repeated.figures, repeated.repeats)
         scattered = np.sqrt((scatter.reshape(*shape, -1) ** 2).mean(axis=2))
     return {
         "gain": np.abs(G),
         "phase": np.degrees(np.angle(G)),
-        "distortion": np.where(moves, _distortion(found, lines, shape), np.nan),
+        "distortion": np.where(moves, _distortion(repeated, lines, shape), np.nan),
         "coherence": np.where(moves, coherence, np.nan),
         "scatter": np.where(moves, scattered, np.nan),
     }
 
 
-def _distortion(found: Repeated, lines: list[int], shape: tuple[int, int, int]) -> Array:
+def _distortion(repeated: Repeated, lines: list[int], shape: tuple[int, int, int]) -> Array:
     """Return what is near each line but not excited, over what is at it, from the last window."""
-    power = np.abs(np.fft.rfft(found.values[:, :, 0], axis=1)[:, : lines[-1] + 1]) ** 2
+    power = np.abs(np.fft.rfft(repeated.values[:, :, 0], axis=1)[:, : lines[-1] + 1]) ** 2
     power = power.reshape(*shape, -1).mean(axis=2)
     at = power[:, :, lines]
     power[:, :, lines] = 0.0
@@ -219,13 +223,13 @@ def _distortion(found: Repeated, lines: list[int], shape: tuple[int, int, int]) 
 
 
 def _of_runs(
-    found: Repeated, shares: Mapping[str, Array], shape: tuple[int, int, int], lines: int
+    repeated: Repeated, shares: Mapping[str, Array], shape: tuple[int, int, int], lines: int
 ) -> dict[str, Array]:
     """Return what concerns whole runs: the worst of their realizations, means of the shares."""
     known = {
-        "windows": found.windows.reshape(shape).max(axis=2),
-        "settled": found.repeats.reshape(shape).min(axis=2),
-        "unsettled_substeps": found.unsettled.reshape(shape).sum(axis=2),
+        "windows": repeated.windows.reshape(shape).max(axis=2),
+        "settled": repeated.repeats.reshape(shape).min(axis=2),
+        "unsettled_substeps": repeated.unsettled.reshape(shape).sum(axis=2),
         **{name: share.reshape(shape).mean(axis=2) for name, share in shares.items()},
     }
     return {k: np.repeat(v.astype(float)[:, :, None], lines, axis=2) for k, v in known.items()}

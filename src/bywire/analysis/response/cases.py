@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.response.dataset import Sweep
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.simulation.engine import structure_of
 from bywire.simulation.run import Run
 from bywire.simulation.variations import case_matrix
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,12 +65,12 @@ def cases_of(run: Run, sweep: Sweep, points: Sequence[Run] | None) -> Cases:
         runs = [run] * matrix.shape[1]
     else:
         _require_alike(run, sweep, points)
-        matrix, runs = np.stack([_column(one) for one in points], axis=1), list(points)
+        matrix, runs = np.stack([_column(variant) for variant in points], axis=1), list(points)
     n = sizes.size
     return Cases(
         matrix=np.repeat(matrix, n, axis=1),
-        starts=[(one.state, one.memory) for one in runs for _ in range(n)],
-        rest=np.repeat(np.concatenate([one.stimulus(np.zeros(1)) for one in runs]), n, axis=0),
+        starts=[(variant.state, variant.memory) for variant in runs for _ in range(n)],
+        rest=np.repeat(np.concatenate([run.stimulus(np.zeros(1)) for run in runs]), n, axis=0),
         sizes=np.tile(sizes, len(runs)),
         shape=(len(runs), n),
     )
@@ -88,8 +86,8 @@ def _require_alike(run: Run, sweep: Sweep, points: Sequence[Run]) -> None:
     if not points:
         raise ParameterError("variants: give at least one operating point")
     structure, tasks = structure_of(run.model, run.par), run.model.tasks(run.par)
-    for k, one in enumerate(points):
-        if structure_of(one.model, one.par) != structure:
+    for k, variant in enumerate(points):
+        if structure_of(variant.model, variant.par) != structure:
             raise ParameterError(f"variant {k} is another model or makes another choice")
-        if [t.period for t in one.model.tasks(one.par)] != [t.period for t in tasks]:
+        if [t.period for t in variant.model.tasks(variant.par)] != [t.period for t in tasks]:
             raise ParameterError(f"variant {k} has other sample times: they cannot vary in a sweep")

@@ -66,7 +66,7 @@ class Sweep:
     @property
     def recorded(self) -> tuple[str, ...]:
         """Outputs that a run must record: the answer first, then flags, then what is limited."""
-        limited = [name for one in self.saturations for name in one.signals]
+        limited = [name for limit in self.saturations for name in limit.signals]
         return (self.output, *self.flags, *limited)
 
     def shares(self, values: Array, matrix: Array, names: Sequence[str]) -> dict[str, Array]:
@@ -81,12 +81,12 @@ class Sweep:
         """
         k = 1 + len(self.flags)
         means = values[:, :, 1:k].mean(axis=1)
-        found = {f"share_{name}": means[:, j] for j, name in enumerate(self.flags)}
-        for one in self.saturations:
-            own = values[:, :, k : k + len(one.signals)]
-            found[f"share_{one.name}"] = one.share(own, matrix, names)
-            k += len(one.signals)
-        return found
+        shares = {f"share_{name}": means[:, j] for j, name in enumerate(self.flags)}
+        for limit in self.saturations:
+            signals = values[:, :, k : k + len(limit.signals)]
+            shares[f"share_{limit.name}"] = limit.share(signals, matrix, names)
+            k += len(limit.signals)
+        return shares
 
 
 def as_dataset(
@@ -96,7 +96,7 @@ def as_dataset(
     stimuli, outputs = signals_of(run.model.Stimulus), signals_of(run.model.Output)
     ratio = f"({outputs[sweep.output].unit})/({stimuli[sweep.inputs[0]].unit})"
     units = {"phase": "degree", "gain": ratio}
-    stacked = {name: np.stack([one[name] for one in done], axis=2) for name in done[0]}
+    stacked = {name: np.stack([figures[name] for figures in done], axis=2) for name in done[0]}
     stacked["phase"] = _unwrapped(stacked["phase"])
     variables: dict[str, Any] = {
         name: (("variant", "amplitude", "frequency"), value, {"units": units.get(name, "1")})
@@ -116,11 +116,11 @@ def as_dataset(
 
 def _unwrapped(phase: Array) -> Array:
     """Return phases without jumps along frequency, gaps of what sticks left out."""
-    found = phase.copy()
+    unwrapped = phase.copy()
     for index in np.ndindex(phase.shape[:2]):
         known = np.isfinite(phase[index])
-        found[index][known] = np.unwrap(phase[index][known], period=360.0)
-    return found
+        unwrapped[index][known] = np.unwrap(phase[index][known], period=360.0)
+    return unwrapped
 
 
 def complex_values(response: xr.Dataset) -> Complex:

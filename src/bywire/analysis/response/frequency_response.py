@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
@@ -16,14 +16,12 @@ from numpy.typing import NDArray
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.response.cases import Cases, cases_of
 from bywire.analysis.response.dataset import Sweep, as_dataset
-from bywire.analysis.response.window import interval, require_measurable, sine_window
-from bywire.analysis.response.window_scatter import spread_of
+from bywire.analysis.response.window import interval, require_measurable, sine_window, spread_of
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex, Progress
 from bywire.simulation.repetition import Repeated, repeat
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 HARMONICS = 9
 """highest harmonic that counts as distortion"""
@@ -52,7 +50,7 @@ def require_stable(closed: LinearModel) -> None:
 def frequency_response(
     run: Run,
     sweep: Sweep,
-    progress: Callable[[str, float], None] | None = None,
+    progress: Progress | None = None,
     *,
     points: Sequence[Run] | None = None,
     lanes: bool = True,
@@ -80,7 +78,7 @@ def frequency_response(
         Dimensions ``variant``, ``amplitude``, ``frequency`` [Hz]; variables ``gain`` (output over
         input, SI), ``phase`` [degree], ``distortion`` (total harmonic, share), ``coherence``
         (share of the output's power, its mean left out, at the excited line), ``scatter`` (of the
-        complex amplitude, see ``window_scatter``), ``windows``, ``settled`` (0 or 1), and
+        complex amplitude, see `spread_of`), ``windows``, ``settled`` (0 or 1), and
         ``share_FLAG`` for every flag and saturation. Gain and phase are NaN where the output does
         not move at all: what sticks has no gain. Where it never repeats, they are means of the
         last windows.
@@ -103,17 +101,17 @@ def frequency_response(
 
     def measure(plan: tuple[float, int]) -> dict[str, Array]:
         window, periods = plan
-        own = replace(run, duration=window, record=interval(run))
-        found = _repeated(own, sweep, cases, periods, lanes, stop)
-        measured = _measured(found, cases.sizes, periods, least)
-        measured |= sweep.shares(found.values, cases.matrix, names)
+        windowed = replace(run, duration=window, record=interval(run))
+        repeated = _repeated(windowed, sweep, cases, periods, lanes, stop)
+        measured = _measured(repeated, cases.sizes, periods, least)
+        measured |= sweep.shares(repeated.values, cases.matrix, names)
         return {name: value.reshape(cases.shape) for name, value in measured.items()}
 
     done: list[dict[str, Array]] = []
     pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
     try:
-        for k, one in enumerate(pool.map(measure, plans)):
-            done.append(one)
+        for k, figures in enumerate(pool.map(measure, plans)):
+            done.append(figures)
             if progress is not None:
                 progress("frequency response", (k + 1) / len(plans))
     except KeyboardInterrupt:
@@ -125,12 +123,12 @@ def frequency_response(
 
 
 def _repeated(
-    own: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
+    windowed: Run, sweep: Sweep, cases: Cases, periods: int, lanes: bool, stop: threading.Event
 ) -> Repeated:
     """Run all amplitudes and variants at one frequency until they repeat."""
-    columns = [own.model.Stimulus._fields.index(name) for name in sweep.inputs]
-    schedule = own.schedule()
-    apart, f = schedule.stimulus_frames * schedule.frame, periods / own.duration
+    columns = [windowed.model.Stimulus._fields.index(name) for name in sweep.inputs]
+    schedule = windowed.schedule()
+    apart, f = schedule.stimulus_frames * schedule.frame, periods / windowed.duration
 
     def sines(which: NDArray[np.int64], first: int, last: int) -> Array:
         rows = np.repeat(cases.rest[which, None], last - first, axis=1)
@@ -138,36 +136,36 @@ def _repeated(
         rows[:, :, columns] += (cases.sizes[which, None] * wave)[:, :, None]
         return rows
 
-    rows = round(own.duration / own.record)
+    rows = round(windowed.duration / windowed.record)
     wave = 2j / rows * np.exp(-2j * math.pi * periods / rows * np.arange(rows))
 
-    def figures(window: Array) -> NDArray[np.complex128]:
+    def figures(window: Array) -> Complex:
         # A matrix product would start the threads of a linear algebra library within ours.
         return np.asarray(np.einsum("lr,r->l", window[:, :, 0], wave)[:, None])
 
     return repeat(
-        own, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
+        windowed, cases.matrix, sines, sweep.recorded, figures, sweep.tolerance, sweep.most,
         starts=cases.starts, lanes=lanes, stop=stop,
     )  # fmt: skip
 
 
-def _measured(found: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:
+def _measured(repeated: Repeated, sizes: Array, periods: int, least: float) -> dict[str, Array]:
     """Return the figures of all cases at one frequency, shape (cases,) each."""
-    outputs = found.values[:, :, 0]
+    outputs = repeated.values[:, :, 0]
     count = max(min(HARMONICS, outputs.shape[1] // (2 * periods)), 1)
     # The window holds whole periods: harmonics are lines of its Fourier transform.
     spectrum = np.fft.rfft(outputs, axis=1)[:, periods : count * periods + 1 : periods]
     lines = 2.0 / outputs.shape[1] * spectrum
     moves = np.ptp(outputs, axis=1) > least
     last = np.where(moves, np.abs(lines[:, 0]), np.nan)
-    value, scatter = (one[:, 0] for one in spread_of(found.figures, found.repeats))
+    value, scatter = (column[:, 0] for column in spread_of(repeated.figures, repeated.repeats))
     return {
         "gain": np.where(moves, np.abs(value), np.nan) / sizes,
         "phase": np.where(moves, np.degrees(np.angle(value)), np.nan),
         "distortion": np.sqrt(np.sum(np.abs(lines[:, 1:]) ** 2, axis=1)) / last,
         "coherence": 0.5 * last**2 / np.where(moves, np.var(outputs, axis=1), np.nan),
         "scatter": np.where(moves, scatter, np.nan),
-        "windows": found.windows.astype(float),
-        "settled": found.repeats.astype(float),
-        "unsettled_substeps": found.unsettled.astype(float),
+        "windows": repeated.windows.astype(float),
+        "settled": repeated.repeats.astype(float),
+        "unsettled_substeps": repeated.unsettled.astype(float),
     }

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Complex
 
 
-def amplitudes(t: Array, y: Array, f: float, count: int) -> NDArray[np.complex128]:
+def amplitudes(t: Array, y: Array, f: float, count: int) -> Complex:
     """Return the complex amplitudes of the first harmonics, sine phase.
 
     Parameters

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
@@ -23,6 +24,7 @@ from bywire.analysis.loop import Loop, Point
 from bywire.analysis.response.dataset import complex_values
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.signals import signals_of
 from bywire.core.typing import Array, Complex
 
 
@@ -56,7 +58,7 @@ class Variant:
         """Return the loop gain behind a measured closed response, both of shape (n,)."""
         T = self.linear(frequencies)
         L = self.loop.gain(self.par, self.value).response(frequencies)[:, 0, 0]
-        H = T * (1.0 + L) / L
+        H = T * (1.0 + L) / L  # the plant has dropped out: T = C_r P/(1 + L), L = C_y P
         return np.asarray(closed / (H - closed))
 
 
@@ -95,44 +97,76 @@ class Width:
     phase_margin: float
 
 
-def width(variant: Variant, one: xr.Dataset) -> Width:
+def width(variant: Variant, response: xr.Dataset) -> Width:
     """Return the figures of one variant and amplitude.
 
     Parameters
     ----------
     variant
         What was measured.
-    one
+    response
         Its response over ``frequency``; see ``frequency_response``.
     """
     start = float(np.abs(variant.linear(np.zeros(1))[0]))
-    values, f = complex_values(one), one["frequency"].values
-    bandwidth, known = fall(one["gain"].values, f, start), np.isfinite(values)
+    values, f = complex_values(response), response["frequency"].values
+    bandwidth, known = fall(response["gain"].values, f, start), np.isfinite(values)
     if not variant.loop.single or not known.any():
         return Width(bandwidth, math.nan, math.nan)
     margin = measured_margin(f[known], variant.gain(values[known], f[known]))
     return Width(bandwidth, margin.crossover, margin.phase)
 
 
-def widths(variants: Sequence[Variant], found: xr.Dataset) -> list[list[Width]]:
+def widths(variants: Sequence[Variant], response: xr.Dataset) -> list[list[Width]]:
     """Return the figures of every variant and, within it, amplitude."""
     return [
-        [width(one, found.isel(variant=k, amplitude=j)) for j in range(found.sizes["amplitude"])]
-        for k, one in enumerate(variants)
+        [width(variant, response.isel(variant=k, amplitude=j))
+         for j in range(response.sizes["amplitude"])]
+        for k, variant in enumerate(variants)
     ]
 
 
-def with_widths(found: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dataset:
+def with_widths(response: xr.Dataset, figures: Sequence[Sequence[Width]]) -> xr.Dataset:
     """Return a response with bandwidth, crossover and phase margin by variant and amplitude."""
     units = {"bandwidth": "Hz", "crossover": "Hz", "phase_margin": "degree"}
     rows = {
-        name: [[getattr(one, name) for one in row] for row in figures] for name in units
+        name: [[getattr(figure, name) for figure in row] for row in figures] for name in units
     }
-    return found.assign(
+    return response.assign(
         {name: (("variant", "amplitude"), rows[name], {"units": units[name]}) for name in units}
     )
 
 
-def narrowest(found: xr.Dataset, amplitude: int) -> int:
+def narrowest(response: xr.Dataset, amplitude: int) -> int:
     """Return the variant with the smallest bandwidth at an amplitude; the first of several."""
-    return int(np.argmin(found["bandwidth"].values[:, amplitude]))
+    return int(np.argmin(response["bandwidth"].values[:, amplitude]))
+
+
+if TYPE_CHECKING:
+    from bywire.analysis.loop import Loop
+    from bywire.core.parameters import ParameterSet
+
+
+def leaving(loop: Loop, par: ParameterSet, value: float, amplitude: float) -> str:
+    """Return why a sine around an operating point leaves the brake's range; empty where it stays.
+
+    Parameters
+    ----------
+    loop, par, value
+        The loop and its operating point.
+    amplitude
+        Of the sine [SI unit of the first input].
+
+    Notes
+    -----
+    Only set points of the quantity that the operating point is given by can be judged: both
+    ends of the sine are tried as operating points.
+    """
+    stimulus = loop.point(par, value).model.Stimulus
+    if signals_of(stimulus)[loop.inputs[0]].unit != loop.at.unit:
+        return ""
+    for end in (value - amplitude, value + amplitude):
+        try:
+            loop.point(par, end)
+        except ParameterError as error:
+            return str(error)
+    return ""

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _ROUNDING = 1e-12  # share of a limit by which a demand clipped to it may differ
 

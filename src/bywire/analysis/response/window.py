@@ -1,15 +1,21 @@
-"""Windows over which a periodic response is evaluated, and which requests can be measured."""
+"""Windows over which a periodic response is evaluated: how long, and how far they scatter."""
 
 from __future__ import annotations
 
 import itertools
 import math
 from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from bywire.analysis.response.dataset import Sweep
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array, Complex
 from bywire.core.units import shown
+from bywire.simulation.repetition import KEPT
 from bywire.simulation.run import Run
 
 _LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
@@ -101,4 +107,44 @@ def line_window(run: Run, sweep: Sweep) -> tuple[float, list[int]]:
     wanted = max(max(sweep.least, _LOWEST) / f[0], sweep.shortest, *(2.0 / step for step in apart))
     # Half a line more: rounded to lines, neighbors keep one between them.
     length = math.ceil(wanted * 1.25 / common) * common
-    return length, [math.floor(one * length + 0.5) for one in f]
+    return length, [math.floor(frequency * length + 0.5) for frequency in f]
+
+
+def kept(figures: Complex, settled: NDArray[np.bool_]) -> np.ma.MaskedArray[Any, Any]:
+    """Return the windows that count: the last two of what repeats, else all that are kept.
+
+    Parameters
+    ----------
+    figures
+        Complex amplitudes of the last windows, shape (cases, KEPT, lines); see
+        ``simulation.repetition``.
+    settled
+        Which cases repeat, shape (cases,).
+    """
+    old = np.arange(KEPT)[None] < np.where(settled, KEPT - 2, 0)[:, None]
+    return np.ma.array(figures, mask=np.isnan(figures) | old[:, :, None])
+
+
+def spread_of(
+    figures: Complex, settled: NDArray[np.bool_]
+) -> tuple[Complex, Array]:
+    """Return complex amplitudes and their scatter.
+
+    Parameters
+    ----------
+    figures, settled
+        As in `kept`.
+
+    Returns
+    -------
+    tuple
+        Amplitudes, shape (cases, lines): those of the last window where they repeat, else the
+        mean of the windows that count. Their scatter as a share of that: root mean square of the
+        windows' distance from their mean. A drift counts as scatter.
+    """
+    seen = kept(figures, settled)
+    mean = seen.mean(axis=1)
+    apart = np.sqrt((np.abs(seen - mean[:, None]) ** 2).mean(axis=1))
+    value = np.where(settled[:, None], figures[:, -1], np.ma.filled(mean, np.nan))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return value, np.asarray(np.ma.filled(apart, np.nan) / np.abs(value))

@@ -7,20 +7,13 @@ from typing import Annotated, Literal, NamedTuple
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.control import position_pd
 from bywire.core.model import Bounds
+from bywire.core.parts import Wired
 from bywire.core.signals import Signal
 from bywire.plant import axial_bearing, current_drive, roller_screw, servo_motor
 
 Par = WedgeParameters
-Rows = tuple[float, ...]
-
-
-class Side(NamedTuple):
-    """What belongs to one motor."""
-
-    drive: current_drive.State
-    motor: servo_motor.State
-    i_ref: Annotated[float, Signal("A", "current demand", 5.0)]
-    par: servo_motor.Parameters
+Drive = Wired[current_drive.State, current_drive.Input, None, current_drive.Parameters]
+Motor = Wired[servo_motor.State, servo_motor.Input, None, servo_motor.Parameters]
 
 
 class Command(NamedTuple):
@@ -39,56 +32,62 @@ class Demand(NamedTuple):
     i: Annotated[float, Signal("A", "demanded current", 5.0)]
 
 
-def drive_input(s: Side, on: float) -> current_drive.Input:
-    """Return what a drive sees; ``on`` is 1 while its power stage is on."""
-    emf = servo_motor.torque_constant(s.par) * s.motor.omega
-    return current_drive.Input(i_ref=s.i_ref, i=s.motor.i, emf=emf, on=on)
-
-
-def voltage(s: Side, on: float, par: Par) -> float:
-    """Return a motor's voltage [V]."""
-    return current_drive.output(s.drive, drive_input(s, on), par.drive).v
-
-
-def power(s: Side, on: float, par: Par) -> float:
-    """Return the electrical power into a motor [W]."""
-    return voltage(s, on, par) * s.motor.i
-
-
-def mass(motor: servo_motor.Parameters) -> Rows:
-    """Return the factors of the six derivatives: drive (3), winding, angle, speed."""
-    return (1.0, 1.0, 1.0, *servo_motor.mass(motor))
-
-
-def balance(s: Side, on: float, force: float, par: Par) -> Rows:
-    """Return the right-hand sides of the six equations, without dry friction.
+def wire(drive: Drive, motor: Motor, i_ref: float, on: float, force: float, par: Par) -> None:
+    """Connect one motor to its drive and its screw.
 
     Parameters
     ----------
+    i_ref
+        Current demand [A].
+    on
+        1 while the power stage is on.
     force
         Axial force on the screw [N], positive toward clamping.
     """
+    emf = servo_motor.torque_constant(motor.par) * motor.x.omega
+    drive.u = current_drive.Input(i_ref=i_ref, i=motor.x.i, emf=emf, on=on)
+    v = current_drive.output(drive.x, drive.u, drive.par).v
     load = roller_screw.load_torque(roller_screw.Input(force, 0.0), par.screw)
-    v = voltage(s, on, par)
-    rate = current_drive.rate(s.drive, drive_input(s, on), par.drive)
-    return (*rate, *servo_motor.balance(s.motor, servo_motor.Input(v, load, 0.0), s.par))
+    motor.u = servo_motor.Input(v, load, 0.0)
 
 
-def bounds(s: Side, force: float, par: Par) -> Bounds:
-    """Return the limits [N m] of the dry friction of bearings and screw on one shaft."""
-    bearing = bearing_friction(s, force, par)
-    screw = screw_friction(s, force, par)
+def power(motor: Motor) -> float:
+    """Return the electrical power into a motor [W]."""
+    return motor.u.v * motor.x.i
+
+
+def measured_power(drive: Drive, motor: Motor, i_ref: float, on: float) -> float:
+    """Return the electrical power into a motor [W], value-only: nothing feels its measurement."""
+    emf = servo_motor.torque_constant(motor.par) * motor.xe.omega
+    u = current_drive.Input(i_ref=i_ref, i=motor.xe.i, emf=emf, on=on)
+    return current_drive.output(drive.xe, u, drive.par).v * motor.xe.i
+
+
+def torque(motor: Motor) -> float:
+    """Return the electromagnetic torque of a motor [N m]."""
+    return servo_motor.torque_constant(motor.par) * motor.x.i
+
+
+def bounds(omega: float, torque: float, force: float, par: Par) -> Bounds:
+    """Return the limits [N m] of the dry friction of bearings and screw on one shaft.
+
+    Parameters
+    ----------
+    omega, torque, force
+        Speed of the shaft [rad/s], torque of its motor [N m], axial force on its screw [N].
+    """
+    bearing = bearing_friction(omega, force, par)
+    screw = screw_friction(torque, force, par)
     return (-(bearing + screw.T_p), bearing + screw.T_n)
 
 
-def bearing_friction(s: Side, force: float, par: Par) -> float:
+def bearing_friction(omega: float, force: float, par: Par) -> float:
     """Return the bearing's friction torque [N m]."""
-    return axial_bearing.friction(axial_bearing.Input(force, s.motor.omega), par.bearing)
+    return axial_bearing.friction(axial_bearing.Input(force, omega), par.bearing)
 
 
-def screw_friction(s: Side, force: float, par: Par) -> roller_screw.Output:
+def screw_friction(torque: float, force: float, par: Par) -> roller_screw.Output:
     """Return the screw's friction torques [N m] in both directions."""
-    torque = servo_motor.torque_constant(s.par) * s.motor.i
     return roller_screw.friction(roller_screw.Input(force, torque), par.screw)
 
 

@@ -8,7 +8,6 @@ from typing import Any, cast
 
 import numpy as np
 
-from bywire.analysis.linear.channels import with_channels
 from bywire.analysis.linear.equilibrium import equilibrium
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import Friction, linearize
@@ -18,7 +17,6 @@ from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.plant import State
 from bywire.brakes.wedge.start import memory_at, state_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
@@ -56,34 +54,34 @@ def point(par: Par, F_N: float, speed: float = 0.0) -> Point:
         When the force is not positive, the travel is beyond the end stop, the currents are
         beyond the drives' limit, or there is no equilibrium.
     """
-    own = par.replace({**SMOOTH, "command.mode": "current"})
-    x = travel_for(F_N, own)
+    smooth = par.replace({**SMOOTH, "command.mode": "current"})
+    x = travel_for(F_N, smooth)
     if not F_N > 0.0:
         raise ParameterError(f"normal force = {F_N:g} N is no operating point: it must be > 0 N")
-    if not x < own.wedge.x_stop:
+    if not x < smooth.wedge.x_stop:
         raise ParameterError(
             f"normal force = {F_N:g} N needs {x * 1e3:.3g} mm of wedge travel: it must be below "
-            f"wedge.x_stop = {own.wedge.x_stop * 1e3:g} mm; ask for less"
+            f"wedge.x_stop = {smooth.wedge.x_stop * 1e3:g} mm; ask for less"
         )
-    turning = -1.0 if own.flywheel.Omega_0 < 0.0 else 1.0
+    turning = -1.0 if smooth.flywheel.Omega_0 < 0.0 else 1.0
     # Beyond the limit the drives do not answer: the search is for what would be needed.
-    free = own.replace({"drive.i_max": _FREE * own.drive.i_max})
+    free = smooth.replace({"drive.i_max": _FREE * smooth.drive.i_max})
     state, memory = equilibrium(
-        WedgeBrake(), free, state_at(turning * x, own), memory_at(turning * x, own),
+        WedgeBrake(), free, state_at(turning * x, smooth), memory_at(turning * x, smooth),
         given=("x",), inputs=INPUTS, running=("Omega", "phi"),
         tied=("theta_1", "theta_2"),
     )  # fmt: skip
     most = max(abs(getattr(memory, name)) for name in INPUTS)
-    if most > own.drive.i_max:
+    if most > smooth.drive.i_max:
         raise ParameterError(
             f"normal force = {F_N:g} N needs {most:.3g} A in a motor even without friction: "
-            f"drive.i_max = {own.drive.i_max:g} A; ask for less"
+            f"drive.i_max = {smooth.drive.i_max:g} A; ask for less"
         )
     moving = turning * speed
     state = state._replace(
-        omega_1=moving, omega_2=moving, v=moving * roller_screw.slope(own.screw)
+        omega_1=moving, omega_2=moving, v=moving * roller_screw.slope(smooth.screw)
     )  # fmt: skip
-    return Point(WedgeBrake(), own, state, memory, zeros(Stimulus))
+    return Point(WedgeBrake(), smooth, state, memory, zeros(Stimulus))
 
 
 def force_for_current(i: float, par: Par) -> float:
@@ -125,7 +123,7 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
     """
     at = point(par, F_N, speed)
     kinds: dict[str, Friction] = dict.fromkeys(WedgeBrake.frictions, friction)
-    if cast(State, at.state).Omega != 0.0 and friction == "stuck":
+    if cast(Any, at.state).Omega != 0.0 and friction == "stuck":
         kinds["Omega"] = "sliding"
     return linearize(
         at.model, at.par, at.state, at.memory,
@@ -150,9 +148,9 @@ def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:
         States `MECHANICAL`, outputs `OUTPUTS`; the disc keeps its speed.
     """
     kept = tuple(name for name in whole.states if name not in (*_RECORDING, "Omega", "y_M"))
-    own = with_channels(whole, outputs=OUTPUTS).reduced(kept, held=True)
-    found = residualized(own, MECHANICAL, corrected=corrected)
-    return replace(found, name="wedge, mechanical")
+    moving = whole.channels(outputs=OUTPUTS).reduced(kept, held=True)
+    slow = residualized(moving, MECHANICAL, corrected=corrected)
+    return replace(slow, name="wedge, mechanical")
 
 
 def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
@@ -188,7 +186,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
     split = np.zeros((2, 6))
     for row, columns in ((0, [0, 2, 4]), (1, [1, 3, 5])):
         split[row, columns] = T[columns, row] * np.array(masses)[columns]
-    left = np.linalg.solve(split @ T, split)
+    left = np.linalg.solve(split @ T, split)  # inverse of T weighted by the masses
     return replace(
         mechanical, name="wedge, rigid",
         A=left @ mechanical.A @ T, B=left @ mechanical.B, C=mechanical.C @ T,

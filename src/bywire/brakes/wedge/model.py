@@ -6,35 +6,179 @@ Mechatronic Wedge Brake", SAE, 2003.
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
-from bywire.brakes.wedge import control, drive_train, energy, plant
-from bywire.brakes.wedge import output as recording
+from bywire.brakes.wedge import control, drive_train
 from bywire.brakes.wedge import watch as warnings
-from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper
+from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.core.model import Bounds, Matrix, Model, Task
-from bywire.plant import drive_supply, end_stop, flywheel, moment_sensor, shaft_encoder
+from bywire.core import ops
+from bywire.core.assembly import Assembly
+from bywire.core.model import Bounds, Task
+from bywire.core.parts import Integral, Part, Shown, Wire
+from bywire.core.signals import Role
+from bywire.plant import (
+    current_drive,
+    drive_supply,
+    end_stop,
+    flywheel,
+    moment_sensor,
+    roller_screw,
+    servo_motor,
+    shaft_encoder,
+)
 
 Par = WedgeParameters
+LOSSES = {"E_copper": "copper_loss", "E_damping": "damping_loss"}
+"""energies that the motors lose, both together"""
+_SUPPLY = Role("source", "supply", whole="W_electric", rest="E_standby",
+               rest_label="standby of the drives")  # fmt: skip
+_DISC = Role("source", "disc", whole="W_disc", rest="E_pads", rest_label="heat of pads and disc",
+             book="with disc")  # fmt: skip
 
 
-class WedgeBrake(Model):
-    """Model of the brake for the engine; see ``bywire.core.model.Model``.
+class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
+    """Model of the brake.
 
     Four dry frictions: both shafts (bearings and screw), the wedge, the pads on the disc. Six
     contacts: three coupled ones in the heart, the caliper, two end stops of the wedge.
     """
 
     name: ClassVar[str] = "wedge-brake"
-    State: ClassVar = plant.State
     Memory: ClassVar = control.Memory
     Stimulus: ClassVar = control.Stimulus
-    Flow: ClassVar = energy.Flow
-    Output: ClassVar = recording.Output
     frictions: ClassVar[tuple[str, ...]] = ("omega_1", "omega_2", "v", "Omega")
-    limits: ClassVar[tuple[str, ...]] = ()
-    usually_open: ClassVar[tuple[bool, ...]] = (False, False, True, True)
+
+    W_supply = Integral("J", "energy at the drives' input, standby included", role=_SUPPLY)
+    W_electric = Integral(
+        "J", "electrical energy into the motors", role=Role("source", "electrical")
+    )
+    W_disc = Integral("J", "work of the disc on the wedge", role=Role("source", "disc on wedge"))
+    W_runout = Integral("J", "work of the run-out on the caliper", role=Role("source", "run-out"))
+    W_brake = Integral("J", "energy taken from the disc", role=_DISC)
+    drive_1 = Part(current_drive, par="drive", suffix="_1")
+    motor_1 = Part(servo_motor, suffix="_1", fixed=("theta",), loss=LOSSES)
+    drive_2 = Part(current_drive, par="drive", suffix="_2")
+    motor_2 = Part(servo_motor, suffix="_2", fixed=("theta",), loss=LOSSES)
+    E_shaft = Integral(
+        "J", "friction of bearings and screws", role=Role("sink", "bearings and screws")
+    )
+    E_wedge = Integral("J", "friction on the wedge", role=Role("sink", "friction on the wedge"))
+    heart = Part(brake_heart, output=("f_1", "f_2", "f_12", "F_M"), work="W_heart", loss="E_heart")
+    body = Part(wedge, par="wedge")
+    caliper = Part(wedge_caliper, output=("F_N",), work="W_caliper", loss="E_caliper")
+    stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
+    t_stuck = Integral("s", "time in which shafts and wedge stick", role=Role("standstill"))
+    disc = Part(flywheel, par="flywheel", outside=True)
+    moment_sensor = Part(moment_sensor, state={"M": "y_M"})
+    supply = Part(drive_supply, state={"P": "y_P"})
+
+    F_1 = Wire("N", "axial force on screw 1", 400.0)
+    F_2 = Wire("N", "axial force on screw 2", 400.0)
+    squeeze = Wire("N", "sum of the forces on the wedge", 800.0)
+    turning = Wire("1", "direction of the disc")
+    M_B = Wire("N*m", "braking moment", 300.0)
+    voltage_1 = Shown("V", "motor voltage 1", 10.0)
+    voltage_2 = Shown("V", "motor voltage 2", 10.0)
+    F_end = Shown("N", "load of the end stops", 100.0)
+    T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
+    T_fr_2 = Shown("N*m", "friction torque 2", 0.1)
+    F_fr = Shown("N", "friction on the wedge", 50.0)
+    contacts = Shown("1", "contacts of the heart: 1, 2, 4 added", 4.0)
+    stuck = Shown("1", "shafts and wedge stuck")
+    P_in = Shown("W", "power at the drives' input", 50.0)
+    P_meas = Shown("W", "power at the drives' input, filtered", 50.0)
+    E_source = Shown("J", "energy in: electrical, disc on wedge, run-out")
+    U_caliper = Shown("J", "energy of the caliper")
+
+    records: ClassVar[tuple[str, ...]] = (
+        "M_set", "M_B", "y_M", "mode", "rate", "sat_rate", "theta_c", "theta_ref", "theta_1_ref",
+        "theta_2_ref", "theta_1", "theta_2", "omega_1", "omega_2", "i_1_ref", "i_2_ref", "i_1",
+        "i_2", "voltage_1", "voltage_2", "x", "v", "f_1", "f_2", "f_12", "F_M", "F_N", "F_end",
+        "T_fr_1", "T_fr_2", "F_fr", "Omega", "phi", "contacts", "stuck", "P_in", "P_meas",
+        "E_source", "E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart", "E_caliper",
+        "E_stop", "E_stored", "U_caliper", "W_supply", "W_electric", "W_disc", "W_runout",
+        "W_brake", "t_stuck",
+    )  # fmt: skip
+
+    def wire(self, w: Self) -> None:
+        """Say what every part feels: forces of the contacts, shafts, wedge, disc, measurements."""
+        par, forces = w.par, brake_heart.output(w.heart.f)
+        w.F_1, w.F_2, w.squeeze = forces.F_1, forces.F_2, forces.squeeze
+        w.turning = flywheel.turning(w.disc.xe, par.flywheel)
+        w.M_B = wedge_caliper.moment(w.caliper.f.F_N, par.wedge.mu_B, w.turning, par.caliper)
+        for drive, motor, i_ref, force in (
+            (w.drive_1, w.motor_1, w.m.i_1_ref, w.F_1), (w.drive_2, w.motor_2, w.m.i_2_ref, w.F_2)
+        ):  # fmt: skip
+            drive_train.wire(drive, motor, i_ref, w.m.on, force, par)
+        side, x, k = wedge.side(w.body.xe), w.body.x, roller_screw.slope(par.screw)
+        F_stop = end_stop.load(w.stop.f)
+        w.body.u = wedge.Input(forces.F_M, w.caliper.f.F_N, F_stop, 0.0, side, w.turning)
+        left, right = w.motor_1.x, w.motor_2.x
+        w.heart.u = brake_heart.Input(
+            k * left.theta, k * right.theta, x.x, k * left.omega, k * right.omega, x.v
+        )
+        w.caliper.u = wedge_caliper.Input(
+            x=x.x,
+            v=x.v,
+            side=side,
+            tan_alpha=wedge.slope(par.wedge),
+            runout=flywheel.runout(w.disc.xe, par.flywheel),
+            runout_rate=flywheel.runout_rate(w.disc.xe, par.flywheel),
+        )
+        w.stop.u = end_stop.Input(x.x, x.v, -par.wedge.x_stop, par.wedge.x_stop)
+        w.disc.u = flywheel.Input(0.0)
+        w.moment_sensor.u = moment_sensor.Input(w.M_B)
+        w.supply.u = drive_supply.Input(
+            drive_train.measured_power(w.drive_1, w.motor_1, w.m.i_1_ref, w.m.on)
+            + drive_train.measured_power(w.drive_2, w.motor_2, w.m.i_2_ref, w.m.on)
+        )
+
+    def friction(self, w: Self) -> tuple[Bounds, ...]:
+        """Return the limits of the frictions on both shafts, on the wedge and on the disc."""
+        par = w.par
+        shafts = (
+            drive_train.bounds(motor.x.omega, drive_train.torque(motor), force, par)
+            for motor, force in ((w.motor_1, w.F_1), (w.motor_2, w.F_2))
+        )
+        F_N, mu_B = w.caliper.f.F_N, par.wedge.mu_B
+        pressed = wedge_friction.Input(w.squeeze, F_N, wedge.slope(par.wedge), mu_B, w.turning)
+        sliding = wedge_friction.friction(pressed, par.wedge_friction)
+        moment = wedge_caliper.moment(F_N, mu_B, 1.0, par.caliper)
+        return (*shafts, (-sliding, sliding), (-moment, moment))
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return what crosses the border, and what the dry frictions take."""
+        friction_1, friction_2, friction, moment = w.reaction
+        motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
+        return {
+            "W_supply": drive_supply.power(motors, w.supply.par),
+            "W_electric": motors,
+            "W_disc": wedge.pad_power(w.body.x, w.body.u, w.body.par),
+            "W_runout": w.caliper.f.F_N * w.caliper.u.runout_rate,
+            "W_brake": -moment * w.disc.x.Omega,
+            "E_shaft": -(friction_1 * w.motor_1.x.omega + friction_2 * w.motor_2.x.omega),
+            "E_wedge": -friction * w.body.x.v,
+            "t_stuck": _stuck(w),
+        }
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return what is recorded beside states, wires and losses."""
+        motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
+        return {
+            "voltage_1": w.motor_1.u.v,
+            "voltage_2": w.motor_2.u.v,
+            "T_fr_1": -w.reaction[0],
+            "T_fr_2": -w.reaction[1],
+            "F_fr": -w.reaction[2],
+            "F_end": end_stop.load(w.stop.f),
+            "contacts": _contact_number(w.heart.f),
+            "stuck": _stuck(w),
+            "P_in": drive_supply.power(motors, w.supply.par),
+            "P_meas": w.supply.x.P,
+            "E_source": w.flow.W_electric + w.flow.W_disc + w.flow.W_runout,
+            "U_caliper": wedge_caliper.energy(w.caliper.u, w.caliper.par),
+        }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the controllers, the outer one first."""
@@ -46,115 +190,36 @@ class WedgeBrake(Model):
             return (position,)
         return (Task("moment", T.T_slow, self._moment), position)
 
-    def _moment(
-        self, x: plant.State, m: control.Memory, u: control.Stimulus, par: Par
-    ) -> control.Memory:
+    def _moment(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.moment_tick(_readings(x, par), m, u, par)
 
-    def _position(
-        self, x: plant.State, m: control.Memory, u: control.Stimulus, par: Par
-    ) -> control.Memory:
+    def _position(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.position_tick(_readings(x, par), m, u, par)
 
-    def _current(
-        self, x: plant.State, m: control.Memory, u: control.Stimulus, par: Par
-    ) -> control.Memory:
+    def _current(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.current_tick(m, u)
-
-    def mass(self, xe: plant.State, par: Par) -> plant.State:
-        """Return inductances, inertias and masses."""
-        rows: list[float] = []
-        for motor in (par.motor_1, par.motor_2):
-            rows += drive_train.mass(motor)
-        body, disc = wedge.mass(par.wedge), flywheel.mass(par.flywheel)
-        return plant.State._make((*rows, *body, *disc, 1.0, 1.0))
-
-    def balance(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        m: control.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-    ) -> plant.State:
-        """Return voltages, torques, forces, and the filters' rates."""
-        w = plant.wires(xe, par, contact)
-        rows: list[float] = []
-        for s, force in zip(plant.sides(x, xe, m, par), (w.F_1, w.F_2), strict=True):
-            rows += drive_train.balance(s, m.on, force, par)
-        body = wedge.balance(wedge.State(x.x, x.v), plant.wedge_input(w, 0.0), par.wedge)
-        disc = flywheel.balance(flywheel.State(x.Omega, x.phi), flywheel.Input(0.0), par.flywheel)
-        # Value-only: the brake does not feel the measurement of its power.
-        power = drive_supply.Input(plant.motor_power(xe, m, par))
-        sensor = moment_sensor.State(x.y_M)
-        moment = moment_sensor.rate(sensor, moment_sensor.Input(w.M_B), par.moment_sensor)
-        shown = drive_supply.rate(drive_supply.State(x.y_P), power, par.supply)
-        return plant.State._make((*rows, *body, *disc, *moment, *shown))
-
-    def bounds(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        m: control.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-    ) -> tuple[Bounds, ...]:
-        """Return the limits of the frictions on both shafts, on the wedge and on the disc."""
-        w = plant.wires(xe, par, contact)
-        found: list[Bounds] = []
-        for s, force in zip(plant.sides(x, xe, m, par), (w.F_1, w.F_2), strict=True):
-            found.append(drive_train.bounds(s, force, par))
-        sliding = plant.wedge_bound(w, par)
-        moment = wedge_caliper.moment(w.F_N, par.wedge.mu_B, 1.0, par.caliper)
-        return (*found, (-sliding, sliding), (-moment, moment))
-
-    def compliance(self, par: Par) -> tuple[Matrix, ...]:
-        """Return the compliances: coupled ones of the heart, the caliper, the end stops."""
-        stop = end_stop.compliance(par.stop)
-        caliper = wedge_caliper.compliance(par.caliper)
-        return (brake_heart.matrix(par.heart), ((caliper,),), ((stop,),), ((stop,),))
-
-    def gap(self, x: plant.State, xe: plant.State, par: Par) -> tuple[tuple[float, ...], ...]:
-        """Return the damped overlaps of all contacts."""
-        heart = brake_heart.overlaps(plant.heart_input(x, par), par.heart)
-        caliper = wedge_caliper.overlap(plant.caliper_input(x, xe, par), par.caliper)
-        stop = end_stop.overlaps(plant.stop_input(x, par), par.stop)
-        return (tuple(heart), (caliper,), (stop.near,), (stop.far,))
-
-    def powers(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        rate: plant.State,
-        m: control.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-    ) -> energy.Flow:
-        """Return the powers for the energy balance."""
-        return energy.rates(x, xe, m, par, contact, reaction)
-
-    def output(
-        self,
-        x: plant.State,
-        m: control.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-        flow: energy.Flow,
-    ) -> recording.Output:
-        """Return what is recorded at an instant."""
-        return recording.instant(x, m, par, contact, reaction, flow)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the user should know of a recording."""
-        return warnings.watch(recording, par)
+        return warnings.watch(recording, par) + super().watch(recording, par)
 
 
-def _readings(x: plant.State, par: Par) -> control.Readings:
+def _readings(x: Any, par: Par) -> control.Readings:
     return control.Readings(
         theta_1=shaft_encoder.reading(x.theta_1, par.encoder),
         theta_2=shaft_encoder.reading(x.theta_2, par.encoder),
         M=x.y_M,
         Omega=x.Omega,
     )
+
+
+def _stuck(w: WedgeBrake) -> float:
+    """Return 1 where shafts and wedge stand still, else 0."""
+    shafts = ops.fabs(w.motor_1.x.omega) + ops.fabs(w.motor_2.x.omega)
+    return ops.where(shafts == 0, 1.0, 0.0) * ops.where(w.body.x.v == 0, 1.0, 0.0)
+
+
+def _contact_number(forces: brake_heart.Forces) -> float:
+    bits = (1.0, 2.0, 4.0)
+    closed = (bit * ops.where(f > 0, 1.0, 0.0) for bit, f in zip(bits, forces, strict=True))
+    return sum(closed, 0.0)

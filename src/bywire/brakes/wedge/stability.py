@@ -71,11 +71,11 @@ def brake(
     known
         Whether the moment controller knows the friction coefficient too.
     """
-    own = redesigned(par, tan_alpha, par.screw.lead)
-    slope = own.control.moment.slope_hat
+    redesign = redesigned(par, tan_alpha, par.screw.lead)
+    slope = redesign.control.moment.slope_hat
     if known:
         slope *= mu_B / par.wedge.mu_B
-    return own.replace({"wedge.mu_B": mu_B, "control.moment.slope_hat": slope})
+    return redesign.replace({"wedge.mu_B": mu_B, "control.moment.slope_hat": slope})
 
 
 def motion(par: WedgeParameters, F_N: float) -> Motion:
@@ -91,6 +91,7 @@ def motion(par: WedgeParameters, F_N: float) -> Motion:
     acting = np.abs(whole.A).max(axis=0) > _FREE * np.abs(whole.A).max()
     bound = whole.reduced([n for n, acts in zip(whole.states, acting, strict=True) if acts],
                           held=True)  # fmt: skip
+    # The one that grows fastest; rounded, so that of a pair the upper one is taken every time.
     slow = max(bound.poles(), key=lambda s: (round(s.real, 9), s.imag))
     locked = whole.reduced(("x", "v"), held=True).poles()
     return Motion(
@@ -159,5 +160,5 @@ def moment_borders(
     InputError
         When an operating point does not exist.
     """
-    values = [float(one) for one in np.geomspace(*between, count)]
+    values = [float(value) for value in np.geomspace(*between, count)]
     return locus(LOOP, par, moment, "wedge.mu_B", "1", values).borders

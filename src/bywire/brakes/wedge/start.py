@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from bywire.brakes.wedge.control import Memory
 from bywire.brakes.wedge.elements import wedge, wedge_caliper
 from bywire.brakes.wedge.laws import screw_offset
+from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.plant import State
 from bywire.core.signals import zeros
-from bywire.plant import roller_screw
+from bywire.plant import drive_supply, flywheel, roller_screw, servo_motor
 
 Par = WedgeParameters
 
@@ -28,16 +30,16 @@ def contact_angle(par: Par) -> float:
     return travel_for(0.0, par) / roller_screw.slope(par.screw)
 
 
-def state_at(x: float, par: Par) -> State:
+def state_at(x: float, par: Par) -> Any:
     """Return the state at rest with the wedge at a travel [m], both screws offset from it."""
     k = roller_screw.slope(par.screw)
     apart = par.control.offset.delta_preload / k
-    return zeros(State)._replace(
-        theta_1=x / k - apart,
-        theta_2=x / k + apart,
-        x=x,
-        Omega=par.flywheel.Omega_0,
-        y_P=par.supply.P_standby,
+    return WedgeBrake.state(
+        motor_1=servo_motor.State(i=0.0, theta=x / k - apart, omega=0.0),
+        motor_2=servo_motor.State(i=0.0, theta=x / k + apart, omega=0.0),
+        body=wedge.State(x=x, v=0.0),
+        disc=flywheel.State(Omega=par.flywheel.Omega_0, phi=0.0),
+        supply=drive_supply.State(par.supply.P_standby),
     )
 
 

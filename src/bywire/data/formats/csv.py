@@ -15,9 +15,8 @@ from numpy.typing import NDArray
 from bywire.core.errors import FileError
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
 from bywire.data.growing_columns import GrowingColumns
-from bywire.data.text_dialect import HEAD, Dialect, dialect_of
-from bywire.data.text_end import LOOKED_AT, require_whole_end
-from bywire.data.text_rows import strict_columns
+from bywire.data.text_dialect import HEAD, Dialect, dialect_of, with_mark
+from bywire.data.text_rows import LOOKED_AT, require_whole_end, strict_columns
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -44,13 +43,14 @@ class TextSource:
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns; blank cells become NaN."""
         indices = [self._index[name] for name in names]
+        dialect = with_mark(self._path, self._dialect, indices)
         size = self._path.stat().st_size
         found = GrowingColumns(len(names), 0)
         line, done, tail = self._dialect.first_line, self._dialect.start, b""
         for block in _blocks(self._path, self._dialect.start):
-            columns = _fast(block, self._dialect, indices)
+            columns = _fast(block, dialect, indices)
             if columns is None:
-                columns = strict_columns(self._path, block, line, self._dialect, indices)
+                columns = strict_columns(self._path, block, line, dialect, indices)
             done += len(block)
             if not found.rows:  # as many rows as bytes promise, and a hundredth more
                 expected = 1.01 * len(columns[0]) * (size - self._dialect.start) / len(block)
@@ -58,7 +58,7 @@ class TextSource:
             found.append(columns)
             line += block.count(b"\n")
             tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
-            require_whole_end(self._path, tail, line, self._dialect)
+            require_whole_end(self._path, tail, line, dialect)
             progress(f"reading {self._path.name}", done / max(size, 1))
         return dict(zip(names, found.finished(), strict=True))
 

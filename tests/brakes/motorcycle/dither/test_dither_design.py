@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from bywire.brakes.motorcycle.dither.choice import best_of, candidates, crossing, least
-from bywire.brakes.motorcycle.dither.ramp import area_ratios
 from bywire.brakes.motorcycle.dither.reach import (
     admissible_frequencies,
     attenuation,
@@ -18,7 +17,7 @@ from bywire.brakes.motorcycle.dither.reach import (
     reach,
     waveform,
 )
-from bywire.brakes.motorcycle.dither.trial import Trial, tried
+from bywire.brakes.motorcycle.dither.trial import Trial, area_ratios, tried
 from bywire.brakes.motorcycle.studies import dither
 from bywire.control.dither import breakaway_current
 from bywire.core.catalog import PARAMETER_SETS

@@ -16,7 +16,6 @@ from bywire.brakes.wedge import control as wedge_control
 from bywire.brakes.wedge.control import Memory, Readings, Stimulus
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.plant import State
 from bywire.brakes.wedge.series import FRICTIONLESS
 from bywire.simulation.run import simulate
 
@@ -178,7 +177,7 @@ def test_held_wedge_is_in_balance(results, reading):
 class SensorTrusted(WedgeBrake):
     """A brake whose moment control believes that the disc turns for ever."""
 
-    def _moment(self, x: State, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
+    def _moment(self, x, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
         seen = Readings(x.theta_1, x.theta_2, M=x.y_M, Omega=60.0)
         return wedge_control.moment_tick(seen, m, u, par)
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bywire.analysis.loop import LOOPS
-from bywire.brakes.wedge.rigs import screw_rig_plant as plant
+from bywire.brakes.wedge.rigs.screw_rig import screws_compliance
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
@@ -30,7 +30,8 @@ def test_slowly_shaken_the_force_is_that_of_three_springs_in_a_row():
     """Both controllers give way as springs; so does the line between them."""
     loop, par = LOOPS.find("force-against"), parameters("roberts2003")
     k, own = roller_screw.slope(par.screw), loop.point(par, 0.0).par
-    line = force_sensor.stiffness(plant.line(zeros(plant.State), own), own.rig.sensor) * k**2
+    rest = zeros(force_sensor.Input)._replace(c=screws_compliance(own))
+    line = force_sensor.stiffness(rest, own.rig.sensor) * k**2
     control = own.control.position
     motor = own.motor_1.K_ref * (2.0 * np.pi * control.f_n) ** 2 * control.J_hat / control.K_hat
     expected = 1.0 / (1.0 / line + 2.0 / motor) / k

@@ -9,7 +9,7 @@ import xarray as xr
 from bywire.bench.experiment import Case
 from bywire.brakes.wedge.experiments import load_sweep, run_down
 from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed
-from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft, Load, Motion
+from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft, Load
 from bywire.core.catalog import parameters
 from bywire.identification.output_error import trial
 from bywire.simulation.run import simulate
@@ -22,7 +22,7 @@ def moved(case: Case, own: xr.Dataset, step: float) -> np.ndarray:
     first = own.isel(time=0)
     one = trial(
         DrivenShaft(), case.par, own, {"i": "i", "F": "F"}, {"theta": 1.0}, step=step,
-        state=Motion(float(first["theta"]), float(first["omega"])),
+        state=DrivenShaft.State(float(first["theta"]), float(first["omega"])),
         memory=Load(float(first["i"]), float(first["F"])),
     )  # fmt: skip
     return simulate(one.run, ("theta",))["theta"]
@@ -65,6 +65,6 @@ def test_under_the_force_of_the_other_screw() -> None:
 @pytest.mark.parametrize("load", ["dummy", "screw"])
 def test_the_dummy_shaft_counts_where_it_is_mounted(load: str) -> None:
     par = parameters("roberts2003").replace({"rig.load": load})
-    J = DrivenShaft().mass(Motion(0.0, 0.0), par).omega
+    J = DrivenShaft().mass(DrivenShaft.State(0.0, 0.0), par).omega
     more = par.rig.J_dummy if load == "dummy" else 0.0
     assert pytest.approx(par.motor_1.J_M + more) == J

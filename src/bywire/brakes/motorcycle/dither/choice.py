@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
+
 Figures = Mapping[str, Array]
 
 OVERCOMES = ("stuck", "band")
@@ -73,9 +73,9 @@ def at_gain(
     gains: Array, figures: Figures, limits: Mapping[str, float], gain: float, binding: str
 ) -> Least:
     """Return the figures at a gain within the grid, linear between its points."""
-    found = {name: float(np.interp(gain, gains, values)) for name, values in figures.items()}
-    exceeded = tuple(name for name in COSTS if found[name] > limits[name])
-    return Least(gain, binding, exceeded, found)
+    at = {name: float(np.interp(gain, gains, values)) for name, values in figures.items()}
+    exceeded = tuple(name for name in COSTS if at[name] > limits[name])
+    return Least(gain, binding, exceeded, at)
 
 
 def crossing(gains: Array, values: Array, limit: float) -> float:
@@ -144,15 +144,20 @@ def candidates(
     """
     count = next(iter(figures[0].values())).shape[1]
     return [
-        _candidate(gains, [{name: values[:, k] for name, values in one.items()} for one in figures],
-                   limits) for k in range(count)
-    ]  # fmt: skip
+        _candidate(gains, [_column(at_pressure, k) for at_pressure in figures], limits)
+        for k in range(count)
+    ]
 
 
-def best_of(found: Sequence[Candidate]) -> int | None:
+def _column(figures: Figures, k: int) -> Figures:
+    """Return the figures of a frequency, shape (gains,) each."""
+    return {name: values[:, k] for name, values in figures.items()}
+
+
+def best_of(candidates: Sequence[Candidate]) -> int | None:
     """Return which candidate costs least; None where none is admissible."""
-    admissible = [k for k, one in enumerate(found) if not one.verdict]
-    return min(admissible, key=lambda k: found[k].price, default=None)
+    admissible = [k for k, candidate in enumerate(candidates) if not candidate.verdict]
+    return min(admissible, key=lambda k: candidates[k].price, default=None)
 
 
 def _candidate(
@@ -166,7 +171,7 @@ def _candidate(
     there = [at_gain(gains, column, limits, gain, binding) for column in columns]
     return Candidate(
         gain, n, binding,
-        price=float(np.mean([one.figures["copper"] for one in there])),
-        ripple=max(one.figures["ripple_caliper"] for one in there),
-        exceeded=tuple(sorted({name for one in there for name in one.exceeded})),
+        price=float(np.mean([at_pressure.figures["copper"] for at_pressure in there])),
+        ripple=max(at_pressure.figures["ripple_caliper"] for at_pressure in there),
+        exceeded=tuple(sorted({name for at_pressure in there for name in at_pressure.exceeded})),
     )  # fmt: skip

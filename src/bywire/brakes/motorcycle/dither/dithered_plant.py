@@ -70,16 +70,17 @@ def dithered_plant(par: Par, p: float, step: float | None = None) -> DitheredPla
         When no motion repeats itself, or none has this mean pressure: where the dither leaves
         the piston stuck, pressure does not follow the current.
     """
-    own = par.replace({"drive.mode": "current", "adc.law": "ideal"})
-    dither = own.ecu.dither
+    driven = par.replace({"drive.mode": "current", "adc.law": "ideal"})
+    dither = driven.ecu.dither
     whole = () if dither.waveform == "off" else (dither.f_dit,)
-    i = holding_current(p, own)
+    i = holding_current(p, driven)
     for _ in range(_ROUNDS):
         stimulus = zeros(Stimulus)._replace(i_set=i)
-        start = Point(MotorcycleBrake(), own, state_at(p, own), memory_at(p, own), stimulus)
+        state, memory = state_at(p, driven), memory_at(p, driven)
+        start = Point(MotorcycleBrake(), driven, state, memory, stimulus)
         model = periodic_model(start, ("i_set",), "p_mc", whole, step)
         require_moving(model)
-        gain = model.steady_gain
+        gain = model.steady_gain  # negative or zero: the orbit is not the one that attracts
         if not gain > 0.0:
             break
         if abs(model.mean - p) <= _CLOSE * p:

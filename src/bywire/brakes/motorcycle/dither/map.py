@@ -1,4 +1,4 @@
-"""Many dithers beside each other, as a dataset."""
+"""Many dithers beside each other: the dataset, tables by frequency and by pressure, the law."""
 
 from __future__ import annotations
 
@@ -7,15 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from bywire.brakes.motorcycle.dither.choice import least
-from bywire.brakes.motorcycle.dither.reach import needed_gain, reach
+from bywire.bench.kpis.kpi import Kpi
+from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate, least
+from bywire.brakes.motorcycle.dither.reach import breakaway_torques, needed_gain, reach
 from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, tried
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.synthesis.study import variable
+from bywire.control.dither import breakaway_current
+from bywire.core.typing import Array
+from bywire.synthesis.study import Cut, variable
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 Report = Callable[[float], None]
 
@@ -40,11 +41,11 @@ class Grid:
 
 def figures_of(par: Par, grid: Grid, report: Report) -> list[Mapping[str, Array]]:
     """Return every pressure's figures, shape (gains, frequencies) each."""
-    found = []
+    figures = []
     for k, p in enumerate(grid.pressures):
-        found.append(tried(par, p, grid.gains, grid.frequencies, grid.trial))
+        figures.append(tried(par, p, grid.gains, grid.frequencies, grid.trial))
         report((k + 1) / len(grid.pressures))
-    return found
+    return figures
 
 
 def mapped(
@@ -62,22 +63,22 @@ def mapped(
     """
     dims = ("pressure", "gain", "frequency")
     gains = np.asarray(grid.gains)
-    found = {}
+    columns = {}
     for name, (unit, label) in FIGURES.items():
-        values = np.stack([one[name] for one in figures])
-        found[name] = variable(values, dims, unit, label)
-        found[f"worst_{name}"] = variable(
+        values = np.stack([at_pressure[name] for at_pressure in figures])
+        columns[name] = variable(values, dims, unit, label)
+        columns[f"worst_{name}"] = variable(
             values.max(axis=0), dims[1:], unit, f"{label}, worst"
         )
     enough = [
-        [least(gains, {n: v[:, k] for n, v in one.items()}, limits)
+        [least(gains, {n: v[:, k] for n, v in at_pressure.items()}, limits)
          for k in range(len(grid.frequencies))]
-        for one in figures
+        for at_pressure in figures
     ]  # fmt: skip
     both = ("pressure", "frequency")
     predicted = [[needed_gain(par, f, p) for f in grid.frequencies] for p in grid.pressures]
     middle = grid.pressures[len(grid.pressures) // 2]
-    found |= {
+    columns |= {
         "least_gain": variable([[c.gain for c in row] for row in enough], both, "1",
                                "least gain that overcomes the friction"),
         "least_copper": variable([[c.figures["copper"] for c in row] for row in enough], both, "W",
@@ -87,8 +88,79 @@ def mapped(
         "reach": variable([reach(par, f, middle) for f in grid.frequencies], ("frequency",), "1",
                           "motor current over dither, stuck shaft"),
     }  # fmt: skip
-    return xr.Dataset(found).assign_coords(
+    return xr.Dataset(columns).assign_coords(
         pressure=variable(list(grid.pressures), ("pressure",), "Pa", "pressure"),
         gain=variable(gains, ("gain",), "1", "dither gain"),
         frequency=variable(list(grid.frequencies), ("frequency",), "Hz", "dither frequency"),
     )
+
+
+def by_frequency(grid: Grid, each: list[Candidate]) -> Cut:
+    """Return the gain that is enough at every pressure, its price, and what stands against it."""
+    names = ("gain", "price", "ripple")
+    units = {"price": "W", "ripple": "Pa"}
+    words = {
+        "decided by": [
+            f"{NAMES[candidate.binding]} at {grid.pressures[candidate.decisive] / 1e5:g} bar"
+            for candidate in each
+        ],
+        "beyond": [candidate.verdict or "nothing" for candidate in each],
+    }
+    columns = {name: variable([getattr(candidate, name) for candidate in each], ("frequency",),
+                            units.get(name, "1"), name) for name in names}  # fmt: skip
+    columns |= {name: variable(texts, ("frequency",), "1", name) for name, texts in words.items()}
+    coordinate = variable(list(grid.frequencies), ("frequency",), "Hz", "dither frequency")
+    table = xr.Dataset(columns, coords={"frequency": coordinate})
+    return Cut("least gain for all pressures together", table, ("frequency", *names, *words))
+
+
+def by_pressure(par: Par, data: xr.Dataset) -> Cut:
+    """Return the least dither of every pressure, each at the frequency where it costs least."""
+    rows: dict[str, list[float]] = {}
+    for k, p in enumerate(data["pressure"].values):
+        copper = data["least_copper"].values[k]
+        n = int(np.nanargmin(copper)) if np.isfinite(copper).any() else 0
+        f, gain = float(data["frequency"].values[n]), float(data["least_gain"].values[k, n])
+        amplitude = gain * float(breakaway_current(p, par.ecu.est_par))
+        torque = amplitude * reach(par, f, p) * par.motor.K_e
+        row = {
+            "frequency": f, "gain": gain,
+            "predicted": float(data["predicted_gain"].values[k, n]), "amplitude": amplitude,
+            "torque": torque, "breakaway": breakaway_torques(par, p)[0],
+            "copper": float(copper[n]),
+            **{name: float(np.interp(gain, data["gain"].values, data[name].values[k, :, n]))
+               for name in ("ripple_sensor", "ripple_caliper", "current_share")},
+        }  # fmt: skip
+        for name, value in row.items():
+            rows.setdefault(name, []).append(value)
+    units = {"frequency": "Hz", "amplitude": "A", "torque": "N*m", "breakaway": "N*m",
+             "copper": "W", "ripple_sensor": "Pa", "ripple_caliper": "Pa"}  # fmt: skip
+    table = xr.Dataset(
+        {name: variable(v, ("pressure",), units.get(name, "1"), name) for name, v in rows.items()},
+        coords={"pressure": data["pressure"]},
+    )
+    title = "least dither of each pressure on its own; torque at the shaft, predicted gain linear"
+    return Cut(title, table, ("pressure", *rows))
+
+
+def law(par: Par, data: xr.Dataset, best: int, grid: Grid) -> list[Kpi]:
+    """Return what the ECU should believe of the friction so that gain 1 is just enough."""
+    f = grid.frequencies[best]
+    p, est = np.asarray(grid.pressures), par.ecu.est_par
+    current = np.array([float(breakaway_current(pressure, est)) for pressure in p])
+    needed = data["least_gain"].values[:, best] * current * est.K_e / est.k_brk_p
+    kpis = [
+        Kpi("optimum_reach", reach(par, f, float(np.median(p))), "1",
+            "Motor current over dither at the optimum's frequency, shaft stuck."),
+        Kpi("optimum_predicted_gain", float(data["predicted_gain"].values[:, best].max()),
+            "1", "Gain that breaks the stuck shaft away both ways, from linear models alone."),
+    ]  # fmt: skip
+    if p.size > 1:
+        slope, offset = np.polyfit(p, needed, 1)
+        offset += float(np.max(needed - (offset + slope * p)))  # enough at every pressure
+        text = "What the ECU must believe for a gain of 1 to be just enough:"
+        kpis += [
+            Kpi("law_T_pr", offset, "N*m", f"{text} preload's friction torque."),
+            Kpi("law_f_cfr_p", slope, "N*m/Pa", f"{text} growth with pressure."),
+        ]
+    return kpis

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Factor, Fraction, Frequency, Pressure, Unit
+from bywire.synthesis.study import require_ranges
 
 Count = Annotated[int, Unit("1", 8.0), Field(ge=3, le=101)]
 Node = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -62,10 +63,7 @@ class Options(ParameterSet):
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
-        for low, high, unit in (("gain_min", "gain_max", ""), ("f_min", "f_max", " Hz")):
-            a, b = getattr(self, low), getattr(self, high)
-            if not a < b:
-                raise ValueError(f"{low} = {a:g}{unit} must be below {high} = {b:g}{unit}")
+        require_ranges(self, (("gain_min", "gain_max", "1"), ("f_min", "f_max", "Hz")))
         if any(not a < b for a, b in pairwise(self.pressures)):
             raise ValueError("pressures must be given in ascending order, none twice")
         lowest = min(self.pressures)

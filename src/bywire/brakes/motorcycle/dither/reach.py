@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bywire.brakes.motorcycle.linear.control_laws import demand_filter
-from bywire.brakes.motorcycle.linear.current_loop import current_loop
+from bywire.brakes.motorcycle.linear.control_laws import current_loop, demand_filter
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import dither
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array, Complex
 from bywire.plant import seal_friction
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 Par = MotorcycleParameters
 
 _LEAST = 4  # samples in a period: with fewer, a triangle is none
@@ -37,8 +34,8 @@ def admissible_frequencies(par: Par, low: float, high: float, count: int) -> lis
     T = par.ecu.T_s
     wanted = np.geomspace(low, high, count)
     halves = {max(round(0.5 / (f * T)), _LEAST // 2) for f in wanted}
-    found = sorted(0.5 / (n * T) for n in halves)
-    inside = [f for f in found if low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
+    known = sorted(0.5 / (n * T) for n in halves)
+    inside = [f for f in known if low * (1 - 1e-9) <= f <= high * (1 + 1e-9)]
     if not inside:
         raise ParameterError(
             f"no dither of {low:g} to {high:g} Hz has a period of an even number of sample times "
@@ -92,13 +89,13 @@ def reach(par: Par, f: float, p: float) -> float:
 
 def waveform(par: Par, f: float) -> Array:
     """Return one period of the dither at the ECU's samples, amplitude 1."""
-    own = par.ecu.dither.replace({"f_dit": f, "gain": 1.0})
+    shape = par.ecu.dither.replace({"f_dit": f, "gain": 1.0})
     unit = par.ecu.est_par.replace({"T_pr": 1.0, "f_cfr_p": 0.0, "k_brk_p": 1.0, "K_e": 1.0})
-    state, found = dither.State(0.0), []
+    state, samples = dither.State(0.0), []
     for _ in range(round(1.0 / (f * par.ecu.T_s))):
-        state, out = dither.output(state, 0.0, par.ecu.T_s, own, unit)
-        found.append(float(out.i))
-    return np.array(found)
+        state, out = dither.output(state, 0.0, par.ecu.T_s, shape, unit)
+        samples.append(float(out.i))
+    return np.array(samples)
 
 
 def needed_gain(par: Par, f: float, p: float) -> float:

@@ -6,18 +6,21 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.bench.experiment import as_run
+from bywire.bench.kpis.hysteresis import Loop, loop_area
+from bywire.bench.kpis.smoothing import smoothed
 from bywire.brakes.motorcycle.dither.reach import dead_band
 from bywire.brakes.motorcycle.ecu import Stimulus
+from bywire.brakes.motorcycle.experiments import friction_ramp
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.core.signals import zeros
+from bywire.core.typing import Array
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 FIGURES = {
@@ -82,11 +85,11 @@ def tried(
     SolverError
         When a trajectory leaves the numbers.
     """
-    own = par.replace({"drive.mode": "pressure"})
+    controlled = par.replace({"drive.mode": "pressure"})
     pairs = [(g, f) for g in gains for f in frequencies]
-    both = [_measured(own, p, start, pairs, trial) for start in (p - trial.approach,
+    both = [_measured(controlled, p, start, pairs, trial) for start in (p - trial.approach,
                                                                 p + trial.approach)]  # fmt: skip
-    apart = np.abs(both[1]["mean"] - both[0]["mean"]) / dead_band(own, p)
+    apart = np.abs(both[1]["mean"] - both[0]["mean"]) / dead_band(controlled, p)
     worse = {name: np.fmax(both[0][name], both[1][name]) for name in FIGURES if name != "band"}
     shape = (len(gains), len(frequencies))
     return {name: value.reshape(shape) for name, value in {**worse, "band": apart}.items()}
@@ -103,14 +106,14 @@ def _measured(
         lambda t: np.repeat([row], t.size, axis=0), trial.settle + trial.window, _STEP, T,
     )  # fmt: skip
     gains, frequencies = (np.array(values) for values in zip(*pairs, strict=True))
-    found = simulate_ensemble(
+    ensemble = simulate_ensemble(
         run, {"ecu.dither.gain": gains, "ecu.dither.f_dit": frequencies}, _SIGNALS
     )
     figures = [
-        _figures(par, found.values[k], max(int(trial.window * f), 1), round(1.0 / (f * T)))
+        _figures(par, ensemble.values[k], max(int(trial.window * f), 1), round(1.0 / (f * T)))
         for k, f in enumerate(frequencies)
     ]
-    return {name: np.array([one[name] for one in figures]) for name in figures[0]}
+    return {name: np.array([case[name] for case in figures]) for name in figures[0]}
 
 
 def _figures(par: Par, values: Array, periods: int, samples: int) -> dict[str, float]:
@@ -141,3 +144,30 @@ def _ripple(pressure: Array, samples: int) -> float:
     then; that jump is no ripple.
     """
     return float(np.median(np.ptp(pressure.reshape(-1, samples), axis=1)))
+
+
+def area_ratios(par: Par, designs: Sequence[tuple[float, float]]) -> list[float]:
+    """Return the area of each design's loop of current over pressure, over that without dither.
+
+    Loops are averaged over one dither period. Most of what is left is delay rather than friction,
+    and shrinks with the ramp's slope.
+
+    Parameters
+    ----------
+    designs
+        Gain and frequency [Hz] of each dither.
+    """
+    options = friction_ramp.EXPERIMENT.defaults
+    case = friction_ramp.cases(par, friction_ramp.Options.model_validate(options.model_dump()))[1]
+    run = as_run(case, _STEP)
+    every = [(0.0, designs[0][1]), *designs]
+    changes = {
+        "ecu.dither.gain": [gain for gain, _ in every],
+        "ecu.dither.f_dit": [f for _, f in every],
+    }
+    ensemble = simulate_ensemble(run, changes, ("i", "p_mc"))
+    areas = []
+    for k, (_, f) in enumerate(every):
+        i, p = (smoothed(ensemble.time, ensemble[name][k], 1.0 / f) for name in ("i", "p_mc"))
+        areas.append(loop_area(Loop(ensemble.time, i, p)).value)
+    return [area / areas[0] for area in areas[1:]]

@@ -33,8 +33,8 @@ def compared(
     cases = [(shape, place) for place in PLACES for shape in WAVEFORMS]
     rows: list[dict[str, Any]] = []
     for k, (shape, place) in enumerate(cases):
-        own = par.replace({"ecu.dither.waveform": shape, "ecu.filter.place": place})
-        rows.append({"waveform": shape, "filter": place, **_row(own, grid, f, limits)})
+        shaped = par.replace({"ecu.dither.waveform": shape, "ecu.filter.place": place})
+        rows.append({"waveform": shape, "filter": place, **_row(shaped, grid, f, limits)})
         report((k + 1) / len(cases))
     index = np.arange(len(rows))
     table = xr.Dataset(
@@ -62,12 +62,12 @@ def _row(par: Par, grid: Grid, f: float, limits: Mapping[str, float]) -> dict[st
     gains = np.asarray(grid.gains)
     middle = grid.pressures[len(grid.pressures) // 2]
     columns = [tried(par, p, grid.gains, (f,), grid.trial) for p in grid.pressures]
-    found = candidates(gains, columns, limits)[0]
+    candidate = candidates(gains, columns, limits)[0]
     return {
         "reach": reach(par, f, middle),
         "distortion": distortion(par, f, middle),
-        "gain": found.gain,
-        "copper": found.price,
-        "ripple_caliper": found.ripple,
-        "limit": found.verdict or "none",
+        "gain": candidate.gain,
+        "copper": candidate.price,
+        "ripple_caliper": candidate.ripple,
+        "limit": candidate.verdict or "none",
     }

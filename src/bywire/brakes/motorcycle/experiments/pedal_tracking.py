@@ -20,7 +20,7 @@ from bywire.core.errors import FileError, ParameterError, quoted
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
 from bywire.core.units import shown
-from bywire.data.trace import column_names, read_trace
+from bywire.data.trace import read_trace, trace_names
 from bywire.plant import pedal
 
 _COLUMNS = {"pressure": "Pa", "force": "N", "pedal": "m"}  # of a trace, the best one first
@@ -34,7 +34,9 @@ class Options(ParameterSet):
     """The ride."""
 
     trace: str
-    """CSV file with columns time and pedal travel or foot force; empty for the built-in ride"""
+    """measurement file with time and pedal, force or pressure; empty for the built-in ride"""
+    trace_map: str
+    """mapping file whose signals are pedal, force or pressure; empty where columns are"""
     max_gap: TimeConstant
     """longest gap of the file that is bridged by a straight line"""
     smoothing: TimeConstant
@@ -81,15 +83,18 @@ def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
         travel = PchipInterpolator(_TIMES, np.array(_TRAVELS) * 1e-3)(times)
         ride = xr.Dataset({"pedal": ("time", travel)}, coords={"time": times})
     else:
-        names = column_names(options.trace)
+        meaning = options.trace_map or None
+        names = [name.casefold() for name in trace_names(options.trace, meaning)]
         chosen = next((name for name in _COLUMNS if name in names), None)
         if chosen is None:
             raise FileError(
                 f"{options.trace}: none of its columns {quoted(', '.join(names))} is pedal [mm], "
-                "force [N] or pressure [bar]: rename the one that the brake shall follow"
+                "force [N] or pressure [bar]: rename the one that the brake shall follow, or "
+                "name it in a mapping file, options.trace_map"
             )
         wanted = {chosen: _COLUMNS[chosen]}
-        ride = read_trace(options.trace, wanted, max_gap=max(options.max_gap, 1e-9))
+        longest = max(options.max_gap, 1e-9)
+        ride = read_trace(options.trace, wanted, max_gap=longest, mapping=meaning)
     _require_within_stop(ride, par, options.trace or "the built-in ride")
     if "pedal" not in ride:
         return ride
@@ -117,9 +122,9 @@ def _set_point(force: float, par: MotorcycleParameters) -> float:
 EXPERIMENT = Experiment(
     name="pedal-tracking",
     assembly="motorcycle-brake",
-    summary="pressure follows the rider's pedal, built in or from a CSV file (Fig. 7b)",
+    summary="pressure follows the rider's pedal, built in or from a measurement file (Fig. 7b)",
     options=Options,
-    defaults=Options(trace="", max_gap=0.1, smoothing=0.02),
+    defaults=Options(trace="", trace_map="", max_gap=0.1, smoothing=0.02),
     cases=cases,
     judge=judge,
     kpis=units_of("tracking", "effort", "occupation", resolved={"level": "Pa"}),

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.rational import Rational, first_orders
 from bywire.analysis.reduction.error import ReductionError, reduction_error
+from bywire.brakes.motorcycle.linear.rational import Rational, first_orders
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.errors import ParameterError
 from bywire.plant import ball_screw_gear, brake_fluid, caliper, master_cylinder, pipeline
@@ -201,13 +201,13 @@ def two_pole_error(
     """
     whole, less = linear_model(par, p, x), two_pole(par, p, x)
     a_2, a_1, _ = less.den
-    own = replace(
+    simplified = replace(
         whole, name="eq-21",
         A=np.array([[0.0, 1.0], [-1.0 / a_2, -a_1 / a_2]]), B=np.array([[0.0], [less.gain / a_2]]),
         C=np.array([[1.0, 0.0]]), states=("p_mc", "rate"), state_units=("Pa", "Pa/s"),
         rate=np.zeros(2),
     )  # fmt: skip
-    return reduction_error(whole, own, high)
+    return reduction_error(whole, simplified, high)
 
 
 def with_slow_pair(K: float, tau_L: float, T_1: float, T_2: float, T_L: float) -> Rational:

@@ -1,4 +1,4 @@
-"""The ECU's control laws as linear models, from the laws themselves.
+"""The ECU's control laws, and its current loop, as linear models: from the laws themselves.
 
 Where the gains are scheduled, a law is that of the gains frozen at a pressure: small motion about
 an equilibrium knows no other, because the schedule is bumpless.
@@ -7,25 +7,29 @@ an equilibrium knows no other, because the schedule is bumpless.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
+from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.brakes.motorcycle.parameters import EcuParameters
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import EcuParameters, MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.control import current_pi, low_pass_2, pressure_pid
 from bywire.core.signals import signals_of, zeros
 
+Rotor = Literal["locked", "free"]
 Law = Callable[[Any, Any], tuple[Any, Any]]
 
 
 def pressure_feedback(ecu: EcuParameters, p: float) -> LinearModel:
     """Return the PID at a pressure p from a fall of the measured one [Pa] to the demand [A]."""
-    own = ecu.pressure_at(p)
+    gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=0.0 * u, p_meas=-u)
-        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, gains)
         return state, out.i
 
     return _linear("pressure-feedback", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
@@ -33,11 +37,11 @@ def pressure_feedback(ecu: EcuParameters, p: float) -> LinearModel:
 
 def pressure_demand(ecu: EcuParameters, p: float) -> LinearModel:
     """Return the PID at a pressure p [Pa] from the set point [Pa] to the current demand [A]."""
-    own = ecu.pressure_at(p)
+    gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=u, p_meas=0.0 * u)
-        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, gains)
         return state, out.i
 
     return _linear("pressure-demand", law, pressure_pid.State, ecu.T_s, ("Pa", "A"))
@@ -45,11 +49,11 @@ def pressure_demand(ecu: EcuParameters, p: float) -> LinearModel:
 
 def pressure_control(ecu: EcuParameters, p: float) -> LinearModel:
     """Return the PID at a pressure p from set point and measured one [Pa] to the demand [A]."""
-    own = ecu.pressure_at(p)
+    gains = ecu.pressure_at(p)
 
     def law(x: pressure_pid.State, u: Any) -> tuple[Any, Any]:
         signals = pressure_pid.Input(p_ref=u[0], p_meas=u[1])
-        state, out = pressure_pid.output(x, signals, ecu.T_s, own)
+        state, out = pressure_pid.output(x, signals, ecu.T_s, gains)
         return state, out.i
 
     units, inputs = ("Pa", "A"), ("p_ref", "p_meas")
@@ -75,6 +79,30 @@ def demand_filter(ecu: EcuParameters) -> LinearModel:
         return state, out.y
 
     return _linear("demand-filter", law, low_pass_2.State, ecu.T_s, ("A", "A"))
+
+
+def current_loop(par: MotorcycleParameters, p: float, rotor: Rotor) -> LinearModel:
+    """Return the loop from the set point ``i_set`` to the currents ``i`` and ``i_meas``.
+
+    PI at the ECU's sample time, battery and bridge, winding, anti-alias filter; the converter's
+    resolution is left out.
+
+    Parameters
+    ----------
+    par
+        Parameters; the drive mode does not matter.
+    p
+        Pressure of the operating point [Pa].
+    rotor
+        ``"locked"``: no back-EMF, as where friction holds the shaft. ``"free"``: the shaft moves
+        against the brake, without dry friction.
+    """
+    driven = par.replace({"drive.mode": "current-direct", "adc.law": "ideal"})
+    return closed_loop(
+        MotorcycleBrake(), driven, state_at(p, driven), memory_at(p, driven),
+        inputs=("i_set",), outputs=("i", "i_meas"),
+        locked=("theta", "omega", "p_mc", "p_pd", "y_p") if rotor == "locked" else (),
+    )  # fmt: skip
 
 
 def _linear(

@@ -7,19 +7,17 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.crossings import Margin, margin
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.rational import Rational
 from bywire.brakes.motorcycle.linear import control_laws
+from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.core.typing import Array, Complex
 
-Array = NDArray[np.float64]
-Complex = NDArray[np.complex128]
 BAND = (0.02, 200.0)
 """frequencies over which margins are looked for [Hz]"""
 
@@ -49,15 +47,15 @@ class PressureLoop:
     def plant(self) -> LinearModel:
         """Sampled model from duty cycle to measured current, pressure and measured pressure."""
         mode = {"drive.mode": "current-direct", "adc.law": "ideal"}
-        own = self.par.replace(mode)
+        driven = self.par.replace(mode)
         motor = linearize(
-            MotorcycleBrake(), own, state_at(self.p, own), memory_at(self.p, own),
+            MotorcycleBrake(), driven, state_at(self.p, driven), memory_at(self.p, driven),
             inputs=("duty",), outputs=("i", "y_i"),
         ).reduced(("i", "y_i"), held=True)  # fmt: skip
-        sensor = own.current_sensor
+        sensor = driven.current_sensor
         span = np.diag([1.0, sensor.i_high - sensor.i_low])
         motor = replace(motor, C=span @ motor.C, outputs=("i", "i_meas"), output_units=("A", "A"))
-        return _cascade(motor, self.brake, own.anti_alias.f_aa).sampled(own.ecu.T_s)
+        return _cascade(motor, self.brake, driven.anti_alias.f_aa).sampled(driven.ecu.T_s)
 
     def open(self, frequencies: Array) -> Complex:
         """Return the open loop, cut at the measured pressure, at frequencies [Hz]."""
@@ -72,8 +70,8 @@ class PressureLoop:
         """Return loop gain (cut at the measured pressure) and closed loop, one model each."""
         import control
 
-        def block(made: LinearModel) -> Any:
-            return control.ss(made.A, made.B, made.C, made.D, made.period)
+        def block(model: LinearModel) -> Any:
+            return control.ss(model.A, model.B, model.C, model.D, model.period)
 
         ecu, T = self.par.ecu, self.plant.period
         current = control.ss([], [], [], [[1.0, 0.0, 0.0]], T)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bywire.analysis.linear.rational import Rational, first_orders
+from bywire.brakes.motorcycle.linear.rational import Rational, first_orders
 from bywire.brakes.motorcycle.sets.dardanelli2010 import SOURCE
 from bywire.reproduction.item import Fact
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth
 from bywire.bench.result import Result
-from bywire.brakes.motorcycle.linear.current_loop import Rotor, current_loop
+from bywire.brakes.motorcycle.linear.control_laws import Rotor, current_loop
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.runs import MAIN, PRINTED, Runs, parameters
 from bywire.brakes.motorcycle.paper.tolerances import ROUND

@@ -6,10 +6,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.analysis.linear.rational import Rational
 from bywire.bench.kpis import step_response
 from bywire.bench.result import Result
 from bywire.brakes.motorcycle.linear.brake import theoretical
+from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.methods.braking.records import averaged
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.identified import identified_model

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.analysis.linear.rational import Rational
 from bywire.brakes.motorcycle.linear.brake import theoretical, two_pole_error
+from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, PRINTED, SETS, Runs, parameters
 from bywire.brakes.motorcycle.paper.tolerances import PRINTED as DIGITS

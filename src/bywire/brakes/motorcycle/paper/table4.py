@@ -6,9 +6,9 @@ import numpy as np
 import xarray as xr
 
 from bywire.analysis.crossings import fall
-from bywire.analysis.linear.rational import Rational
 from bywire.analysis.response.dataset import complex_values
 from bywire.brakes.motorcycle.linear.brake import theoretical
+from bywire.brakes.motorcycle.linear.rational import Rational
 from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper import identified as dardanelli2010_identified
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters

@@ -11,14 +11,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
+from bywire.core.typing import Array
 from bywire.plant import ball_screw_gear, brake_fluid, caliper, master_cylinder, pipeline
 from bywire.plant import seal_friction as seal
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 _POINTS = 721
@@ -107,7 +106,8 @@ def step(par: Par, p_from: float, p_to: float, bandwidth: float) -> Course:
     """
     middle, height = 0.5 * (p_from + p_to), p_to - p_from
     w, a = 2.0 * math.pi * bandwidth / _DOUBLE_POLE, 1.0 / _lag(par, middle)
-    w = w if abs(w / a - 1.0) > 1e-6 else w * (1.0 + 1e-6)  # the two never coincide
+    # Of a triple pole the closed form divides by zero: the lag and the double pole stay apart.
+    w = w if abs(w / a - 1.0) > 1e-6 else w * (1.0 + 1e-6)
     t = np.linspace(0.0, 10.0 / w, _POINTS)
     slow, fast = np.exp(-w * t), np.exp(-a * t)
     A, C = -(w * w) / (w - a) ** 2, -w * a / (a - w)
@@ -144,6 +144,7 @@ def motion(par: Par, course: Course) -> Motion:
     omega = v / k_g
     force, rubbing = _load(par, course.p, v, omega)
     limits = ball_screw_gear.friction_bounds(rubbing.T_p, rubbing.T_n, force, par.gear)
+    # Bounds are torques on the shaft; against its motion they add to what the motor must give.
     friction = np.where(omega > 0, -np.asarray(limits.low), -np.asarray(limits.high))
     friction = np.where(omega == 0, 0.0, friction)
     efficiency = par.gear.eta_g if par.gear.law == "paper" else 1.0

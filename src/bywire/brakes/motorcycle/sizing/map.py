@@ -6,13 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing.demand import Course, Motion, breakaway_current, geared, motion
-from bywire.synthesis.study import variable
+from bywire.core.typing import Array
+from bywire.synthesis.study import variable, variables
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
 SIZES = {
@@ -78,17 +77,13 @@ def mapped(
     """
     rows: list[list[dict[str, float]]] = []
     for k_g in ratios:
-        own = geared(par, float(k_g))
-        static = breakaway_current(own, p_peak)
+        brake = geared(par, float(k_g))
+        static = breakaway_current(brake, p_peak)
         rows.append(
-            [sizes_of(own, motion(own, course(own, float(f))), static) for f in frequencies]
+            [sizes_of(brake, motion(brake, course(brake, float(f))), static) for f in frequencies]
         )
-    dims = ("k_g", "frequency")
-    found = {
-        name: variable([[one[name] for one in row] for row in rows], dims, unit, label)
-        for name, (unit, label) in SIZES.items()
-    }
-    return xr.Dataset(found).assign_coords(
+    values = {name: [[sizes[name] for sizes in row] for row in rows] for name in SIZES}
+    return xr.Dataset(variables(values, ("k_g", "frequency"), SIZES)).assign_coords(
         k_g=variable(ratios, ("k_g",), "m/rad", "gear ratio"),
         frequency=variable(frequencies, ("frequency",), "Hz", "bandwidth"),
     )

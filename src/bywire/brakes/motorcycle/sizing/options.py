@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Frequency, GearRatio, Pressure, Unit
-from bywire.core.units import shown
+from bywire.synthesis.study import require_ranges
 
 Count = Annotated[int, Unit("1", 41.0), Field(ge=3, le=401)]
 
@@ -53,13 +53,8 @@ class Options(ParameterSet):
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
-        for low, high, unit in (("k_g_min", "k_g_max", "m/rad"), ("f_min", "f_max", "Hz"),
-                                ("p_from", "p_peak", "Pa")):  # fmt: skip
-            a, b = getattr(self, low), getattr(self, high)
-            if not a < b:
-                raise ValueError(
-                    f"{low} = {shown(a, unit)} must be below {high} = {shown(b, unit)}"
-                )
+        ratios, bandwidths = ("k_g_min", "k_g_max", "m/rad"), ("f_min", "f_max", "Hz")
+        require_ranges(self, (ratios, bandwidths, ("p_from", "p_peak", "Pa")))
         if not 2.0 * self.amplitude <= self.p_peak:
             raise ValueError(
                 f"amplitude = {self.amplitude / 1e5:g} bar must be <= half of p_peak = "

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.kpis.kpi import Kpi
@@ -13,10 +12,10 @@ from bywire.brakes.motorcycle.case import case_from_rest
 from bywire.brakes.motorcycle.experiments import hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.sizing.demand import motion, sine
+from bywire.core.typing import Array
 from bywire.simulation.run import simulate
 
 Par = MotorcycleParameters
-Array = NDArray[np.float64]
 
 WITHOUT_DITHER = {"ecu.dither.waveform": "off"}
 _STEP = 20e-6
@@ -33,6 +32,7 @@ def sine_figures(label: str, par: Par, top: float, amplitude: float, f: float) -
     """
     mean, swing = top - amplitude, amplitude
     run, reached = _sine_run(par, mean, swing, f), 0.0
+    # The fundamental is near proportional to the demand: two or three corrections are enough.
     for _ in range(_ROUNDS):
         run = _sine_run(par, mean, swing, f)
         middle, reached = _fitted(run, f)
@@ -64,11 +64,11 @@ def braking_figures(label: str, par: Par, p_from: float, p_to: float) -> list[Kp
     following = {} if experiment.following is None else dict(experiment.following(par))
     options = experiment.defaults.replace({"p_from": p_from, "p_to": p_to, **following})
     (case,) = experiment.cases(par, options, None)
-    found = {one.name: one for one in experiment.judge({"run": _recorded(case)}, options)}
+    kpis = {kpi.name: kpi for kpi in experiment.judge({"run": _recorded(case)}, options)}
     wanted = ("rise_time", "overshoot", "peak_current", "peak_power", "share_sat_current")
     return [
-        Kpi(f"{label}_braking_{name}", found[name].value, found[name].unit,
-            f"Hard braking: {found[name].definition}", found[name].note)
+        Kpi(f"{label}_braking_{name}", kpis[name].value, kpis[name].unit,
+            f"Hard braking: {kpis[name].definition}", kpis[name].note)
         for name in wanted
     ]  # fmt: skip
 
@@ -91,13 +91,13 @@ def _fitted(run: xr.Dataset, f: float) -> tuple[float, float]:
     angle = 2.0 * np.pi * f * run["time"].values
     waves = [wave(n * angle) for n in range(1, _HARMONICS + 1) for wave in (np.sin, np.cos)]
     columns = np.column_stack([np.ones_like(angle), *waves])
-    found = np.linalg.lstsq(columns, run["p_mc"].values, rcond=None)[0]
-    return float(found[0]), float(np.hypot(found[1], found[2]))
+    coefficients = np.linalg.lstsq(columns, run["p_mc"].values, rcond=None)[0]
+    return float(coefficients[0]), float(np.hypot(coefficients[1], coefficients[2]))
 
 
 def _recorded(case: Case) -> xr.Dataset:
-    made = as_run(case, _STEP)
-    trajectory = simulate(made)
+    run = as_run(case, _STEP)
+    trajectory = simulate(run)
     if trajectory.status == "interrupted":
         raise KeyboardInterrupt
-    return record(made, trajectory, case.settle, case.keep, {})
+    return record(run, trajectory, case.settle, case.keep, {})

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import math
-from typing import cast
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -24,13 +22,15 @@ from bywire.brakes.motorcycle.sizing.map import SIZES, mapped, sizes_of
 from bywire.brakes.motorcycle.sizing.options import ASSUMPTIONS, Options
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import ParameterError
-from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings
 
-Array = NDArray[np.float64]
 Par = MotorcycleParameters
 
-_BISECTIONS, _SECTIONS, _ROWS = 50, 60, 13
-_GOLDEN = 0.5 * (math.sqrt(5.0) - 1.0)
+_ROWS = 13  # gear ratios of the table
+_AT_EDGE = 1e-3  # share of an end of the range that counts as on it
+_SLOWEST, _FASTEST = 1e-2, 1e3  # bandwidths among which the highest possible is searched [Hz]
+_EXACT = 1e-12  # of the logarithm of a ratio or bandwidth that is searched
 
 
 def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
@@ -40,7 +40,7 @@ def course(par: Par, options: Options, f: float, demand: str = "") -> Course:
     return step(par, options.p_from, options.p_peak, f)
 
 
-def compute(par: Par, options: Options, progress: Progress) -> Found:
+def compute(par: Par, options: Options, progress: Progress) -> Findings:
     """Return power over gear ratio and bandwidth, the best ratio, and its trial on the bench.
 
     Raises
@@ -67,16 +67,16 @@ def compute(par: Par, options: Options, progress: Progress) -> Found:
         *_figures("given", par, options),
     ]
     warnings = _warnings(kpis, k_best, options)
-    for n, (label, own) in enumerate((("optimum", chosen), ("given", par))):
+    for n, (label, brake) in enumerate((("optimum", chosen), ("given", par))):
         progress("bench", 0.5 * n)
-        kpis += actuator_trial.sine_figures(label, own, options.p_peak, options.amplitude, f)
-        kpis += actuator_trial.braking_figures(label, own, options.p_from, options.p_peak)
+        kpis += actuator_trial.sine_figures(label, brake, options.p_peak, options.amplitude, f)
+        kpis += actuator_trial.braking_figures(label, brake, options.p_from, options.p_peak)
     progress("bench", 1.0)
     marks = (Mark("optimum", k_best, f), Mark("given gear ratio", par.gear.k_g, f))
     limits = {"current limit": ("current_share", 1.0), "voltage limit": ("voltage_share", 1.0)}
     caption = f"Electrical power of the motor for a {options.demand}: {power:.3g} W at the optimum."
     maps = {"power": Map("electrical", "k_g", "frequency", caption, marks, limits)}
-    return Found(data, tuple(kpis), ASSUMPTIONS, maps, (_cut(par, options),), warnings)
+    return Findings(data, tuple(kpis), ASSUMPTIONS, maps, (_cut(par, options),), warnings)
 
 
 def _at(par: Par, options: Options, f: float, demand: str = "") -> dict[str, float]:
@@ -89,33 +89,31 @@ def _electrical(par: Par, options: Options) -> Array:
 
 
 def _best_ratio(par: Par, options: Options) -> float:
-    """Return the gear ratio [m/rad] of least electrical power, by golden section in its log."""
+    """Return the gear ratio [m/rad] of least electrical power."""
+    from scipy.optimize import minimize_scalar
 
     def power(z: float) -> float:
         return _at(geared(par, math.exp(z)), options, options.bandwidth)["electrical"]
 
     # The power has one minimum: inertia falls with the ratio, the load grows with it.
-    low, high = math.log(options.k_g_min), math.log(options.k_g_max)
-    for _ in range(_SECTIONS):
-        a, b = high - _GOLDEN * (high - low), low + _GOLDEN * (high - low)
-        low, high = (low, b) if power(a) < power(b) else (a, high)
-    return math.exp(0.5 * (low + high))
+    ends = (math.log(options.k_g_min), math.log(options.k_g_max))
+    least = minimize_scalar(power, bounds=ends, method="bounded", options={"xatol": _EXACT})
+    return math.exp(least.x)
 
 
 def fastest(par: Par, options: Options, demand: str) -> float:
     """Return the highest bandwidth [Hz] within current and voltage limit; NaN for none."""
+    from scipy.optimize import bisect
 
-    def fits(f: float) -> bool:
-        sizes = _at(par, options, f, demand)
-        return max(sizes["current_share"], sizes["voltage_share"]) <= 1.0
+    def excess(z: float) -> float:
+        sizes = _at(par, options, math.exp(z), demand)
+        return max(sizes["current_share"], sizes["voltage_share"]) - 1.0
 
-    low, high = 1e-2, 1e3
-    if not fits(low):
+    low, high = math.log(_SLOWEST), math.log(_FASTEST)
+    if excess(low) > 0.0:
         return math.nan
-    for _ in range(_BISECTIONS):
-        middle = math.sqrt(low * high)
-        low, high = (middle, high) if fits(middle) else (low, middle)
-    return low
+    # Bisection, because the share of the voltage is infinite where none is left.
+    return math.exp(bisect(excess, low, high, xtol=_EXACT))
 
 
 def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
@@ -129,8 +127,8 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
         "inertia_share": "Largest torque of rotor and piston inertia over the largest torque.",
         "voltage_share": "Largest voltage over what the bridge gives at its current.",
     }
-    own = course(par, options, options.bandwidth)
-    copper = par.motor.R_m * np.mean(motion(par, own).current ** 2)
+    wanted = course(par, options, options.bandwidth)
+    copper = par.motor.R_m * np.mean(motion(par, wanted).current ** 2)
     dither = par.ecu.est_par
     A_dit = dither.k_brk_p * (dither.T_pr + dither.f_cfr_p * options.p_peak) / dither.K_e
     note = "" if par.ecu.dither.waveform != "off" else "dither is off"
@@ -148,7 +146,7 @@ def _figures(label: str, par: Par, options: Options) -> list[Kpi]:
 
 def _mapped(par: Par, options: Options, ratios: int, frequencies: Array) -> xr.Dataset:
     k_g = np.geomspace(options.k_g_min, options.k_g_max, ratios)
-    return mapped(par, options.p_peak, k_g, frequencies, lambda own, f: course(own, options, f))
+    return mapped(par, options.p_peak, k_g, frequencies, lambda brake, f: course(brake, options, f))
 
 
 def _cut(par: Par, options: Options) -> Cut:
@@ -160,19 +158,16 @@ def _cut(par: Par, options: Options) -> Cut:
 
 
 def _warnings(kpis: list[Kpi], k_best: float, options: Options) -> tuple[str, ...]:
-    value = {one.name: one.value for one in kpis}
-    found: list[str] = []
+    value = {kpi.name: kpi.value for kpi in kpis}
+    warnings: list[str] = []
     fast = value[f"optimum_fastest_{options.demand}"]
     if not fast >= options.bandwidth:
-        found.append(
+        warnings.append(
             f"this motor cannot follow the {options.demand} at {options.bandwidth:g} Hz: at the "
             f"best gear ratio its limits allow {fast:.3g} Hz"
         )
-    for edge in (options.k_g_min, options.k_g_max):
-        if math.isclose(k_best, edge, rel_tol=1e-3):
-            at = f"k_g = {1e3 * edge:g} mm/rad"
-            found.append(f"the optimum lies at the edge, {at}: widen the range")
-    return tuple(found)
+    ends = (options.k_g_min, options.k_g_max)
+    return (*warnings, *edge_warnings("k_g", k_best, ends, "m/rad", _AT_EDGE))
 
 
 STUDY = Study(
@@ -184,7 +179,7 @@ STUDY = Study(
         bandwidth=10.0, p_peak=37e5, amplitude=3e5, p_from=6e5, demand="sine", k_g_min=1e-4,
         k_g_max=1e-3, ratios=41, f_min=1.0, f_max=30.0, frequencies=31,
     ),
-    compute=lambda par, options, progress: compute(cast(Par, par), options, progress),
+    compute=compute,
     ruled={
         "drive.mode": "the study demands pressures",
         "pedal": "the study demands pressures without it",

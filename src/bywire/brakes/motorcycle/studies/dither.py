@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import cast
 
 import numpy as np
 import xarray as xr
@@ -11,22 +10,28 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.motorcycle.dither.choice import NAMES, Candidate, best_of, candidates
 from bywire.brakes.motorcycle.dither.dithered_plant import dithered_plant
-from bywire.brakes.motorcycle.dither.map import Grid, figures_of, mapped
+from bywire.brakes.motorcycle.dither.map import (
+    Grid,
+    by_frequency,
+    by_pressure,
+    figures_of,
+    law,
+    mapped,
+)
 from bywire.brakes.motorcycle.dither.options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.brakes.motorcycle.dither.ramp import area_ratios
 from bywire.brakes.motorcycle.dither.reach import admissible_frequencies
-from bywire.brakes.motorcycle.dither.tables import by_frequency, by_pressure, law
-from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, tried
+from bywire.brakes.motorcycle.dither.trial import FIGURES, Trial, area_ratios, tried
 from bywire.brakes.motorcycle.dither.waveforms import compared
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import highest_pressure
 from bywire.core.errors import InputError, ParameterError, RunError
-from bywire.synthesis.study import Found, Map, Mark, Progress, Study
+from bywire.core.typing import Progress
+from bywire.synthesis.study import Findings, Map, Mark, Study
 
 Par = MotorcycleParameters
 
 
-def compute(par: Par, options: Options, progress: Progress) -> Found:
+def compute(par: Par, options: Options, progress: Progress) -> Findings:
     """Return figures over gain and frequency, the dither of least price, and its comparison.
 
     Raises
@@ -35,25 +40,27 @@ def compute(par: Par, options: Options, progress: Progress) -> Found:
         When a pressure cannot be reached, or no frequency fits the ECU's sampling.
     """
     _require_reachable(par, options)
-    own = par if par.ecu.dither.waveform != "off" else par.replace({"ecu.dither.waveform": "sine"})
-    grid = grid_of(own, options)
-    figures = figures_of(own, grid, lambda share: progress("dithers", share))
+    dithered = par
+    if par.ecu.dither.waveform == "off":
+        dithered = par.replace({"ecu.dither.waveform": "sine"})
+    grid = grid_of(dithered, options)
+    figures = figures_of(dithered, grid, lambda share: progress("dithers", share))
     limits = limits_of(options)
-    data = mapped(own, grid, figures, limits)
+    data = mapped(dithered, grid, figures, limits)
     each = candidates(np.asarray(grid.gains), figures, limits)
     best = best_of(each)
-    given = (own.ecu.dither.gain, own.ecu.dither.f_dit)
+    given = (dithered.ecu.dither.gain, dithered.ecu.dither.f_dit)
     designs = {"given": given}
     if best is not None:
         designs = {"optimum": (each[best].gain, grid.frequencies[best]), **designs}
-    kpis = _kpis(own, options, grid, designs)
-    cuts = [by_frequency(grid, each), by_pressure(own, data)]
+    kpis = _kpis(dithered, options, grid, designs)
+    cuts = [by_frequency(grid, each), by_pressure(dithered, data)]
     if best is not None:
-        kpis += law(own, data, best, grid)
+        kpis += law(dithered, data, best, grid)
     if options.compare == "waveforms":
         f = designs.get("optimum", given)[1]
-        cuts.append(compared(own, grid, f, limits, lambda share: progress("waveforms", share)))
-    return Found(
+        cuts.append(compared(dithered, grid, f, limits, lambda share: progress("waveforms", share)))
+    return Findings(
         data, tuple(kpis), ASSUMPTIONS, _maps(data, options, designs), tuple(cuts),
         _warnings(options, grid, each, best), _limits(grid, each, best),
     )  # fmt: skip
@@ -91,38 +98,38 @@ def _kpis(
 ) -> list[Kpi]:
     """Return what each design does on the bench: not interpolated."""
     ratios = area_ratios(par, list(designs.values()))
-    found = []
+    kpis = []
     for (label, (gain, f)), ratio in zip(designs.items(), ratios, strict=True):
         each = [tried(par, p, (gain,), (f,), grid.trial) for p in grid.pressures]
-        found += [
+        kpis += [
             Kpi(f"{label}_gain", gain, "1", "Gain of the dither's law, eqs. (18) and (19)."),
             Kpi(f"{label}_frequency", f, "Hz", "Frequency of the dither."),
         ]
         limits = limits_of(options)
         for name, (unit, text) in FIGURES.items():
-            values = [float(one[name][0, 0]) for one in each]
+            values = [float(figures[name][0, 0]) for figures in each]
             mean = name in ("copper", "current_rms")
             value = float(np.mean(values)) if mean else max(values)
             over = name in limits and value > limits[name] * 1.02  # interpolated designs scatter
             which = "mean of the pressures" if mean else "worst pressure"
-            found.append(
+            kpis.append(
                 Kpi(f"{label}_{name}", value, unit, f"{text.capitalize()}, {which}.",
                     "beyond its limit" if over else "")
             )  # fmt: skip
-        found.append(
+        kpis.append(
             Kpi(f"{label}_area_ratio", ratio, "1",
                 "Area of the loop on the ramp of eq. (17) over that without dither; delay counts.")
         )  # fmt: skip
-        found += _plant(par, label, gain, f, grid.pressures[len(grid.pressures) // 2])
-    return found
+        kpis += _plant(par, label, gain, f, grid.pressures[len(grid.pressures) // 2])
+    return kpis
 
 
 def _plant(par: Par, label: str, gain: float, f: float, p: float) -> list[Kpi]:
     """Return what friction under dither leaves of the plant's gain and speed."""
-    own = par.replace({"ecu.dither.gain": gain, "ecu.dither.f_dit": f})
+    dithered = par.replace({"ecu.dither.gain": gain, "ecu.dither.f_dit": f})
     values, note = (math.nan, math.nan), ""
     try:
-        plant = dithered_plant(own, p)
+        plant = dithered_plant(dithered, p)
         values = (plant.gain, plant.slowest)
     except (InputError, RunError) as error:
         note = str(error).partition(":")[0]
@@ -144,7 +151,7 @@ def _maps(
         ),
         "current limit": ("worst_current_share", 1.0),
     }  # fmt: skip
-    low, high = (one / 1e5 for one in (min(options.pressures), max(options.pressures)))
+    low, high = (p / 1e5 for p in (min(options.pressures), max(options.pressures)))
     where = f"worst of {len(options.pressures)} pressures from {low:g} to {high:g} bar"
     return {
         "copper": Map("worst_copper", "gain", "frequency", f"Dither's copper power, {where}.",
@@ -160,31 +167,31 @@ def _limits(grid: Grid, each: list[Candidate], best: int | None) -> tuple[str, .
     """Return what binds."""
     if best is None:
         return ()
-    one = each[best]
-    found = [
-        f"the gain of {one.gain:.3g} is asked for by the {NAMES[one.binding]} at "
-        f"{grid.pressures[one.decisive] / 1e5:g} bar"
+    chosen = each[best]
+    texts = [
+        f"the gain of {chosen.gain:.3g} is asked for by the {NAMES[chosen.binding]} at "
+        f"{grid.pressures[chosen.decisive] / 1e5:g} bar"
     ]
     out = [f"{f:.4g} Hz ({e.verdict})" for f, e in zip(grid.frequencies, each, strict=True)
            if e.verdict]  # fmt: skip
-    return (*found, f"frequencies excluded: {', '.join(out)}") if out else tuple(found)
+    return (*texts, f"frequencies excluded: {', '.join(out)}") if out else tuple(texts)
 
 
 def _warnings(
     options: Options, grid: Grid, each: list[Candidate], best: int | None
 ) -> tuple[str, ...]:
     if best is None:
-        reasons = {one.verdict for one in each}
+        reasons = {candidate.verdict for candidate in each}
         return (
             f"no dither overcomes the friction within the limits: {'; '.join(sorted(reasons))}",
         )
-    found = []
+    texts = []
     f = grid.frequencies[best]
     if best in (0, len(each) - 1):
-        found.append(f"the optimum lies at the edge of the frequencies, {f:g} Hz: widen the range")
+        texts.append(f"the optimum lies at the edge of the frequencies, {f:g} Hz: widen the range")
     if math.isclose(each[best].gain, options.gain_min):
-        found.append(f"the smallest gain is enough, {options.gain_min:g}: widen the range")
-    return tuple(found)
+        texts.append(f"the smallest gain is enough, {options.gain_min:g}: widen the range")
+    return tuple(texts)
 
 
 STUDY = Study(
@@ -193,7 +200,5 @@ STUDY = Study(
     summary="amplitude and frequency of the dither that overcomes the friction at least price",
     options=Options,
     defaults=DEFAULTS,
-    compute=lambda par, options, progress: compute(
-        cast(Par, par), cast(Options, options), progress
-    ),
+    compute=compute,
 )

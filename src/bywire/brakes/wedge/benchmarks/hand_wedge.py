@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from bywire.benchmark.peers.hand_code import HandCode
 from bywire.benchmark.peers.hand_source import Subject
-from bywire.brakes.wedge.energy import Flow
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
@@ -25,7 +24,7 @@ SUBJECT = _Wedge(
     indices="hand_written_wedge_indices.h",
     shared=("hand_written_wedge_model.h",),
     model=WedgeBrake,
-    flow=Flow,
+    flow=WedgeBrake.Flow,
     choices={
         "screw.law": ("load",),
         "wedge_friction.stopped_disc": ("drop",),

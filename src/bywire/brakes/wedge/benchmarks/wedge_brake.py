@@ -137,9 +137,7 @@ def regularized(par: WedgeParameters) -> list[Result]:
         f"tanh {others[0] * 1e9:.2g} nm and {others[1]:.2g} N m"
     )
     note += "; the peer is the more exact here" if better else "; at equal error it is slower still"
-    return [
-        at_least("wedge.peer.tanh_rk4", solution.seconds / seconds, 20.0, "times faster", note)
-    ]
+    return [at_least("wedge.peer.tanh_rk4", solution.seconds / seconds, 20.0, "times faster", note)]
 
 
 def _rms(error: Array) -> float:

@@ -9,8 +9,17 @@ from pydantic import Field
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Stiffness, TimeConstant, Unit
-from bywire.core.signals import ContactCompliance, Energy, Power, Signal
+from bywire.core.signals import ContactCompliance, Energy, Role, Signal
 
+Work = Annotated[float, Signal("W", "work on the heart's contacts")]
+Loss = Annotated[
+    float,
+    Signal(
+        "W",
+        "loss in the heart's contacts, less its energy at start",
+        role=Role("sink", "brake heart"),
+    ),
+]
 FreePlay = Annotated[float, Unit("m", 2e-5), Field(ge=0, allow_inf_nan=False)]
 
 
@@ -187,11 +196,11 @@ def energy(u: Input, par: Parameters) -> Energy:
     return 0.5 * (f.f_1 * d.d_1 + f.f_2 * d.d_2 + f.f_12 * d.d_12)
 
 
-def power_in(u: Input, f: Forces) -> Power:
+def power_in(u: Input, f: Forces) -> Work:
     """Return the work that screws and wedge do on the contacts."""
     return f.f_1 * (u.v - u.V_1) + f.f_2 * (u.V_2 - u.v) + f.f_12 * (u.V_1 - u.V_2)
 
 
-def power_loss(u: Input, f: Forces, par: Parameters) -> Power:
+def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
     """Return what the contacts take and do not store, >= 0."""
     return power_in(u, f) - power_in(u, solve(depths(u, par), par))

@@ -34,7 +34,7 @@ class Parameters(ParameterSet):
 class State(NamedTuple):
     """Travel and velocity, zero in the middle."""
 
-    x: Annotated[float, Signal("m", "wedge travel", 5e-4)]
+    x: Annotated[float, Signal("m", "wedge travel", 1e-3)]
     v: Annotated[float, Signal("m/s", "wedge velocity", 0.02)]
 
 

@@ -11,9 +11,16 @@ from pydantic import Field, model_validator
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Length, Nodes, Stiffness, TimeConstant, Unit
-from bywire.core.signals import ContactCompliance, Energy, Overlap, Power, Signal
+from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
 
 Clearance = Annotated[float, Unit("m", 2e-4), Field(ge=0, allow_inf_nan=False)]
+Work = Annotated[float, Signal("W", "work on the caliper")]
+Loss = Annotated[
+    float,
+    Signal(
+        "W", "loss in the caliper, less its energy at start", role=Role("sink", "caliper damping")
+    ),
+]
 NormalForce = Annotated[float, Signal("N", "normal force", 3e3)]
 
 
@@ -106,7 +113,7 @@ def closing(u: Input) -> Annotated[float, Signal("m/s", "rate of the overlap", 5
     return u.side * u.v * u.tan_alpha + u.runout_rate
 
 
-def overlap(u: Input, par: Parameters) -> Overlap:
+def overlaps(u: Input, par: Parameters) -> Overlap:
     """Return the damped overlap, n + tau dn/dt."""
     return depth(u, par) + par.tau_cal * closing(u)
 
@@ -138,6 +145,11 @@ def normal_force(
     return f + _bent(f * compliance(par), par)
 
 
+def bent(f: Forces, par: Parameters) -> Forces:
+    """Return the contact forces that belong to those of constant compliance; `normal_force`."""
+    return Forces(F_N=normal_force(f.F_N, par))
+
+
 def forces(u: Input, par: Parameters) -> Forces:
     r"""Return the normal force, :math:`F_N = K_{CAL} \max(0, n + \tau \dot n)`, or by the table.
 
@@ -145,7 +157,7 @@ def forces(u: Input, par: Parameters) -> Forces:
     ----------
     Roberts et al. (2003), section "Wedge and calliper", with clearance, run-out and damping.
     """
-    return Forces(F_N=_elastic_force(ops.fmax(overlap(u, par), 0.0), par))
+    return Forces(F_N=_elastic_force(ops.fmax(overlaps(u, par), 0.0), par))
 
 
 def travel(F_N: NormalForce, par: Parameters) -> Overlap:
@@ -185,12 +197,12 @@ def energy(u: Input, par: Parameters) -> Energy:
     return stored
 
 
-def power_in(u: Input, f: Forces) -> Power:
+def power_in(u: Input, f: Forces) -> Work:
     """Return the work of wedge and run-out on the caliper."""
     return f.F_N * closing(u)
 
 
-def power_loss(u: Input, f: Forces, par: Parameters) -> Power:
+def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
     """Return what the damping takes, >= 0."""
     return (f.F_N - _elastic_force(ops.fmax(depth(u, par), 0.0), par)) * closing(u)
 

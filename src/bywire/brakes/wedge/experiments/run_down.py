@@ -137,9 +137,7 @@ EXPERIMENT = Experiment(
     assembly="wedge-brake",
     summary="a motor coasts to rest: alone, with an added inertia, against a known torque",
     options=Options,
-    defaults=Options(
-        i_spin=4.0, t_spin=0.1, J_added=1e-4, i_brake=0.5, duration=0.5, record=2e-4
-    ),
+    defaults=Options(i_spin=4.0, t_spin=0.1, J_added=1e-4, i_brake=0.5, duration=0.5, record=2e-4),
     cases=cases,
     judge=judge,
     kpis=_UNITS,

@@ -8,9 +8,8 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge import position_steps
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.position_steps import Options
-from bywire.brakes.wedge.rigs import shaft_rig_plant
 from bywire.brakes.wedge.rigs.rig_case import parameters_of
-from bywire.core.signals import zeros
+from bywire.brakes.wedge.rigs.shaft_rig import friction
 
 _LOOPS = ("low", "high")
 
@@ -25,9 +24,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     bands = []
     for loop in _LOOPS:
         par = parameters_of(recordings[f"{loop}_small"])
-        rest = zeros(shaft_rig_plant.State)
-        s = shaft_rig_plant.side(rest, rest, zeros(shaft_rig_plant.Memory), par)
-        held = max(abs(bound) for bound in shaft_rig_plant.friction(s, par))
+        held = max(abs(bound) for bound in friction(0.0, 0.0, par))
         band = (held + par.motor_1.T_cog) / position_steps.stiffness(par)
         bands.append(
             Kpi(f"dead_band_{loop}", band, "rad",

@@ -1,1 +1,1 @@
-"""Control loops, one file each, and what they share."""
+"""Control loops, by the controller that closes them, and what they share."""

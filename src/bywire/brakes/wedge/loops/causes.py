@@ -31,8 +31,6 @@ CAUSES: Causes = {
 """the same of the whole brake"""
 
 DRIVE_LIMITS = (
-    Saturation(
-        "sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")
-    ),
+    Saturation("sat_current", ("i_1_ref", "i_2_ref"), ("control.position.i_max", "drive.i_max")),
 )
 """current demand of a drive at the controller's or at its own limit"""

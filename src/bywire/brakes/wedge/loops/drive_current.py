@@ -6,12 +6,11 @@ from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
-from bywire.brakes.wedge.rigs.shaft_rig_plant import Memory, State, Stimulus
+from bywire.brakes.wedge.rigs.shaft_rig import Memory, ShaftRig, Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
-from bywire.plant import servo_motor
+from bywire.plant import current_drive, servo_motor
 
 _SAMPLE = 20e-6  # of the demand [s], which an analog drive takes as it comes
 _STEP = 5e-6  # substep [s]
@@ -26,21 +25,24 @@ def point(par: ParameterSet, value: float) -> Point:
         When the current is beyond the drive's limit, its voltage beyond the supply, or its
         torque beyond the clamp.
     """
-    own = cast(
+    clamped = cast(
         WedgeParameters,
         par.replace({
             "rig.mode_1": "current", "rig.load": "dummy", "rig.clamp": "closed",
             "control.T_fast": _SAMPLE,
         }),
     )  # fmt: skip
-    _require_reachable(value, own)
-    drive, motor = own.drive, own.motor_1
+    _require_reachable(value, clamped)
+    drive, motor = clamped.drive, clamped.motor_1
     held = value / drive.G_sense
     duty = servo_motor.resistance(motor) * held / drive.V_dc
-    state = zeros(State)._replace(demand_1=value, sensed_1=value, integral_1=duty, i_1=held)
+    state = ShaftRig.state(
+        drive=current_drive.State(demand=value, sensed=value, integral=duty),
+        motor=servo_motor.State(i=held, theta=0.0, omega=0.0),
+    )
     memory = zeros(Memory)._replace(i_1_ref=value)
     stimulus = zeros(Stimulus)._replace(i_1_set=value)
-    return Point(ShaftRig(), own, state, memory, stimulus, _STEP)
+    return Point(ShaftRig(), clamped, state, memory, stimulus, _STEP)
 
 
 def _require_reachable(value: float, par: WedgeParameters) -> None:

@@ -35,15 +35,15 @@ def point(par: ParameterSet, value: float) -> Point:
     -----
     The wedge stands on the side to which the disc turns; the moment counts in that direction.
     """
-    own = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
-    _require_braking(value, own)
-    x = travel_for(force_for(value, own), own)
-    _require_reachable(value, x, own)
-    turning = math.copysign(1.0, own.flywheel.Omega_0)
+    closed = cast(WedgeParameters, par.replace({"command.mode": "moment"}))
+    _require_braking(value, closed)
+    x = travel_for(force_for(value, closed), closed)
+    _require_reachable(value, x, closed)
+    turning = math.copysign(1.0, closed.flywheel.Omega_0)
     x *= turning
-    memory = memory_at(x, own)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
-    state = state_at(x, own)._replace(y_M=turning * value)
-    return Point(WedgeBrake(), own, state, memory, zeros(Stimulus)._replace(M_set=value))
+    memory = memory_at(x, closed)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
+    state = state_at(x, closed)._replace(y_M=turning * value)
+    return Point(WedgeBrake(), closed, state, memory, zeros(Stimulus)._replace(M_set=value))
 
 
 def _require_braking(value: float, par: WedgeParameters) -> None:

@@ -6,10 +6,9 @@ from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.loops.causes import DRIVE_TRAIN
-from bywire.brakes.wedge.loops.position_control import BAND, TUNABLES
+from bywire.brakes.wedge.loops.position import BAND, TUNABLES
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
-from bywire.brakes.wedge.rigs.shaft_rig_plant import Memory, State, Stimulus
+from bywire.brakes.wedge.rigs.shaft_rig import Memory, ShaftRig, Stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
 
@@ -18,13 +17,13 @@ CAUSES = {**DRIVE_TRAIN, "cogging": {"motor_1.T_cog": 0.0}}  # the one motor tha
 
 def point(par: ParameterSet, value: float) -> Point:
     """Return the shaft at rest at an angle [rad]."""
-    own = cast(
+    rig = cast(
         WedgeParameters,
         par.replace({"rig.mode_1": "position", "rig.load": "screw", "rig.clamp": "open"}),
     )
-    state = zeros(State)._replace(theta_1=value)
+    state = zeros(ShaftRig.State)._replace(theta_1=value)
     memory = zeros(Memory)._replace(theta_1_ref=value, last_1=value)
-    return Point(ShaftRig(), own, state, memory, zeros(Stimulus)._replace(theta_1_set=value))
+    return Point(ShaftRig(), rig, state, memory, zeros(Stimulus)._replace(theta_1_set=value))
 
 
 LOOP = Loop(

@@ -100,9 +100,7 @@ def _scatter(one: Squeeze) -> float:
     return max(float(np.median(np.abs(np.diff(one.i)))), 1e-9)
 
 
-def _figures(
-    values: Array, one: Squeeze, par: WedgeParameters
-) -> dict[str, tuple[float, str]]:
+def _figures(values: Array, one: Squeeze, par: WedgeParameters) -> dict[str, tuple[float, str]]:
     K = 0.5 * sum(servo_motor.torque_constant(m) for m in (par.motor_1, par.motor_2))
     per = K / roller_screw.slope(par.screw)
     top = float(np.abs(one.F).max())

@@ -39,9 +39,7 @@ class Sensor:
     sigma: float = 0.0
 
 
-def sensed(
-    case: Case, sensors: Mapping[str, Sensor], random: np.random.Generator
-) -> xr.Dataset:
+def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generator) -> xr.Dataset:
     """Return one run's signals from time zero on, with noise.
 
     Parameters
@@ -91,6 +89,4 @@ def turned(case: Case, angle: float) -> Case:
         given = dict(case.stimulus(t))
         return given | {n: v + angle for n, v in given.items() if n.startswith(_ANGLES)}
 
-    return replace(
-        case, state=shifted(case.state), memory=shifted(case.memory), stimulus=stimulus
-    )
+    return replace(case, state=shifted(case.state), memory=shifted(case.memory), stimulus=stimulus)

@@ -19,7 +19,9 @@ HELD = Fact(200.0, "N*m", f"{_MOMENT}, Fig. 7: 200 Nm step, held at the desired 
 PULSED = Fact(160.0, "N*m", f"{_MOMENT}, Fig. 7: pulsed to reduce it to 80 % of this value")
 ONCE = Fact(1.0, "1", f"{_MOMENT}, Fig. 7: oscillations occur once per revolution")
 RUNOUT = Fact(
-    0.0, "%", f"{_MOMENT}, Fig. 7: oscillations are the result of run-out; read as: none without",
+    0.0,
+    "%",
+    f"{_MOMENT}, Fig. 7: oscillations are the result of run-out; read as: none without",
     "reading",
 )
 PEAK_FIRST = Fact(

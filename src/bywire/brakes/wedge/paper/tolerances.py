@@ -24,7 +24,9 @@ FORMULA = Allowance(
     "the model without friction obeys the formula; what is left is a run not quite at rest",
 )  # fmt: skip
 FORCE = Allowance(
-    "forces that vanish by symmetry or at the neutral point", 0.1, "N",
+    "forces that vanish by symmetry or at the neutral point",
+    0.1,
+    "N",
     "1e-4 of the forces that the same test shows otherwise",
 )
 NEUTRAL = Allowance(

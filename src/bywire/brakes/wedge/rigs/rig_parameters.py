@@ -27,3 +27,8 @@ class Parameters(ParameterSet):
     T_clamp: Torque
     """torque at which the clamp slips"""
     sensor: force_sensor.Parameters
+
+
+def dummy_inertia(par: Parameters) -> float:
+    """Return the inertia [kg m^2] that the rig adds; the screw's own is in the motor's."""
+    return par.J_dummy if par.load == "dummy" else 0.0 * par.J_dummy

@@ -6,93 +6,161 @@ Mechatronic Wedge Brake", SAE, 2003, sections "Motor & rollerscrew alone", "Moto
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 from bywire.brakes.wedge import drive_train
+from bywire.brakes.wedge.drive_train import Command, Demand
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs import shaft_rig_plant as plant
-from bywire.core.model import Bounds, Matrix, Model, Task
+from bywire.brakes.wedge.rigs.rig_parameters import dummy_inertia
+from bywire.core import ops
+from bywire.core.assembly import Assembly
+from bywire.core.model import Bounds, Task
+from bywire.core.parts import Integral, Part, Shown
+from bywire.core.signals import Role, Signal
+from bywire.plant import current_drive, servo_motor, shaft_encoder
 
 Par = WedgeParameters
+ON = 1.0  # the rig's power stage is never switched off
+NUT = 0.0  # net axial force: a preloaded nut is braced against itself
 
 
-class ShaftRig(Model):
-    """Model of the rig for the engine; see ``bywire.core.model.Model``.
+class Memory(NamedTuple):
+    """What the controller holds between its sampling instants."""
+
+    theta_1_ref: Annotated[float, Signal("rad", "angle reference 1", 3.0)]
+    last_1: Annotated[float, Signal("rad", "encoder 1 at the last sample", 3.0)]
+    speed_1: Annotated[float, Signal("rad/s", "measured speed 1", 50.0)]
+    i_1_ref: Annotated[float, Signal("A", "current demand 1", 5.0)]
+
+
+class Stimulus(NamedTuple):
+    """What the operator demands; ``rig.mode_1`` says which of them acts."""
+
+    theta_1_set: Annotated[float, Signal("rad", "demanded angle 1", 3.0)]
+    i_1_set: Annotated[float, Signal("A", "current demand 1", 5.0)]
+
+
+class ShaftRig(Assembly[WedgeParameters, Memory]):
+    """Model of the rig.
 
     One dry friction: bearings, screw and clamp together.
     """
 
     name: ClassVar[str] = "shaft-rig"
-    State: ClassVar = plant.State
-    Memory: ClassVar = plant.Memory
-    Stimulus: ClassVar = plant.Stimulus
-    Flow: ClassVar = plant.Flow
-    Output: ClassVar = plant.Output
+    Memory: ClassVar = Memory
+    Stimulus: ClassVar = Stimulus
     frictions: ClassVar[tuple[str, ...]] = ("omega_1",)
-    limits: ClassVar[tuple[str, ...]] = ()
-    usually_open: ClassVar[tuple[bool, ...]] = ()
+
+    W_electric = Integral("J", "electrical energy into the motor")
+    drive = Part(current_drive, suffix="_1")
+    motor = Part(
+        servo_motor,
+        par="motor_1",
+        suffix="_1",
+        fixed=("theta",),
+        loss={"E_copper": "copper_loss", "E_damping": "damping_loss"},
+    )
+    E_shaft = Integral(
+        "J", "friction of bearings, screw and clamp", role=Role("sink", "bearings and screws")
+    )
+    t_stuck = Integral("s", "time in which the shaft sticks", role=Role("standstill"))
+    q_1 = Shown("rad", "angle shown by encoder 1", 3.0)
+    sat_current = Shown("1", "current demand saturated")
+    voltage_1 = Shown("V", "motor voltage 1", 10.0)
+    T_fr_1 = Shown("N*m", "friction torque 1", 0.1)
+    stuck = Shown("1", "shaft stuck")
+    P_el = Shown("W", "electrical power", 50.0)
+    E_source = Shown("J", "electrical energy into the motor", role=Role("source", "source"))
+
+    records: ClassVar[tuple[str, ...]] = (
+        "theta_1_ref", "theta_1", "q_1", "omega_1", "i_1_ref", "i_1", "sat_current", "voltage_1",
+        "T_fr_1", "stuck", "P_el", "E_source", "E_copper", "E_damping", "E_shaft", "E_stored",
+        "t_stuck",
+    )  # fmt: skip
+
+    def wire(self, w: Self) -> None:
+        """Say what drive and motor feel."""
+        drive_train.wire(w.drive, w.motor, w.m.i_1_ref, ON, NUT, w.par)
+
+    def mass(self, xe: Any, par: Par) -> Any:
+        """Return the inductance and the inertia, that of the dummy shaft included."""
+        motor = super().mass(xe, par)
+        return motor._replace(omega_1=motor.omega_1 + dummy_inertia(par.rig))
+
+    def stored(self, w: Self) -> Any:
+        """Return the energy in the motor and in the dummy shaft [J]."""
+        omega = w.motor.x.omega
+        return super().stored(w) + 0.5 * dummy_inertia(w.par.rig) * omega * omega
+
+    def friction(self, w: Self) -> tuple[Bounds, ...]:
+        """Return the limits of the friction on the shaft."""
+        return (friction(w.motor.x.omega, drive_train.torque(w.motor), w.par),)
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return what goes in, and what the friction takes."""
+        omega = w.motor.x.omega
+        return {
+            "W_electric": drive_train.power(w.motor),
+            "E_shaft": -w.reaction[0] * omega,
+            "t_stuck": ops.where(omega == 0, 1.0, 0.0),
+        }
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return what is recorded beside states and losses."""
+        limited = ops.fabs(w.m.i_1_ref) >= current_limit(w.par)
+        return {
+            "q_1": shaft_encoder.reading(w.motor.x.theta, w.par.encoder),
+            "sat_current": ops.where(limited, 1.0, 0.0),
+            "voltage_1": w.motor.u.v,
+            "T_fr_1": -w.reaction[0],
+            "stuck": ops.where(w.motor.x.omega == 0, 1.0, 0.0),
+            "P_el": drive_train.power(w.motor),
+            "E_source": w.flow.W_electric,
+        }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the one controller."""
-        return (Task(par.rig.mode_1, par.control.T_fast, plant.tick),)
+        return (Task(par.rig.mode_1, par.control.T_fast, tick),)
 
-    def mass(self, xe: plant.State, par: Par) -> plant.State:
-        """Return the inductance and the inertia, that of the dummy shaft included."""
-        motor = plant.State._make(drive_train.mass(par.motor_1))
-        return motor._replace(omega_1=motor.omega_1 + plant.dummy(par))
 
-    def balance(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        m: plant.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-    ) -> plant.State:
-        """Return voltage, torque, and the filters' rates."""
-        s = plant.side(x, xe, m, par)
-        return plant.State._make(drive_train.balance(s, plant.ON, plant.NUT, par))
+def friction(omega: float, torque: float, par: Par) -> Bounds:
+    """Return the limits of the dry friction [N m] of bearings, screw and clamp.
 
-    def bounds(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        m: plant.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-    ) -> tuple[Bounds, ...]:
-        """Return the limits of the friction on the shaft."""
-        return (plant.friction(plant.side(x, xe, m, par), par),)
+    Parameters
+    ----------
+    omega, torque
+        Speed of the shaft [rad/s], torque of its motor [N m].
 
-    def compliance(self, par: Par) -> tuple[Matrix, ...]:
-        """Return none: the rig has no contacts."""
-        return ()
+    Notes
+    -----
+    A preloaded nut has two halves that push on each other through the screw: whichever way it
+    turns, one half drives and the other is driven. Both rub, and no net torque is left.
+    """
+    T_p = T_n = drive_train.bearing_friction(omega, NUT, par)
+    if par.rig.load == "screw":
+        F_0 = par.rig.F_0
+        halves = [drive_train.screw_friction(torque, force, par) for force in (F_0, -F_0)]
+        # A loss by the motor's torque does not see the preload: it must not count twice.
+        once = drive_train.screw_friction(torque, 0.0 * F_0, par)
+        T_p = T_p + halves[0].T_p + halves[1].T_p - once.T_p
+        T_n = T_n + halves[0].T_n + halves[1].T_n - once.T_n
+    if par.rig.clamp == "closed":
+        T_p, T_n = T_p + par.rig.T_clamp, T_n + par.rig.T_clamp
+    return (-T_p, T_n)
 
-    def gap(self, x: plant.State, xe: plant.State, par: Par) -> tuple[tuple[float, ...], ...]:
-        """Return none: the rig has no contacts."""
-        return ()
 
-    def powers(
-        self,
-        x: plant.State,
-        xe: plant.State,
-        rate: plant.State,
-        m: plant.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-    ) -> plant.Flow:
-        """Return the powers for the energy balance."""
-        return plant.rates(x, m, par, reaction[0])
+def current_limit(par: Par) -> float:
+    """Return the limit [A] of the current demand: the drive's, or a lower one of the control."""
+    if par.rig.mode_1 == "position":
+        return ops.fmin(par.control.position.i_max, par.drive.i_max)
+    return par.drive.i_max
 
-    def output(
-        self,
-        x: plant.State,
-        m: plant.Memory,
-        par: Par,
-        contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-        flow: plant.Flow,
-    ) -> plant.Output:
-        """Return what is recorded at an instant."""
-        return plant.instant(x, m, par, reaction[0], flow)
+
+def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Run the real-time computer once."""
+    theta = shaft_encoder.reading(x.theta_1, par.encoder)
+    return Memory._make(
+        drive_train.command(
+            par.rig.mode_1, theta, Command._make(m), Demand(u.theta_1_set, u.i_1_set), par
+        )
+    )

@@ -36,7 +36,6 @@ def _moment_slope(mu_B: float, alpha: float) -> Cited:
     return derived(slope, "2 mu_B r_B K_CAL tan(alpha) L/2pi")
 
 
-
 _MOTOR = {
     "R_ref": chosen(_R, _CLASS),
     "L_M": chosen(_L, "low, as the paper says of the motor"),
@@ -197,9 +196,7 @@ def _entry(
 
 
 ENTRIES = (
-    _entry(
-        "roberts2003", "self-reinforcing wedge brake with two motors, near its neutral point"
-    ),
+    _entry("roberts2003", "self-reinforcing wedge brake with two motors, near its neutral point"),
     _entry(
         "roberts2003-unstable",
         "the same with pad friction 0.45 above tan(alpha): unstable without control",

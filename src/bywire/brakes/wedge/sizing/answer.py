@@ -6,10 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 PHASES = tuple(0.5 * math.pi * k for k in range(4))
 """angles of the disc [rad] at which a run begins"""

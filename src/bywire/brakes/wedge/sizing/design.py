@@ -19,11 +19,10 @@ from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.start import force_for, travel_for
+from bywire.core.typing import Array
 from bywire.plant import roller_screw
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
@@ -72,27 +71,29 @@ def answer(par: WedgeParameters, demand: Demand) -> Answer:
     one at which the slowest case meets the demanded time, within 1 %; where none does, the one
     that comes closest. Else it is 1.
     """
-    own = par.replace({"command.mode": "moment"})
+    controlled = par.replace({"command.mode": "moment"})
     if not demand.enforced:
-        return _judged(own, demand, 1.0)
+        return _judged(controlled, demand, 1.0)
     # The pads cannot be slower than their travel in the time demanded.
-    F_N = 0.9 * max(force_for(demand.moment, own.replace({"wedge.mu_B": m})) for m in demand.mu_B)
-    least = travel_for(F_N, own) * wedge.slope(own.wedge) / demand.t_90
-    factors = least / closing_speed(own) * np.geomspace(1.0, _FASTEST, _TRIED)
+    pads = [controlled.replace({"wedge.mu_B": mu_B}) for mu_B in demand.mu_B]
+    F_N = 0.9 * max(force_for(demand.moment, brake) for brake in pads)
+    least = travel_for(F_N, controlled) * wedge.slope(controlled.wedge) / demand.t_90
+    # All speeds of a round run side by side: a round of eight costs little more than one.
+    factors = least / closing_speed(controlled) * np.geomspace(1.0, _FASTEST, _TRIED)
     low = high = slow_time = fast_time = math.nan
     for _ in range(_ROUNDS):
-        times = _slowest(own, demand, factors)
+        times = _slowest(controlled, demand, factors)
         fast = np.flatnonzero(times <= demand.t_90)
         k = int(fast[0]) if fast.size else int(np.argmin(times))
         if k == 0 or not fast.size:
-            return _judged(own, demand, float(factors[k]))
+            return _judged(controlled, demand, float(factors[k]))
         low, high = float(factors[k - 1]), float(factors[k])
         slow_time, fast_time = float(times[k - 1]), float(times[k])
         factors = np.geomspace(low, high, _TRIED)
     share = 1.0
     if math.isfinite(slow_time):
         share = (slow_time - demand.t_90) / (slow_time - fast_time)
-    return _judged(own, demand, low * (high / low) ** share)
+    return _judged(controlled, demand, low * (high / low) ** share)
 
 
 def _run(par: WedgeParameters, demand: Demand, phase: float, duration: float) -> Run:
@@ -110,11 +111,11 @@ def _variations(par: WedgeParameters, demand: Demand, factors: Array) -> Mapping
         grid.ravel() for grid in np.meshgrid(np.asarray(demand.mu_B), factors, indexing="ij")
     )
     control = par.control.moment
-    found = {"wedge.mu_B": mu}
-    found |= {f"control.moment.{name}": getattr(control, name) * factor for name in SPEEDS}
+    cases = {"wedge.mu_B": mu}
+    cases |= {f"control.moment.{name}": getattr(control, name) * factor for name in SPEEDS}
     if demand.known:
-        found["control.moment.slope_hat"] = control.slope_hat * mu / par.wedge.mu_B
-    return found
+        cases["control.moment.slope_hat"] = control.slope_hat * mu / par.wedge.mu_B
+    return cases
 
 
 def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
@@ -126,8 +127,8 @@ def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
     cases, slowest = _variations(par, demand, factors), np.zeros(factors.size)
     for phase in demand.phases:
         run = _run(par, demand, phase, demand.t_hold)
-        found = simulate_ensemble(run, cases, ("y_M",), threads=1)
-        times = _times(found.time, found["y_M"], 0.9 * demand.moment)
+        ensemble = simulate_ensemble(run, cases, ("y_M",), threads=1)
+        times = _times(ensemble.time, ensemble["y_M"], 0.9 * demand.moment)
         times = np.where(np.isnan(times), math.inf, times)
         slowest = np.maximum(slowest, times.reshape(len(demand.mu_B), -1).max(axis=0))
     return slowest
@@ -136,23 +137,23 @@ def _slowest(par: WedgeParameters, demand: Demand, factors: Array) -> Array:
 def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
     cases = _variations(par, demand, np.array([factor]))
     whole = demand.t_hold + demand.t_release
-    found = [
+    runs = [
         simulate_ensemble(_run(par, demand, phase, whole), cases, SIGNALS, threads=1)
         for phase in demand.phases
     ]
-    time = found[0].time - _SETTLE
+    time = runs[0].time - _SETTLE
     after, held = time >= -_TINY, time < demand.t_hold - _TINY
     counted = after if demand.whole else after & held
 
     def largest(rows: NDArray[np.bool_], *names: str) -> Array:
-        sizes = [np.abs(one[name][:, rows]).max(axis=1) for one in found for name in names]
+        sizes = [np.abs(run[name][:, rows]).max(axis=1) for run in runs for name in names]
         return np.asarray(np.max(sizes, axis=0))
 
     def gained(name: str) -> Array:
-        rows = [one[name][:, after] for one in found]
+        rows = [run[name][:, after] for run in runs]
         return np.asarray(np.max([row[:, -1] - row[:, 0] for row in rows], axis=0))
 
-    times = [_times(one.time, one["y_M"], 0.9 * demand.moment) for one in found]
+    times = [_times(run.time, run["y_M"], 0.9 * demand.moment) for run in runs]
     at_end = held & (time >= _LAST * demand.t_hold)
     return Answer(
         closing_speed=factor * closing_speed(par),
@@ -164,20 +165,20 @@ def _judged(par: WedgeParameters, demand: Demand, factor: float) -> Answer:
         speed=largest(after, "omega_1", "omega_2"),
         copper=gained("E_copper"),
         friction=gained("E_shaft"),
-        held=np.min([one["y_M"][:, at_end].mean(axis=1) for one in found], axis=0),
-        left=np.max([np.abs(one["y_M"][:, -1]) for one in found], axis=0),
+        held=np.min([run["y_M"][:, at_end].mean(axis=1) for run in runs], axis=0),
+        left=np.max([np.abs(run["y_M"][:, -1]) for run in runs], axis=0),
         stop=largest(after, "F_end"),
-        unsettled=sum(int(one.unsettled.sum()) for one in found),
+        unsettled=sum(int(run.unsettled.sum()) for run in runs),
     )
 
 
 def _times(time: Array, y: Array, level: float) -> Array:
     """Return when each row first exceeds a level [s after the demand], interpolated, or NaN."""
-    found = np.full(y.shape[0], math.nan)
+    times = np.full(y.shape[0], math.nan)
     for n, row in enumerate(y):
         above = np.flatnonzero(row > level)
         if above.size and above[0] > 0:
             k = int(above[0])
             share = (level - row[k - 1]) / (row[k] - row[k - 1])
-            found[n] = time[k - 1] + share * (time[k] - time[k - 1]) - _SETTLE
-    return found
+            times[n] = time[k - 1] + share * (time[k] - time[k - 1]) - _SETTLE
+    return times

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.map import HELD, LATE, LEFT
 from bywire.brakes.wedge.sizing.options import Options
+from bywire.core.typing import Array
 
 _AT = 0.99  # share of a limit from which on it counts as reached
 
@@ -28,46 +28,46 @@ def active(at: xr.Dataset, par: WedgeParameters, options: Options) -> list[str]:
     options
         The study's.
     """
-    found = []
+    texts = []
     if options.response == "enforced" and float(at["lateness"]) >= _AT:
-        found.append(
+        texts.append(
             f"time: {float(at['t_90'].max()) * 1e3:.4g} ms of the {options.t_90 * 1e3:.4g} ms "
             f"demanded, slowest at mu_B = {_where(at['t_90']):g}"
         )
     limits = {"control.position.i_max": par.control.position.i_max, "drive.i_max": par.drive.i_max}
-    name, i_max = min(limits.items(), key=lambda one: one[1])
+    name, i_max = min(limits.items(), key=lambda limit: limit[1])
     if float(at["current"].max()) >= _AT * i_max:
         reached = at["mu_B"].values[at["current"].values >= _AT * i_max]
-        found.append(f"current: at the limit {name} = {i_max:g} A with mu_B = {_listed(reached)}")
+        texts.append(f"current: at the limit {name} = {i_max:g} A with mu_B = {_listed(reached)}")
     held = at["held"].min() / options.moment
     if float(held) < HELD / _AT:
-        found.append(
+        texts.append(
             f"hold: {100.0 * float(held):.3g} % of the demand is held, least at "
             f"mu_B = {_where(-at['held']):g}"
         )
     if float(at["left"].max()) > _AT * LEFT * options.moment:
-        found.append(f"release: {float(at['left'].max()):.3g} N·m are left at its end")
+        texts.append(f"release: {float(at['left'].max()):.3g} N·m are left at its end")
     powers = at[options.power]
     near = at["mu_B"].values[powers.values >= _AT * float(powers.max())]
-    found.append(f"power: {float(powers.max()):.3g} W at mu_B = {_listed(near)}")
-    return found
+    texts.append(f"power: {float(powers.max()):.3g} W at mu_B = {_listed(near)}")
+    return texts
 
 
 def failures(at: xr.Dataset, options: Options) -> list[str]:
     """Return why a design is infeasible; empty where it is not."""
-    found = []
+    reasons = []
     slowest = float(at["t_90"].max(skipna=False))
     if math.isnan(slowest):
-        found.append("never reaches 90 % of the demand")
+        reasons.append("never reaches 90 % of the demand")
     elif options.response == "enforced" and float(at["lateness"]) > LATE:
-        found.append(f"late, {slowest * 1e3:.4g} ms at mu_B = {_where(at['t_90']):g}")
+        reasons.append(f"late, {slowest * 1e3:.4g} ms at mu_B = {_where(at['t_90']):g}")
     if float(at["held"].min()) < HELD * options.moment:
-        found.append("does not hold the demand")
+        reasons.append("does not hold the demand")
     if float(at["left"].max()) > LEFT * options.moment:
-        found.append("does not release")
+        reasons.append("does not release")
     if float(at["stop"].max()) > 0.0:
-        found.append("presses on an end stop")
-    return found
+        reasons.append("presses on an end stop")
+    return reasons
 
 
 def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> list[str]:
@@ -93,12 +93,12 @@ def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> l
         k, m = i + di, j + dj
         if not (0 <= k < grid.sizes["tan_alpha"] and 0 <= m < grid.sizes["lead"]):
             continue
-        one = grid.isel(tan_alpha=k, lead=m)
-        value = (f"tan(alpha) = {float(one['tan_alpha']):.4g}" if di
-                 else f"lead = {1e3 * float(one['lead']):.4g} mm")  # fmt: skip
-        reasons = failures(one, options)
-        more = 100.0 * (float(one[options.power].max()) / power - 1.0)
-        outcome = f"{more:+.2g} % power, at mu_B = {_where(one[options.power]):g}"
+        neighbor = grid.isel(tan_alpha=k, lead=m)
+        value = (f"tan(alpha) = {float(neighbor['tan_alpha']):.4g}" if di
+                 else f"lead = {1e3 * float(neighbor['lead']):.4g} mm")  # fmt: skip
+        reasons = failures(neighbor, options)
+        more = 100.0 * (float(neighbor[options.power].max()) / power - 1.0)
+        outcome = f"{more:+.2g} % power, at mu_B = {_where(neighbor[options.power]):g}"
         if reasons:
             outcome = f"infeasible: {'; '.join(reasons)}"
         texts.append(f"{label}, {value}: {outcome}")
@@ -109,5 +109,5 @@ def _where(values: xr.DataArray) -> float:
     return float(values["mu_B"].values[np.argmax(values.values)])
 
 
-def _listed(values: NDArray[np.float64]) -> str:
-    return ", ".join(f"{float(one):g}" for one in values)
+def _listed(values: Array) -> str:
+    return ", ".join(f"{float(value):g}" for value in values)

@@ -8,14 +8,12 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.answer import Answer, Demand
 from bywire.brakes.wedge.sizing.design import answer, redesigned
-from bywire.synthesis.study import variable
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
+from bywire.synthesis.study import variable, variables
 
 LATE = 1.02
 """share of the demanded time up to which a design answers equally fast"""
@@ -70,8 +68,9 @@ def mapped(
     answers: list[Answer] = []
     pool = ThreadPoolExecutor(os.cpu_count() or 1)
     try:
-        for k, one in enumerate(pool.map(lambda d: answer(redesigned(par, *d), demand), designs)):
-            answers.append(one)
+        every = pool.map(lambda design: answer(redesigned(par, *design), demand), designs)
+        for k, judged in enumerate(every):
+            answers.append(judged)
             progress((k + 1) / len(designs))
     finally:  # an interrupt waits for what runs, and starts nothing more
         pool.shutdown(cancel_futures=True)
@@ -86,25 +85,25 @@ def mapped(
 def _dataset(answers: Sequence[Answer], demand: Demand, shape: tuple[int, int, int]) -> xr.Dataset:
     plane, cube = ("tan_alpha", "lead"), ("tan_alpha", "lead", "mu_B")
     cases = {
-        name: np.array([getattr(one, name) for one in answers]).reshape(shape)
+        name: np.array([getattr(each, name) for each in answers]).reshape(shape)
         for name in _PER_CASE
     }
-    found = xr.Dataset({name: variable(cases[name], cube, *_PER_CASE[name]) for name in cases})
+    data = xr.Dataset(variables(cases, cube, _PER_CASE))
     slowest = cases["t_90"].max(axis=2)  # NaN where one case never gets there
     lateness = np.where(np.isnan(slowest), _NEVER, slowest / demand.t_90)
     in_time = (lateness <= LATE) if demand.enforced else (lateness < _NEVER)
     holds = cases["held"].min(axis=2) >= HELD * demand.moment
     released = cases["left"].max(axis=2) <= LEFT * demand.moment
     feasible = in_time & holds & released & (cases["stop"].max(axis=2) == 0.0)
-    speeds = np.array([one.closing_speed for one in answers]).reshape(shape[:2])
-    found["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
-    found["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
-    found["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
+    speeds = np.array([each.closing_speed for each in answers]).reshape(shape[:2])
+    data["closing_speed"] = variable(speeds, plane, "m/s", "closing speed of the pads")
+    data["lateness"] = variable(lateness, plane, "1", "slowest time over the demanded time")
+    data["infeasible"] = variable(1.0 - feasible, plane, "1", "late, not held, or at a stop")
     for name in ("filtered", "instantaneous"):
         worst = np.where(feasible, cases[name].max(axis=2), np.nan)
         mu_B = np.asarray(demand.mu_B)[cases[name].argmax(axis=2)]
         label = f"largest {name} power, worst mu_B"
-        found[f"worst_{name}"] = variable(worst, plane, "W", label)
-        found[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
-    found.attrs["unsettled_substeps"] = sum(one.unsettled for one in answers)
-    return found
+        data[f"worst_{name}"] = variable(worst, plane, "W", label)
+        data[f"mu_B_{name}"] = variable(mu_B, plane, "1", "worst friction coefficient")
+    data.attrs["unsettled_substeps"] = sum(each.unsettled for each in answers)
+    return data

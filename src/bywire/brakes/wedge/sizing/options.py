@@ -10,6 +10,7 @@ from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.series import Coefficients
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Length, Unit
+from bywire.synthesis.study import require_ranges
 
 Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
 Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
@@ -70,15 +71,8 @@ class Options(ParameterSet):
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
-        ranges = (
-            ("tan_alpha_min", "tan_alpha_max", ""),
-            ("lead_min", "lead_max", " m"),
-            ("t_90", "t_hold", " s"),
-        )
-        for low, high, unit in ranges:
-            a, b = getattr(self, low), getattr(self, high)
-            if not a < b:
-                raise ValueError(f"{low} = {a:g}{unit} must be below {high} = {b:g}{unit}")
+        slopes, leads = ("tan_alpha_min", "tan_alpha_max", "1"), ("lead_min", "lead_max", "m")
+        require_ranges(self, (slopes, leads, ("t_90", "t_hold", "s")))
         return self
 
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.wedge.elements import wedge
@@ -19,9 +18,8 @@ from bywire.brakes.wedge.sizing.design import answer
 from bywire.brakes.wedge.sizing.limits import active, around
 from bywire.brakes.wedge.sizing.map import mapped
 from bywire.brakes.wedge.sizing.options import ASSUMPTIONS, DEFAULTS, Options
-from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, edge_warnings
 
 NONE_FEASIBLE = "no design is feasible: allow more time (t_90, t_hold), or compare other designs"
 NEAR = 1.05
@@ -40,7 +38,7 @@ class Best(NamedTuple):
     at: xr.Dataset
 
 
-def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found:
+def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findings:
     """Return the map of peak power, its optimum on a finer grid around it, and the given design.
 
     Raises
@@ -61,13 +59,13 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found
     warnings = _warnings(data)
     if data["infeasible"].values.all():
         warnings += (NONE_FEASIBLE,)
-        return Found(data, _given(given, options), ASSUMPTIONS, {}, (), warnings)
+        return Findings(data, _given(given, options), ASSUMPTIONS, {}, (), warnings)
     coarse = smallest(data, options.power)
     grids, best = [data], coarse
     for n in range(1, _ROUNDS + 1):
         near = (_around(slopes, best.tan_alpha, n), _around(leads, best.lead, n))
         grids.append(mapped(par, demand, *near, partial(progress, f"optimum, round {n}")))
-        best = min(best, smallest(grids[-1], options.power), key=lambda one: one.power)
+        best = min(best, smallest(grids[-1], options.power), key=lambda design: design.power)
     here = Mark("given drive train", par.screw.lead, wedge.slope(par.wedge))
     marks = (Mark("optimum", best.lead, best.tan_alpha), here)
     maps = {
@@ -80,7 +78,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found
     }  # fmt: skip
     kpis = (*_optimum(best, grids, options), *_given(given, options))
     limits = (*active(best.at, par, options), *around(grids, best.at, options))
-    return Found(
+    return Findings(
         data, kpis, ASSUMPTIONS, maps, _cuts(data, best), warnings + _edges(best, options), limits
     )
 
@@ -110,8 +108,8 @@ def _optimum(best: Best, grids: Sequence[xr.Dataset], options: Options) -> tuple
     slopes, leads = [best.tan_alpha], [best.lead]
     for data in grids:
         good = np.argwhere(data[f"worst_{options.power}"].values <= NEAR * best.power)
-        slopes += [float(one) for one in data["tan_alpha"].values[good[:, 0]]]
-        leads += [float(one) for one in data["lead"].values[good[:, 1]]]
+        slopes += [float(value) for value in data["tan_alpha"].values[good[:, 0]]]
+        leads += [float(value) for value in data["lead"].values[good[:, 1]]]
     share = f"of designs within {100 * (NEAR - 1):.0f} % of the smallest power"
     return (
         Kpi("optimum_tan_alpha", best.tan_alpha, "1", "Slope of the wedge of least power."),
@@ -178,11 +176,11 @@ def _warnings(data: xr.Dataset) -> tuple[str, ...]:
 
 def _edges(best: Best, options: Options) -> tuple[str, ...]:
     """Return whether the optimum lies at the edge of the designs compared."""
-    return tuple(
-        f"the optimum lies at the edge of the designs, {name} = {edge:g}: widen the range"
-        for name, value in (("tan_alpha", best.tan_alpha), ("lead", best.lead))
-        for edge in (getattr(options, f"{name}_min"), getattr(options, f"{name}_max"))
-        if math.isclose(value, edge)
+    slopes = (options.tan_alpha_min, options.tan_alpha_max)
+    leads = (options.lead_min, options.lead_max)
+    return (
+        *edge_warnings("tan_alpha", best.tan_alpha, slopes, "1"),
+        *edge_warnings("lead", best.lead, leads, "m"),
     )
 
 

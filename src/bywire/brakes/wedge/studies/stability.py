@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
 from bywire.bench.kpis.kpi import Kpi
@@ -18,9 +17,18 @@ from bywire.brakes.wedge.sizing.options import Count, Slope
 from bywire.brakes.wedge.stability import brake, controlled, moment_borders, motion, neutral
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
-from bywire.synthesis.study import Cut, Found, Map, Mark, Progress, Study, variable
+from bywire.core.typing import Array, Progress
+from bywire.synthesis.study import (
+    Cut,
+    Findings,
+    Map,
+    Mark,
+    Study,
+    require_ranges,
+    variable,
+    variables,
+)
 
-Array = NDArray[np.float64]
 Coefficient = Annotated[float, Unit("1", 0.4), Field(gt=0, le=5, allow_inf_nan=False)]
 Force = Annotated[float, Unit("N", 1e3), Field(gt=0, allow_inf_nan=False)]
 
@@ -37,6 +45,14 @@ ASSUMPTIONS = (
 HIGHEST = 5.0
 """friction coefficient up to which the moment loop's border is sought"""
 _SEARCHED = 40
+_PLANES = {
+    "growth_open": ("1/s", "growth rate, motors at constant currents"),
+    "frequency_open": ("Hz", "frequency of that motion"),
+    "growth_rigid": ("1/s", "growth rate by the closed form of a rigid heart"),
+    "growth_locked": ("1/s", "growth rate, motors locked"),
+    "disk_moment": ("1", "disk margin of the moment loop"),
+    "unstable_moment": ("1", "whether the moment loop is unstable"),
+}
 _FAST = 5.0  # growth [1/s] from which rates are compared with the closed form
 
 
@@ -64,10 +80,8 @@ class Options(ParameterSet):
 
     @model_validator(mode="after")
     def _ordered(self) -> Options:
-        for low, high in (("mu_B_min", "mu_B_max"), ("tan_alpha_min", "tan_alpha_max")):
-            a, b = getattr(self, low), getattr(self, high)
-            if not a < b:
-                raise ValueError(f"{low} = {a:g} must be below {high} = {b:g}")
+        slopes = ("tan_alpha_min", "tan_alpha_max", "1")
+        require_ranges(self, (("mu_B_min", "mu_B_max", "1"), slopes))
         return self
 
 
@@ -79,7 +93,7 @@ DEFAULTS = Options(
 """around the catalog's wedge and the pads of Roberts et al. (2003)"""
 
 
-def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found:
+def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findings:
     """Return growth rates, borders and disk margins over the map.
 
     Raises
@@ -92,43 +106,32 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Found
     rows, borders = [], []
     known = options.believed == "known"
     for k, slope in enumerate(map(float, tan)):
-        cases = [brake(par, float(one), slope, known) for one in mu]
+        cases = [brake(par, float(mu_B), slope, known) for mu_B in mu]
         rows.append([
-            (*motion(own, options.force), *controlled(own, options.moment)) for own in cases
+            (*motion(design, options.force), *controlled(design, options.moment))
+            for design in cases
         ])  # fmt: skip
         borders.append(neutral(cases[0], options.force))
         progress("stability", (k + 1) / tan.size)
     data = _dataset(mu, tan, np.array(rows), np.array(borders))
     given = Mark("given wedge", par.wedge.mu_B, wedge.slope(par.wedge))
     kpis = (*_uncontrolled(par, data, options), *_controlled(par, data, options))
-    return Found(data, kpis, ASSUMPTIONS, _maps(data, given), (_cut(data, given),))
+    return Findings(data, kpis, ASSUMPTIONS, _maps(data, given), (_cut(data, given),))
 
 
 def _dataset(mu: Array, tan: Array, values: Array, borders: Array) -> xr.Dataset:
-    labels = (
-        ("growth_open", "1/s", "growth rate, motors at constant currents"),
-        ("frequency_open", "Hz", "frequency of that motion"),
-        ("growth_rigid", "1/s", "growth rate by the closed form of a rigid heart"),
-        ("growth_locked", "1/s", "growth rate, motors locked"),
-        ("disk_moment", "1", "disk margin of the moment loop"),
-        ("unstable_moment", "1", "whether the moment loop is unstable"),
-    )
     dims = ("tan_alpha", "mu_B")
-    found: dict[str, Any] = {
-        name: variable(values[:, :, k], dims, unit, label)
-        for k, (name, unit, label) in enumerate(labels)
-    }
-    found["border_open"] = variable(
-        borders, ("tan_alpha",), "1", "friction coefficient of the neutral point"
-    )
-    found["beyond_open"] = variable(
-        mu[None, :] - borders[:, None], dims, "1", "friction coefficient beyond the neutral point"
-    )
+    beyond = mu[None, :] - borders[:, None]
+    planes = {**dict(zip(_PLANES, np.moveaxis(values, 2, 0), strict=True)), "beyond_open": beyond}
+    border = variable(borders, dims[:1], "1", "friction coefficient of the neutral point")
     axes = {
-        "tan_alpha": variable(tan, ("tan_alpha",), "1", "slope of the wedge, tan(alpha)"),
-        "mu_B": variable(mu, ("mu_B",), "1", "friction coefficient of the pads"),
+        "tan_alpha": variable(tan, dims[:1], "1", "slope of the wedge, tan(alpha)"),
+        "mu_B": variable(mu, dims[1:], "1", "friction coefficient of the pads"),
     }
-    return xr.Dataset(found, axes)
+    beyond_label = {"beyond_open": ("1", "friction coefficient beyond the neutral point")}
+    return xr.Dataset(
+        {**variables(planes, dims, _PLANES | beyond_label), "border_open": border}, axes
+    )
 
 
 def _maps(data: xr.Dataset, given: Mark) -> dict[str, Map]:
@@ -186,14 +189,14 @@ def _controlled(par: WedgeParameters, data: xr.Dataset, options: Options) -> tup
         where = (f"at mu_B = {float(data['mu_B'][j]):.3g}, "
                  f"tan(alpha) = {float(data['tan_alpha'][i]):.3g}")  # fmt: skip
     between = (options.mu_B_min, HIGHEST)
-    found = [b.value for b in moment_borders(par, options.moment, between, _SEARCHED)
+    border = [b.value for b in moment_borders(par, options.moment, between, _SEARCHED)
              if not b.above]  # fmt: skip
-    note = "" if found else f"stable up to {HIGHEST:g}"
+    note = "" if border else f"stable up to {HIGHEST:g}"
     return (
         Kpi("moment_disk_min", least, "1", "Least disk margin of the moment loop.", where),
         Kpi("moment_unstable", float(np.nansum(unstable)), "1",
             "Designs whose moment loop is unstable."),
-        Kpi("moment_mu_B", found[0] if found else math.nan, "1",
+        Kpi("moment_mu_B", border[0] if border else math.nan, "1",
             "Friction coefficient from which the given wedge's moment loop is unstable, its "
             "controller as given.", note),
     )  # fmt: skip

@@ -98,9 +98,7 @@ class Motions:
         return np.array([values[w.rows].mean(axis=0) for w in self.windows])
 
 
-def motions(
-    data: xr.Dataset, speed: str, slowest: float, margin: float, length: float
-) -> Motions:
+def motions(data: xr.Dataset, speed: str, slowest: float, margin: float, length: float) -> Motions:
     """Return a measurement with its windows; see :func:`windows`."""
     interval = even_interval(data["time"].values)
     return Motions(data, windows(data[speed].values, interval, slowest, margin, length))
@@ -124,9 +122,7 @@ def window_residuals(
     return Problem(tuple(unknowns), evaluate)
 
 
-def steady_dynamics(
-    parts: Sequence[Problem], unknowns: Sequence[Unknown], advice: str
-) -> Estimate:
+def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advice: str) -> Estimate:
     """Solve the averaged equations of several bodies for what they share.
 
     Every part counts by its own scatter, which a first fit tells.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bywire.analysis.linear.linear_batch import linearize_many
 from bywire.analysis.linear.linearize import linearize
 from bywire.analysis.loop import LOOPS
+from bywire.benchmark.linear_batch import linearize_many
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

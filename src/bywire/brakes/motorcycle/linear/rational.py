@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array, Complex
+
 _BAR = 1e5
 
 
@@ -40,12 +40,12 @@ class Rational:
         return self.gain / _BAR
 
     @property
-    def zeros(self) -> NDArray[np.complex128]:
+    def zeros(self) -> Complex:
         """Zeros [rad/s], the slowest first."""
         return _sorted_roots(self.num)
 
     @property
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Poles [rad/s], the slowest first."""
         return _sorted_roots(self.den)
 
@@ -59,7 +59,7 @@ class Rational:
         """Frequencies of the poles [Hz], the slowest first."""
         return np.abs(self.poles) / (2.0 * math.pi)
 
-    def response(self, frequencies: Array) -> NDArray[np.complex128]:
+    def response(self, frequencies: Array) -> Complex:
         """Return the frequency response [Pa/A] at frequencies [Hz], shape (n,)."""
         s = 2j * math.pi * np.asarray(frequencies, dtype=float)
         return np.asarray(np.polyval(self.num, s) / np.polyval(self.den, s))
@@ -111,16 +111,17 @@ def first_orders(
     """
 
     def product(corners: tuple[float, ...]) -> Array:
-        found: Array = np.ones(1)
+        coefficients: Array = np.ones(1)
         for hertz in corners:
-            found = np.asarray(np.polymul(found, [1.0 / (2.0 * math.pi * hertz), 1.0]))
-        return found
+            factor = [1.0 / (2.0 * math.pi * hertz), 1.0]
+            coefficients = np.asarray(np.polymul(coefficients, factor))
+        return coefficients
 
     return Rational(
         name, tuple(float(v) for v in gain * product(zeros_hz)), tuple(product(poles_hz).tolist())
     )
 
 
-def _sorted_roots(coefficients: tuple[float, ...]) -> NDArray[np.complex128]:
-    found = np.roots(coefficients).astype(np.complex128)
-    return found[np.argsort(np.abs(found))]
+def _sorted_roots(coefficients: tuple[float, ...]) -> Complex:
+    roots = np.roots(coefficients).astype(np.complex128)
+    return roots[np.argsort(np.abs(roots))]

@@ -1,4 +1,4 @@
-"""The motorcycle brake's plant at an operating point."""
+"""The motorcycle brake's plant at an operating point: behind its current loop, or its bridge."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any, cast
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.plant import PlantPoint
+from bywire.analysis.linear.plant import Plant, PlantPoint
 from bywire.analysis.loop import Quantity
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -14,9 +14,9 @@ from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 
-PRESSURE = Quantity("pressure", "Pa", 20e5)
-CURRENT = Quantity("current", "A", 2.0)
-AT = (PRESSURE, CURRENT)
+_PRESSURE = Quantity("pressure", "Pa", 20e5)
+_CURRENT = Quantity("current", "A", 2.0)
+_AT = (_PRESSURE, _CURRENT)
 """pressure in both chambers, motor current without friction"""
 
 
@@ -40,23 +40,51 @@ def linear(
         When the point does not exist.
     """
     changes: dict[str, Any] = {"drive.mode": mode}
-    own = cast(MotorcycleParameters, par.replace(changes))
+    driven = cast(MotorcycleParameters, par.replace(changes))
     # The holding current is proportional to the pressure.
-    p = at.value / holding_current(1.0, own) if at.quantity is CURRENT else at.value
+    p = at.value / holding_current(1.0, driven) if at.quantity is _CURRENT else at.value
     if not p > 0.0:
         raise ParameterError(
             f"{at.quantity.name} = {at.value:g} {at.quantity.unit} is no operating point: it must "
             f"be > 0 {at.quantity.unit}"
         )
     try:
-        state = state_at(p, own)._replace(omega=at.speed)
+        state = state_at(p, driven)._replace(omega=at.speed)
     except ParameterError as error:
-        if at.quantity is PRESSURE:
+        if at.quantity is _PRESSURE:
             raise
         raise ParameterError(
             f"current = {at.value:g} A is no operating point: {error}"
         ) from None
     return linearize(
-        MotorcycleBrake(), own, state, memory_at(p, own),
+        MotorcycleBrake(), driven, state, memory_at(p, driven),
         inputs=inputs, outputs=outputs, friction=at.friction,
     )  # fmt: skip
+
+
+def by_current(par: ParameterSet, at: PlantPoint) -> LinearModel:
+    """Return the plant from the motor current: eq. (14) of Dardanelli et al. (2010), and angle."""
+    return linear(par, at, "current-source", ("i_source",), ("p_mc", "p_pd", "x_mc"))
+
+
+def by_voltage(par: ParameterSet, at: PlantPoint) -> LinearModel:
+    """Return the plant from the motor voltage, winding and back-EMF included."""
+    return linear(par, at, "voltage-source", ("v_source",), ("i", "p_mc", "p_pd", "x_mc"))
+
+
+CURRENT = Plant(
+    name="motorcycle-plant",
+    assembly="motorcycle-brake",
+    summary="motor current to pressures: gear, master cylinder, pipeline, caliper (eq. 14)",
+    at=_AT,
+    model=by_current,
+    band=50.0,
+)
+VOLTAGE = Plant(
+    name="motorcycle-voltage",
+    assembly="motorcycle-brake",
+    summary="motor voltage to current and pressures: winding, gear, hydraulics",
+    at=_AT,
+    model=by_voltage,
+    band=200.0,
+)

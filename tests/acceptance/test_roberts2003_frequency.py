@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 
 import pytest
 
-from bywire.brakes.wedge.paper import fig5 as roberts2003_fig5
 from bywire.brakes.wedge.paper import fig6 as roberts2003_fig6
 from bywire.brakes.wedge.paper.frequency_causes import causes
-from bywire.reproduction.runs import Runs
 
 
 @pytest.fixture(scope="module")
-def items():
-    parts = [one.part(Runs()) for one in (roberts2003_fig5, roberts2003_fig6)]
-    return {item.id: item for part in parts for item in part.items}
+def items(wedge_paper):
+    shown = re.compile(r"fig[56]\.")
+    return {item.id: item for item in wedge_paper.reproduction.items if shown.match(item.id)}
 
 
 def test_what_disagrees_has_its_cause(items):

@@ -9,14 +9,12 @@ from itertools import combinations
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.linear.smooth_functions import smooth_functions, vector
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

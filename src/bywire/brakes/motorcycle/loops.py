@@ -1,0 +1,128 @@
+"""Control loops of the motorcycle brake's ECU: current, and pressure around it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, cast
+
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.analysis.loop_schedule import LoopSchedule
+from bywire.brakes.motorcycle.ecu import Stimulus
+from bywire.brakes.motorcycle.linear import control_laws
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+from bywire.core.typing import Array, Complex
+
+_STEP = 10e-6  # substep [s]: at most 1/(100 f) of the current loop's band, or its error shows
+
+CAUSES: Mapping[str, Mapping[str, Any]] = {
+    "seal friction": {"seal.T_pr": 0.0, "seal.f_cfr_p": 0.0, "seal.f_cfr_n": 0.0,
+                      "seal.mu_T": 0.0},
+    "dither": {"ecu.dither.waveform": "off"},
+    "converter": {"adc.law": "ideal"},
+}  # fmt: skip
+"""cause -> parameters without it"""
+
+
+def _require_pressed(p: float) -> None:
+    """Refuse a brake that is released: its piston just touches its stop and has no linear model."""
+    if p == 0.0:
+        raise ParameterError(
+            "pressure = 0 bar is no operating point: the piston just touches its stop; it must be "
+            "> 0 bar, for instance '5 bar'"
+        )
+
+
+def current_point(par: ParameterSet, value: float) -> Point:
+    """Return the brake held at a pressure [Pa] by its current."""
+    _require_pressed(value)
+    closed = cast(MotorcycleParameters, par.replace({"drive.mode": "current-direct"}))
+    state, memory = state_at(value, closed), memory_at(value, closed)
+    stimulus = zeros(Stimulus)._replace(i_set=state.i)
+    return Point(MotorcycleBrake(), closed, state, memory, stimulus, _STEP)
+
+
+def current_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
+    """Return what the PI makes of set point and current, up to its duty cycle, at any pressure."""
+    brake = cast(MotorcycleParameters, par)
+    pi = control_laws.current_control(brake.ecu).response(frequencies)[:, 0, 0]
+    return pi, pi / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
+
+
+def pressure_point(par: ParameterSet, value: float) -> Point:
+    """Return the brake in equilibrium at a pressure [Pa]."""
+    _require_pressed(value)
+    closed = cast(MotorcycleParameters, par.replace({"drive.mode": "pressure"}))
+    stimulus = zeros(Stimulus)._replace(p_set=value)
+    state, memory = state_at(value, closed), memory_at(value, closed)
+    return Point(MotorcycleBrake(), closed, state, memory, stimulus)
+
+
+def dither_frequency(par: ParameterSet) -> Sequence[float]:
+    """Return the dither's frequency [Hz], where there is one."""
+    dither = cast(MotorcycleParameters, par).ecu.dither
+    return () if dither.waveform == "off" else (dither.f_dit,)
+
+
+def pressure_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[Complex, Complex]:
+    """Return what the PID makes of set point and pressure at a pressure [Pa], up to its demand."""
+    brake = cast(MotorcycleParameters, par)
+    demand = control_laws.pressure_demand(brake.ecu, value).response(frequencies)[:, 0, 0]
+    feedback = control_laws.pressure_feedback(brake.ecu, value).response(frequencies)[:, 0, 0]
+    return demand, feedback / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
+
+
+_GAINS = {"k_p": (5e-7, 1e-4), "k_i": (1e-6, 3e-3), "k_d": (1e-9, 3e-6)}
+_OWN = {f"ecu.pressure.{name}": span for name, span in _GAINS.items()} | {
+    "ecu.pressure.tau_d": (5e-5, 1e-2), "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
+}  # fmt: skip
+
+CURRENT = Loop(
+    name="current",
+    assembly="motorcycle-brake",
+    summary="current control, 1 kHz, rotor free",
+    at=Quantity("pressure", "Pa", 20e5),
+    inputs=("i_set",),
+    output="i",
+    cut="duty",
+    point=current_point,
+    causes=CAUSES,
+    band=(1.0, 400.0),
+    amplitudes=(1e-2, 1.0),
+    tunables={"ecu.current.k_p": (1e-4, 0.1), "ecu.current.k_i": (0.1, 200.0)},
+    proof="current-step",
+    laws=current_laws,
+)
+
+PRESSURE = Loop(
+    name="pressure",
+    assembly="motorcycle-brake",
+    summary="pressure control around current control, 1 kHz",
+    at=Quantity("pressure", "Pa", 20e5),
+    inputs=("p_set",),
+    output="p_mc",
+    cut="y_p",
+    point=pressure_point,
+    causes=CAUSES,
+    band=(0.1, 50.0),
+    amplitudes=(1e4, 1e5, 3e5),
+    whole=dither_frequency,
+    tunables=_OWN,
+    proof="hard-braking",
+    laws=pressure_laws,
+    schedule=LoopSchedule(
+        changes={"ecu.schedule.law": "regions"},
+        borders=("ecu.schedule.p_1", "ecu.schedule.p_2"),
+        regions={
+            "low": {f"ecu.schedule.low.{name}": span for name, span in _GAINS.items()},
+            "medium": _OWN,
+            "high": {f"ecu.schedule.high.{name}": span for name, span in _GAINS.items()},
+        },
+        main="medium",
+        points=(5e5, 20e5, 37e5),
+    ),
+)

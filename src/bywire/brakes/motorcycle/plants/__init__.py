@@ -1,1 +1,0 @@
-"""Plants and their simplified models, one file each."""
