@@ -29,7 +29,7 @@ from bywire.core.errors import FileError
 from bywire.core.extras import how_to_install
 from bywire.core.machine_memory import machine_memory
 from bywire.data.file_format import Column, FileFormat, Progress
-from bywire.data.reading_child import fill, receive, send
+from bywire.data.reading_child import NUMBERS, fill, receive, send
 
 SECONDS = 60.0
 """how long a library may take to open a file, and from one piece of it to the next"""
@@ -162,9 +162,14 @@ class LimitedSource:
             k, begin, size = answer["column"], answer["begin"], answer["count"]
             if begin != filled[k] or begin + size > columns[k].size:
                 raise self._torn(names[k], begin + size, columns[k].size)
+            part = columns[k][begin : begin + size]
+            kind = NUMBERS[answer["kind"]]
+            numbers = part if kind == "float64" else np.empty(size, kind)
             with self._child.within(self._seconds):
-                if not fill(self._child.stream, columns[k][begin : begin + size]):
+                if not fill(self._child.stream, numbers):
                     raise self._ended(self._child.reason())
+            if numbers is not part:
+                part[:] = numbers
             filled[k] += size
             progress(f"reading {self._path.name}", sum(filled) / total)
             answer = self._answer(None)

@@ -6,7 +6,7 @@ crash, run without an end, or ask for all memory. Here that ends a child, and no
 Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
 lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds}``; the answer
 is ``{columns}``. It asks for ``{names}`` as often as it likes, and ends with none; the answers are
-pieces ``{column, begin, count}`` and ``{end}``. ``{error}`` and ``{memory}`` end it early.
+pieces ``{column, begin, count, kind}`` and ``{end}``. ``{error}`` and ``{memory}`` end it early.
 
 On Linux the process imports the library once and forks for each file, so that a file costs
 milliseconds, starts from a sound state and has its own limits. Elsewhere it reads one file.
@@ -31,6 +31,9 @@ import numpy as np
 
 from bywire.core.errors import FileError
 from bywire.data.file_format import FileFormat, PieceSource, ReadOptions
+
+NUMBERS = ("float64", "float32", "int32", "int16", "uint32", "uint16", "int8", "uint8")
+"""types of numbers that pass from one process to the other"""
 
 _LENGTH = struct.Struct("<I")
 
@@ -110,8 +113,11 @@ def _serve(
             while names := (receive(requests) or {"names": []})["names"]:
                 for name, begin, part in source.pieces(names):
                     _allow(request["seconds"])
-                    numbers = np.ascontiguousarray(part, dtype=np.float64)
-                    place = {"column": names.index(name), "begin": begin, "count": numbers.size}
+                    # As they are stored: single precision takes half the way through the pipe.
+                    is_plain = part.dtype.isnative and part.dtype.name in NUMBERS
+                    numbers = np.ascontiguousarray(part, None if is_plain else np.float64)
+                    place = {"column": names.index(name), "begin": begin, "count": numbers.size,
+                             "kind": NUMBERS.index(numbers.dtype.name)}  # fmt: skip
                     send(answers, place, numbers)
                 send(answers, {"end": True})
     except FileError as error:
