@@ -19,13 +19,16 @@ if TYPE_CHECKING:
     from bywire.api.agreement import agreement
     from bywire.api.check import Check, check
     from bywire.api.convert import Conversion, convert
+    from bywire.api.describe import describe
     from bywire.api.design import design
     from bywire.api.frequency_response import frequency_response
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
     from bywire.api.linearize import linearize
     from bywire.api.margins import margins
+    from bywire.api.overview import overview
     from bywire.api.replay import Replay, replay
+    from bywire.api.reproduce import reproduce
     from bywire.api.run import BenchResult, run
     from bywire.api.study import study
     from bywire.api.trust import TrustStudy, trust
@@ -72,6 +75,9 @@ _HOMES = {
     "linearize": "api.linearize",
     "design": "api.design",
     "study": "api.study",
+    "reproduce": "api.reproduce",
+    "describe": "api.describe",
+    "overview": "api.overview",
     "margins": "api.margins",
     "run": "api.run",
     "simulate": "simulation.run",
@@ -100,6 +106,7 @@ __all__ = [
     "agreement",
     "check",
     "convert",
+    "describe",
     "design",
     "frequency_response",
     "identify",
@@ -107,10 +114,12 @@ __all__ = [
     "load",
     "load_system",
     "margins",
+    "overview",
     "parameters",
     "read_measurement",
     "read_recording",
     "replay",
+    "reproduce",
     "resample",
     "run",
     "simulate",

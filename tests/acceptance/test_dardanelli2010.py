@@ -13,7 +13,6 @@ import pytest
 
 from bywire.brakes.motorcycle.paper.dardanelli2010 import PARTS, reproduce
 from bywire.reproduction.reproduction import Reproduction
-from bywire.reproduction.results import as_json, write
 
 Items = Mapping[str, dict[str, Any]]
 TABLE2 = {"K": 10.1, "zero": 160.0, "pole1": 0.866, "pole2": 9.75, "pole3": 4.7e4}
@@ -85,7 +84,7 @@ def reproduction() -> Reproduction:
 
 @pytest.fixture(scope="module")
 def items(reproduction: Reproduction) -> Items:
-    return by_id(as_json(reproduction)["items"])
+    return by_id(reproduction.as_object()["items"])
 
 
 def by_id(listed: Iterable[dict[str, Any]]) -> Items:
@@ -220,12 +219,14 @@ def test_report_shows_every_figure_and_progress_every_part(
 ) -> None:
     names = {exhibit.name for exhibit in reproduction.figures}
     assert names >= {"fig3", "fig4", "fig5", "fig6", "fig7a", "fig7b", "table2-bode"}
-    paths = write(reproduction, tmp_path)
-    html = paths[0].read_text(encoding="utf-8")
+    paths = reproduction.write(tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert html.count("<figcaption>Figure") == len(reproduction.figures)
-    assert json.loads(paths[1].read_text()) == as_json(reproduction)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert results.pop("files") == [str(path) for path in paths]
+    assert results == reproduction.as_object()
     assert {p.name for p in paths if p.suffix == ".png"} == {f"{name}.png" for name in names}
-    assert {p.suffix for p in paths[2:]} == {".png", ".nc"}
+    assert {p.suffix for p in paths} == {".png", ".nc", ".html", ".json"}
     for title in ("In short", "Tolerances"):
         assert f"<h2>{title}</h2>" in html
     assert [label for label, share in STAGES if share == 1.0] == list(PARTS)

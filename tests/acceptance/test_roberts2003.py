@@ -14,7 +14,6 @@ import pytest
 
 from bywire.brakes.wedge.paper.roberts2003 import PARTS
 from bywire.reproduction.reproduction import Reproduction
-from bywire.reproduction.results import as_json, write
 
 Items = Mapping[str, dict[str, Any]]
 TAN_ALPHA = math.tan(math.radians(20.0))
@@ -66,7 +65,7 @@ def reproduction(wedge_paper: Any) -> Reproduction:
 
 @pytest.fixture(scope="module")
 def items(reproduction: Reproduction) -> Items:
-    return by_id(as_json(reproduction)["items"])
+    return by_id(reproduction.as_object()["items"])
 
 
 def by_id(listed: Iterable[dict[str, Any]]) -> Items:
@@ -209,9 +208,11 @@ def test_report_opens_with_causes_and_shows_every_figure(
     names = {exhibit.name for exhibit in reproduction.figures}
     assert names >= {"fig5", "fig6", "fig7", "fig8", "fig9"}
     assert names >= {"brake-factor", "power-off-hold", "force-fight"}
-    paths = write(reproduction, tmp_path)
-    html = paths[0].read_text(encoding="utf-8")
+    paths = reproduction.write(tmp_path)
+    html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert html.count("<figcaption>Figure") == len(reproduction.figures)
     assert html.index("leaves friction out") < html.index("<figcaption>Figure")
-    assert json.loads(paths[1].read_text()) == as_json(reproduction)
+    results = json.loads((tmp_path / "results.json").read_text())
+    assert results.pop("files") == [str(path) for path in paths]
+    assert results == reproduction.as_object()
     assert [label for label, share in wedge_paper.stages if share == 1.0] == list(PARTS)

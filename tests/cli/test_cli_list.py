@@ -9,12 +9,12 @@ from command_line import Outcome, refused
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
-from bywire.bench.experiment import EXPERIMENTS
-from bywire.cli.described_systems import (
+from bywire.api.described_systems import (
     described_drive,
     described_loop,
     described_plant,
 )
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
 from bywire.identification.method import METHODS

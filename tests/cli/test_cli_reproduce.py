@@ -8,7 +8,7 @@ import time
 import pytest
 from command_line import refused
 
-from bywire.reproduction.reproduction import SOURCES
+from bywire.reproduction.reproduction import SOURCES, Reproduction
 
 
 @pytest.fixture
@@ -24,10 +24,9 @@ def quick(monkeypatch):
         def reproduce(progress):
             """Compute nothing."""
             calls.append(progress)
-            return source.name
+            return Reproduction(source.name, "nobody", ())
 
     monkeypatch.setattr(type(SOURCES), "find", lambda kind, name: Quick)
-    monkeypatch.setattr("bywire.reproduction.results.as_json", lambda found: {"source": found})
     return calls
 
 
@@ -56,9 +55,9 @@ def test_results_are_shown_even_when_they_cannot_be_written(bywire, tmp_path, qu
     def full(*_):
         raise FileError("cannot write x: No space left on device")
 
-    monkeypatch.setattr("bywire.reproduction.results.write", full)
+    monkeypatch.setattr("bywire.report.answer.write_document", full)
     status, out, err = bywire("reproduce", "dardanelli2010", "--out", tmp_path, "--json")
-    assert (status, json.loads(out)) == (2, {"source": "dardanelli2010"})
+    assert (status, json.loads(out)["source"]) == (2, "dardanelli2010")
     assert err == "bywire: error: cannot write x: No space left on device\n"
 
 

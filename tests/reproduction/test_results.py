@@ -14,10 +14,9 @@ from bywire.data.netcdf import read_recording
 from bywire.report.tables import text_table
 from bywire.reproduction.item import Fact, compared, found
 from bywire.reproduction.reproduction import SOURCES, Exhibit, Part, Reproduction
-from bywire.reproduction.results import as_json, as_table, write
 from bywire.reproduction.root_cause import RootCause
+from bywire.reproduction.statements import verdicts
 from bywire.reproduction.tally import Tally, tallies
-from bywire.reproduction.terminal_text import terminal_text
 from bywire.reproduction.tolerance import SHARE, Allowance
 
 KEYS = ["id", "unit", "stated", "computed", "tolerance", "agrees", "note"]
@@ -47,7 +46,7 @@ def made_up() -> Reproduction:
 
 
 def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
-    content = as_json(made_up)
+    content = made_up.as_object()
     assert list(content) == ["source", "items", "in_short"]
     assert all(list(item) == KEYS for item in content["items"])
     json.dumps(content, allow_nan=False)
@@ -59,7 +58,7 @@ def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
 
 
 def test_table_has_a_row_per_item(made_up: Reproduction) -> None:
-    assert [row[0].text for row in as_table(made_up).rows] == ["t.K", "t.n", "t.x"]
+    assert [row[0].text for row in verdicts(made_up.items).rows] == ["t.K", "t.n", "t.x"]
 
 
 def test_verdicts_are_counted_for_each_parameter_set() -> None:
@@ -74,13 +73,14 @@ def test_verdicts_are_counted_for_each_parameter_set() -> None:
 
 @pytest.mark.parametrize("width", [50, 80, 200])
 def test_terminal_shows_verdicts_then_causes_counts_and_the_report(
-    made_up: Reproduction, width: int
+    made_up: Reproduction, width: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lines = terminal_text(made_up, width, "report: here").splitlines()
+    monkeypatch.setenv("COLUMNS", str(width))
+    lines = str(made_up).splitlines()
     assert lines[0].split() == ["statement", "kind", "stated", "computed", "verdict"]
     assert lines[2].split() == ["t.K", "printed", "10.1", "bar/A", "7.6", "bar/A", "disagrees"]
-    assert max(map(len, lines)) <= width + 8
-    assert lines[-1] == "report: here"
+    assert max(map(len, lines[:-1])) <= width + 8
+    assert lines[-1].endswith("bywire reproduce made-up --out FOLDER")
     rest = " ".join(lines[lines.index("In short") :])
     assert "- Tables differ. [1 disagreement]" in rest
     assert "- The set: 0 agree, 2 disagree," in rest
@@ -88,10 +88,10 @@ def test_terminal_shows_verdicts_then_causes_counts_and_the_report(
 
 def test_folder_is_complete_and_self_contained(made_up: Reproduction, tmp_path: Path) -> None:
     folder = tmp_path / "new" / "folder"
-    paths = write(made_up, folder)
-    assert [p.name for p in paths] == ["report.html", "results.json", "fig.png", "run-1-a.nc"]
+    paths = made_up.write(folder)
+    assert [p.name for p in paths] == ["run-1-a.nc", "fig.png", "report.html", "results.json"]
     assert sorted(p.name for p in folder.iterdir()) == sorted(p.name for p in paths)
-    html = paths[0].read_text(encoding="utf-8")
+    html = paths[2].read_text(encoding="utf-8")
     assert "0 agree, 2 disagree, 1 without verdict" in html
     assert "Tables differ. [1 disagreement]" in html
     for text in ("5 % of what is stated", "0.1 s", "two digits", "&lt;= 1", "printed"):
@@ -99,8 +99,10 @@ def test_folder_is_complete_and_self_contained(made_up: Reproduction, tmp_path: 
     assert "Table &lt;2&gt;" in html
     assert "<svg" in html
     assert "<script" not in html
-    assert json.loads(paths[1].read_text()) == as_json(made_up)
-    np.testing.assert_array_equal(read_recording(paths[3])["p_mc"], [0.0, 1.0, 2.0])
+    results = json.loads(paths[3].read_text())
+    assert results.pop("files") == [str(path) for path in paths]
+    assert results == made_up.as_object()
+    np.testing.assert_array_equal(read_recording(paths[0])["p_mc"], [0.0, 1.0, 2.0])
 
 
 def test_folder_that_cannot_be_made_is_one_clear_error(
@@ -108,7 +110,7 @@ def test_folder_that_cannot_be_made_is_one_clear_error(
 ) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(FileError, match="cannot make the output folder"):
-        write(made_up, tmp_path / "file" / "folder")
+        made_up.write(tmp_path / "file" / "folder")
 
 
 def test_sources_are_found_by_name() -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import asdict, dataclass
 
 from bywire.benchmark.result import Result, machine
 from bywire.core.errors import CompilerError
 from bywire.core.registry import Kind, instances
+from bywire.report.answer import Answer
+from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Table, text_table
 from bywire.simulation.compiler import find_compiler
 
@@ -34,11 +35,38 @@ PARTS = Kind("part of the benchmark", ("benchmarks",), instances(Part), "bywire.
 
 
 @dataclass(frozen=True)
-class Benchmark:
-    """All figures, and the machine."""
+class Benchmark(Answer):
+    """All figures, and the machine that they depend on."""
 
     machine: dict[str, object]
     results: tuple[Result, ...]
+
+    def document(self) -> Document:
+        """Return the figures with their goals."""
+        table = TableBlock(self._table())
+        shown = "; ".join(f"{name} {value}" for name, value in self.machine.items())
+        return Document(
+            "Benchmark",
+            shown,
+            sections=[Section("Figures", [table])],
+            brief=[table],
+            has_files=False,
+            data={"machine": self.machine, "results": [asdict(each) for each in self.results]},
+        )
+
+    def _table(self) -> Table:
+        verdict = {True: "yes", False: "no", None: "-"}
+        rows = [
+            (
+                r.id,
+                "-" if r.value is None else f"{r.value:.3g} {r.unit}",
+                r.goal or "-",
+                verdict[r.holds],
+                r.note,
+            )
+            for r in self.results
+        ]
+        return text_table(("figure", "value", "goal", "holds", "how"), rows)
 
 
 def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
@@ -60,37 +88,3 @@ def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
         if progress is not None:
             progress(f"benchmark: {label}", 1.0)
     return Benchmark(here, tuple(results))
-
-
-def as_json(found: Benchmark) -> dict[str, Any]:
-    """Return the object that ``bywire benchmark --json`` prints."""
-    return {
-        "machine": found.machine,
-        "results": [
-            {
-                "id": r.id,
-                "value": r.value,
-                "unit": r.unit,
-                "goal": r.goal,
-                "holds": r.holds,
-                "note": r.note,
-            }
-            for r in found.results
-        ],
-    }
-
-
-def as_table(found: Benchmark) -> Table:
-    """Return the figures as a table."""
-    verdict = {True: "yes", False: "no", None: "-"}
-    rows = [
-        (
-            r.id,
-            "-" if r.value is None else f"{r.value:.3g} {r.unit}",
-            r.goal or "-",
-            verdict[r.holds],
-            r.note,
-        )
-        for r in found.results
-    ]
-    return text_table(("figure", "value", "goal", "holds", "how"), rows)

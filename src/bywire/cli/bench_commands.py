@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes, execute
+from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
 
 
@@ -19,7 +19,14 @@ def list_command(
     json: JsonFlag = False,
 ) -> None:
     """Show assemblies, parameter sets, experiments, methods, KPIs; or all about one of them."""
-    execute("list_command", name, json)
+    from bywire.api.overview import overview
+
+    if name is None:
+        show(lambda _: overview(), as_json=json)
+        return
+    from bywire.api.describe import describe
+
+    show(lambda _: describe(name), as_json=json)
 
 
 def run(
@@ -37,15 +44,19 @@ def run(
     show(lambda progress: run_bench(bench, changes(set_), progress=progress), out, json)
 
 
-def reproduce(
+def reproduce_command(
     source: Annotated[str, typer.Argument(help="Published source, e.g. dardanelli2010.")],
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Make a paper's tables and figures: stated, computed, agrees or not."""
-    execute("reproduce_command", source, out, json)
+    from bywire.api.reproduce import reproduce
+
+    show(lambda progress: reproduce(source, progress=progress), out, json)
 
 
-def benchmark(json: JsonFlag = False) -> None:
+def benchmark_command(json: JsonFlag = False) -> None:
     """Measure speed against hand-written C and what users would pick instead."""
-    execute("benchmark_command", json)
+    from bywire.benchmark.suite import measure
+
+    show(measure, as_json=json)

@@ -12,9 +12,9 @@ from typing import Annotated, Any
 import typer
 
 from bywire.cli.bench_commands import (
-    benchmark,
+    benchmark_command,
     list_command,
-    reproduce,
+    reproduce_command,
     run,
 )
 from bywire.cli.brake_commands import check_command
@@ -26,8 +26,8 @@ from bywire.cli.loop_commands import (
     linearize_command,
     margins_command,
 )
-from bywire.cli.options import INTERRUPTED
 from bywire.cli.output import flush, message, open_streams, result
+from bywire.cli.show import INTERRUPTED
 from bywire.cli.sizing_commands import design_command, study_command
 from bywire.core.errors import BywireError, ModelError, ParameterError
 
@@ -44,8 +44,8 @@ app = typer.Typer(
 # In the order of the help.
 app.command("list")(list_command)
 app.command("run")(run)
-app.command("reproduce")(reproduce)
-app.command("benchmark")(benchmark)
+app.command("reproduce")(reproduce_command)
+app.command("benchmark")(benchmark_command)
 app.command("linearize")(linearize_command)
 app.command("frequency-response")(frequency_response_command)
 app.command("agreement")(agreement_command)

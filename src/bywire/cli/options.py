@@ -1,18 +1,14 @@
-"""What the commands share: the types of their options, and the way to what they do."""
+"""What the commands share: the types of their options."""
 
 from __future__ import annotations
 
-from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
-from bywire.cli.output import message
 from bywire.cli.output_folder import folder
 from bywire.core.errors import ParameterError
-
-INTERRUPTED = 130
 
 JsonFlag = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output.")]
 OutFolder = Annotated[
@@ -48,16 +44,6 @@ Inputs = Annotated[
 CaseName = Annotated[
     str, typer.Option("--case", help="Run of the experiment; the first by default.")
 ]
-
-
-# Each command loads what it needs when it runs, so that `bywire --help` stays quick.
-def execute(name: str, *arguments: Any) -> Any:
-    """Run a command's module; an interrupt ends it with its exit status and a word."""
-    try:
-        return import_module(f"bywire.cli.{name}").execute(*arguments)
-    except KeyboardInterrupt:  # typer would exit without a word
-        message("interrupted")
-        raise typer.Exit(INTERRUPTED) from None
 
 
 def named(texts: list[str] | None, flag: str) -> dict[str, str]:

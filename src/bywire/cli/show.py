@@ -73,7 +73,8 @@ def show(
     for text in (*answer.notes, *([] if out is None else document.file_notes)):
         output.message(f"note: {text}")
     if as_json:
-        output.result(json.dumps(with_files(document, files)))
+        shown = with_files(document, files) if document.has_files else answer.as_object()
+        output.result(json.dumps(shown))
     elif text := terminal_text(document):
         output.result(text)
     for remark in (*answer.failures, *document.remarks):

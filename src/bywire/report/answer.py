@@ -11,6 +11,7 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from bywire.core.errors import FileError
 from bywire.report.document import Document, FigureBlock, TableBlock
 
 if TYPE_CHECKING:
@@ -123,6 +124,11 @@ def write_document(document: Document, folder: Path) -> list[Path]:
     KeyboardInterrupt
         When interrupted, with what to do about what is missing.
     """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(f"cannot make the output folder {folder}: {reason}") from None
     if document.prepare is not None:
         document.prepare(folder)
     try:

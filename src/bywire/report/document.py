@@ -63,7 +63,7 @@ class TableBlock:
     Parameters
     ----------
     width
-        Characters per line that a terminal may give it.
+        Characters per line that a terminal may give it; 0 for the terminal's own width.
     title
         Line above it on a terminal, which shows no captions; none where it is empty.
     """
@@ -154,6 +154,8 @@ class Document:
         Whether an output folder gets a page and figures; not where an interrupt left too little.
     page_name
         File of the page.
+    has_files
+        Whether it may be written into a folder; its JSON object then lists the files.
     """
 
     title: str
@@ -170,6 +172,7 @@ class Document:
     prepare: Callable[[Path], None] | None = None
     is_paged: bool = True
     page_name: str = "report.html"
+    has_files: bool = True
 
     @cached_property
     def page(self) -> Sequence[Section]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import textwrap
 
 from bywire.report.document import Document, FigureBlock, Flat, Listing, Paragraph
@@ -23,8 +24,16 @@ def _text(block: str | Flat) -> str:
     if isinstance(block, Paragraph):
         return textwrap.fill(block.text, WIDTH)
     if isinstance(block, Listing):
-        lines = [f"- {text}" for text in block.texts]
+        lines = [_bullet(text) for text in block.texts]
         return "\n".join([block.title, *lines] if block.title else lines)
     assert not isinstance(block, FigureBlock)
-    text = table_text(block.table, block.width)
+    text = table_text(block.table, block.width or shutil.get_terminal_size().columns)
     return f"{block.title}\n{text}" if block.title else text
+
+
+def _bullet(text: str) -> str:
+    width = max(min(shutil.get_terminal_size().columns, WIDTH), 20)
+    return textwrap.fill(
+        text, width, initial_indent="- ", subsequent_indent="  ", break_long_words=False,
+        break_on_hyphens=False,
+    )  # fmt: skip

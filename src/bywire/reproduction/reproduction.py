@@ -2,17 +2,35 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
 from bywire.bench.running import Progress
 from bywire.core.registry import Kind, instances
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Details,
+    Document,
+    FigureBlock,
+    Listing,
+    Paragraph,
+    Section,
+    TableBlock,
+)
 from bywire.report.tables import Table
 from bywire.reproduction.item import Item
 from bywire.reproduction.root_cause import RootCause
+from bywire.reproduction.statements import KINDS, statements, tolerances, verdicts
+from bywire.reproduction.tally import tallies, tally
 from bywire.reproduction.tolerance import Allowance
 
 if TYPE_CHECKING:
@@ -57,7 +75,7 @@ class Part:
 
 
 @dataclass(frozen=True, eq=False)
-class Reproduction:
+class Reproduction(Answer):
     """A source, reproduced.
 
     Parameters
@@ -98,6 +116,78 @@ class Reproduction:
         """All recordings by name."""
         return {name: kept for part in self.parts for name, kept in part.recordings.items()}
 
+    @property
+    def in_short(self) -> list[str]:
+        """Why it disagrees, a sentence each, then how often, for each parameter set."""
+        lines = []
+        for cause in self.causes:
+            number = len(cause.explained(self.items))
+            plural = "" if number == 1 else "s"
+            lines.append(f"{cause.text} [{number} disagreement{plural}]")
+        return lines + [
+            f"{self.sets.get(name, f'@{name}' if name else 'Main set')}: {counted}."
+            for name, counted in tallies(self.items).items()
+        ]
+
+    def document(self) -> Document:
+        """Return statements beside computed numbers, part by part, and what disagrees."""
+        short = Listing(self.in_short)
+        hint = f"bywire reproduce {self.source} --out FOLDER"
+        return Document(
+            f"Reproduction of {self.source}",
+            self.citation,
+            sections=lambda: self._sections(short),
+            brief=[
+                TableBlock(verdicts(self.items), width=0), "", "In short", short, "",
+                f"Report with notes, tolerances and figures: {hint}",
+            ],
+            data=self._data(),
+            banner=Banner(f"All statements together: {tally(self.items)}"),
+            attachments=[
+                Attachment(f"{_stem(name)}.nc", partial(_recorded, recording))
+                for name, recording in self.recordings.items()
+            ],
+            record="results.json",
+        )  # fmt: skip
+
+    def _sections(self, short: Listing) -> list[Section]:
+        apart = [item for item in self.items if item.agrees is False]
+        sections = [Section("In short", [short, Paragraph(KINDS)])]
+        sections += [Section("Disagreements", [TableBlock(statements(apart))])] if apart else []
+        for part in self.parts:
+            blocks: list[Block] = [Paragraph(part.text)]
+            blocks += [FigureBlock(e.figure, e.caption, _stem(e.name)) for e in part.exhibits]
+            blocks += [TableBlock(statements(part.items))] if part.items else []
+            blocks += [Details(title, [TableBlock(t)]) for title, t in part.appendix.items()]
+            sections.append(Section(part.title, blocks))
+        if self.allowances:
+            sections.append(Section("Tolerances", [TableBlock(tolerances(self.allowances))]))
+        return sections
+
+    def _data(self) -> dict[str, Any]:
+        """Return the JSON object.
+
+        What is not stated, not computed or not defined is None; a tolerance is a number in the
+        item's unit, or ``"<="`` or ``">="`` where the statement is a bound. The note ends with the
+        kind of statement.
+        """
+        return {
+            "source": self.source,
+            "items": [
+                {
+                    "id": item.id,
+                    "unit": item.unit,
+                    "stated": item.stated,
+                    "computed": item.computed,
+                    "tolerance": item.tolerance,
+                    "agrees": item.agrees,
+                    "note": f"{item.note}; " * bool(item.note) + f"kind: {item.kind}",
+                }
+                for item in self.items
+            ],
+            "in_short": self.in_short,
+        }
+
 
 @dataclass(frozen=True)
 class Source:
@@ -121,3 +211,14 @@ class Source:
 
 SOURCES = Kind("source", ("paper",), instances(Source))
 """every source that can be reproduced"""
+
+
+def _stem(name: str) -> str:
+    """Return the name of a file, without what file systems dislike."""
+    return re.sub(r"[^A-Za-z0-9.-]+", "-", name)
+
+
+def _recorded(recording: xr.Dataset, path: Path) -> Path:
+    from bywire.data.netcdf import write_recording
+
+    return write_recording(recording, path)

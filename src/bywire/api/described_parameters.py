@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import Any
 
+from bywire.api.option_rows import option_rows
 from bywire.bench.experiment import EXPERIMENTS
-from bywire.cli.option_rows import option_rows
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.field_notes import field_notes
 from bywire.core.quantities import display_unit

@@ -1,31 +1,32 @@
-"""What ``bywire list NAME`` shows: everything of that name, with options, signals and units."""
+"""All about a name: a method, an experiment, a signal, with options, signals and units."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
-from bywire.bench.experiment import EXPERIMENTS, Experiment
-from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
-from bywire.bench.kpis.registry import definitions
-from bywire.bench.stimuli.registry import STIMULI, StimulusKind
-from bywire.cli.described_parameters import (
+from bywire.api.described_parameters import (
     described_group,
     described_kpi,
     described_parameter,
     groups,
     parameters,
 )
-from bywire.cli.described_systems import (
+from bywire.api.described_systems import (
     described_drive,
     described_loop,
     described_plant,
     described_system,
     signals,
 )
-from bywire.cli.option_rows import option_rows, option_table
+from bywire.api.option_rows import option_rows, option_table
+from bywire.bench.experiment import EXPERIMENTS, Experiment
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
+from bywire.bench.kpis.registry import definitions
+from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import unknown_name
@@ -35,6 +36,10 @@ from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.identification.fitting.asked import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method
+from bywire.report.answer import Answer
+from bywire.report.document import Document, Flat, Paragraph, Section, TableBlock
+from bywire.report.tables import text_table
+from bywire.report.wording import unit_text
 from bywire.synthesis.study import STUDIES, Study
 
 Object = dict[str, Any]
@@ -77,32 +82,70 @@ def described(name: str) -> list[Object]:
     return found
 
 
-def described_text(one: Object) -> str:
-    """Return such an object as the terminal shows it."""
-    from bywire.report.table_text import table_text
-    from bywire.report.tables import text_table
-    from bywire.report.wording import unit_text
+@dataclass(frozen=True)
+class Description(Answer):
+    """Everything of a name, as plain data: an object for each kind of thing that has it."""
 
-    lines = [f"{one['kind']} {one['name']}: {one['summary']}"]
-    lines += [f"  {key}: {unit_text(one[key]) if key == 'unit' else one[key]}"
-              for key in _LINES if one.get(key)]  # fmt: skip
-    parts = ["\n".join(lines)]
+    name: str
+    found: tuple[Object, ...]
+
+    def document(self) -> Document:
+        """Return lines and tables of each."""
+        blocks = [_blocks(thing) for thing in self.found]
+        titles = [f"{thing['kind']} {thing['name']}" for thing in self.found]
+        spaced = [part for k, each in enumerate(blocks) for part in ([""] * (k > 0) + each)]
+        return Document(
+            self.name,
+            "; ".join(str(thing["summary"]) for thing in self.found),
+            sections=[
+                Section(title, [Paragraph(b) if isinstance(b, str) else b for b in each])
+                for title, each in zip(titles, blocks, strict=True)
+            ],
+            brief=spaced,
+            data={"name": self.name, "found": list(self.found)},
+            has_files=False,
+        )
+
+
+def describe(name: str) -> Description:
+    """Return all about something of the list, a parameter, a group of them, or a signal.
+
+    Parameters
+    ----------
+    name
+        Name of an assembly, experiment, loop, plant, study, method, parameter set, stimulus, key
+        figure, parameter (``"motor.R_m"``), group of parameters, or signal.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    return Description(name, tuple(described(name)))
+
+
+def _blocks(thing: Object) -> list[str | Flat]:
+    """Return an object as lines and tables, apart by empty lines."""
+    lines = [f"{thing['kind']} {thing['name']}: {thing['summary']}"]
+    lines += [f"  {key}: {unit_text(thing[key]) if key == 'unit' else thing[key]}"
+              for key in _LINES if thing.get(key)]  # fmt: skip
+    blocks: list[str | Flat] = ["\n".join(lines)]
     for key in _TABLES:
-        rows = one.get(key)
+        rows = thing.get(key)
         if rows:
             columns = list(rows[0])
             cells = [
                 [(unit_text(row[n]) if n == "unit" else row[n]) or "-" for n in columns]
                 for row in rows
             ]
-            parts.append(f"{key}\n{table_text(text_table(columns, cells))}")
+            blocks += ["", key, TableBlock(text_table(columns, cells))]
     for key, heading in (("options", "default"), ("parameters", "value")):
-        if one.get(key):
-            said = f"{key}, changed with {one['changed_with']}" if "changed_with" in one else key
-            parts.append(f"{said}\n{table_text(option_table(one[key], heading))}")
-    if one.get("see"):
-        parts.append(one["see"])
-    return "\n\n".join(parts)
+        if thing.get(key):
+            changed = f", changed with {thing['changed_with']}" if "changed_with" in thing else ""
+            blocks += ["", f"{key}{changed}", TableBlock(option_table(thing[key], heading))]
+    if thing.get("see"):
+        blocks += ["", thing["see"]]
+    return blocks
 
 
 def _method(one: Method) -> Object:
