@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections.abc import Callable
 from typing import Any, Self
@@ -13,7 +14,10 @@ PURE = ("exp", "log", "sin", "cos", "floor", "power")  # functions of pure numbe
 
 
 class Dimensioned:
-    """A number with a unit; zero goes with every unit, any other plain number is pure."""
+    """A number with a unit; zero goes with every unit, any other plain number is pure.
+
+    A plain NaN is what is not known: it goes with every unit too, and so does what follows from it.
+    """
 
     __array_ufunc__ = None  # NumPy's scalars hand operations over to this class
 
@@ -124,6 +128,8 @@ def _quantity(value: Any) -> Any:
 def _combined(operation: Callable[[Any, Any], Any], left: Any, right: Any) -> Any:
     if operation in (operator.add, operator.sub):
         return Dimensioned.of(operation(*_alike(left, right)))
+    if _is_unknown(left) or _is_unknown(right):
+        return float("nan")
     if _is_nothing(left) or (operation is operator.mul and _is_nothing(right)):
         return 0.0  # nothing goes with every unit, times anything too
     return Dimensioned.of(operation(_quantity(left), _quantity(right)))
@@ -133,11 +139,15 @@ def _is_nothing(value: Any) -> bool:
     return not isinstance(value, Dimensioned) and value == 0
 
 
+def _is_unknown(value: Any) -> bool:
+    return not isinstance(value, Dimensioned) and math.isnan(value)
+
+
 def _alike(left: Any, right: Any) -> tuple[Any, Any]:
-    """Return two quantities of one dimension; a plain zero takes that of the other one."""
+    """Return two quantities of one dimension; zero and unknown ones take that of the other."""
     x, y = _quantity(left), _quantity(right)
-    if _is_nothing(left):
-        x = 0.0 * y
-    elif _is_nothing(right):
-        y = 0.0 * x
+    if _is_nothing(left) or _is_unknown(left):
+        x = float(left) * y
+    elif _is_nothing(right) or _is_unknown(right):
+        y = float(right) * x
     return x, y.to(x.units)

@@ -114,6 +114,11 @@ def is_package(brake: Brake) -> bool:
     return hasattr(importlib.import_module(brake.module), "__path__")
 
 
+def loaded_files() -> tuple[str, ...]:
+    """Return the files of the brakes that were loaded by path: what another process has to load."""
+    return tuple(brake.file for brake in _loaded.values())
+
+
 def load_system(path: str | Path) -> Brake:
     """Load a brake from a file or a package, and have it known by its names from then on.
 
@@ -122,7 +127,7 @@ def load_system(path: str | Path) -> Brake:
     Parameters
     ----------
     path
-        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``.
+        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; also that file.
 
     Raises
     ------
@@ -132,6 +137,7 @@ def load_system(path: str | Path) -> Brake:
         When it fails on import, declares no brake, or one whose name is taken.
     """
     place = Path(path).expanduser().resolve()
+    place = place.parent if place.name == "__init__.py" else place
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
         raise FileError(

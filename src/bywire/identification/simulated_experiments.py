@@ -14,6 +14,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from bywire.core.brake import load_system, loaded_files
 from bywire.core.errors import BywireError, FileError, ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.identification.method import Effort, Method
@@ -131,12 +132,16 @@ def _made(
         yield from map(one, seeds)
         return
     context = multiprocessing.get_context("spawn")  # forks of a process with threads may hang
-    with context.Pool(min(processes, len(seeds)), _ignore_interrupts) as pool:
+    count = min(processes, len(seeds))
+    with context.Pool(count, _prepare_worker, (loaded_files(),)) as pool:
         yield from pool.imap_unordered(one, seeds)
 
 
-def _ignore_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent's business alone
+def _prepare_worker(systems: tuple[str, ...]) -> None:
+    """Leave interrupts to the parent, and know the brakes that it loaded by path."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    for path in systems:
+        load_system(path)
 
 
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
