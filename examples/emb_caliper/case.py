@@ -1,0 +1,51 @@
+"""What the experiments share: runs that start at rest at a clamp force."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.experiment import Case
+from emb_caliper.model import EmbCaliper
+from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
+from emb_caliper.trim import memory_at, state_at
+
+Array = NDArray[np.float64]
+
+
+def case_from_rest(
+    par: CaliperBrakeParameters,
+    drive: DriveMode,
+    F: float,
+    stimulus: Callable[[Array], Mapping[str, Array]],
+    duration: float,
+    label: str = "run",
+    **timing: float,
+) -> Case:
+    """Return a run that starts in equilibrium at a clamp force.
+
+    Parameters
+    ----------
+    par
+        Parameters, of which ``drive`` is replaced.
+    drive
+        What the stimulus commands.
+    F
+        Clamp force at the start [N]; parked where it is 0.
+    stimulus, duration, label
+        As of a case.
+    timing
+        ``settle``, ``keep`` and ``record`` of the case [s].
+    """
+    driven = par.replace({"drive": drive})
+    return Case(
+        label, EmbCaliper(), driven, state_at(F, driven), memory_at(F, driven), stimulus, duration,
+        **timing,
+    )  # fmt: skip
+
+
+def step_at_zero(name: str, before: float, after: float) -> Callable[[Array], Mapping[str, Array]]:
+    """Return the stimulus that steps one signal at t = 0."""
+    return lambda t: {name: np.where(t < -1e-9, before, after)}

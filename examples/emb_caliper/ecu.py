@@ -1,0 +1,136 @@
+"""The brake's ECU: force, speed and current control in a cascade, at their sample times."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+from bywire.control import current_pi
+from bywire.core import ops
+from bywire.core.signals import Signal
+from bywire.plant import adc, h_bridge
+from emb_caliper.elements import ball_screw, floating_caliper, planetary_gear
+from emb_caliper.laws import limited_pi
+from emb_caliper.parameters import CaliperBrakeParameters as Par
+
+
+class Stimulus(NamedTuple):
+    """External inputs; which of them acts depends on ``drive``."""
+
+    F_set: Annotated[float, Signal("N", "force demand", 1e4)]
+    omega_set: Annotated[float, Signal("rad/s", "speed demand", 100.0)]
+    i_set: Annotated[float, Signal("A", "current demand", 10.0)]
+    v_set: Annotated[float, Signal("V", "voltage demand", 10.0)]
+    noise_F: Annotated[float, Signal("1", "noise of the force channel")]
+
+
+class Memory(NamedTuple):
+    """What the ECU holds between its ticks."""
+
+    F_meas: Annotated[float, Signal("N", "measured clamp force", 1e4)]
+    theta_meas: Annotated[float, Signal("rad", "measured motor angle", 50.0)]
+    omega_meas: Annotated[float, Signal("rad/s", "measured motor speed", 100.0)]
+    F_ref: Annotated[float, Signal("N", "force set point", 1e4, set_point_of="F_cl")]
+    omega_ref: Annotated[float, Signal("rad/s", "speed set point", 100.0, set_point_of="omega")]
+    i_ref: Annotated[float, Signal("A", "current set point", 10.0, set_point_of="i")]
+    duty: Annotated[float, Signal("1", "duty cycle", 0.5)]
+    v_source: Annotated[float, Signal("V", "source voltage", 10.0)]
+    parked: Annotated[float, Signal("1", "parked by position control")]
+    sat_speed: Annotated[float, Signal("1", "speed demand saturated")]
+    sat_current: Annotated[float, Signal("1", "current demand saturated")]
+    sat_duty: Annotated[float, Signal("1", "duty cycle saturated")]
+    force_integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
+    speed_integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
+    current_integral: Annotated[float, Signal("1", "integral part of the current PI", 0.3)]
+
+
+class Readings(NamedTuple):
+    """What the sensors show at a tick; resolver and current sensor are ideal."""
+
+    F_cl: Annotated[float, Signal("N", "clamp force", 1e4)]
+    theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
+    omega: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
+    i: Annotated[float, Signal("A", "motor current", 10.0)]
+
+
+def force_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Read the force sensor, and run force control once: the speed set point is renewed."""
+    share = adc.sample(r.F_cl / par.F_span, u.noise_F, par.adc)
+    m = m._replace(F_meas=share * par.F_span, theta_meas=r.theta)
+    return _force_control(m, u, par) if par.drive == "force" else m
+
+
+def speed_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Run speed control once: the current set point is renewed."""
+    m = m._replace(omega_meas=r.omega)
+    if par.drive == "speed":
+        m = m._replace(omega_ref=u.omega_set)
+    state, out = limited_pi.speed(
+        limited_pi.SpeedState(m.speed_integral),
+        limited_pi.SpeedInput(m.omega_ref - m.omega_meas, _ahead(m, par)),
+        par.ecu.T_force,
+        par.ecu.speed,
+    )
+    saturated = ops.where(ops.fabs(out.i) >= par.ecu.speed.i_max, 1.0, 0.0)
+    return m._replace(i_ref=out.i, sat_current=saturated, speed_integral=state.integral)
+
+
+def current_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Run current control once."""
+    if par.drive == "current":
+        m = m._replace(i_ref=u.i_set)
+    limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
+    state, out = current_pi.output(
+        current_pi.State(m.current_integral),
+        current_pi.Input(i_ref=m.i_ref, i_meas=r.i, D_lim=limit),
+        par.ecu.T_current,
+        par.ecu.current,
+    )
+    saturated = ops.where(ops.fabs(out.duty) >= limit, 1.0, 0.0)
+    return m._replace(duty=out.duty, sat_duty=saturated, current_integral=state.integral)
+
+
+def source_tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Renew the voltage that an ideal source holds."""
+    return m._replace(v_source=u.v_set)
+
+
+def travel_per_angle(par: Any) -> float:
+    """Return the piston's travel per angle of the motor [m/rad]."""
+    return ball_screw.slope(par.screw) / planetary_gear.ratio(par.gear)
+
+
+def _force_control(m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Return the memory with the speed set point renewed: press, or park clear of the disc."""
+    ecu = par.ecu
+    state, out = limited_pi.force(
+        limited_pi.ForceState(m.force_integral),
+        limited_pi.ForceInput(u.F_set - m.F_meas, _factor(m, par)),
+        ecu.T_force,
+        ecu.force,
+    )
+    top = ecu.force.omega_max
+    parking = ops.clip(-ecu.k_park * m.theta_meas, -top, top)
+    pressing = u.F_set >= ecu.F_on
+    omega_ref = ops.where(pressing, out.omega, parking)
+    return m._replace(
+        F_ref=u.F_set,
+        omega_ref=omega_ref,
+        parked=ops.where(pressing, 0.0, 1.0),
+        sat_speed=ops.where(ops.fabs(omega_ref) >= top, 1.0, 0.0),
+        force_integral=ops.where(pressing, state.integral, 0.0),
+    )
+
+
+def _factor(m: Memory, par: Par) -> float:
+    """Return what the force controller's gains are multiplied by."""
+    if par.ecu.scheduling == "off":
+        return 1.0
+    n = ops.fmax(travel_per_angle(par) * m.theta_meas - par.caliper.clearance, 0.0)
+    return par.caliper.k_1 / floating_caliper.stiffness(n, par.caliper)
+
+
+def _ahead(m: Memory, par: Par) -> float:
+    """Return the current that is fed forward [A]."""
+    if par.ecu.load == "off":
+        return 0.0
+    return travel_per_angle(par) * ops.fmax(m.F_meas, 0.0) / par.motor.K_e

@@ -1,0 +1,1 @@
+"""Physical elements that bywire lacks, one file each."""

@@ -1,0 +1,146 @@
+"""Floating caliper: running clearance, then pads and bridge as one spring that stiffens."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Length, Stiffness, TimeConstant, Unit
+from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
+from bywire.core.validity import Array, first, outside
+
+Quadratic = Annotated[float, Unit("N/m**2", 3e10), Field(ge=0, allow_inf_nan=False)]
+Cubic = Annotated[float, Unit("N/m**3", 7e12), Field(allow_inf_nan=False)]
+Clearance = Annotated[float, Unit("m", 3e-4), Field(ge=0, allow_inf_nan=False)]
+ClampForce = Annotated[float, Signal("N", "clamp force", 1e4)]
+Work = Annotated[float, Signal("W", "work on the caliper")]
+Loss = Annotated[
+    float, Signal("W", "loss of the caliper's damping", role=Role("sink", "caliper damping"))
+]
+
+
+class Parameters(ParameterSet):
+    """Pads, disc and bridge in series, reckoned along the piston's travel; it never pulls.
+
+    The floating body centers itself without friction, so that one travel closes both sides.
+    """
+
+    k_1: Stiffness
+    """stiffness at first touch"""
+    k_2: Quadratic
+    """factor of the square of the overlap"""
+    k_3: Cubic
+    """factor of its cube; below 0 where the curve straightens toward high forces"""
+    n_max: Length
+    """overlap up to which the curve was measured; it rises up to there"""
+    tau: TimeConstant
+    """damping over stiffness"""
+    clearance: Clearance
+    """running clearance, both sides of the disc together"""
+
+    @model_validator(mode="after")
+    def _rises(self) -> Parameters:
+        # The slope is a parabola: least at an end, or at its vertex where k_3 > 0 > k_2 (excluded).
+        slope = self.k_1 + (2.0 * self.k_2 + 3.0 * self.k_3 * self.n_max) * self.n_max
+        if not slope > 0.0:
+            raise ValueError(
+                f"the force must rise up to n_max = {self.n_max:g} m, where its slope is "
+                f"{slope:.3g} N/m: lower n_max or raise k_3 = {self.k_3:g} N/m**3"
+            )
+        return self
+
+
+class Input(NamedTuple):
+    """Motion of the piston."""
+
+    x: Annotated[float, Signal("m", "piston travel", 1e-3)]
+    v: Annotated[float, Signal("m/s", "piston speed", 3e-3)]
+
+
+class InputRate(NamedTuple):
+    """Derivatives of what the stored energy depends on."""
+
+    x: Annotated[float, Signal("m/s", "piston speed", 3e-3)]
+
+
+class Forces(NamedTuple):
+    """Clamp force, >= 0."""
+
+    F_cl: ClampForce
+
+
+def depth(u: Input, par: Parameters) -> Overlap:
+    """Return the overlap of pads and disc; negative in the clearance."""
+    return u.x - par.clearance
+
+
+def overlaps(u: Input, par: Parameters) -> Overlap:
+    """Return the damped overlap, n + tau dn/dt, affine in the motion."""
+    return depth(u, par) + par.tau * u.v
+
+
+def compliance(par: Parameters) -> ContactCompliance:
+    """Return the compliance at first touch, which decides on touching."""
+    return 1.0 / par.k_1
+
+
+def elastic(n: Overlap, par: Parameters) -> ClampForce:
+    r"""Return the clamp force of an overlap n >= 0.
+
+    .. math:: F_{cl} = k_1 n + k_2 n^2 + k_3 n^3
+    """
+    return n * (par.k_1 + n * (par.k_2 + n * par.k_3))
+
+
+def stiffness(
+    n: Overlap, par: Parameters
+) -> Annotated[float, Signal("N/m", "stiffness of the caliper", 2e7)]:
+    """Return the slope of the clamp force over the overlap n >= 0."""
+    return par.k_1 + n * (2.0 * par.k_2 + n * 3.0 * par.k_3)
+
+
+def bent(f: Forces, par: Parameters) -> Forces:
+    """Return the clamp force that belongs to a contact force of constant compliance.
+
+    Contacts have constant compliances: f is the first slope times the overlap, and the curve bends
+    it. It rises, so that nothing pulls, and the damping never gives energy.
+    """
+    return Forces(F_cl=elastic(f.F_cl * compliance(par), par))
+
+
+def forces(u: Input, par: Parameters) -> Forces:
+    """Return the clamp force of pads that no other contact holds."""
+    return Forces(F_cl=elastic(ops.fmax(overlaps(u, par), 0.0), par))
+
+
+def input_rate(u: Input) -> InputRate:
+    """Return how the piston moves: the caliper stores energy, and its travel is the port."""
+    return InputRate(x=u.v)
+
+
+def energy(u: Input, par: Parameters) -> Energy:
+    """Return the elastic energy."""
+    n = ops.fmax(depth(u, par), 0.0)
+    return n * n * (0.5 * par.k_1 + n * (par.k_2 / 3.0 + 0.25 * n * par.k_3))
+
+
+def power_in(u: Input, f: Forces) -> Work:
+    """Return the work of the piston on the caliper."""
+    return f.F_cl * u.v
+
+
+def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
+    """Return what the damping takes, >= 0."""
+    return (f.F_cl - elastic(ops.fmax(depth(u, par), 0.0), par)) * u.v
+
+
+def watch(u: Input, par: Parameters, t: Array) -> list[str]:
+    """Return whether the pads were pressed beyond the measured curve, and when first."""
+    text = (
+        f"the pads were pressed beyond the measured curve, caliper.n_max = {1e3 * par.n_max:g} mm,"
+    )
+    return first(t, outside(depth(u, par), -math.inf, par.n_max), text)

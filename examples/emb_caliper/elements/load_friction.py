@@ -1,0 +1,77 @@
+"""Dry friction of a drive train that grows with the clamp force."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field, model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Torque, Unit
+from bywire.core.signals import Power, Signal
+
+TorquePerForce = Annotated[float, Unit("N*m/N", 1e-5), Field(ge=0, allow_inf_nan=False)]
+StribeckSpeed = Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]
+
+
+class Parameters(ParameterSet):
+    """Set-valued at rest, the same both ways: what sticks holds exactly.
+
+    The viscous part belongs to the rotor.
+    """
+
+    C: Torque
+    """sliding friction without load"""
+    G: TorquePerForce
+    """friction per clamp force, sliding and at rest"""
+    T_s: Torque
+    """breakaway torque without load, not below C"""
+    omega_s: StribeckSpeed
+    """speed within which breakaway falls to sliding friction"""
+
+    @model_validator(mode="after")
+    def _breaks_away(self) -> Parameters:
+        if self.T_s < self.C:
+            raise ValueError(
+                f"T_s = {self.T_s:g} N*m must be >= C = {self.C:g} N*m: what rests is held by no "
+                "less than what rubs"
+            )
+        return self
+
+
+class Input(NamedTuple):
+    """Speed and clamp force."""
+
+    omega: Annotated[float, Signal("rad/s", "motor speed", 5.0)]
+    F_cl: Annotated[float, Signal("N", "clamp force", 1e4)]
+
+
+class Output(NamedTuple):
+    """Magnitude of the friction."""
+
+    torque: Annotated[float, Signal("N*m", "friction torque", 0.1)]
+
+
+def output(u: Input, par: Parameters) -> Output:
+    r"""Return the magnitude of the friction torque at the motor's shaft.
+
+    .. math:: T = C + G F_{cl} + (T_s - C)\, e^{-|\omega| / \omega_s}
+
+    Notes
+    -----
+    That friction grows with the clamp force, and that it sticks, are the findings of Line, Manzie
+    and Good (2008); that the growth is in proportion, and the way in which breakaway falls to
+    sliding friction, are chosen.
+    """
+    pressed = ops.fmax(u.F_cl, 0.0)
+    fall = ops.decay(ops.fabs(u.omega) / par.omega_s)
+    return Output(torque=par.C + par.G * pressed + (par.T_s - par.C) * fall)
+
+
+def power_loss(
+    torque: Annotated[float, Signal("N*m", "friction torque on the shaft", 0.1)],
+    omega: Annotated[float, Signal("rad/s", "motor speed", 5.0)],
+) -> Power:
+    """Return the heat of the friction, signed as torque and speed are given."""
+    return -torque * omega

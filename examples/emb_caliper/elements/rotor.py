@@ -1,0 +1,79 @@
+"""Rotor of the motor with all that turns with it."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Inertia, RotaryDamping
+from bywire.core.signals import Energy, Power, Role, Signal
+
+Loss = Annotated[
+    float, Signal("W", "loss of the viscous friction", role=Role("sink", "viscous friction"))
+]
+
+
+class Parameters(ParameterSet):
+    """One inertia: gear, screw and piston are rigid, their inertia reckoned at the motor."""
+
+    J: Inertia
+    """inertia of rotor, gear, screw and piston at the motor's shaft"""
+    D: RotaryDamping
+    """viscous friction of the whole drive train at the motor's shaft"""
+
+
+class State(NamedTuple):
+    """Angle and speed, zero where the piston is retracted, positive toward clamping."""
+
+    theta: Annotated[float, Signal("rad", "motor angle", 50.0)]
+    omega: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
+
+
+class Factors(NamedTuple):
+    """Factors of the derivatives of angle and speed."""
+
+    theta: Annotated[float, Signal("1", "unity")]
+    omega: Annotated[float, Signal("kg*m**2", "inertia", 3e-4)]
+
+
+class Balance(NamedTuple):
+    """What drives angle and speed."""
+
+    theta: Annotated[float, Signal("rad/s", "motor speed", 100.0)]
+    omega: Annotated[float, Signal("N*m", "accelerating torque", 1.0)]
+
+
+class Input(NamedTuple):
+    """Torques of motor, load and dry friction."""
+
+    torque: Annotated[float, Signal("N*m", "motor torque", 1.0)]
+    load: Annotated[float, Signal("N*m", "load of the gear", 0.5)]
+    friction: Annotated[float, Signal("N*m", "friction torque, along the motion", 0.1)]
+
+
+def mass(x: State, par: Parameters) -> Factors:
+    """Return the factors of the derivatives: 1 and the inertia."""
+    return Factors(theta=1.0, omega=par.J)
+
+
+def balance(x: State, u: Input, par: Parameters) -> Balance:
+    r"""Return the speed and the torque that accelerates.
+
+    .. math:: J \dot\omega = T_m - T_L - D \omega + T_F
+    """
+    return Balance(theta=x.omega, omega=u.torque - u.load - par.D * x.omega + u.friction)
+
+
+def energy(x: State, par: Parameters) -> Energy:
+    """Return the kinetic energy."""
+    return 0.5 * par.J * x.omega * x.omega
+
+
+def power_in(x: State, u: Input, par: Parameters) -> Power:
+    """Return what motor and friction give less what the load takes."""
+    return (u.torque - u.load + u.friction) * x.omega
+
+
+def power_loss(x: State, par: Parameters) -> Loss:
+    """Return what the viscous friction takes, >= 0."""
+    return par.D * x.omega * x.omega

@@ -1,0 +1,87 @@
+"""Apply and release: ramp up, hold, ramp down, park."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import effort, occupation
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from emb_caliper.case import Array, case_from_rest
+from emb_caliper.experiments.slow_strokes import TopForce
+from emb_caliper.parameters import CaliperBrakeParameters
+
+
+class Options(ParameterSet):
+    """The maneuver."""
+
+    F_top: TopForce
+    """clamp force that is held"""
+    t_ramp: Duration
+    """time in which the demand rises, and in which it falls"""
+    t_hold: Duration
+    """time in between"""
+    duration: Duration
+    """time recorded"""
+
+
+def demand(t: Array, options: Options) -> Array:
+    """Return the force demand [N] at times [s]."""
+    o = options
+    corners = np.cumsum((0.0, o.t_ramp, o.t_hold, o.t_ramp))
+    return np.interp(t, corners, (0.0, o.F_top, o.F_top, 0.0))
+
+
+def cases(
+    par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the one run, from the parked piston."""
+    return (
+        case_from_rest(
+            par, "force", 0.0, lambda t: {"F_set": demand(t, options)}, options.duration
+        ),
+    )
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return how well the demand is followed, what holding costs, and when the disc is free."""
+    run = recordings["run"]
+    t, F = run["time"].values, run["F_cl"].values
+    error = run["F_ref"].values - F
+    begin = options.t_ramp + 0.5 * options.t_hold
+    holding = (t >= begin) & (t <= options.t_ramp + options.t_hold)
+    release = 2.0 * options.t_ramp + options.t_hold
+    pressed = np.flatnonzero(F > 0.0)
+    last = float(t[pressed[-1]]) if pressed.size else 0.0
+    free = last < float(t[-1])
+    note = "" if free else "the pads touch to the end"
+    figures = evaluate("effort", run, effort.Setting())
+    figures |= evaluate("occupation", run, occupation.Setting())
+    return (
+        Kpi("error_max", float(np.max(np.abs(error))), "N", "Largest error of the clamp force."),
+        Kpi("error_held", float(np.mean(error[holding])), "N",
+            "Mean error in the second half of the hold."),
+        Kpi("current_held", float(np.mean(run["i"].values[holding])), "A",
+            "Mean current in the second half of the hold."),
+        Kpi("time_to_free", last - release if free else float("nan"), "s",
+            "Time from the end of the demand until the pads leave the disc.", note),
+        *figures.values(),
+    )  # fmt: skip
+
+
+EXPERIMENT = Experiment(
+    name="apply-release",
+    assembly="emb-caliper",
+    summary="ramp to 25 kN, hold, ramp down, park: tracking, holding current, release",
+    options=Options,
+    defaults=Options(F_top=25e3, t_ramp=0.5, t_hold=0.5, duration=2.0),
+    cases=cases,
+    judge=judge,
+    kpis={"error_max": "N", "error_held": "N", "current_held": "A", "time_to_free": "s",
+          **units_of("effort", "occupation")},
+    figures=("time-traces", "energy-balance"),
+)  # fmt: skip

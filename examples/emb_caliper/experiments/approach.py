@@ -1,0 +1,57 @@
+"""Approach: the linear benchmark's step over the clearance."""
+
+from __future__ import annotations
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import step_response
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Length
+from emb_caliper.case import step_at_zero
+from emb_caliper.rigs.approach import Approach, ApproachParameters, at_rest
+
+
+class Options(ParameterSet):
+    """The step."""
+
+    x_to: Length
+    """travel asked for"""
+    duration: Duration
+    """time recorded"""
+
+
+def cases(par: ApproachParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+    """Return the one run, from rest."""
+    state, memory = at_rest()
+    stimulus = step_at_zero("x_set", 0.0, options.x_to)
+    run = Case("run", Approach(), par, state, memory, stimulus, options.duration, record=1e-4)
+    return (run,)
+
+
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the travel."""
+    return step_response.Setting("x", 0.0, 0.0, options.x_to, set_point="x_set")
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the step's key figures and the largest travel."""
+    run = recordings["run"]
+    figures = evaluate("step_response", run, step(options))
+    farthest = Kpi("x_max", float(run["x"].max()), "m", "Largest travel.")
+    return (*figures.values(), farthest)
+
+
+EXPERIMENT = Experiment(
+    name="approach",
+    assembly="emb-approach",
+    summary="linear benchmark of 2015: step over a clearance of 5 mm, no contact",
+    options=Options,
+    defaults=Options(x_to=5e-3, duration=0.1),
+    cases=cases,
+    judge=judge,
+    kpis={**units_of("step_response", resolved={"level": "m"}), "x_max": "m"},
+    figures=("time-traces",),
+    step=step,
+)

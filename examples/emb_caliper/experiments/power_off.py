@@ -1,0 +1,78 @@
+"""Power off: the motor's current ends under load, and friction decides what force stays."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from emb_caliper.case import case_from_rest, step_at_zero
+from emb_caliper.ecu import travel_per_angle
+from emb_caliper.experiments.slow_strokes import TopForce
+from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
+from emb_caliper.trim import memory_at
+
+
+class Options(ParameterSet):
+    """The clamp force that is left alone."""
+
+    F_from: TopForce
+    """clamp force before"""
+    circuit: Literal["open", "short"]
+    """whether the motor carries no current from then on, or its winding is short-circuited"""
+    duration: Duration
+    """time recorded after the current ends"""
+
+
+def held_force(par: CaliperBrakeParameters) -> float:
+    """Return the largest clamp force [N] that friction holds without current; inf for any.
+
+    Where the load's torque grows faster than the friction: (N - G) F = T_s.
+    """
+    grows = travel_per_angle(par) - par.friction.G
+    return par.friction.T_s / grows if grows > 0.0 else float("inf")
+
+
+def cases(
+    par: CaliperBrakeParameters, options: Options, _: Stimulus | None = None
+) -> tuple[Case, ...]:
+    """Return the one run; the current loop stands for the open circuit."""
+    drive: DriveMode
+    held, F = memory_at(options.F_from, par), options.F_from
+    if options.circuit == "open":
+        drive, stimulus = "current", step_at_zero("i_set", held.i_ref, 0.0)
+    else:
+        drive, stimulus = "voltage", step_at_zero("v_set", held.v_source, 0.0)
+    return (case_from_rest(par, drive, F, stimulus, options.duration, settle=0.01, keep=0.01),)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return what force stays, and when the shaft comes to rest."""
+    run = recordings["run"].sel(time=slice(-1e-9, None))
+    time, stuck = run["time"].values, run["stuck"].values > 0.5
+    rests = bool(stuck[-1])
+    moving = np.flatnonzero(~stuck)
+    t_rest = float(time[moving[-1] + 1] if moving.size else 0.0) if rests else float("nan")
+    note = "" if rests else "the shaft does not come to rest in the recorded time"
+    return (
+        Kpi("residual_force", float(run["F_cl"].values[-1]), "N", "Clamp force at the end."),
+        Kpi("time_to_rest", t_rest, "s", "Time until the shaft rests for good.", note),
+    )
+
+
+EXPERIMENT = Experiment(
+    name="power-off",
+    assembly="emb-caliper",
+    summary="25 kN, then no current: what clamp force the friction holds",
+    options=Options,
+    defaults=Options(F_from=25e3, circuit="open", duration=1.0),
+    cases=cases,
+    judge=judge,
+    kpis={"residual_force": "N", "time_to_rest": "s"},
+    figures=("time-traces", "energy-balance"),
+)

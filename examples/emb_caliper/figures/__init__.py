@@ -1,0 +1,1 @@
+"""Kinds of figures that bywire lacks, one file each."""

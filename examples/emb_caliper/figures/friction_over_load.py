@@ -1,0 +1,26 @@
+"""Figure: motor torque over clamp force while the shaft turns, both ways."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from bywire.bench.result import Result
+from bywire.report import style
+from bywire.report.bench_figures import FigureKind, Shown
+
+
+def _draw(result: Result) -> list[Shown]:
+    run = result.recordings["run"]
+    figure, axes = style.new_figure(3.4, (1.0,))
+    F, T, omega = (run[name].values for name in ("F_cl", "torque", "omega"))
+    for label, color, way in (("apply", style.BLUE, 1.0), ("release", style.VERMILLION, -1.0)):
+        moving = np.sign(omega) == way
+        axes[0].plot(1e-3 * F[moving], T[moving], ".", color=color, markersize=2.0, label=label)
+    axes[0].set_xlabel(style.axis_label("clamp force", "kN"))
+    axes[0].set_ylabel(style.axis_label("motor torque", "N*m"))
+    style.legend_above(axes[0])
+    caption = "Motor torque over clamp force: half the distance of the branches is friction."
+    return [Shown("friction-over-load", figure, caption)]
+
+
+FIGURE = FigureKind("friction-over-load", _draw)

@@ -1,0 +1,1 @@
+"""Control laws that bywire lacks, one file each."""

@@ -1,0 +1,111 @@
+"""PI controllers of the cascade, each with its limit; the integral part waits at it.
+
+Back-calculation would charge the integral part with all that is beyond the limit: a force step of
+25 kN asks for three times the largest speed, and the brake then creeps toward its demand.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from annotated_types import Gt
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Current, Unit
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
+MotorSpeed = Annotated[float, Unit("rad/s", 300.0), Field(gt=0, allow_inf_nan=False)]
+SpeedPerForce = Annotated[float, Unit("rad/(N*s)", 0.03), Field(ge=0, allow_inf_nan=False)]
+SpeedPerForceTime = Annotated[float, Unit("rad/(N*s**2)", 0.05), Field(ge=0, allow_inf_nan=False)]
+CurrentPerSpeed = Annotated[float, Unit("A*s/rad", 0.5), Field(ge=0, allow_inf_nan=False)]
+CurrentPerAngle = Annotated[float, Unit("A/rad", 20.0), Field(ge=0, allow_inf_nan=False)]
+
+
+class ForceParameters(ParameterSet):
+    """Gains from the error of the clamp force to a motor speed."""
+
+    k_p: SpeedPerForce
+    """proportional gain"""
+    k_i: SpeedPerForceTime
+    """integral gain"""
+    omega_max: MotorSpeed
+    """largest speed asked for"""
+
+
+class SpeedParameters(ParameterSet):
+    """Gains from the error of the motor's speed to a current."""
+
+    k_p: CurrentPerSpeed
+    """proportional gain"""
+    k_i: CurrentPerAngle
+    """integral gain"""
+    i_max: Current
+    """largest current asked for"""
+
+
+class ForceInput(NamedTuple):
+    """Error of the force, and what the gain is multiplied by."""
+
+    error: Annotated[float, Signal("N", "error of the clamp force", 1e3)]
+    factor: Annotated[float, Signal("1", "factor of the gains", 1.0)]
+
+
+class SpeedInput(NamedTuple):
+    """Error of the speed, and the current that is known to be needed."""
+
+    error: Annotated[float, Signal("rad/s", "error of the speed", 10.0)]
+    ahead: Annotated[float, Signal("A", "current fed forward", 5.0)]
+
+
+class ForceState(NamedTuple):
+    """Integral part."""
+
+    integral: Annotated[float, Signal("rad/s", "integral part of the force PI", 10.0)]
+
+
+class SpeedState(NamedTuple):
+    """Integral part."""
+
+    integral: Annotated[float, Signal("A", "integral part of the speed PI", 5.0)]
+
+
+class ForceOutput(NamedTuple):
+    """Speed within its limits."""
+
+    omega: Annotated[float, Signal("rad/s", "speed set point", 100.0)]
+
+
+class SpeedOutput(NamedTuple):
+    """Current within its limits."""
+
+    i: Annotated[float, Signal("A", "current set point", 10.0)]
+
+
+def force(
+    x: ForceState, u: ForceInput, T: SampleTime, par: ForceParameters
+) -> tuple[ForceState, ForceOutput]:
+    r"""Advance the force controller by one sample.
+
+    .. math:: \omega = \kappa k_p e + I, \quad I_{k+1} = I_k + T \kappa k_i e
+    """
+    wanted = u.factor * par.k_p * u.error + x.integral
+    omega = ops.clip(wanted, -par.omega_max, par.omega_max)
+    within = ops.fabs(wanted) < par.omega_max
+    growth = ops.where(within, u.factor * par.k_i * u.error, 0.0)
+    return ForceState(x.integral + T * growth), ForceOutput(omega)
+
+
+def speed(
+    x: SpeedState, u: SpeedInput, T: SampleTime, par: SpeedParameters
+) -> tuple[SpeedState, SpeedOutput]:
+    r"""Advance the speed controller by one sample.
+
+    .. math:: i = k_p e + I + i_{ff}, \quad I_{k+1} = I_k + T k_i e
+    """
+    wanted = par.k_p * u.error + x.integral + u.ahead
+    i = ops.clip(wanted, -par.i_max, par.i_max)
+    growth = ops.where(ops.fabs(wanted) < par.i_max, par.k_i * u.error, 0.0)
+    return SpeedState(x.integral + T * growth), SpeedOutput(i)

@@ -1,0 +1,29 @@
+"""Force loop, around speed and current loop."""
+
+from __future__ import annotations
+
+from bywire.analysis.loop import Loop, Point
+from bywire.core.parameters import ParameterSet
+from emb_caliper.loops.points import CAUSES, FORCE, point
+
+
+def at(par: ParameterSet, value: float) -> Point:
+    """Return the brake in equilibrium at a clamp force [N]."""
+    return point(par, value, "force")
+
+
+LOOP = Loop(
+    name="clamp-force",
+    assembly="emb-caliper",
+    summary="force control around speed and current control, 1 kHz",
+    at=FORCE,
+    inputs=("F_set",),
+    output="F_cl",
+    cut="omega_ref",
+    point=at,
+    causes=CAUSES,
+    band=(0.5, 50.0),
+    amplitudes=(100.0, 1e3, 3e3),
+    tunables={"ecu.force.k_p": (1e-3, 1.0), "ecu.force.k_i": (1e-4, 1.0)},
+    proof="clamp-step",
+)

@@ -1,0 +1,29 @@
+"""Speed loop, around the current loop."""
+
+from __future__ import annotations
+
+from bywire.analysis.loop import Loop, Point
+from bywire.core.parameters import ParameterSet
+from emb_caliper.loops.points import CAUSES, FORCE, point
+
+
+def at(par: ParameterSet, value: float) -> Point:
+    """Return the brake held at a clamp force [N] by its speed loop."""
+    return point(par, value, "speed")
+
+
+LOOP = Loop(
+    name="motor-speed",
+    assembly="emb-caliper",
+    summary="speed control around current control, 1 kHz",
+    at=FORCE,
+    inputs=("omega_set",),
+    output="omega",
+    cut="i_ref",
+    point=at,
+    causes=CAUSES,
+    band=(0.5, 200.0),
+    amplitudes=(0.1, 3.0),
+    tunables={"ecu.speed.k_p": (1e-2, 10.0), "ecu.speed.k_i": (0.1, 500.0)},
+    proof="slow-strokes",
+)

@@ -1,0 +1,44 @@
+"""Operating points of the loops, and what makes them nonlinear."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, cast
+
+from bywire.analysis.loop import Point, Quantity
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.signals import zeros
+from emb_caliper.ecu import Stimulus
+from emb_caliper.model import EmbCaliper
+from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
+from emb_caliper.trim import memory_at, state_at
+
+FORCE = Quantity("clamp force", "N", 20e3)
+
+CAUSES: Mapping[str, Mapping[str, Any]] = {
+    "dry friction": {"friction.C": 0.0, "friction.G": 0.0, "friction.T_s": 0.0},
+    "converter": {"adc.law": "ideal"},
+}
+"""cause -> parameters without it; the stiffness bends at any amplitude and cannot be left out"""
+
+
+def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) -> Point:
+    """Return the brake held at a clamp force [N].
+
+    Raises
+    ------
+    ParameterError
+        When the pads do not touch.
+    """
+    own = cast(CaliperBrakeParameters, par.replace({"drive": drive}))
+    if own.ecu.F_on > F:
+        raise ParameterError(
+            f"clamp force = {F:g} N is no operating point: below ecu.F_on = {own.ecu.F_on:g} N the "
+            "piston is parked; take for instance '5 kN'"
+        )
+    state = state_at(F, own)
+    held = {"force": {"F_set": F}, "speed": {}, "current": {"i_set": state.i},
+            "voltage": {"v_set": own.motor.R_m * state.i}}[drive]  # fmt: skip
+    stimulus = zeros(Stimulus)._replace(**held)
+    return Point(EmbCaliper(), own, state, memory_at(F, own), stimulus, step)

@@ -1,0 +1,185 @@
+"""Friction over load and speed, from slow strokes of the whole brake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from typing import Annotated
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+from pydantic import Field
+
+from bywire.bench.experiment import as_run
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.identification.differentiation import differentiated
+from bywire.identification.lack_of_fit import lack_of_fit
+from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.unknown import parameters_of
+from bywire.identification.wrong_sign import wrong_sign
+from bywire.simulation.run import simulate
+from emb_caliper.ecu import travel_per_angle
+from emb_caliper.experiments import slow_strokes
+from emb_caliper.parameters import CaliperBrakeParameters
+
+Array = NDArray[np.float64]
+MotorSpeed = Annotated[float, Unit("rad/s", 5.0), Field(gt=0, allow_inf_nan=False)]
+
+_NAMES = ("friction.C", "friction.G", "rotor.D")
+_STEP = 20e-6
+_SPREAD = 1.5  # by which loads, and speeds, have to differ for their parts of the friction to part
+_ADVICE = "go up to a high clamp force and back at two speeds, as 'bywire run slow-strokes' does"
+
+
+class Options(ParameterSet):
+    """Which part of the strokes counts, how it is filtered, and the synthetic noise."""
+
+    slowest: MotorSpeed
+    """speed that a stroke keeps; slower, breakaway rules it"""
+    margin: Duration
+    """time left out at either end of a stroke"""
+    window: Duration
+    """time over which the torque balance is averaged"""
+    cutoff: Frequency
+    """low-pass before the angle is differentiated"""
+    sigma_i: Annotated[float, Unit("A", 0.05), Field(ge=0)]
+    """noise of the measured current in synthetic measurements"""
+    sigma_F: Annotated[float, Unit("N", 20.0), Field(ge=0)]
+    """noise of the measured clamp force in synthetic measurements"""
+    sigma_theta: Annotated[float, Unit("rad", 1e-3), Field(ge=0)]
+    """noise of the measured angle in synthetic measurements"""
+
+
+def identify(
+    data: xr.Dataset, par: CaliperBrakeParameters, options: Options, effort: Effort
+) -> Identified:
+    r"""Return sliding friction without load, friction per clamp force, and viscous friction.
+
+    .. math:: K_e i - N F_{cl} - J \dot\omega = \mathrm{sgn}(\omega) (C + G F_{cl}) + D \omega
+
+    averaged over windows within the strokes; torque constant, ratio and inertia are known.
+
+    Parameters
+    ----------
+    data
+        ``i`` [A], ``theta`` [rad], ``F_cl`` [N].
+
+    Raises
+    ------
+    ParameterError
+        When strokes, loads or speeds do not tell the friction, or a sign is wrong.
+    """
+    signals = data[["i", "theta", "F_cl"]]
+    moved = differentiated(signals, "theta", ("omega", "alpha"), options.cutoff)
+    rows = list(_windows(moved, options))
+    if not rows:
+        raise ParameterError(
+            f"the motor never turns faster than {options.slowest:g} rad/s for long: {_ADVICE}"
+        )
+    mean = {n: np.array([moved[n].values[r].mean() for r in rows])
+            for n in ("i", "F_cl", "omega", "alpha")}  # fmt: skip
+    _require_spread(mean)
+    torque = par.motor.K_e * mean["i"] - travel_per_angle(par) * mean["F_cl"]
+    torque = torque - par.rotor.J * mean["alpha"]
+    way = np.sign(mean["omega"])
+    if float(np.median(torque * way)) < 0.0:
+        raise wrong_sign("i", "theta", "turning as theta does, the drive train would gain power")
+    W = np.column_stack((way, way * mean["F_cl"], mean["omega"]))
+    unknowns = parameters_of(par, _NAMES)
+    scatter = _scatter(torque, W)
+    problem = Problem(unknowns, lambda p: ((W @ p - torque) / scatter, W / scatter))
+    best = estimate(problem)
+    values = {u.name: u.start for u in unknowns} | best.parameters()
+    fitted = W @ np.array([values[name] for name in _NAMES])
+    scale = mean["F_cl"] / float(np.max(mean["F_cl"]))
+    richer = np.column_stack((W, way * scale**2, way * scale * np.abs(mean["omega"])))
+    check = lack_of_fit(
+        "torque_left_over", fitted - torque, np.full(torque.size, 1.0 / scatter), richer,
+        len(_NAMES), "whether the friction bends over the load, or its slope changes with speed",
+    )  # fmt: skip
+    return Identified(
+        estimates={"friction": best}, parameters=best.parameters(), checks=(check,),
+        curves=(_curve(mean["F_cl"], torque, fitted),),
+        notes=("breakaway is not told by strokes that slide: friction.T_s stays as it is",),
+    )  # fmt: skip
+
+
+def _windows(moved: xr.Dataset, options: Options) -> Iterator[slice]:
+    """Yield the samples of every window within a stroke, from one reversal to the next."""
+    time, omega = moved["time"].values, moved["omega"].values
+    interval = float(time[1] - time[0])
+    skip, size = round(options.margin / interval), max(round(options.window / interval), 4)
+    way = np.where(np.abs(omega) > options.slowest, np.sign(omega), 0.0)
+    edges = np.flatnonzero(np.diff(np.concatenate(([0.0], way, [0.0]))))
+    for begin, end in pairwise(edges):
+        if way[begin] != 0.0:
+            for k in range((end - begin - 2 * skip) // size):
+                yield slice(begin + skip + k * size, begin + skip + (k + 1) * size)
+
+
+def _require_spread(mean: dict[str, Array]) -> None:
+    for name, told, unit in (("F_cl", "friction.G", "N"), ("omega", "rotor.D", "rad/s")):
+        low, high = np.quantile(np.abs(mean[name]), (0.02, 0.98))
+        if high < _SPREAD * low or high == 0.0:
+            raise ParameterError(
+                f"the data does not tell {told} from friction.C: {name} stays near {high:.3g} "
+                f"{unit}; {_ADVICE}"
+            )
+
+
+def _scatter(torque: Array, W: Array) -> float:
+    left = torque - W @ np.linalg.lstsq(W, torque, rcond=None)[0]
+    return max(float(np.sqrt(np.mean(left**2))), 1e-12)
+
+
+def _curve(F: Array, torque: Array, fitted: Array) -> Curve:
+    """Return the friction torque over the clamp force, measured and modeled."""
+    order = np.argsort(F)
+    attrs = {"units": "N*m", "long_name": "friction torque along the motion"}
+    columns = {"measured": np.abs(torque[order]), "modeled": np.abs(fitted[order])}
+    return Curve(
+        "friction-over-load",
+        "Friction torque in steady motion over the clamp force, window by window.",
+        xr.Dataset(
+            {name: ("F_cl", values, attrs) for name, values in columns.items()},
+            {"F_cl": ("F_cl", F[order], {"units": "N", "long_name": "clamp force"})},
+        ),
+        "F_cl",
+    )
+
+
+def synthetic(par: CaliperBrakeParameters, options: Options, seed: int) -> xr.Dataset:
+    """Return the slow strokes, simulated, with the sensors' noise."""
+    experiment = slow_strokes.EXPERIMENT
+    (case,) = experiment.cases(par, experiment.defaults, None)
+    noise = {"i": options.sigma_i, "theta": options.sigma_theta, "F_cl": options.sigma_F}
+    made = simulate(as_run(case, _STEP), tuple(noise))
+    random = np.random.default_rng(seed)
+    units = {"i": "A", "theta": "rad", "F_cl": "N"}
+    return xr.Dataset(
+        {n: ("time", made[n] + random.normal(0.0, s, made.time.size), {"units": units[n]})
+         for n, s in noise.items()},
+        {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
+    )  # fmt: skip
+
+
+METHOD = Method(
+    name="friction-strokes",
+    assembly="emb-caliper",
+    summary="dry friction without load and per clamp force, viscous friction, from slow strokes",
+    experiment="slow-strokes",
+    signals={"i": "A", "theta": "rad", "F_cl": "N"},
+    options=Options,
+    defaults=Options(
+        slowest=5.0, margin=0.05, window=0.02, cutoff=60.0, sigma_i=0.05, sigma_F=20.0,
+        sigma_theta=1e-3,
+    ),
+    identify=identify,
+    synthetic=synthetic,
+    simulated=("sigma_i", "sigma_F", "sigma_theta"),
+    unknowns=_NAMES,
+)  # fmt: skip

@@ -1,0 +1,1 @@
+"""What the sources state, beside what this model computes."""

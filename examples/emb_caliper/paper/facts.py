@@ -1,0 +1,36 @@
+"""What was read in the sources, and how a sentence was read as a number."""
+
+from __future__ import annotations
+
+from bywire.reproduction.item import Fact
+
+_ABSTRACT = "Line, Manzie, Good (2008), abstract"
+LIMITED = "standard cascaded PI control has limited performance under nonlinear stiffness"
+
+UNEVEN = Fact(
+    1.5, "1",
+    f"{_ABSTRACT}: {LIMITED}; read as: steps of 0.5 kN take 1.5 times as "
+    "long at 1 kN as at 19 kN",
+    "reading",
+)  # fmt: skip
+IMPROVED = Fact(
+    1.0,
+    "1",
+    f"{_ABSTRACT}: gain scheduling is an improvement; read as: with it small steps take more alike",
+    "reading",
+)
+STICKS = Fact(
+    1.0,
+    "1",
+    f"{_ABSTRACT}: load-dependent friction; read as: more current is needed to apply than to "
+    "release, and the difference grows with the load",
+    "reading",
+)
+SATURATES = Fact(
+    95.0, "%", f"{_ABSTRACT}: actuator saturation; read as: large steps reach the current's limit",
+    "reading",
+)  # fmt: skip
+
+_BENCHMARK = "Strathmann, Oehlerking (2015), as in ARCH-COMP's model"
+POLE = Fact(-504.0, "1/s", f"{_BENCHMARK}: middle of the interval of the current's coefficient")
+TOUCH = Fact(0.05, "dm", f"{_BENCHMARK}: x stays below x0 up to 0.1 s", "requirement")

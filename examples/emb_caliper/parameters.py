@@ -1,0 +1,109 @@
+"""Parameters of the brake: one group per element, the ECU's apart."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from bywire.control import current_pi
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Unit
+from bywire.plant import adc, battery_supply, dc_motor, end_stop, h_bridge
+from emb_caliper.elements import (
+    ball_screw,
+    floating_caliper,
+    load_friction,
+    planetary_gear,
+    rotor,
+)
+from emb_caliper.laws import limited_pi
+
+Force = Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
+Position = Annotated[float, Unit("m", 1e-3), Field(allow_inf_nan=False)]
+PerTime = Annotated[float, Unit("1/s", 30.0), Field(gt=0, allow_inf_nan=False)]
+
+DriveMode = Literal["force", "speed", "current", "voltage"]
+
+
+class StopParameters(end_stop.Parameters):
+    """Where the piston meets its stops, and how hard they are."""
+
+    x_rest: Position
+    """travel of the retracted piston at its stop"""
+    x_end: Position
+    """travel of the extended piston at its stop"""
+
+    @model_validator(mode="after")
+    def _leaves_a_stroke(self) -> StopParameters:
+        if not self.x_rest < 0.0 < self.x_end:
+            raise ValueError(
+                f"x_rest = {self.x_rest:g} m must be below 0 m, where the piston parks, and "
+                f"x_end = {self.x_end:g} m above"
+            )
+        return self
+
+
+class EcuParameters(ParameterSet):
+    """The ECU: sample times, controllers, and what it believes of the brake.
+
+    ``scheduling``: ``"stiffness"`` divides the force controller's gains by the stiffness that the
+    piston's travel promises, in units of that at first touch. ``load``: ``"fed-forward"`` adds the
+    current that the measured force needs, friction left out.
+    """
+
+    T_force: Duration
+    """sample time of force and speed control"""
+    T_current: Duration
+    """sample time of current control"""
+    F_on: Force
+    """force demand below which the piston is parked, clear of the disc"""
+    k_park: PerTime
+    """gain of the position control that parks it"""
+    scheduling: Literal["off", "stiffness"]
+    """whether the force controller's gains follow the stiffness"""
+    load: Literal["off", "fed-forward"]
+    """whether the current that holds the force is fed forward"""
+    force: limited_pi.ForceParameters
+    speed: limited_pi.SpeedParameters
+    current: current_pi.Parameters
+
+    @model_validator(mode="after")
+    def _samples_fit(self) -> EcuParameters:
+        ratio = self.T_force / self.T_current
+        if ratio < 1.0 or abs(ratio - round(ratio)) > 1e-9:
+            raise ValueError(
+                f"T_force = {self.T_force:g} s must be a whole multiple of T_current = "
+                f"{self.T_current:g} s"
+            )
+        return self
+
+
+class CaliperBrakeParameters(ParameterSet):
+    """The whole brake: plant, force sensor, ECU."""
+
+    supply: battery_supply.Parameters
+    bridge: h_bridge.Parameters
+    motor: dc_motor.Parameters
+    rotor: rotor.Parameters
+    friction: load_friction.Parameters
+    gear: planetary_gear.Parameters
+    screw: ball_screw.Parameters
+    caliper: floating_caliper.Parameters
+    stop: StopParameters
+    F_span: Force
+    """clamp force at which the force sensor ends"""
+    adc: adc.Parameters
+    ecu: EcuParameters
+    drive: DriveMode
+    """what the stimulus commands; voltage is an ideal source at the motor"""
+
+    @model_validator(mode="after")
+    def _stop_is_beyond(self) -> CaliperBrakeParameters:
+        needed = self.caliper.clearance + self.caliper.n_max
+        if not self.stop.x_end > needed:
+            raise ValueError(
+                f"stop.x_end = {self.stop.x_end:g} m must be beyond the measured curve of the "
+                f"caliper, caliper.clearance + caliper.n_max = {needed:g} m"
+            )
+        return self

@@ -1,0 +1,39 @@
+"""The brake without controllers: motor voltage to current, speed and clamp force."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from bywire.analysis.linear.linear_model import LinearModel
+from bywire.analysis.linear.linearize import linearize
+from bywire.analysis.linear.plant import Plant, PlantPoint
+from bywire.analysis.loop import Quantity
+from bywire.core.parameters import ParameterSet
+from emb_caliper.ecu import travel_per_angle
+from emb_caliper.loops.points import FORCE, point
+from emb_caliper.parameters import CaliperBrakeParameters
+
+CURRENT = Quantity("current", "A", 7.5)
+
+
+def model(par: ParameterSet, at: PlantPoint) -> LinearModel:
+    """Return the exact plant at a clamp force, or where a current holds it without friction."""
+    own = cast(CaliperBrakeParameters, par)
+    F = at.value
+    if at.quantity is CURRENT:
+        F = at.value * own.motor.K_e / travel_per_angle(own)
+    p = point(par, F, "voltage")
+    return linearize(
+        p.model, p.par, p.state._replace(omega=at.speed), p.memory,
+        inputs=("v_source",), outputs=("i", "omega", "F_cl"), friction=at.friction,
+    )  # fmt: skip
+
+
+PLANT = Plant(
+    name="emb-plant",
+    assembly="emb-caliper",
+    summary="motor voltage to current, speed and clamp force: winding, rotor, gear, caliper",
+    at=(FORCE, CURRENT),
+    model=model,
+    band=200.0,
+)

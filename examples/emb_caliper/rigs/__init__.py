@@ -1,0 +1,1 @@
+"""Rigs and reduced brakes, one file each."""
