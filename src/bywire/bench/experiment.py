@@ -136,6 +136,8 @@ class Experiment:
         ``cases`` with any start, for checks alone; where those have to compute runs first.
     without
         ``without(options)``: key figures that some options leave out.
+    begins_at
+        Recorded signal by the option whose start it shows: a replay begins where it was measured.
     compared
         What its overlaid traces compare of several runs: what an ordinate says, by signal.
     named
@@ -164,6 +166,7 @@ class Experiment:
     preview: Cases | None = None
     without: Callable[[Any], tuple[str, ...]] | None = None
     named: Callable[[Any], Mapping[str, str]] | None = None
+    begins_at: Mapping[str, str] = field(default_factory=dict)
     compared: Mapping[str, str] = field(default_factory=dict)
 
     def kpis_with(self, options: Any) -> dict[str, str]:

@@ -129,6 +129,14 @@ def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
     return tuple(found)
 
 
+def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
+    """Return what a structural choice of a dotted name may be; nothing where any text will do."""
+    *groups, last = name.split(".")
+    for group in groups:
+        cls = cast("type[ParameterSet]", cls.model_fields[group].annotation)
+    return typing.get_args(cls.model_fields[last].annotation)
+
+
 def require_units(cls: type[ParameterSet], prefix: str = "") -> None:
     """Refuse a class with numbers that have no unit: they would count as structural choices.
 

@@ -17,7 +17,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.identification.estimate import Estimate
 from bywire.identification.fitting.asked import Asked
 from bywire.identification.fitting.options import Options
@@ -48,8 +48,7 @@ from bywire.identification.unknown import Unknown
 
 Array = NDArray[np.float64]
 
-# Rounding has no derivative, closed loops would look open: these laws leave it out.
-_SMOOTH = {"adc.law": "ideal", "encoder.law": "ideal"}
+_ROUNDED, _EXACT = "quantized", "ideal"  # of the law of a sensor or a converter
 _ROUGH = 1e-4  # of the cost: enough to begin from
 _AT_REST = 5.0  # times the noise: a start below it is none that could be estimated
 
@@ -95,7 +94,8 @@ class BenchFit:
         for one, trial in zip(records.values(), trials, strict=True):
             unknowns += self.starts(one, trial)
         problem = replace(
-            output_error(trials, unknowns), silent=switched_off(bench.par, unknowns, _SMOOTH)
+            output_error(trials, unknowns),
+            silent=switched_off(bench.par, unknowns, exact_laws(type(bench.par))),
         )
         starts = starts_of(
             unknowns, self.asked.unknowns, effort.starts, effort.spread, effort.seed
@@ -154,8 +154,7 @@ class BenchFit:
     def trial(self, one: MeasuredRun, label: str) -> Trial:
         """Return a record beside its run; while the run settles nothing is compared."""
         before = np.full(one.settled, np.nan)
-        known = one.case.par.choices()
-        smooth = {name: law for name, law in _SMOOTH.items() if name in known}
+        smooth = exact_laws(type(one.case.par))
         values = {name: one.data[name].values for name in one.compared}
         return Trial(
             replace(one.run, par=one.run.par.replace(smooth)),
@@ -207,10 +206,23 @@ def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, A
     return one.state, one.memory
 
 
+def exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
+    """Return the laws of a parameter class that leave rounding out, by dotted name.
+
+    Rounding has no derivative, closed loops would look open. What rounds chooses between a law
+    that is ``"quantized"`` and one that is ``"ideal"``.
+    """
+    return {
+        name: _EXACT
+        for name in choice_fields(cls)
+        if {_ROUNDED, _EXACT} <= set(choices_of(cls, name))
+    }
+
+
 def _smoothed(bench: Bench) -> tuple[str, ...]:
-    known = bench.par.choices()
-    changed = [name for name, law in _SMOOTH.items() if known.get(name, law) != law]
-    return tuple(f"{name} = {_SMOOTH[name]} in the fit: rounding has no derivative"
+    known, exact = bench.par.choices(), exact_laws(type(bench.par))
+    changed = [name for name, law in exact.items() if known.get(name, law) != law]
+    return tuple(f"{name} = {exact[name]} in the fit: rounding has no derivative"
                  for name in changed)  # fmt: skip
 
 

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.core.errors import ParameterError, StepError, unknown_name
+from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
 from bywire.identification.measured import as_even
 from bywire.identification.output_error import even_interval
@@ -26,8 +27,6 @@ from bywire.simulation.run import Run
 
 Array = NDArray[np.float64]
 Between = Literal["held", "linear"]
-
-_AT_START = {"p_start": "p_mc"}  # option of an experiment: output that shows it
 
 
 @dataclass(frozen=True)
@@ -169,13 +168,14 @@ def _started(
     bench: Bench, data: xr.Dataset, compared: Sequence[str]
 ) -> tuple[Bench, dict[str, str], tuple[str, ...]]:
     """Return the bench with its start at what was measured, where the experiment has one."""
-    for option, signal in _AT_START.items():
+    for option, signal in bench.definition.begins_at.items():
         known = option in bench.chosen_options.flat() and option not in bench.options
         if known and signal in compared:
             first = data[signal].values[np.isfinite(data[signal].values)][:1]
-            start = max(float(first[0]), 0.0) if first.size else 0.0
+            leaf = leaf_fields(bench.definition.options)[option]
+            start = max(float(first[0]), leaf.low) if first.size else leaf.low
             own = replace(bench, options={**bench.options, option: start})
-            said = f"starts at the measured {signal}, {start:.5g} Pa"
+            said = f"starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
             return own, {option: signal}, (said,)
     return bench, {}, ()
 

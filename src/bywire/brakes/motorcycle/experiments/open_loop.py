@@ -110,4 +110,5 @@ EXPERIMENT = Experiment(
     finish=finish,
     driven_unit=lambda options: _SOURCES[options.source][2],
     without=without,
+    begins_at={"p_start": "p_mc"},
 )

@@ -103,4 +103,5 @@ EXPERIMENT = Experiment(
     step=step,
     following=smoothing,
     preview=preview,
+    begins_at={"p_start": "p_mc"},
 )
