@@ -108,3 +108,11 @@ def test_without_a_unique_solution(m: int) -> None:
         w, failed = evaluate(project, *problem)
         assert violation(*problem, w)[~failed].max(initial=0.0) < TOLERANCE
         assert failed.mean() < (0.7 if project is project_fast else 1e-9)
+
+
+@pytest.mark.parametrize("project", [project_fast, project_exact])
+def test_without_frictions_there_is_nothing_to_find_and_nothing_fails(project: object) -> None:
+    nothing = ca.SX(0, 1)
+    result = project(ca.SX(0, 0), nothing, nothing, nothing)  # type: ignore[operator]
+    assert result.w.shape == (0, 1)
+    assert float(result.failed) == 0.0
