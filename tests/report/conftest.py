@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from bywire.bench.energy_ledger import role_attributes
+from bywire.core.signals import Role
+
 LABELS = {
     "p_mc": ("Pa", "master-cylinder pressure"),
     "p_pd": ("Pa", "caliper pressure"),
@@ -23,6 +26,13 @@ LABELS = {
 SHARES = {
     "E_source": 1.0, "E_supply": 0.04, "E_copper": 0.52, "E_gear": -0.03, "E_seal": 0.15,
     "E_damping": 0.08, "E_pipeline": 0.06, "E_stop": 0.0, "E_port": 0.0, "E_stored": 0.18,
+}
+ROLES = {
+    "E_source": Role("source", "source"), "E_supply": Role("sink", "supply"),
+    "E_copper": Role("sink", "copper"), "E_gear": Role("sink", "gear and screw"),
+    "E_seal": Role("sink", "seal friction"), "E_damping": Role("sink", "fluid damping"),
+    "E_pipeline": Role("sink", "pipeline"), "E_stop": Role("sink", "end stops"),
+    "E_port": Role("sink", "reservoir port"), "E_stored": Role("sink", "stored"),
 }
 
 
@@ -51,7 +61,10 @@ def pressure_step(duration: float = 1.2, sample_time: float = 1e-3) -> xr.Datase
     }
     return xr.Dataset(
         {
-            name: ("time", np.asarray(value, dtype=float), {"units": unit, "long_name": label})
+            name: (
+                "time", np.asarray(value, dtype=float),
+                {"units": unit, "long_name": label} | role_attributes(ROLES.get(name)),
+            )
             for name, (unit, label, value) in entries.items()
         },
         coords={"time": time},

@@ -29,7 +29,7 @@ def linearize_command(
     at: At = "",
     set_: Changes = None,
     locus: Annotated[
-        str, typer.Option(help="Poles over a range of a parameter, e.g. wedge.mu_B=0.1:0.8:71.")
+        str, typer.Option(help="Poles over a range, e.g. motor.R_m=0.1ohm:1ohm:71.")
     ] = "",
     reduce: Annotated[
         str, typer.Option(help="Reduce it to an order, e.g. 4, or to a band, e.g. '150 Hz'.")
@@ -67,7 +67,7 @@ def frequency_response_command(
         str, typer.Option(help="sine (one frequency at a time), multisine, or chirp.")
     ] = "sine",
     over: Annotated[
-        str, typer.Option(help="Range, for bandwidths, e.g. wedge.mu_B=0.2:0.6:5.")
+        str, typer.Option(help="Range, for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.")
     ] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -114,7 +114,7 @@ def margins_command(
     at: At = "",
     set_: Changes = None,
     over: Annotated[
-        str, typer.Option(help="Range, e.g. wedge.mu_B=0.2:0.6:9 or at=5bar:35bar:7.")
+        str, typer.Option(help="Range, e.g. motor.R_m=0.2ohm:0.6ohm:9 or at=5bar:35bar:7.")
     ] = "",
     out: OutFolder = None,
     json: JsonFlag = False,

@@ -25,7 +25,7 @@ Parameters = Annotated[str, typer.Option(help="Parameter set, e.g. roberts2003."
 At = Annotated[str, typer.Option("--at", help="Operating point, e.g. '20 bar'.")]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. wedge.mu_B=0.4."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. motor.R_m=0.4ohm."),
 ]
 BenchChanges = Annotated[
     list[str] | None,

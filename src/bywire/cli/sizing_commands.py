@@ -53,7 +53,7 @@ def design_command(
     ] = None,
     over: Annotated[
         list[str] | None,
-        typer.Option(help="Range to serve too, e.g. wedge.mu_B=0.2:0.6:5 or at=5bar:35bar:7."),
+        typer.Option(help="Range to serve too, e.g. motor.R_m=0.2ohm:0.6ohm:5 or at=5bar:35bar:7."),
     ] = None,
     amplitudes: Annotated[
         str, typer.Option(help="Amplitudes of the sines on the bench, e.g. '1 bar, 3 bar'.")

@@ -24,7 +24,6 @@ COLORS = {
     "E_copper_moving": style.VERMILLION,
     "E_copper_holding": "#F2A679",
     "E_standby": "#8B5A2B",
-    "E_pads": style.BLACK,
     "E_gear": style.GREEN,
     "E_seal": style.ORANGE,
     "E_damping": style.PURPLE,
@@ -33,10 +32,7 @@ COLORS = {
     "E_stop": style.GRAY,
     "E_port": "#8B5A2B",
     "E_shaft": style.GREEN,
-    "E_wedge": style.ORANGE,
-    "E_heart": style.SKY,
     "E_caliper": style.YELLOW,
-    "E_line": style.SKY,
     "E_stored": style.BLUE,
 }
 """the same energy has the same color in every figure; others take what a figure leaves over"""

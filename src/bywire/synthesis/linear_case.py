@@ -30,7 +30,7 @@ class LinearCase:
     Parameters
     ----------
     label
-        What distinguishes it, for instance ``"wedge.mu_B = 0.2"``.
+        What distinguishes it, for instance ``"motor.R_m = 0.2"``.
     build
         ``build(gains) -> (loop gain, closed loop)`` for gains by dotted name, both sampled alike.
     changes, at

@@ -9,8 +9,6 @@ from typing import Any
 
 from bywire.core.parameters import ParameterSet
 
-FOLDER = Path(__file__).parents[1]
-
 
 @dataclass(frozen=True)
 class Subject:
@@ -18,8 +16,10 @@ class Subject:
 
     Parameters
     ----------
+    folder
+        Where the files are.
     source, indices, shared
-        Files in the benchmark's folder: the scheme; what it includes for the generated indices;
+        Files in that folder: the scheme; what it includes for the generated indices;
         what it includes for the parts that it shares with other schemes.
     model
         The brake's model, whose signals the indices name.
@@ -29,6 +29,7 @@ class Subject:
         The choices that the C covers: name of a parameter, its admissible texts.
     """
 
+    folder: Path
     source: str
     indices: str
     model: Any
@@ -77,8 +78,8 @@ class Subject:
                     f"{' and '.join(map(repr, covered))} only"
                 )
         pieces = {self.indices: self.enums(par)}
-        pieces |= {name: (FOLDER / name).read_text() for name in self.shared}
-        path = FOLDER / (scheme or self.source)
+        pieces |= {name: (self.folder / name).read_text() for name in self.shared}
+        path = self.folder / (scheme or self.source)
         text = path.read_text()
         for name, piece in pieces.items():
             line = f'#include "{name}"\n'

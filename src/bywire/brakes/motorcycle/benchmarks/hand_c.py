@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode
 from bywire.benchmark.peers.hand_source import Subject
 from bywire.brakes.motorcycle.model import MotorcycleBrake
@@ -11,6 +13,7 @@ from bywire.simulation.compiler import PLAIN
 __all__ = ["OUTPUTS", "SUBJECT", "THREADS", "WITHOUT_SUMS", "HandWritten", "indices"]
 
 SUBJECT = Subject(
+    folder=Path(__file__).parent,
     source="hand_written.c",
     indices="hand_written_indices.h",
     model=MotorcycleBrake,

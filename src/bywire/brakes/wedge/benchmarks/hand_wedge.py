@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from bywire.benchmark.peers.hand_code import HandCode
 from bywire.benchmark.peers.hand_source import Subject
 from bywire.brakes.wedge.model import WedgeBrake
@@ -20,6 +22,7 @@ class _Wedge(Subject):
 
 
 SUBJECT = _Wedge(
+    folder=Path(__file__).parent,
     source="hand_written_wedge.c",
     indices="hand_written_wedge_indices.h",
     shared=("hand_written_wedge_model.h",),
