@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 from bywire.api.option_rows import option_rows
@@ -15,43 +14,58 @@ from bywire.core.quantities import display_unit
 Object = dict[str, Any]
 
 
-@cache
-def parameters() -> Mapping[str, str]:
-    """Return the assembly of every parameter by dotted name; none is in two."""
-    found = {}
+def parameters() -> Mapping[str, tuple[str, ...]]:
+    """Return the assemblies of every parameter by dotted name."""
+    found: dict[str, tuple[str, ...]] = {}
     for assembly in sorted({e.assembly for e in PARAMETER_SETS.all().values()}):
         for name in field_notes(PARAMETER_SETS.find(main_set(assembly)).parameter_class):
-            found[name] = assembly
+            found[name] = (*found.get(name, ()), assembly)
     return found
 
 
-def groups() -> Mapping[str, str]:
-    """Return the assembly of every group of parameters, such as ``motor``, by name."""
-    return {name.rpartition(".")[0]: one for name, one in parameters().items() if "." in name}
+def groups() -> Mapping[str, tuple[str, ...]]:
+    """Return the assemblies of every group of parameters, such as ``motor``, by name."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name, assemblies in parameters().items():
+        group = name.rpartition(".")[0]
+        if group:
+            found[group] = tuple(dict.fromkeys((*found.get(group, ()), *assemblies)))
+    return found
 
 
 def described_parameter(name: str) -> Object:
     """Return unit, range and meaning of a parameter, and its value in every set."""
-    assembly, values = parameters()[name], []
+    assemblies, values = parameters()[name], []
+    told: dict[str, list[str]] = {"meaning": [], "unit": [], "range": []}
     for one in PARAMETER_SETS.all().values():
-        if one.assembly == assembly:
+        if one.assembly in assemblies:
             rows = option_rows(one.parameter_class, one.parameters())
             (row,) = (row for row in rows if row["name"] == name)
             values.append({"parameter set": one.name, "value": row["value"]})
+            for key, texts in told.items():
+                texts += [] if row[key] in texts else [row[key]]
+    said = {key: " or ".join(filter(None, texts)) for key, texts in told.items()}
     return {
-        "summary": row["meaning"], "assembly": assembly, "unit": row["unit"], "range": row["range"],
-        "values": values, "see": f"changed with --set {name}=VALUE",
+        "summary": said["meaning"], "assembly": ", ".join(assemblies), "unit": said["unit"],
+        "range": said["range"], "values": values, "see": f"changed with --set {name}=VALUE",
     }  # fmt: skip
 
 
 def described_group(name: str) -> Object:
-    """Return the parameters of a group, with the values of the assembly's main set."""
-    assembly = groups()[name]
-    one = PARAMETER_SETS.find(main_set(assembly))
-    rows = [row for row in option_rows(one.parameter_class, one.parameters())
-            if row["name"].rpartition(".")[0] == name]  # fmt: skip
-    return {"summary": f"parameters, with the values of {one.name}", "assembly": assembly,
-            "parameters": rows, "changed_with": "--set NAME=VALUE"}  # fmt: skip
+    """Return the parameters of a group, with the values of each assembly's main set."""
+    assemblies = groups()[name]
+    rows, sets = [], []
+    for assembly in assemblies:
+        one = PARAMETER_SETS.find(main_set(assembly))
+        sets.append(one.name)
+        new = [row for row in option_rows(one.parameter_class, one.parameters())
+               if row["name"].rpartition(".")[0] == name]  # fmt: skip
+        if len(assemblies) > 1:
+            new = [{**row, "meaning": f"{row['meaning']} ({assembly})".strip()} for row in new]
+        rows += new
+    return {"summary": f"parameters, with the values of {' and '.join(sets)}",
+            "assembly": ", ".join(assemblies), "parameters": rows,
+            "changed_with": "--set NAME=VALUE"}  # fmt: skip
 
 
 def described_kpi(name: str, definition: str) -> Object:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Mapping, Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from bywire.synthesis.study import STUDIES
 Object = dict[str, Any]
 
 
-@cache
 def signals() -> Mapping[str, Sequence[Object]]:
     """Return every signal of a system by name: in which systems, with unit, meaning and place."""
     found: dict[str, list[Object]] = {}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
-from functools import cache
 from types import MappingProxyType, ModuleType
 from typing import Any
 
@@ -53,7 +52,6 @@ FAMILIES = Kind("family of key figures", ("kpis",), _declared, "bywire.bench.kpi
 """every family of key figures"""
 
 
-@cache
 def definitions() -> Mapping[str, Measure[Any]]:
     """Return every key figure by name, for listings; names are unique over the families."""
     found: dict[str, Measure[Any]] = {}
