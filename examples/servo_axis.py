@@ -19,19 +19,20 @@ from pydantic import Field
 
 import bywire
 from bywire.core import ops
-from bywire.core.model import Model, Task
+from bywire.core.assembly import Assembly
+from bywire.core.model import Task
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Inertia, RotaryDamping, Torque, Unit, Voltage
-from bywire.core.signals import Angle, Energy, Signal, Speed, zeros
-from bywire.plant import dc_motor
+from bywire.core.parts import Integral, Part
+from bywire.core.quantities import Duration, Torque, Unit, Voltage
+from bywire.core.signals import Angle, Role, Signal
+from bywire.plant import dc_motor, shaft
 
 
 class Parameters(ParameterSet):
     """Every number has a unit and a range, which are checked."""
 
     motor: dc_motor.Parameters
-    J: Inertia
-    d: RotaryDamping
+    shaft: shaft.Parameters
     T_forward: Torque
     T_backward: Torque
     count: Annotated[float, Unit("rad", 1e-3), Field(gt=0)]
@@ -40,14 +41,6 @@ class Parameters(ParameterSet):
     k_i: Annotated[float, Unit("V/rad"), Field(ge=0)]
     v_max: Voltage
     T_s: Duration
-
-
-class State(NamedTuple):
-    """What the engine integrates."""
-
-    i: Annotated[float, Signal("A", "current")]
-    theta: Angle
-    omega: Speed
 
 
 class Memory(NamedTuple):
@@ -64,23 +57,6 @@ class Stimulus(NamedTuple):
     target: Angle
 
 
-class Flow(NamedTuple):
-    """What the engine integrates along: the energies."""
-
-    E_source: Energy
-    E_lost: Energy
-
-
-class Output(NamedTuple):
-    """What is recorded."""
-
-    theta: Angle
-    omega: Speed
-    E_source: Energy
-    E_lost: Energy
-    E_stored: Energy
-
-
 def control(x, m, u, par):
     """Run the cascade once; the integral part waits while the voltage is limited."""
     seen = par.count * ops.floor(x.theta / par.count + 0.5)
@@ -90,53 +66,50 @@ def control(x, m, u, par):
     return Memory(seen, ops.clip(wanted, -par.v_max, par.v_max), m.v_i + par.T_s * growth)
 
 
-class ServoAxis(Model):
-    """The wiring: mass_k dx_k/dt = balance_k, and what is not smooth beside it."""
+class ServoAxis(Assembly[Parameters, Memory]):
+    """Parts and wires; states, masses, balances, energies and recorded signals follow from them."""
 
     name = "servo-axis"
-    State, Memory, Stimulus, Flow, Output = State, Memory, Stimulus, Flow, Output
+    Memory, Stimulus = Memory, Stimulus
     frictions = ("omega",)  # this state's equation carries a set-valued force
+
+    E_source = Integral("J", "energy from the source", role=Role("source", "source"))
+    motor = Part(dc_motor, loss="E_copper")
+    shaft = Part(shaft, loss="E_damping")
+    E_friction = Integral("J", "loss of the dry friction", role=Role("sink", "dry friction"))
+
+    def wire(self, w):
+        """Say what every part feels."""
+        w.motor.u = dc_motor.Input(w.m.v, w.shaft.x.omega)
+        w.shaft.u = shaft.Input(dc_motor.output(w.motor.x, w.motor.par).torque, 0.0)
+
+    def friction(self, w):
+        """Return the dry friction while turning forward, backward; at rest all between."""
+        return ((-w.par.T_forward, w.par.T_backward),)
+
+    def power(self, w):
+        """Return the powers that no part gives."""
+        lost = -w.reaction[0] * w.shaft.x.omega
+        return {"E_source": w.m.v * w.motor.x.i, "E_friction": lost}
 
     def tasks(self, par):
         """Return the controllers and their sample times; several share one memory."""
         return (Task("control", par.T_s, control),)
 
-    def mass(self, xe, par):
-        """Return inductance, unity, inertia."""
-        return State(par.motor.L_m, 1.0, par.J)
-
-    def balance(self, x, xe, m, par, contact):
-        """Return voltage, speed, torque."""
-        motor = dc_motor.State(x.i)
-        v = dc_motor.balance(motor, dc_motor.Input(m.v, x.omega), par.motor).i
-        return State(v, x.omega, dc_motor.output(motor, par.motor).torque - par.d * x.omega)
-
-    def bounds(self, x, xe, m, par, contact):
-        """Return the dry friction while turning forward, backward; at rest all between."""
-        return ((-par.T_forward, par.T_backward),)
-
-    def powers(self, x, xe, rate, m, par, contact, reaction):
-        """Return the power of the source, and what copper and friction take."""
-        copper = dc_motor.power_loss(dc_motor.State(x.i), par.motor)
-        return Flow(m.v * x.i, copper + (par.d * x.omega - reaction[0]) * x.omega)
-
-    def output(self, x, m, par, contact, reaction, flow):
-        """Return what is recorded."""
-        stored = dc_motor.energy(dc_motor.State(x.i), par.motor) + 0.5 * par.J * x.omega * x.omega
-        return Output(x.theta, x.omega, *flow, stored)
-
 
 PAR = Parameters(
-    motor=dc_motor.Parameters(R_m=0.35, L_m=1e-4, K_e=0.0304), J=2e-4, d=1e-5, T_forward=0.03,
-    T_backward=0.015, count=6e-4, k_angle=25.0, k_p=0.15, k_i=3.0, v_max=6.0, T_s=1e-3,
+    motor=dc_motor.Parameters(R_m=0.35, L_m=1e-4, K_e=0.0304),
+    shaft=shaft.Parameters(J=2e-4, d=1e-5), T_forward=0.03, T_backward=0.015, count=6e-4,
+    k_angle=25.0, k_p=0.15, k_i=3.0, v_max=6.0, T_s=1e-3,
 )  # fmt: skip
 TARGET = 3.0  # for one second; then back to zero for another one
 
 
 def move(par):
     """Return the trajectory there and back."""
+    state, memory = ServoAxis().rest(par)
     run = bywire.Run(
-        ServoAxis(), par, state=zeros(State), memory=zeros(Memory), duration=2.0,
+        ServoAxis(), par, state, memory, duration=2.0,
         stimulus=lambda t: np.where(t < 1.0, TARGET, 0.0)[:, None],
     )  # fmt: skip
     return bywire.simulate(run)
@@ -164,5 +137,6 @@ if __name__ == "__main__":
     for run in (p_only, with_i):
         omega = run["omega"]
         assert not np.concatenate((omega[800:1000], omega[1800:])).any()  # zero, not small
-        left = run["E_source"] - run["E_lost"] - run["E_stored"]
+        lost = run["E_copper"] + run["E_damping"] + run["E_friction"]
+        left = run["E_source"] - lost - run["E_stored"]
         assert np.max(np.abs(left)) < 1e-9 * run["E_source"][-1]

@@ -89,20 +89,16 @@ class Start:
 def start_of(model: Model, par: ParameterSet) -> Start:
     """Return where the runs of a model with some parameters start.
 
-    The model's own rest where it says one (``rest(par)``); else the operating point of one of its
-    loops, or the start of one of its experiments, of the same choices where there is one; else all
-    zeros.
+    The operating point of one of its loops, or the start of one of its experiments, of the same
+    choices where there is one; else its rest. A rest is often on a stop, where contacts just touch
+    and little can be put to the test.
     """
-    rest = getattr(model, "rest", None)
-    if rest is not None:
-        state, memory = rest(par)
-        return Start(model, par, state, memory, zeros(model.Stimulus), "the model's rest")
     known = list(_points(model, par)) or list(_cases(model, par))
     same = [each for each in known if each.par.choices() == par.choices()]
     if known:
         return (same or known)[0]
-    state, memory = zeros(model.State), zeros(model.Memory)
-    return Start(model, par, state, memory, zeros(model.Stimulus), "all zeros")
+    state, memory = model.rest(par)
+    return Start(model, par, state, memory, zeros(model.Stimulus), "the model's rest")
 
 
 def start_of_a_rig(model: Model, sets: Iterable[ParameterSet], module: str) -> Start:

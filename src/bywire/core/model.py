@@ -23,6 +23,7 @@ from types import ModuleType
 from typing import Any, NamedTuple, Protocol
 
 from bywire.core.registry import Kind
+from bywire.core.signals import zeros
 
 Bounds = tuple[float, float]
 Matrix = tuple[tuple[float, ...], ...]
@@ -162,6 +163,14 @@ class Model(Protocol):
     ) -> Any:
         """Return what is recorded at an instant; ``reaction`` is that of the last substep."""
         ...
+
+    def rest(self, par: Any) -> tuple[Any, Any]:
+        """Return a State and a Memory in which the system rests without stimulus.
+
+        Where generic experiments and checks start; all zeros by default, which is right where
+        nothing is preloaded, filled or held.
+        """
+        return zeros(self.State), zeros(self.Memory)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the user should know of a recording: validity left, stops met, none here.

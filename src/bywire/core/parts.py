@@ -474,8 +474,8 @@ def _arguments(function: Callable[..., Any]) -> tuple[str, ...]:
 
 
 def _line() -> str:
-    """Return file and line of the equation that is being evaluated: the first beyond this file."""
+    """Return file and line of the equation that is being evaluated: the first beyond this room."""
     frame = inspect.currentframe()
-    while frame is not None and frame.f_code.co_filename == __file__:
+    while frame is not None and frame.f_globals.get("__package__") == __package__:
         frame = frame.f_back
     return f"{frame.f_code.co_filename}, line {frame.f_lineno}," if frame else ""

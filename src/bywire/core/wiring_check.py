@@ -27,7 +27,7 @@ def check_wiring(model: AnyAssembly, par: ParameterSet) -> None:
     """
     at = _Operands(model, par)
     w = at.wired("wire")
-    _check_inputs(model, w)
+    _check_inputs(model, at, w)
     _check_balance(model, at, w)
     _check_contacts(model, at)
     bounds = at.evaluated("friction", model.friction, w)
@@ -109,9 +109,10 @@ class _Operands:
             ) from None
 
 
-def _check_inputs(model: AnyAssembly, w: AnyAssembly) -> None:
+def _check_inputs(model: AnyAssembly, at: _Operands, w: AnyAssembly) -> None:
     instant = instant_of(w, "wire")
     for name, wire in _wires(type(model)).items():
+        at.dimension(wire.signal.unit, name)
         if name not in instant.wires:
             raise ModelError(
                 f"{_place(model)}: the wire {name} ({wire.signal.label}) is never set: assign "

@@ -12,9 +12,9 @@ from bywire.analysis.linear.closed_loop import closed_loop
 from bywire.analysis.linear.open_loop import open_loop
 from bywire.brakes.motorcycle.linear.pressure_loop import PressureLoop
 from bywire.brakes.wedge.laws import moment_control
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import force_for, memory_at, state_at, travel_for
+from bywire.brakes.wedge.start import force_for, memory_at, travel_for
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 

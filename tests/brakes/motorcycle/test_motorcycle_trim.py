@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import bywire
+from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import (
     highest_pressure,
@@ -119,3 +120,9 @@ def test_converters_live_in_open_loop(source: str) -> None:
     assert len(set(late["p_meas"].values.tolist())) > 50
     for name in {"duty", "p_ref", "i_star"} & set(run.data_vars):
         assert float(abs(run[name]).max()) == 0.0
+
+
+@pytest.mark.parametrize("mode", ["pressure", "current", "voltage-source", "current-source"])
+def test_rest_is_the_trim_without_pressure(mode: str) -> None:
+    par = brake({"drive.mode": mode})
+    assert MotorcycleBrake().rest(par) == (state_at(0.0, par), memory_at(0.0, par))

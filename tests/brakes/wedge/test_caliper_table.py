@@ -9,8 +9,8 @@ import pytest
 from wedge_runs import FRICTIONLESS, IDEAL, TAN_ALPHA, brake, drive, residual
 
 from bywire.bench import bench_file
-from bywire.brakes.wedge.model import WedgeBrake
-from bywire.brakes.wedge.start import memory_at, state_at, travel_for
+from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.simulation.run import Run, simulate
 

@@ -15,7 +15,7 @@ from bywire.core import ops
 from bywire.core.assembly import Assembly
 from bywire.core.model import Bounds, Task
 from bywire.core.parts import Integral, Part, Shown, Wire
-from bywire.core.signals import Role
+from bywire.core.signals import Role, zeros
 from bywire.plant import (
     anti_alias_filter,
     ball_screw_gear,
@@ -186,6 +186,17 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         if par.drive.mode in IDEAL:
             return (Task("source", par.drive.T_source, _source),)
         return (Task("ecu", par.ecu.T_s, _ecu),)
+
+    def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
+        """Return the piston at its retracted end, without pressure and current."""
+        state = self.state(
+            gear=ball_screw_gear.State(theta=par.master_cylinder.x_rest / par.gear.k_g, omega=0.0),
+            filter_p=anti_alias_filter.State(
+                pressure_sensor.reading(par.fluid.p_atm, par.pressure_sensor)
+            ),
+            filter_i=anti_alias_filter.State(current_sensor.reading(0.0, par.current_sensor)),
+        )
+        return state, zeros(ecu.Memory)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the user should know of a recording."""

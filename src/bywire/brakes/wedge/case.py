@@ -15,10 +15,10 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import energy_residual
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import PARKED
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rows import along_disc
-from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.brakes.wedge.start import memory_at
 
 Array = NDArray[np.float64]
 Signals = Mapping[str, Array]

@@ -15,9 +15,9 @@ from bywire.analysis.loop import Point
 from bywire.analysis.reduction.residualized import residualized
 from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at, state_at, travel_for
+from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
 from bywire.plant import roller_screw, servo_motor

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
-from bywire.brakes.wedge import control, drive_train
+from bywire.brakes.wedge import control, drive_train, start
 from bywire.brakes.wedge import watch as warnings
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -199,9 +199,26 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     def _current(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.current_tick(m, u)
 
+    def rest(self, par: Par) -> tuple[Any, control.Memory]:
+        """Return the brake parked: the wedge in its middle, preloaded, without current."""
+        return state_at(0.0, par), start.memory_at(0.0, par)
+
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the user should know of a recording."""
         return warnings.watch(recording, par) + super().watch(recording, par)
+
+
+def state_at(x: float, par: Par) -> Any:
+    """Return the state at rest with the wedge at a travel [m], both screws offset from it."""
+    k = roller_screw.slope(par.screw)
+    apart = par.control.offset.delta_preload / k
+    return WedgeBrake.state(
+        motor_1=servo_motor.State(i=0.0, theta=x / k - apart, omega=0.0),
+        motor_2=servo_motor.State(i=0.0, theta=x / k + apart, omega=0.0),
+        body=wedge.State(x=x, v=0.0),
+        disc=flywheel.State(Omega=par.flywheel.Omega_0, phi=0.0),
+        supply=drive_supply.State(par.supply.P_standby),
+    )
 
 
 def _readings(x: Any, par: Par) -> control.Readings:

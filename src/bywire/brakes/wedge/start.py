@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from bywire.brakes.wedge.control import Memory
 from bywire.brakes.wedge.elements import wedge, wedge_caliper
 from bywire.brakes.wedge.laws import screw_offset
-from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.signals import zeros
-from bywire.plant import drive_supply, flywheel, roller_screw, servo_motor
+from bywire.plant import roller_screw
 
 Par = WedgeParameters
 
@@ -30,25 +27,11 @@ def contact_angle(par: Par) -> float:
     return travel_for(0.0, par) / roller_screw.slope(par.screw)
 
 
-def state_at(x: float, par: Par) -> Any:
-    """Return the state at rest with the wedge at a travel [m], both screws offset from it."""
-    k = roller_screw.slope(par.screw)
-    apart = par.control.offset.delta_preload / k
-    return WedgeBrake.state(
-        motor_1=servo_motor.State(i=0.0, theta=x / k - apart, omega=0.0),
-        motor_2=servo_motor.State(i=0.0, theta=x / k + apart, omega=0.0),
-        body=wedge.State(x=x, v=0.0),
-        disc=flywheel.State(Omega=par.flywheel.Omega_0, phi=0.0),
-        supply=drive_supply.State(par.supply.P_standby),
-    )
-
-
 def memory_at(x: float, par: Par) -> Memory:
     """Return the controllers' memory in which the references stand at that state."""
     k = roller_screw.slope(par.screw)
     delta = par.control.offset.delta_preload
     both = screw_offset.output(x / k, delta, par.control.offset)
-    shafts = state_at(x, par)
     return zeros(Memory)._replace(
         on=1.0,
         direction=-1.0 if par.flywheel.Omega_0 < 0 else 1.0,
@@ -57,6 +40,6 @@ def memory_at(x: float, par: Par) -> Memory:
         delta=delta,
         theta_1_ref=both.theta_1,
         theta_2_ref=both.theta_2,
-        last_1=shafts.theta_1,
-        last_2=shafts.theta_2,
+        last_1=x / k - delta / k,
+        last_2=x / k + delta / k,
     )

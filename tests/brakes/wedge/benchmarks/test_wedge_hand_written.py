@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, Call
 from bywire.brakes.wedge.benchmarks import wedge_brake
 from bywire.brakes.wedge.benchmarks.hand_wedge import SUBJECT, HandWrittenWedge
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.brakes.wedge.start import memory_at
 from bywire.core.catalog import parameters
 from bywire.core.errors import CompilerError
 from bywire.simulation.compiler import find_compiler

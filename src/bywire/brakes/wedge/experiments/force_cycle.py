@@ -14,7 +14,7 @@ import xarray as xr
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Array, Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
     Stimuli,
@@ -23,7 +23,7 @@ from bywire.brakes.wedge.rigs.rig_case import (
     slope_of,
     torque_constant_of,
 )
-from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.brakes.wedge.start import memory_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Length
 from bywire.plant.axial_bearing import AngularSpeed

@@ -18,10 +18,10 @@ import xarray as xr
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Array, Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, parameters_of, screw_case, slope_of
-from bywire.brakes.wedge.start import memory_at, state_at
+from bywire.brakes.wedge.start import memory_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration
 from bywire.plant import shaft_encoder

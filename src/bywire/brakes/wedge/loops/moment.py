@@ -10,9 +10,9 @@ from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.loops.causes import CAUSES, DRIVE_LIMITS
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import force_for, memory_at, state_at, travel_for
+from bywire.brakes.wedge.start import force_for, memory_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros

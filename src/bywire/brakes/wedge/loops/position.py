@@ -8,9 +8,9 @@ from typing import Any, cast
 from bywire.analysis.loop import Loop, Point, Quantity
 from bywire.brakes.wedge.control import Stimulus
 from bywire.brakes.wedge.loops.causes import CAUSES, DRIVE_LIMITS
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.start import memory_at, state_at, travel_for
+from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros

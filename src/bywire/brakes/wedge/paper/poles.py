@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from bywire.analysis.linear.linearize import linearize
-from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.paper import facts
 from bywire.brakes.wedge.paper.runs import IDEAL, parameters, tan_alpha
 from bywire.brakes.wedge.paper.tolerances import NEUTRAL
-from bywire.brakes.wedge.start import memory_at, state_at, travel_for
+from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.reproduction.item import Item, compared, found
 
 BELOW, ABOVE = 0.2, 0.5

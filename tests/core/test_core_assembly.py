@@ -1,0 +1,284 @@
+"""Assemblies: what follows from parts, and mistakes of wiring said with place and next step."""
+
+from __future__ import annotations
+
+import pickle
+from typing import Annotated, Any, NamedTuple
+
+import pytest
+
+from bywire.core.assembly import Assembly
+from bywire.core.errors import ModelError
+from bywire.core.model import Task
+from bywire.core.parameters import ParameterSet
+from bywire.core.parts import Integral, Part, Shown, Wire
+from bywire.core.quantities import Length
+from bywire.core.signals import Role, Signal, signals_of
+from bywire.core.wiring_check import check_wiring
+from bywire.plant import ball_screw_gear, dc_motor, end_stop
+from bywire.simulation.model_check import check_model
+
+
+class Parameters(ParameterSet):
+    """A motor on a screw between two stops."""
+
+    motor: dc_motor.Parameters
+    gear: ball_screw_gear.Parameters
+    stop: end_stop.Parameters
+    stroke: Length
+
+
+class Held(NamedTuple):
+    """Voltage."""
+
+    v: Annotated[float, Signal("V", "voltage", 6.0)]
+
+
+class Screw(Assembly[Parameters, Held]):
+    """What the other ones here do wrong, done right."""
+
+    name = "screw"
+    Memory = Stimulus = Held
+    motor = Part(dc_motor, loss="E_copper")
+    gear = Part(ball_screw_gear, output={"x": "x"})
+    stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
+    W_in = Integral("J", "work of the source", role=Role("source", "source"))
+    torque = Wire("N*m", "torque of the motor", 0.1)
+    P_in = Shown("W", "power of the source")
+
+    def wire(self, w):
+        w.torque = dc_motor.output(w.motor.x, w.motor.par).torque
+        piston = ball_screw_gear.output(w.gear.x, w.gear.par)
+        w.stop.u = end_stop.Input(piston.x, piston.v, 0.0, w.par.stroke)
+        w.motor.u = dc_motor.Input(w.m.v, w.gear.x.omega)
+        w.gear.u = ball_screw_gear.Input(w.torque, end_stop.load(w.stop.f), 0.0)
+
+    def power(self, w):
+        return {"W_in": w.m.v * w.motor.x.i}
+
+    def record(self, w):
+        return {"P_in": w.m.v * w.motor.x.i}
+
+    def tasks(self, par):
+        return (Task("source", 1e-3, lambda x, m, u, par: u),)
+
+
+PAR = Parameters(
+    motor=dc_motor.Parameters(R_m=0.35, L_m=1e-4, K_e=0.03),
+    gear=ball_screw_gear.Parameters(k_g=3e-4, eta_g=0.9, law="directional", J_mot=3e-5, M_mc=0.1),
+    stop=end_stop.Parameters(k_stop=1e7, tau_stop=1e-4),
+    stroke=0.01,
+)
+
+
+def test_all_follows_from_the_parts() -> None:
+    model = Screw()
+    check_model(model, PAR)
+    assert Screw.State._fields == ("i", "theta", "omega")
+    assert Screw.Flow._fields == ("E_copper", "W_stop", "W_in")
+    assert Screw.Output._fields == (
+        "i", "theta", "omega", "v", "E_copper", "W_stop", "W_in", "E_stored", "x", "E_stop",
+        "torque", "P_in",
+    )  # fmt: skip
+    shown = signals_of(Screw.Output)
+    assert shown["x"] == signals_of(ball_screw_gear.Output)["x"]
+    assert shown["E_copper"].label == "copper loss"
+    assert shown["E_copper"].role == Role("sink", "copper", split=True)
+    assert model.usually_open == (True, True)
+    x, m = Screw.State(i=2.0, theta=-1.0, omega=5.0), Held(6.0)
+    rows = model.balance(x, x, m, PAR, (10.0, 0.0))
+    assert rows == (6.0 - 0.35 * 2.0 - 0.03 * 5.0, 5.0, 0.03 * 2.0 + 3e-4 * 10.0)
+    assert model.mass(x, PAR) == (1e-4, 1.0, ball_screw_gear.inertia(PAR.gear))
+    row = model.output(x, m, PAR, (10.0, 0.0), (), Screw.Flow(0.0, 5.0, 0.0))
+    elastic = 0.5 * 1e7 * (3e-4) ** 2
+    assert row.E_stop == pytest.approx(5.0 - elastic)
+    kinetic = ball_screw_gear.energy(ball_screw_gear.State(-1.0, 5.0), PAR.gear)
+    assert row.E_stored == pytest.approx(0.5 * 1e-4 * 4.0 + kinetic + elastic)
+    assert pickle.loads(pickle.dumps(x)) == x
+
+
+def test_states_are_made_from_those_of_the_parts() -> None:
+    x = Screw.state(gear=ball_screw_gear.State(theta=1.0, omega=0.0))
+    assert x == Screw.State(0.0, 1.0, 0.0)
+    assert Screw().at(x, Held(0.0), PAR).gear.x.theta == 1.0
+    with pytest.raises(ModelError, match=r"unknown part 'gaer': did you mean 'gear'"):
+        Screw.state(gaer=ball_screw_gear.State(1.0, 0.0))
+    with pytest.raises(ModelError, match=r"Screw.gear: State is no state of ball_screw_gear"):
+        Screw.state(gear=dc_motor.State(1.0))
+
+
+class Forgotten(Screw):
+    def wire(self, w):
+        w.torque = dc_motor.output(w.motor.x, w.motor.par).torque
+        piston = ball_screw_gear.output(w.gear.x, w.gear.par)
+        w.stop.u = end_stop.Input(piston.x, piston.v, 0.0, w.par.stroke)
+        w.motor.u = dc_motor.Input(w.m.v, w.gear.x.omega)
+
+
+class Unset(Screw):
+    more = Wire("A", "current")
+
+
+class Twice(Screw):
+    def wire(self, w):
+        super().wire(w)
+        w.torque = 0.0
+
+
+class InputTwice(Screw):
+    def wire(self, w):
+        super().wire(w)
+        w.motor.u = dc_motor.Input(0.0, 0.0)
+
+
+class Early(Screw):
+    def wire(self, w):
+        w.gear.u = ball_screw_gear.Input(w.torque, 0.0, 0.0)
+
+
+class WrongUnit(Screw):
+    def wire(self, w):
+        w.torque = w.motor.x.i
+        w.gear.u = ball_screw_gear.Input(w.torque, 0.0, 0.0)
+        w.stop.u = end_stop.Input(0.0, 0.0, 0.0, w.par.stroke)
+        w.motor.u = dc_motor.Input(w.m.v, 0.0)
+
+
+class WrongInput(Screw):
+    def wire(self, w):
+        w.torque = dc_motor.output(w.motor.x, w.motor.par).torque
+        w.gear.u = ball_screw_gear.Input(w.m.v, 0.0, 0.0)
+        w.stop.u = end_stop.Input(0.0, 0.0, 0.0, w.par.stroke)
+        w.motor.u = dc_motor.Input(w.m.v, 0.0)
+
+
+class UnlikeSum(Screw):
+    def wire(self, w):
+        w.torque = w.motor.x.i + w.m.v
+
+
+class OtherElement(Screw):
+    def wire(self, w):
+        w.motor.u = ball_screw_gear.Input(0.0, 0.0, 0.0)
+
+
+class UnknownPart(Screw):
+    def wire(self, w):
+        w.moter.u = dc_motor.Input(0.0, 0.0)
+
+
+class UnknownWire(Screw):
+    def wire(self, w):
+        w.torqe = 0.0
+
+
+class OnItself(Screw):
+    def wire(self, w):
+        w.torque = self.motor.x.i
+
+
+class Unitless(Screw):
+    more = Wire("", "something")
+
+    def wire(self, w):
+        super().wire(w)
+        w.more = 0.0 * w.m.v + w.m.v
+
+
+class OddUnit(Screw):
+    more = Wire("flurb", "something")
+
+    def wire(self, w):
+        super().wire(w)
+        w.more = w.m.v
+
+
+class NoPower(Screw):
+    def power(self, w):
+        return {}
+
+
+class OddPower(Screw):
+    def power(self, w):
+        return {"W_out": 0.0, **super().power(w)}
+
+
+class PowerOfAnotherUnit(Screw):
+    def power(self, w):
+        return {"W_in": w.m.v}
+
+
+class NoParameters(Screw):
+    gear = Part(ball_screw_gear, par="gaer", output={"x": "x"})
+
+
+MISTAKES: list[tuple[type[Screw], str, str]] = [
+    (Forgotten, "Forgotten", "input of gear is never wired: assign w.gear.u = ball_screw_gear.I"),
+    (Unset, "Unset", r"wire more \(current\) is never set: assign w.more = ... \[A\] in wire"),
+    (Twice, "Screw.torque", "sets it a second time"),
+    (InputTwice, "Screw.motor", "assigns its input a second time"),
+    (Early, "Screw.torque", "read before it is set"),
+    (WrongUnit, "WrongUnit.wire", r"torque \(torque of the motor\) is in N\*m, .* quantity in A"),
+    (WrongInput, "WrongInput.wire", r"gear.u.torque \(motor torque\) is in N\*m, .* quantity in V"),
+    (UnlikeSum, "UnlikeSum.wire", "a quantity in A and one in V cannot be added"),
+    (OtherElement, "Screw.motor", "assigns a bywire.plant.ball_screw_gear.Input as its input"),
+    (UnknownPart, "UnknownPart", "unknown part or wire 'moter': did you mean 'motor'"),
+    (UnknownWire, "UnknownWire", "unknown part or wire 'torqe': did you mean 'torque'"),
+    (OnItself, "Screw.motor", "has no value here: within wire and its like take it from w"),
+    (Unitless, "Unitless", "more: it has no unit: write '1' for a pure number"),
+    (OddUnit, "OddUnit", "more: the unit 'flurb' is not known"),
+    (NoPower, "NoPower.power", "does not return 'W_in'"),
+    (OddPower, "OddPower.power", "unknown signal 'W_out'"),
+    (PowerOfAnotherUnit, "PowerOfAnotherUnit.power", "W_in .* is in J, but is given"),
+    (NoParameters, "NoParameters.gear", "the parameters have no 'gaer'"),
+]
+
+
+@pytest.mark.parametrize(
+    ("model", "where", "words"), MISTAKES, ids=lambda value: getattr(value, "__name__", "-")
+)
+def test_mistakes_of_wiring_are_named(model: type[Screw], where: str, words: str) -> None:
+    with pytest.raises(ModelError, match=words) as caught:
+        check_wiring(model(), PAR)
+    assert where in str(caught.value)
+
+
+@pytest.mark.parametrize("model", [Forgotten, Twice, WrongUnit, WrongInput, UnlikeSum])
+def test_mistakes_of_wiring_have_a_line(model: type[Screw]) -> None:
+    with pytest.raises(ModelError, match=r"\.py, line \d+"):
+        check_wiring(model(), PAR)
+
+
+def declared(**body: Any) -> None:
+    type("Wrong", (Screw,), body)
+
+
+def test_mistakes_of_declaration_are_named() -> None:
+    with pytest.raises(ModelError, match=r"Wrong.second: another part has a state 'i' too"):
+        declared(second=Part(dc_motor, par="motor"))
+    with pytest.raises(ModelError, match=r"unknown state 'thta': did you mean 'theta'"):
+        declared(second=Part(ball_screw_gear, par="gear", state={"thta": "angle"}))
+    with pytest.raises(ModelError, match=r"unknown signal 'thteta': did you mean 'theta'"):
+        declared(records=("thteta",))
+    with pytest.raises(ModelError, match=r"unknown output 'y': did you mean|known are v, x"):
+        declared(second=Part(ball_screw_gear, suffix="_2", output=("y",)))
+    with pytest.raises(ModelError, match=r"dc_motor has no function heat"):
+        declared(second=Part(dc_motor, suffix="_2", loss={"E_heat": "heat"}))
+    with pytest.raises(ModelError, match=r"Part\(dc_motor\): unknown option 'sufix'"):
+        Part(dc_motor, sufix="_2")  # type: ignore[call-overload]
+
+
+class Massless:
+    """An element with a state and a balance, but no mass."""
+
+    __name__ = "massless"
+    Parameters = dc_motor.Parameters
+    State = dc_motor.State
+    Input = dc_motor.Input
+    balance = staticmethod(dc_motor.balance)
+
+
+def test_a_state_needs_a_mass() -> None:
+    element: Any = Massless()
+    with pytest.raises(ModelError, match=r"massless has states and a balance, but no mass"):
+        declared(second=Part(element, suffix="_2"))
