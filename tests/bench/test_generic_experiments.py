@@ -12,7 +12,10 @@ import pytest
 import bywire
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
+from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNameError
+from bywire.core.model import ASSEMBLIES
+from bywire.core.signals import signals_of
 from bywire.report.bench_figures import bench_figures
 from systems.loading import SPRING_AXIS, loaded
 
@@ -53,6 +56,27 @@ def test_every_one_runs_with_its_defaults_and_gives_what_it_declares(name: str) 
     for recording in result.recordings.values():
         assert all(v.attrs["units"] and v.attrs["long_name"] for v in recording.variables.values())
     assert result.as_object()["kpis"].keys() == {kpi.name for kpi in result.kpis}
+
+
+@pytest.mark.parametrize("parameters", ["dardanelli2010", "roberts2003"])
+@pytest.mark.parametrize("name", ["step", "ramp", "sine-sweep", "release", "open-loop"])
+def test_every_stimulus_of_our_brakes_can_be_driven(name: str, parameters: str) -> None:
+    if (name, parameters) in (("release", "dardanelli2010"), ("open-loop", "dardanelli2010")):
+        return  # it has its own
+    model = ASSEMBLIES.find(PARAMETER_SETS.find(parameters).assembly)
+    for stimulus, signal in signals_of(model.Stimulus).items():
+        if stimulus.startswith("noise_"):
+            continue
+        driven = {"kind": "step", "start": 0, "end": 1, "t_step": 0}
+        made = bywire.Bench(name, parameters, options={"input": stimulus},
+                            stimulus=driven if name == "open-loop" else {})  # fmt: skip
+        (case,) = made.cases()
+        assert set(case.stimulus(np.zeros(1))) == {stimulus}
+        output = made.chosen_options.flat()["output"]
+        assert output != stimulus
+        outputs = signals_of(model.Output)
+        alike = any(n != stimulus and s.unit == signal.unit for n, s in outputs.items())
+        assert (outputs[output].unit == signal.unit) == alike
 
 
 def test_a_step_has_the_overshoot_of_a_second_order_lag() -> None:

@@ -255,8 +255,9 @@ def _signal(
     if not known:
         raise ParameterError(f"experiment {experiment!r} needs a {place}: {model.name} has none")
     if place == "recording":
-        unit = chosen["input"][1].unit
-        name = next((name for name, each in known.items() if each.unit == unit), next(iter(known)))
+        driven, signal = chosen["input"]
+        alike = [n for n, each in known.items() if each.unit == signal.unit and n != driven]
+        name = next(iter((*alike, *known)))
     elif len(known) == 1 or place == "friction":
         name = next(iter(known))
     else:
