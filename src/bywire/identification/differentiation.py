@@ -6,12 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.typing import Array
 from bywire.identification.output_error import even_interval
-
-Array = NDArray[np.float64]
 
 _ORDER = 4
 _STENCIL = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0  # as convolve turns it

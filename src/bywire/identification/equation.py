@@ -9,15 +9,13 @@ from typing import NamedTuple
 import casadi as ca
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.identification.unknown import Unknown
 from bywire.simulation.symbols import SX, column, scalars
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

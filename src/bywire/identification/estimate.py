@@ -7,12 +7,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _AT = 1e-6  # of an unknown's scale: nearer to a bound, it lies at it
 _INDISTINCT = 0.05  # of a standard deviation: nearer to a bound, the data does not tell it from it

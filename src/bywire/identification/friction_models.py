@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.model_choice import Candidate
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _APART = 1.2  # ratio of pressures from which on friction over pressure can be told
 

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.estimate import Estimate
 from bywire.identification.spread import robust_scale
-
-Array = NDArray[np.float64]
 
 _TOLD = 1.0  # standard deviation per scale above which nothing is known
 _FLAT = 1e-7  # singular value per the largest one: below it rounding decides

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.identification.confidence import uncertainty
 from bywire.identification.differentiation import low_passed
 from bywire.identification.equation import Equation, EquationError
@@ -22,8 +23,6 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.identifiability import notes_of
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _ROUNDS, _SETTLED = 50, 1e-12
 _DECIMATED = 0.8  # of half the new sample rate: what the decimation filter lets pass

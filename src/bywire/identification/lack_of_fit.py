@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.confidence import autoregression, is_white
 from bywire.identification.method import Check
-
-Array = NDArray[np.float64]
 
 _LEVEL = 1e-3  # of a false alarm
 

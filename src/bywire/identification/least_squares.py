@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, SolverError
+from bywire.core.typing import Array
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
 from bywire.identification.identifiability import advice, notes_of, untold
@@ -16,7 +16,6 @@ from bywire.identification.problem import Problem, cost_of, with_priors
 
 __all__ = ["Loss", "Problem", "Solution", "estimate", "solve", "with_priors"]
 
-Array = NDArray[np.float64]
 
 _NEWTON = 8  # steps from the least sum to where instruments see no residual
 _WORSE = 0.02  # of the least sum of squares: more is another place

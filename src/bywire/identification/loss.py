@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
+
 Loss = Literal["linear", "soft_l1", "huber", "cauchy"]
 
 _LEAST = 1e-2  # mean slope of the influence

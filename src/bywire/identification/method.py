@@ -13,9 +13,8 @@ from bywire.bench.bench import Bench
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
+from bywire.core.typing import Progress
 from bywire.identification.estimate import Estimate
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)

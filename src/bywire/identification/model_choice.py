@@ -13,15 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.confidence import autoregression
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown
 
-Array = NDArray[np.float64]
 Predict = Callable[[xr.Dataset, Array], tuple[Array, Array]]
 
 _BLOCKS = 10  # of a single record

@@ -7,13 +7,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run
 
-Array = NDArray[np.float64]
 Start = Callable[[Mapping[str, float]], tuple[Any, Any]]
 """``start(values) -> (state, memory)``: where a run begins with parameters, and with what is
 called ``start.NAME``, changed"""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import threading
 from collections.abc import Callable, Collection, Sequence
@@ -12,14 +11,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
-from bywire.core.errors import FileError, SolverError
+from bywire.core.errors import SolverError
+from bywire.core.typing import Array, Progress
 from bywire.identification.least_squares import Loss, Problem, Solution, solve
 from bywire.identification.unknown import moved
-
-Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+from bywire.simulation.job_store import JobStore
 
 _SAME = 0.01  # of the lowest cost: minima that count as one
 _ROUGH = 1e-4  # of the cost: enough to come nearer
@@ -91,9 +88,10 @@ def search(
     KeyboardInterrupt
         When interrupted; finished starts are in the store.
     """
-    known = _read(store)
+    kept = JobStore(store)
+    known = _finished(kept)
     keys = _keys(problem, starts, loss) if store is not None else [""] * len(starts)
-    found = {k: known[key] for k, key in enumerate(keys) if key in known}
+    solutions = {k: known[key] for k, key in enumerate(keys) if key in known}
     stop = threading.Event()
 
     def evaluate(values: Array) -> tuple[Array, Array]:
@@ -103,33 +101,34 @@ def search(
 
     guarded = replace(problem, evaluate=evaluate)
 
-    def one(start: Array) -> Solution:
+    def solved(start: Array) -> Solution:
         return solve(guarded, start if before is None else before(start), loss, share=_ENDED)
 
     failed = 0
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         jobs = {
-            pool.submit(one, start): k for k, start in enumerate(starts) if k not in found
+            pool.submit(solved, start): k for k, start in enumerate(starts) if k not in solutions
         }
         try:
             for job in as_completed(jobs):
                 k = jobs[job]
                 try:
-                    found[k] = job.result()
-                    _append(store, keys[k], found[k])
+                    solutions[k] = job.result()
+                    kept.append({"key": keys[k], "values": solutions[k].values.tolist(),
+                                 "cost": solutions[k].cost})  # fmt: skip
                 except SolverError:
                     failed += 1
                 if progress is not None:
-                    progress("starts", (len(found) + failed) / len(starts))
+                    progress("starts", (len(solutions) + failed) / len(starts))
         except KeyboardInterrupt:
             stop.set()
             pool.shutdown(cancel_futures=True)
             raise
-    if not found:
+    if not solutions:
         raise SolverError(
             "no start could be computed: begin nearer to the truth, or measure at other points"
         )
-    return Search(tuple(found[k] for k in sorted(found)), failed)
+    return Search(tuple(solutions[k] for k in sorted(solutions)), failed)
 
 
 def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
@@ -138,10 +137,10 @@ def nearer(problem: Problem, held: Collection[str], start: Array) -> Array:
     rest = replace(problem, unknowns=moved(problem.unknowns, start))
     for k in reversed(fixed):
         rest = rest.held(k)
-    found = start.copy()
     free = np.delete(np.arange(start.size), fixed)
-    found[free] = solve(rest, start[free], share=_ROUGH).values
-    return found
+    nearer_start = start.copy()
+    nearer_start[free] = solve(rest, start[free], share=_ROUGH).values
+    return nearer_start
 
 
 def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
@@ -161,28 +160,13 @@ def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
     return keys
 
 
-def _read(store: Path | None) -> dict[str, Solution]:
-    """Return the finished starts; a last line that was cut off by a killed run is left out."""
-    if store is None or not store.exists():
-        return {}
-    found = {}
-    try:
-        lines = store.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{store} cannot be read: {error}; delete it to start anew") from None
-    for line in lines:
+def _finished(store: JobStore) -> dict[str, Solution]:
+    """Return the finished starts by key."""
+    solutions = {}
+    for row in store.rows():
         try:
-            row = json.loads(line)
             values = np.array(row["values"], dtype=float)
-            found[str(row["key"])] = Solution(values, float(row["cost"]))
+            solutions[str(row["key"])] = Solution(values, float(row["cost"]))
         except (ValueError, KeyError, TypeError):
             continue
-    return found
-
-
-def _append(store: Path | None, key: str, solution: Solution) -> None:
-    if store is None:
-        return
-    row = {"key": key, "values": solution.values.tolist(), "cost": solution.cost}
-    with store.open("a", encoding="utf-8") as file:
-        file.write(json.dumps(row) + "\n")
+    return solutions

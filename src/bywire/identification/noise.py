@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _ROUNDED = 0.05  # of the samples equal the one before: a converter, not the signal
 _LARGER = 1.5  # times the noise

@@ -20,13 +20,12 @@ from bywire.core.errors import ParameterError, SolverError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of, zeros
+from bywire.core.typing import Array
 from bywire.identification.least_squares import Problem
 from bywire.identification.moved_run import Start, moved_run, start_slopes
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.loss import Loss, rho
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

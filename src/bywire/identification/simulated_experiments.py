@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import multiprocessing
 import os
 import signal
@@ -15,12 +14,12 @@ from pathlib import Path
 from typing import Any
 
 from bywire.core.brake import load_system, loaded_files
-from bywire.core.errors import BywireError, FileError, ParameterError
+from bywire.core.errors import BywireError, ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Progress
 from bywire.identification.method import Effort, Method
 from bywire.identification.unknown import parameters_of, scattered
-
-Progress = Callable[[str, float], None]
+from bywire.simulation.job_store import JobStore
 
 _TRIES = 20
 
@@ -67,9 +66,9 @@ def displaced(par: ParameterSet, names: Sequence[str], spread: float, seed: int)
     unknowns = parameters_of(par, [n for n in names if n in par.leaves()])
     if not unknowns or spread == 0.0:
         return par
-    for one in scattered(unknowns, _TRIES + 1, spread, seed)[1:]:
+    for values in scattered(unknowns, _TRIES + 1, spread, seed)[1:]:
         try:
-            return par.replace({u.name: float(v) for u, v in zip(unknowns, one, strict=True)})
+            return par.replace({u.name: float(v) for u, v in zip(unknowns, values, strict=True)})
         except ParameterError:
             continue
     raise ParameterError(f"no admissible parameters within {100 * spread:g} % of these: lower it")
@@ -90,13 +89,14 @@ def experiments(
     chosen = replace(effort, threads=1, store=None, progress=None)
     wanted = list(dict.fromkeys(seeds))
     key = _key(method, par, options, chosen)
-    done = {o.seed: o for o in _read(store, key) if o.seed in set(wanted)}
+    jobs = JobStore(store)
+    done = {o.seed: o for o in _finished(jobs, key) if o.seed in set(wanted)}
     missing = [seed for seed in wanted if seed not in done]
-    one = partial(experiment, method, par, options, chosen)
-    with closing(_made(one, missing, processes or os.cpu_count() or 1)) as made:
-        for outcome in made:
+    identify = partial(experiment, method, par, options, chosen)
+    with closing(_outcomes(identify, missing, processes or os.cpu_count() or 1)) as outcomes:
+        for outcome in outcomes:
             done[outcome.seed] = outcome
-            _append(store, key, outcome)
+            jobs.append({"key": key, **asdict(outcome)})
             if progress is not None:
                 progress("experiments", len(done) / len(wanted))
     return tuple(done[seed] for seed in wanted)
@@ -125,16 +125,16 @@ def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int
     return Outcome(seed, values, deviations, low, high, units, checks, kept)
 
 
-def _made(
-    one: Callable[[int], Outcome], seeds: Sequence[int], processes: int
+def _outcomes(
+    identify: Callable[[int], Outcome], seeds: Sequence[int], processes: int
 ) -> Generator[Outcome, None, None]:
     if processes < 2 or len(seeds) < 2:
-        yield from map(one, seeds)
+        yield from map(identify, seeds)
         return
     context = multiprocessing.get_context("spawn")  # forks of a process with threads may hang
     count = min(processes, len(seeds))
     with context.Pool(count, _prepare_worker, (loaded_files(),)) as pool:
-        yield from pool.imap_unordered(one, seeds)
+        yield from pool.imap_unordered(identify, seeds)
 
 
 def _prepare_worker(systems: tuple[str, ...]) -> None:
@@ -151,29 +151,12 @@ def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _read(store: Path | None, key: str) -> Iterator[Outcome]:
-    """Yield the finished experiments; a last line that was cut off is left out."""
-    if store is None or not store.exists():
-        return
-    try:
-        lines = store.read_text(encoding="utf-8").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{store} cannot be read: {error}; delete it to start anew") from None
-    for line in lines:
+def _finished(store: JobStore, key: str) -> Iterator[Outcome]:
+    """Yield the finished experiments of a study."""
+    for row in store.rows():
         try:
-            row = json.loads(line)
             if row.pop("key") == key:
                 row |= {name: tuple(row[name]) for name in ("failed_checks", "kept")}
                 yield Outcome(**row)
-        except (ValueError, KeyError, TypeError, AttributeError):
+        except (ValueError, KeyError, TypeError):
             continue
-
-
-def _append(store: Path | None, key: str, outcome: Outcome) -> None:
-    if store is None:
-        return
-    try:
-        with store.open("a", encoding="utf-8") as file:
-            file.write(json.dumps({"key": key, **asdict(outcome)}) + "\n")
-    except OSError as error:
-        raise FileError(f"cannot write {store}: {error.strerror}") from None

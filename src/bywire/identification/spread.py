@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 FAR = 4.0  # standard deviations: of white noise 1 in 16 000 lies beyond
 

@@ -8,17 +8,16 @@ have to hold it about 95 times in 100.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from bywire.core.typing import Progress
 from bywire.identification.method import Effort, Method
 from bywire.identification.simulated_experiments import Outcome, experiments
-
-Progress = Callable[[str, float], None]
 
 _BIAS = 3.0  # standard errors of the mean
 _COVERED = (0.90, 0.99)

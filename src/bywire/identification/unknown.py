@@ -7,12 +7,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _BEYOND = 1e3  # of the start: how far a parameter may go that nothing else bounds
 

@@ -7,10 +7,10 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.explained import explained
 from bywire.identification.least_squares import estimate
@@ -20,8 +20,6 @@ from bywire.identification.output_error import Trial, output_error
 from bywire.identification.unknown import parameters_of
 from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 _AGAINST = -0.5  # correlation of demand and current: beyond chance
 _EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left

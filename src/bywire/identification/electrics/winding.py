@@ -7,18 +7,16 @@ from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import unknown_name
 from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency
 from bywire.core.signals import Signal, zeros
+from bywire.core.typing import Array
 from bywire.identification.output_error import Trial, even_interval
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 Amperes = Annotated[float, Signal("A", "motor current", 5.0)]
 _SETTLED = 10.0  # time constants of the sensor's filter until the start is forgotten

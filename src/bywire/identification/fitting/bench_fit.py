@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.fitting.asked import Asked
 from bywire.identification.fitting.options import Options
@@ -45,8 +45,6 @@ from bywire.identification.output_error import Trial, initial_states, output_err
 from bywire.identification.records import split
 from bywire.identification.replaying.measured_run import MeasuredRun, case_of, measured_run
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _ROUNDED, _EXACT = "quantized", "ideal"  # of the law of a sensor or a converter
 _ROUGH = 1e-4  # of the cost: enough to begin from

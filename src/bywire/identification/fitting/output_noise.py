@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.explained import by_output
 from bywire.identification.measured import NOISE_OF_SAMPLES
@@ -19,8 +19,6 @@ from bywire.identification.noise import is_told, noise_of
 from bywire.identification.output_error import Trial
 from bywire.identification.replaying.measured_run import MeasuredRun
 from bywire.identification.spread import robust_scale
-
-Array = NDArray[np.float64]
 
 _FINEST = 1.0 / 65536.0  # of a signal's range: what a converter of 16 bits resolves
 _FEWEST = 10  # samples

@@ -7,7 +7,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case
 from bywire.bench.values import number
@@ -15,11 +14,10 @@ from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.core.units import shown, split
 from bywire.identification.fitting.asked import Asked
 from bywire.identification.unknown import Unknown, parameters_of, scattered
-
-Array = NDArray[np.float64]
 
 _BETWEEN = re.compile(r"\s*(?:\+-|\+/-|±)\s*")
 _OPEN = 1e-6  # of a range: how near an end comes to zero that is not admissible

@@ -11,6 +11,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.explained import explained
 from bywire.identification.fitting.options import Options
@@ -24,8 +25,6 @@ from bywire.identification.replaying.measured_run import MeasuredRun
 from bywire.identification.replaying.segments import Segment
 from bywire.identification.spread import FAR, outliers, robust_scale
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 _OWN = ("initial.", "start.")  # what each record has for itself
 _EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left

@@ -7,12 +7,12 @@ from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Nodes, Unit
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.estimate import Estimate
 from bywire.identification.friction_models import LAWS, find_law, laws_for
@@ -22,7 +22,6 @@ from bywire.identification.record_axis import after_one_another
 from bywire.identification.records import joined, split
 from bywire.identification.sliding_samples import sliding
 
-Array = NDArray[np.float64]
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, lt=1)]
 Size = Annotated[float, Unit("N", 10.0), Field(ge=0)]
 

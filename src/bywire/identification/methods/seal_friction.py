@@ -6,11 +6,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Force, Frequency, Nodes, Position, Unit
+from bywire.core.typing import Array
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Effort, Identified, Method
 from bywire.identification.records import joined, split
@@ -24,7 +24,6 @@ from bywire.identification.sealing.stroke_groups import (
 )
 from bywire.identification.unknown import Unknown
 
-Array = NDArray[np.float64]
 ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
 
 _MISFIT = 0.1

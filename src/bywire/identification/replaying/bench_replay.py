@@ -5,19 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.identification.records import RECORD
 from bywire.identification.replaying.compared import missed_samples
 from bywire.identification.replaying.measured_run import MeasuredRun, measured_run
 from bywire.simulation.run import Run, simulate
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.core.signals import Signal, signals_of
+from bywire.core.typing import Array
 from bywire.data.column_units import measures, unit_of_symbol
-
-Array = NDArray[np.float64]
 
 _ACCUMULATED = ("J", "s")  # errors of which say when something went wrong, not how well it fits
 

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.data.lag import estimate_lag
 from bywire.identification.replaying.segments import Segment
 from bywire.identification.replaying.tolerances import judge_fit, require_known
-
-Array = NDArray[np.float64]
 
 _LARGEST_LAG = 0.25  # of a stretch
 _FIRST_LAG = 8.0  # samples

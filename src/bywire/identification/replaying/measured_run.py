@@ -13,19 +13,18 @@ from typing import Literal
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.core.errors import ParameterError, StepError, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.identification.measured import as_even
 from bywire.identification.output_error import even_interval
 from bywire.identification.replaying.compared import compared_outputs, require_measured
 from bywire.simulation.run import Run
 
-Array = NDArray[np.float64]
 Between = Literal["held", "linear"]
 
 

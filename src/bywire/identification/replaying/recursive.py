@@ -10,11 +10,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _BURN_IN = 3  # samples per unknown that set the start rather than test the model
 

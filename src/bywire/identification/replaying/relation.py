@@ -6,14 +6,11 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.registry import Kind, instances
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 @dataclass(frozen=True)

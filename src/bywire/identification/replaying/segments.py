@@ -10,13 +10,11 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.typing import Array
 from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
-
-Array = NDArray[np.float64]
 
 _STEADY = 0.02  # of the demand's range: it holds while it moves less than this over a window
 _WINDOW = 0.1  # s

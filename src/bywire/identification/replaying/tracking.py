@@ -10,11 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.output_error import even_interval
 from bywire.identification.replaying.recursive import Tracked, kalman, likeliest
 from bywire.identification.replaying.relation import Relation, Rows, find_relation
-
-Array = NDArray[np.float64]
 
 _UNSURE = 0.5  # of the start: how far off the parameters may be at first
 _MOST = 4000  # blocks

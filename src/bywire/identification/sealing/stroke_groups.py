@@ -8,15 +8,13 @@ from itertools import pairwise
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.output_error import even_interval
 from bywire.identification.sealing.strokes import find_strokes, velocity
 from bywire.identification.wrong_sign import wrong_sign
-
-Array = NDArray[np.float64]
 
 _APART = 1.2  # ratio of the highest pressure to the lowest that tells them apart
 

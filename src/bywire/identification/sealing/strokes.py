@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.differentiation import low_passed
-
-Array = NDArray[np.float64]
 
 _CROSSED = 0.8  # of the stretch that a stroke has to cross
 

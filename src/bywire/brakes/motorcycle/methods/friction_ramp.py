@@ -8,7 +8,6 @@ from typing import Annotated
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.bench.experiment import as_run
@@ -28,6 +27,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, Unit
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
@@ -37,8 +37,6 @@ from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")
 _ZERO, _RIPPLE = "offset.i", "offset.i_ripple"

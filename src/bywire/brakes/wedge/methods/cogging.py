@@ -9,7 +9,6 @@ from typing import Annotated
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import slow_rotation
@@ -27,6 +26,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.core.typing import Array
 from bywire.identification.differentiation import differentiated, low_passed
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
@@ -35,8 +35,6 @@ from bywire.identification.output_error import even_interval
 from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
-
-Array = NDArray[np.float64]
 
 _ADVICE = "turn the shaft slowly by whole revolutions both ways, as 'bywire run slow-rotation' does"
 _BINS = 36

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.experiments import force_cycle
 from bywire.brakes.wedge.methods.drive_train import cogging_waves, force_current
@@ -27,12 +26,11 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
 )
 from bywire.brakes.wedge.methods.simulated_record import sensed, turned
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.typing import Array
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.plant import roller_screw, servo_motor
-
-Array = NDArray[np.float64]
 
 _GAP = np.full((2, 1), np.nan)
 _LAW = len(force_current.NAMES)

@@ -9,15 +9,13 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, as_run
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 _STEP = 20e-6
 _ANGLES = ("theta_", "last_")

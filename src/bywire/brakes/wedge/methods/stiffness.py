@@ -12,7 +12,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.experiments import force_cycle
 from bywire.brakes.wedge.methods.drive_train import force_current, two_stages
@@ -29,12 +28,11 @@ from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import slope_of
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
 from bywire.plant import shaft_encoder
-
-Array = NDArray[np.float64]
 
 _PASSES = 3  # a fit finds the contacts, one without their kinks the forces, one uses both
 _WITHIN = 0.5  # of the clearance, in which the wedge stands when the test begins

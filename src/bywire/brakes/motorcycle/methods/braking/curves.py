@@ -14,10 +14,9 @@ from bywire.brakes.motorcycle.methods.braking.records import Region, StepRecord
 from bywire.brakes.motorcycle.methods.braking.slow_pair import response
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
-
-Array = NDArray[np.float64]
 
 
 def curves_of(

@@ -10,7 +10,6 @@ from functools import partial
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case, as_run
 from bywire.brakes.motorcycle.case import case_from_rest
@@ -20,9 +19,9 @@ from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, travel_at
 from bywire.control.dither import breakaway_current
+from bywire.core.typing import Array
 from bywire.simulation.run import Run, simulate
 
-Array = NDArray[np.float64]
 Demand = Callable[[Array], Array]
 
 REST, STEP, SINES = 1.0, 4.0, 4.0

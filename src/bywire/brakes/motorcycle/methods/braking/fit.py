@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.linear.brake import two_pole
 from bywire.brakes.motorcycle.methods.braking.input_noise import Whitening
@@ -15,11 +14,10 @@ from bywire.brakes.motorcycle.methods.braking.two_step import in_turn, restricte
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _DECADE = 10.0  # tau_L and T_L begin one decade below T1
 _FAR = 1e3  # how far from its start a time constant may go

@@ -7,11 +7,9 @@ neighboring residuals go together over seconds. Their covariance is known but fo
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.braking.slow_pair import impulse
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 class Whitening:

@@ -8,13 +8,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.braking.sine_lines import Points, lines, measured_points
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.output_error import even_interval
-
-Array = NDArray[np.float64]
 
 REGIONS = ("low", "medium", "high")
 BAND = (1.0, 15.0)

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
+
 Complex = NDArray[np.complex128]
 
 _LEAST = 0.1  # of the strongest line: what counts as one

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 NAMES = ("K", "tau_L", "T1", "T2", "T_L")
 """gain and time constants of eq. (22), in the order of the paper's xi"""

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
 from bywire.identification.identifiability import notes_of
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.unknown import Unknown, moved
-
-Array = NDArray[np.float64]
 
 _SETTLED = 1e-6  # of a value
 

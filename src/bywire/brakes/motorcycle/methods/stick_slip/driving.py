@@ -7,15 +7,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.stick_slip.overlay import best_shift
 from bywire.brakes.motorcycle.methods.stick_slip.shots import BEFORE, Shot
 from bywire.brakes.motorcycle.methods.stick_slip.slips import moving_mean
 from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.core.typing import Array
 from bywire.simulation.run import Run, simulate
-
-Array = NDArray[np.float64]
 
 _SMOOTHED = 0.01  # s: over which the measured current is
 _BEGUN = 0.02  # of a slip: before, the current's noise would decide when the model breaks away

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
 from bywire.brakes.motorcycle.methods.stick_slip.shots import Shot
 from bywire.brakes.motorcycle.methods.stick_slip.whitening import Whitening
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 @dataclass(frozen=True)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.stick_slip.shots import LEAD, Shot
 from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _ROUNDS = 12  # of Newton
 

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.stick_slip.driving import driven_by, held, with_more
 from bywire.brakes.motorcycle.methods.stick_slip.overlay import overlaid
@@ -26,12 +25,11 @@ from bywire.brakes.motorcycle.methods.stick_slip.shots import BEFORE, Shot, onse
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.core.typing import Array
 from bywire.identification.equation import Equation, EquationError
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
-
-Array = NDArray[np.float64]
 
 _MORE = 1e-3  # A: with which the answer to an offset is computed
 

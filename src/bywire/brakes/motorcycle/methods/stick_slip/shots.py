@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.stick_slip.slips import Slip, moving_mean
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import state_at
 from bywire.core.errors import ParameterError
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 LEAD = 0.05
 """rest before the measured onset [s]"""

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.noise import noise_of
-
-Array = NDArray[np.float64]
 
 _WINDOW = 0.02  # s: over which a change counts as motion
 _SURE = 6.0  # standard deviations of that change

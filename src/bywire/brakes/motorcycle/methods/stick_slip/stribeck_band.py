@@ -6,13 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core import ops
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.plant import seal_friction
-
-Array = NDArray[np.float64]
 
 _SHARE = 1e-6
 

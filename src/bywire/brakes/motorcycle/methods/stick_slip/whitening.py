@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle.methods.stick_slip.shooting import Fitted
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 _BLOCKS = 250  # at most
 

@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem
 from bywire.identification.method import Check
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _LEVEL = 1e-3  # of a false alarm
 

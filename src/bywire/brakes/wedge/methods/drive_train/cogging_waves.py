@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.typing import Array
 from bywire.identification.unknown import Unknown
 from bywire.plant import servo_motor
-
-Array = NDArray[np.float64]
 
 _WAVES = {
     "cos": "cogging of known order over the motors' angle against each other, cosine",

@@ -16,13 +16,12 @@ from bywire.brakes.wedge.methods.drive_train.cogging_waves import waves
 from bywire.brakes.wedge.methods.drive_train.steady_motion import windows
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.differentiation import low_passed
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, roller_screw, servo_motor
-
-Array = NDArray[np.float64]
 
 MEANINGS: Mapping[str, tuple[str, str]] = {
     "offset": ("A", "current at zero force, i_0"),

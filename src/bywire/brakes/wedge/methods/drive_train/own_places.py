@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 def at_own_places(places: Sequence[Array], rows: Sequence[Array]) -> tuple[Array, Array]:

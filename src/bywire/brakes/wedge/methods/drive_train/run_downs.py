@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.methods.drive_train.steady_motion import (
     Motions,
@@ -18,14 +17,13 @@ from bywire.brakes.wedge.methods.drive_train.steady_motion import (
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.differentiation import differentiated
 from bywire.identification.equation import Equation
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
-
-Array = NDArray[np.float64]
 
 INERTIA = "motor_1.J_M"
 NAMES = (INERTIA, "bearing.C_0", "bearing.T_nu", "motor_1.D_M")

@@ -5,16 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.wedge.methods.drive_train.steady_motion import Motions
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.method import Check
 from bywire.plant import servo_motor
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -13,17 +13,15 @@ from itertools import pairwise
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.identification.equation import Equation, EquationError
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
-
-Array = NDArray[np.float64]
 
 _FEWEST = 4  # samples of a window
 

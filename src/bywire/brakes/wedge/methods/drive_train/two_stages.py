@@ -13,12 +13,11 @@ from bywire.brakes.wedge.methods.drive_train import cogging_waves, force_current
 from bywire.brakes.wedge.methods.drive_train.force_current import Squeeze, branches, law
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem
 from bywire.identification.method import Check
 from bywire.identification.unknown import Unknown, parameters_of
-
-Array = NDArray[np.float64]
 
 _STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")
 _S, _W, _C, _ZERO, _CLOSED, _PLAY = range(6)
