@@ -7,8 +7,7 @@ import pytest
 import xarray as xr
 
 from bywire.identification.measured import NOISE_OF_SAMPLES, as_even
-from bywire.identification.noise import is_told, noise_of
-from bywire.identification.spread import outliers, robust_scale
+from bywire.identification.noise import is_told, noise_of, outliers, robust_scale
 
 
 @pytest.mark.parametrize("count", [30, 130, 1300])

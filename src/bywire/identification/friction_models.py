@@ -6,17 +6,20 @@ All hold while sliding: :math:`F = s\,F_c(p)\,(1 + (k - 1) e^{-|v|/v_s}) + d v`,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
+from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.identification.measured import wrong_sign
 from bywire.identification.model_choice import Candidate
 from bywire.identification.unknown import Unknown
 
 _APART = 1.2  # ratio of pressures from which on friction over pressure can be told
+_LEAST = 20  # samples each way
 
 
 @dataclass(frozen=True)
@@ -114,3 +117,54 @@ def find_law(name: str) -> Law:
 
 def _product(unit: str) -> str:
     return f"({unit})" if "/" in unit else unit
+
+
+def sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.Dataset]:
+    """Return the samples that slide, by record.
+
+    Parameters
+    ----------
+    records
+        ``friction``, ``speed`` and, where measured, ``pressure`` over ``time``; NaN in gaps.
+    slowest
+        Slower samples are left out; a share of the record's fastest speed.
+
+    Raises
+    ------
+    ParameterError
+        When too few slide forward or backward, or the friction drives the motion.
+    """
+    names = ("friction", "speed", "pressure")
+    samples = {}
+    for label, record in records.items():
+        kept = record[[n for n in names if n in record]]
+        v = np.abs(kept["speed"].values)
+        good = np.all([np.isfinite(kept[n].values) for n in kept.data_vars], axis=0)
+        rows = np.flatnonzero(good & (v > slowest * np.max(v[good], initial=0.0)))
+        samples[label] = kept.isel(time=rows)
+    _require_both_ways(samples, slowest)
+    _require_braking(samples)
+    return samples
+
+
+def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> None:
+    """Refuse records in which too few samples slide forward, or backward."""
+    v = np.concatenate([one["speed"].values for one in sliding.values()])
+    counts = {"forward": int(np.sum(v > 0)), "backward": int(np.sum(v < 0))}
+    short = [way for way, count in counts.items() if count < _LEAST]
+    if short:
+        said = ", ".join(f"{count} {way}" for way, count in counts.items())
+        raise ParameterError(
+            f"too few samples slide {' and '.join(short)} ({said}; {_LEAST} each way are needed): "
+            "record motion to and fro (speed changes its sign), or lower --option slowest, which "
+            f"leaves out what is slower than {100 * slowest:g} % of a record's fastest speed"
+        )
+
+
+def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
+    """Refuse friction that gives power: it takes some up, in the mean over the record."""
+    F, v = (np.concatenate([one[n].values for one in sliding.values()])
+            for n in ("friction", "speed"))  # fmt: skip
+    along = float(F @ v / np.sqrt((F @ F) * (v @ v))) if F.any() else 0.0
+    if along < 0.0:
+        raise wrong_sign("friction", "speed", f"cosine {along:.2f}: it would drive the motion")

@@ -7,7 +7,7 @@ import numpy as np
 from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.estimate import Estimate
-from bywire.identification.spread import robust_scale
+from bywire.identification.noise import robust_scale
 
 _TOLD = 1.0  # standard deviation per scale above which nothing is known
 _FLAT = 1e-7  # singular value per the largest one: below it rounding decides

@@ -177,3 +177,19 @@ def _require_whole(data: xr.Dataset, where: str, gaps: bool) -> None:
                 f"{where}: {name} misses {missing.size} samples, the first at {at:.4g} s: cut the "
                 "record there, or fill it knowingly with 'bywire convert --exclude nothing'"
             )
+
+
+def wrong_sign(signal: str, other: str, evidence: str) -> ParameterError:
+    """Return the refusal of two signals of which one has the wrong sign.
+
+    Parameters
+    ----------
+    signal, other
+        Signals, in words.
+    evidence
+        What shows it, with its value.
+    """
+    return ParameterError(
+        f"{signal} goes against {other} ({evidence}): one of the two has the wrong sign; "
+        "write sign = -1 for it in the map"
+    )

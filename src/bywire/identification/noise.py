@@ -1,14 +1,16 @@
-"""Noise of a measured signal, told from the signal itself."""
+"""Noise of a measured signal, told from itself; how large residuals are when some are outliers."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 
 _ROUNDED = 0.05  # of the samples equal the one before: a converter, not the signal
 _LARGER = 1.5  # times the noise
 _SURE = 2.5  # standard errors of a correlation
+FAR = 4.0  # standard deviations: of white noise 1 in 16 000 lies beyond
 
 
 def noise_of(values: Array) -> float:
@@ -51,3 +53,23 @@ def is_told(values: Array) -> bool:
     a = 1.0 - 1.0 / _LARGER**2
     low, high = -max(0.25 * a, reach), max(1.75 * a, reach)
     return bool(low <= correlation + 0.75 <= high)
+
+
+def robust_scale(residuals: Array) -> float:
+    """Return the standard deviation that the median magnitude tells, were they Gaussian.
+
+    About zero, not about their median: an offset that a model leaves is an error of its own.
+
+    References
+    ----------
+    P. J. Huber, Robust Statistics, 1981, section 5.1 (median absolute deviation).
+    """
+    return 1.4826 * float(np.median(np.abs(residuals)))
+
+
+def outliers(residuals: Array) -> NDArray[np.bool_]:
+    """Return which residuals, of size one where the noise is as assumed, are none of noise.
+
+    Shape (n,); where all are larger than assumed, those that stand out from the others.
+    """
+    return np.asarray(np.abs(residuals) > FAR * max(robust_scale(residuals), 1.0))

@@ -8,12 +8,14 @@ they are in memory. Time goes on from one record to the next, so that any file c
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 
 RECORD = "record"
 """the signal that numbers the records"""
@@ -86,4 +88,29 @@ def split(data: xr.Dataset, own_clock: bool = False) -> dict[str, xr.Dataset]:
         axis = pd.Index(np.round(t, 12), name="time")
         label = names[k] if 0 <= k < len(names) else f"record_{k}"
         found[label] = one.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
+    return found
+
+
+def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
+    """Return coordinates for records in a row: ``time``, which goes on, and ``record``, the names.
+
+    Parameters
+    ----------
+    times
+        By record: instants within it [s], shape (n_k,), ascending; not all of its samples need
+        be there. A single record without a name gets no ``record``.
+    """
+    begin, axis, names = 0.0, [], []
+    for name, t in times.items():
+        if t.size:
+            axis.append(begin + t)
+            begin = float(axis[-1][-1]) + (float(np.median(np.diff(t))) if t.size > 1 else 0.0)
+        names += [name] * t.size
+    attrs = {
+        "units": "s",
+        "long_name": "time, records in a row" if len(times) > 1 else "time",
+    }
+    found: dict[str, Any] = {"time": ("time", np.concatenate(axis), attrs)}
+    if len(times) > 1:
+        found["record"] = ("time", np.array(names))
     return found

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 import xarray as xr
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.explained import explained
 from bywire.identification.least_squares import estimate
+from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Identified
 from bywire.identification.moved_run import moved_run
 from bywire.identification.output_error import Trial, output_error
+from bywire.identification.residuals import explained
 from bywire.identification.unknown import parameters_of
-from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
 
 _AGAINST = -0.5  # correlation of demand and current: beyond chance
@@ -170,3 +173,36 @@ def as_curve(one: Trial, found: Estimate) -> Curve:
     )  # fmt: skip
     name = f"current-{one.label}" if one.label else "current"
     return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
+
+
+class LoopOptions(ParameterSet):
+    """What is unknown, and the steps of the synthetic experiment."""
+
+    unknowns: Literal["gains", "all"]
+    """gains alone, the winding being known; or the winding with them"""
+    lead: Duration
+    """beginning of a record that does not count: where the loop was before is not known"""
+    dwell: Duration
+    """synthetic: time from one step to the next"""
+    duration: Duration
+    """synthetic: length of the record"""
+
+    def names(self, gains: tuple[str, ...], winding: tuple[str, ...]) -> tuple[str, ...]:
+        """Return what is estimated, given the names of all."""
+        return gains if self.unknowns == "gains" else (*gains, *winding)
+
+
+def without_lead(trial: Trial, data: xr.Dataset, lead: float) -> Trial:
+    """Return a trial of which the first seconds of its record do not count.
+
+    Parameters
+    ----------
+    trial
+        Of a whole record.
+    data
+        That record, over ``time`` [s].
+    lead
+        How long that is [s].
+    """
+    t = data["time"].values
+    return replace(trial, used=t - t[0] >= lead)

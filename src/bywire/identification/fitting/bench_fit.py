@@ -19,8 +19,7 @@ from bywire.bench.bench import Bench
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.fitting.asked import Asked
-from bywire.identification.fitting.options import Options
+from bywire.identification.fitting.asked import Asked, Options
 from bywire.identification.fitting.output_noise import output_noise, overestimated, resampled
 from bywire.identification.fitting.unknown_texts import (
     is_parameter,

@@ -13,12 +13,11 @@ from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import shown
-from bywire.identification.explained import by_output
 from bywire.identification.measured import NOISE_OF_SAMPLES
-from bywire.identification.noise import is_told, noise_of
+from bywire.identification.noise import is_told, noise_of, robust_scale
 from bywire.identification.output_error import Trial
 from bywire.identification.replaying.measured_run import MeasuredRun
-from bywire.identification.spread import robust_scale
+from bywire.identification.residuals import by_output
 
 _FINEST = 1.0 / 65536.0  # of a signal's range: what a converter of 16 bits resolves
 _FEWEST = 10  # samples

@@ -13,17 +13,17 @@ from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.explained import explained
-from bywire.identification.fitting.options import Options
+from bywire.identification.fitting.asked import Options
 from bywire.identification.fitting.unknown_texts import is_parameter
 from bywire.identification.method import Check, Curve
 from bywire.identification.moved_run import moved_run
+from bywire.identification.noise import FAR, outliers, robust_scale
 from bywire.identification.output_error import Trial
 from bywire.identification.replaying.bench_replay import beside
 from bywire.identification.replaying.fit import fit_figures
 from bywire.identification.replaying.measured_run import MeasuredRun
 from bywire.identification.replaying.segments import Segment
-from bywire.identification.spread import FAR, outliers, robust_scale
+from bywire.identification.residuals import explained
 from bywire.simulation.run import simulate
 
 _OWN = ("initial.", "start.")  # what each record has for itself
@@ -34,6 +34,10 @@ _BETWEEN = (
 )
 _FEW = 0.02  # of the residuals: as many as may be outliers
 _SEVERAL, _MET = 4, 2  # starts: so many are to tell whether one alone found a minimum
+_CAPTIONS = {
+    "fit": "measured and modeled with the estimates",
+    "validation": "a record that was not fitted: measured, and modeled with the estimates",
+}
 
 
 @dataclass(frozen=True)
@@ -65,12 +69,6 @@ class Compared:
             Curve(f"{role}-{name}{own}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
             for name, pair in self.pairs.items()
         )
-
-
-_CAPTIONS = {
-    "fit": "measured and modeled with the estimates",
-    "validation": "a record that was not fitted: measured, and modeled with the estimates",
-}
 
 
 def compared(one: MeasuredRun, trial: Trial, found: Estimate) -> Compared:

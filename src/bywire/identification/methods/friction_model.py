@@ -15,12 +15,10 @@ from bywire.core.quantities import Duration, Frequency, Nodes, Unit
 from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.identification.estimate import Estimate
-from bywire.identification.friction_models import LAWS, find_law, laws_for
+from bywire.identification.friction_models import LAWS, find_law, laws_for, sliding
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.model_choice import Choice, choose
-from bywire.identification.record_axis import after_one_another
-from bywire.identification.records import joined, split
-from bywire.identification.sliding_samples import sliding
+from bywire.identification.records import after_one_another, joined, split
 
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, lt=1)]
 Size = Annotated[float, Unit("N", 10.0), Field(ge=0)]

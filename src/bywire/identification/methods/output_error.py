@@ -2,29 +2,80 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
+import numpy as np
+import pandas as pd
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case
+from bywire.bench.experiment import Case, as_run
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.core.signals import signals_of
-from bywire.identification.fitting.asked import Asked, BenchMethod
+from bywire.core.signals import Signal, signals_of
+from bywire.identification.fitting.asked import Asked, BenchMethod, Options
 from bywire.identification.fitting.bench_fit import BenchFit
-from bywire.identification.fitting.options import Options
 from bywire.identification.fitting.output_noise import noise_given
-from bywire.identification.fitting.simulated import simulated
 from bywire.identification.fitting.unknown_texts import is_parameter, unknowns_of
 from bywire.identification.method import Method
 from bywire.identification.replaying.measured_run import case_of
+from bywire.simulation.run import simulate
 
 _NAME = "output-error"
 _DEFAULTS = Options(
     loss="linear", between="held", most_residual=1.3, most_outliers=0.05, least_vaf=0.9, noise=2e-3
 )
 _SIMULATED = ("noise",)
+
+
+def simulated(bench: Bench, asked: Asked, options: Options, seed: int) -> xr.Dataset:
+    """Return what drives the experiment and what is measured of it.
+
+    Parameters
+    ----------
+    bench
+        With the true values.
+    asked
+        Says which outputs, under which names the inputs, and how noisy the outputs are.
+    options
+        Their noise where it does not.
+    seed
+        Of the noise.
+
+    Returns
+    -------
+    xarray.Dataset
+        Over ``time`` [s], as far before zero as the experiment records.
+    """
+    bench = replace(bench, seed=seed)
+    number = [one.label for one in bench.cases()].index(case_of(bench, asked.case).label)
+    case = bench.cases()[number]
+    run = as_run(case, bench.step, seed=(seed, number))
+    made = simulate(run, tuple(asked.outputs))
+    kept = made.time >= case.settle - case.keep - 1e-9
+    t = np.round(made.time[kept] - case.settle, 12)
+    random = np.random.default_rng([seed, 1])
+    known = signals_of(run.model.Output)
+    rows = {}
+    for name, text in asked.outputs.items():
+        values = made[name][kept]
+        sigma = (
+            noise_given(name, text, known[name].unit) if text
+            else options.noise * float(np.ptp(values))
+        )
+        noisy = values + random.normal(0.0, sigma, values.size)
+        rows[name] = ("time", noisy, _attrs(known[name]))
+    stimuli, given = signals_of(run.model.Stimulus), case.stimulus(t)
+    driven = asked.inputs or {n: n for n in given if not n.startswith("noise_")}
+    for name, signal in driven.items():
+        values = np.asarray(given.get(name, np.zeros(t.size)), dtype=float)
+        rows[signal] = ("time", np.broadcast_to(values, t.shape), _attrs(stimuli[name]))
+    axis = pd.Index(t, name="time")
+    return xr.Dataset(rows, {"time": ("time", axis, {"units": "s", "long_name": "time"})})
+
+
+def _attrs(signal: Signal) -> dict[str, str]:
+    return {"units": signal.unit, "long_name": signal.label}
 
 
 def on(bench: Bench, asked: Asked) -> Method:

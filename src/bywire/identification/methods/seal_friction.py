@@ -15,7 +15,7 @@ from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Effort, Identified, Method
 from bywire.identification.records import joined, split
 from bywire.identification.sealing.seal_curves import friction_line, sliding_force
-from bywire.identification.sealing.stroke_groups import (
+from bywire.identification.sealing.strokes import (
     grouped,
     half_widths,
     pressure_between,

@@ -10,9 +10,8 @@ import xarray as xr
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 from bywire.identification.output_error import even_interval
-from bywire.identification.record_axis import after_one_another
-from bywire.identification.sealing.stroke_groups import Group
-from bywire.identification.sealing.strokes import find_strokes, velocity
+from bywire.identification.records import after_one_another
+from bywire.identification.sealing.strokes import Group, find_strokes, velocity
 
 
 def friction_line(found: Estimate, groups: Sequence[Group]) -> Curve:

@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
+from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.core.units import shown
 from bywire.identification.differentiation import low_passed
+from bywire.identification.measured import wrong_sign
+from bywire.identification.output_error import even_interval
 
 _CROSSED = 0.8  # of the stretch that a stroke has to cross
+_APART = 1.2  # ratio of the highest pressure to the lowest that tells them apart
 
 
 @dataclass(frozen=True)
@@ -69,3 +77,117 @@ def find_strokes(x: Array, v: Array, low: float, high: float, slowest: float) ->
         if rows.size:
             found.append(Stroke(direction, rows))
     return found
+
+
+@dataclass(frozen=True)
+class Group:
+    """Strokes of one record in one direction.
+
+    Parameters
+    ----------
+    direction
+        1 outward, -1 inward.
+    p, F
+        Means over the strokes [Pa, N].
+    scatter
+        Standard deviation of F from stroke to stroke [N].
+    count
+        Strokes.
+    """
+
+    direction: int
+    p: float
+    F: float
+    scatter: float
+    count: int
+
+
+def grouped(
+    one: xr.Dataset, stretch: tuple[float, float], slowest: float, cutoff: float
+) -> list[Group]:
+    """Return the groups of a record, outward first.
+
+    Parameters
+    ----------
+    one
+        ``x`` [m], ``p`` [Pa] and ``F`` [N] over ``time`` [s], evenly spaced.
+    stretch
+        Travels between which strokes count [m].
+    slowest
+        Speed above which the piston slides [m/s].
+    cutoff
+        Corner of the low-pass before the travel is differentiated [Hz].
+    """
+    x, p, F = (one[name].values for name in ("x", "p", "F"))
+    v = velocity(x, even_interval(one["time"].values), cutoff)
+    strokes = find_strokes(x, v, *stretch, slowest)
+    found = []
+    for direction in (1, -1):
+        means = np.array([
+            (np.nanmean(p[s.rows]), np.nanmean(F[s.rows]))
+            for s in strokes if s.direction == direction and np.isfinite(F[s.rows]).any()
+        ])  # fmt: skip
+        if means.size:
+            scatter = float(means[:, 1].std(ddof=1)) if len(means) > 1 else 0.0
+            p_mean, F_mean = means.mean(axis=0).tolist()
+            found.append(Group(direction, p_mean, F_mean, scatter, len(means)))
+    return found
+
+
+def require_told(groups: Sequence[Group]) -> None:
+    """Refuse strokes that do not tell the friction from the area, or its two parts apart.
+
+    Raises
+    ------
+    ParameterError
+        When there are none, in one direction alone, or at one pressure alone.
+    """
+    if not groups:
+        raise ParameterError(
+            "no stroke crosses the stretch x_low to x_high: move the piston to and fro through "
+            "it, or set --option x_low and x_high to where it moves"
+        )
+    if len({g.direction for g in groups}) < 2:
+        raise ParameterError("F_0 and f need strokes both ways: friction alone changes sign")
+    levels = [g.p for g in groups]
+    if max(levels) < _APART * min(levels) or len(groups) < 4:
+        raise ParameterError(
+            f"f cannot be told from F_0: all strokes were made at {min(levels) / 1e5:.3g} to "
+            f"{max(levels) / 1e5:.3g} bar; give a record each at two pressures or more"
+        )
+
+
+def require_signs(A: float, friction: float) -> None:
+    """Refuse an area below zero, and friction that drives.
+
+    Parameters
+    ----------
+    A
+        Force over pressure [m^2].
+    friction
+        In the mean over all strokes [N].
+
+    Raises
+    ------
+    ParameterError
+        When a signal has the wrong sign: the force pushes against the pressure, and more of it
+        outward than inward.
+    """
+    if A < 0.0:
+        raise wrong_sign("F", "p", f"area {shown(float(f'{A:.4g}'), 'm**2')}")
+    if friction < 0.0:
+        raise wrong_sign("F", "x", f"friction {friction:.3g} N in the mean: it would drive")
+
+
+def half_widths(groups: Sequence[Group]) -> tuple[Array, Array]:
+    """Return mean pressure and half the loop's height of neighboring groups up and down."""
+    pairs = [(a, b) for a, b in pairwise(groups)
+             if a.direction == 1 and b.direction == -1]  # fmt: skip
+    p = np.array([0.5 * (a.p + b.p) for a, b in pairs])
+    return p, np.array([0.5 * (a.F - b.F) for a, b in pairs])
+
+
+def pressure_between(groups: Sequence[Group]) -> float:
+    """Return by how much the pressure is higher outward than inward [Pa]."""
+    up, down = (np.mean([g.p for g in groups if g.direction == d]) for d in (1, -1))
+    return float(up - down)

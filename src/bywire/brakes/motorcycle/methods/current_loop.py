@@ -14,12 +14,13 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current, memory_at, state_at
 from bywire.core.quantities import Current, Pressure, Torque, Unit
-from bywire.identification.electrics.loop_experiment import LoopOptions, without_lead
 from bywire.identification.electrics.loop_records import (
+    LoopOptions,
     identified_loop,
     levels,
     noise_of_levels,
     require_steps,
+    without_lead,
 )
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import Trial, trial

@@ -12,8 +12,8 @@ from pydantic import Field
 
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.experiments import friction_ramp
+from bywire.brakes.motorcycle.methods.stick_slip.curves import replayed, stribeck_band
 from bywire.brakes.motorcycle.methods.stick_slip.loss import Noise, SlipLoss
-from bywire.brakes.motorcycle.methods.stick_slip.ramp_replay import replayed
 from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
 from bywire.brakes.motorcycle.methods.stick_slip.shots import (
     Shot,
@@ -22,7 +22,6 @@ from bywire.brakes.motorcycle.methods.stick_slip.shots import (
     require_reachable,
 )
 from bywire.brakes.motorcycle.methods.stick_slip.slips import find_slips
-from bywire.brakes.motorcycle.methods.stick_slip.stribeck_band import stribeck_band
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -30,12 +29,12 @@ from bywire.core.quantities import Current, Duration, Pressure, Unit
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.multistart import Search, nearer, search
 from bywire.identification.noise import noise_of
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown, parameters_of, scattered
-from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
 
 _NAMES = ("T_pr", "f_cfr_p", "f_cfr_n", "k_brk_p", "k_brk_n", "c", "mu_T")

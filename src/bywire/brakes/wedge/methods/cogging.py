@@ -12,13 +12,13 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.brakes.wedge.experiments import slow_rotation
-from bywire.brakes.wedge.methods.drive_train.angle_orders import standing_out
 from bywire.brakes.wedge.methods.drive_train.cogging_fit import (
     CoggingFit,
     Turning,
     cogging_problem,
     same_both_ways,
     slope_as_known,
+    standing_out,
 )
 from bywire.brakes.wedge.methods.drive_train.steady_motion import windows
 from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
@@ -30,9 +30,9 @@ from bywire.core.typing import Array
 from bywire.identification.differentiation import differentiated, low_passed
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
+from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.output_error import even_interval
-from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed
 

@@ -13,12 +13,13 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core.quantities import Current, Duration, Unit
-from bywire.identification.electrics.loop_experiment import LoopOptions, without_lead
 from bywire.identification.electrics.loop_records import (
+    LoopOptions,
     identified_loop,
     levels,
     noise_of_levels,
     require_steps,
+    without_lead,
 )
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.output_error import Trial, trial

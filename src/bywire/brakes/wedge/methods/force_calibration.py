@@ -27,9 +27,9 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
 from bywire.brakes.wedge.methods.simulated_record import sensed, turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.typing import Array
-from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.residuals import lack_of_fit
 from bywire.plant import roller_screw, servo_motor
 
 _GAP = np.full((2, 1), np.nan)

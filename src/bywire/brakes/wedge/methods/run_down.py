@@ -33,9 +33,9 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.units import shown
 from bywire.identification.estimate import Estimate
-from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.method import Check, Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
+from bywire.identification.residuals import lack_of_fit
 from bywire.plant.axial_bearing import AngularSpeed
 
 _RATIOS = {"bearing.C_0": "rad/s**2", "bearing.T_nu": "rad/s**2", "motor_1.D_M": "1/s"}

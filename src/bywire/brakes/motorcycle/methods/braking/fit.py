@@ -7,9 +7,13 @@ import math
 import numpy as np
 
 from bywire.brakes.motorcycle.linear.brake import two_pole
-from bywire.brakes.motorcycle.methods.braking.input_noise import Whitening
 from bywire.brakes.motorcycle.methods.braking.records import BAND, Region
-from bywire.brakes.motorcycle.methods.braking.slow_pair import NAMES, log_response, response
+from bywire.brakes.motorcycle.methods.braking.slow_pair import (
+    NAMES,
+    impulse,
+    log_response,
+    response,
+)
 from bywire.brakes.motorcycle.methods.braking.two_step import in_turn, restricted
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import travel_at
@@ -24,6 +28,53 @@ _FAR = 1e3  # how far from its start a time constant may go
 _UNITS = {"K": "Pa/A"}
 _WEIGHED = 2  # fits: the noise is weighed by the model that is started from, then by the one found
 _MOVES = 5.0  # of a block's noise: what a step must change the pressure by
+
+
+class Whitening:
+    r"""Makes residuals of block means independent, of size one.
+
+    .. math::
+        \Sigma = \sigma^2 I + \sigma_u^2 (H - H 1 w^T)(H - H 1 w^T)^T
+
+    with H the response of the means to every sample of the input, and w the mean before the step,
+    which is taken off the input: a model run over a measured current answers to its noise too,
+    slowly, as the brake does, so that neighboring residuals go together over seconds.
+
+    Parameters
+    ----------
+    values
+        K, tau_L, T1, T2, T_L of the model that answers; SI, shape (5,).
+    blocks, block
+        Number of means, and samples in each.
+    rest
+        Samples before the step whose mean is taken off.
+    sigma, sigma_u
+        Noise of a mean of the output, and of a sample of the input.
+    interval
+        Sample time [s].
+    """
+
+    def __init__(
+        self, values: Array, blocks: int, block: int, rest: int, sigma: float, sigma_u: float,
+        interval: float,
+    ) -> None:  # fmt: skip
+        n = blocks * block
+        h = impulse(values, n, interval)
+        means = np.convolve(h, np.ones(block) / block)[:n]
+        # Row k: the mean over the block that ends with sample (k + 1) block - 1.
+        last = (np.arange(blocks) + 1) * block - 1
+        back = last[:, None] - np.arange(n)[None, :]
+        H = np.where(back >= 0, means[np.clip(back, 0, n - 1)], 0.0)
+        H[:, :rest] -= H.sum(axis=1)[:, None] / rest
+        covariance = sigma_u**2 * (H @ H.T)
+        covariance[np.diag_indices(blocks)] += sigma**2
+        self._root = np.linalg.cholesky(covariance)
+
+    def __call__(self, values: Array) -> Array:
+        """Return residuals or their Jacobian, shape (blocks,) or (blocks, p), made independent."""
+        from scipy import linalg
+
+        return np.asarray(linalg.solve_triangular(self._root, values, lower=True))
 
 
 def starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,10 @@ from bywire.identification.method import Check
 from bywire.identification.unknown import Unknown
 
 _LEVEL = 1e-3  # of a false alarm
+_OTHER = 0.1  # of the cogging, that the friction's slope may leave to doubt
+_FRICTION = ("T_forward", "T_backward", "friction_slope")
+_FALSE = 1e-3  # chance that noise alone shows an order
+_MOST = 8
 
 
 @dataclass(frozen=True)
@@ -81,10 +86,6 @@ class CoggingFit:
         """Friction torque, shape (n,)."""
         told = [self.estimate[n] if n in self.estimate.names else 0.0 for n in _FRICTION]
         return np.asarray(self.turning.friction_columns @ np.array(told))
-
-
-_OTHER = 0.1  # of the cogging, that the friction's slope may leave to doubt
-_FRICTION = ("T_forward", "T_backward", "friction_slope")
 
 
 def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
@@ -164,3 +165,43 @@ def slope_as_known(found: CoggingFit, known: float) -> Check:
     share = abs(slope - known) * ripple / max(told["motor_1.T_cog"], 1e-300)
     note = "ripple given to the friction's slope beyond its law, over the cogging: angular friction"
     return Check("slope_beyond_law", share, limit=_OTHER, note=note)
+
+
+def amplitudes(angle: Array, torque: Array, highest: int) -> Array:
+    """Return the amplitude of every order 1 .. highest, each fitted alone, shape (highest,).
+
+    Parameters
+    ----------
+    angle
+        [rad], shape (n,); spread evenly over whole revolutions, or nearly so.
+    torque
+        Its mean taken off, shape (n,).
+    """
+    found = np.empty(highest)
+    turn = np.exp(-1j * angle)
+    wave = np.ones_like(turn)
+    for order in range(highest):
+        wave = wave * turn
+        found[order] = 2.0 * abs(np.mean(wave * torque))
+    return found
+
+
+def standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:
+    """Return the orders that stand out of the noise, strongest first.
+
+    The power of noise at an order is distributed exponentially, and its mean is the median over
+    all orders by log 2; what exceeds it more than chance lets any order do counts. One after the
+    other is taken off, so that a strong one does not leak into others.
+    """
+    left, orders = torque - torque.mean(), list[int]()
+    limit = math.log(highest / _FALSE) / math.log(2.0)
+    while len(orders) < _MOST:
+        power = amplitudes(angle, left, highest) ** 2
+        best = int(np.argmax(power)) + 1
+        if best in orders or power[best - 1] <= limit * float(np.median(power)):
+            break
+        orders.append(best)
+        A = np.column_stack([f(n * angle) for n in orders for f in (np.cos, np.sin)])
+        A = np.column_stack((np.ones(angle.size), A))
+        left = torque - A @ np.linalg.lstsq(A, torque, rcond=None)[0]
+    return tuple(orders)

@@ -18,9 +18,9 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.differentiation import low_passed
+from bywire.identification.measured import wrong_sign
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
-from bywire.identification.wrong_sign import wrong_sign
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 
 MEANINGS: Mapping[str, tuple[str, str]] = {

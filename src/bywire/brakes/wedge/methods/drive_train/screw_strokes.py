@@ -10,8 +10,8 @@ from bywire.brakes.wedge.methods.drive_train.steady_motion import Motions
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.method import Check
+from bywire.identification.residuals import lack_of_fit
 from bywire.plant import servo_motor
 
 

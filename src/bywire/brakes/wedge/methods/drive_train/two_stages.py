@@ -14,9 +14,9 @@ from bywire.brakes.wedge.methods.drive_train.force_current import Squeeze, branc
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
-from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem
 from bywire.identification.method import Check
+from bywire.identification.residuals import lack_of_fit
 from bywire.identification.unknown import Unknown, parameters_of
 
 _STIFFNESS = ("heart.K_S", "heart.K_W", "heart.K_C")

@@ -1,4 +1,4 @@
-"""Stribeck curves of an identified seal friction, with the band that its uncertainty leaves."""
+"""Curves that show an identified friction: over the speed with its band, and the ramp once more."""
 
 from __future__ import annotations
 
@@ -7,10 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import memory_at, state_at
 from bywire.core import ops
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
+from bywire.identification.output_error import trial
 from bywire.plant import seal_friction
+from bywire.simulation.run import simulate
 
 _SHARE = 1e-6
 
@@ -70,3 +75,27 @@ def _torque(par: seal_friction.Parameters, omega: float, p: float) -> float:
         return float("nan")
     friction = seal_friction.output(seal_friction.Input(omega, p), par)
     return float(ops.where(omega > 0.0, friction.T_p, -friction.T_n))
+
+
+def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
+    """Return the pressure over the whole ramp, measured and modeled, driven by the current.
+
+    Parameters
+    ----------
+    data
+        ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s].
+    step
+        Substep [s].
+    """
+    own = par.replace({"drive.mode": "current-source"})
+    start = max(float(data["p_mc"][0]), 0.0)
+    whole = trial(
+        MotorcycleBrake(), own, data, {"i_set": "i"}, {"p_mc": 1.0}, state=state_at(start, own),
+        memory=memory_at(start, own), step=step,
+    )  # fmt: skip
+    modeled = simulate(whole.run, ("p_mc",))["p_mc"]
+    attrs = {"units": "Pa", "long_name": "master-cylinder pressure"}
+    return xr.Dataset(
+        {"measured": ("time", data["p_mc"].values, attrs), "modeled": ("time", modeled, attrs)},
+        {"time": data["time"]},
+    )

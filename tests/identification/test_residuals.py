@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy import signal
 
-from bywire.identification.lack_of_fit import lack_of_fit
+from bywire.identification.residuals import lack_of_fit
 
 X = np.linspace(-1.0, 1.0, 200)
 RICHER = np.vander(X, 4)
