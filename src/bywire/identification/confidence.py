@@ -62,20 +62,20 @@ def uncertainty(
     scale = np.where(size > 0.0, size, 1.0)
     bread = np.linalg.pinv((Z.T @ jacobian) / np.outer(scale, scale))
     known = (Z[n - prior_rows :].T @ Z[n - prior_rows :]) / np.outer(scale, scale)
-    found: list[Uncertainty] = []
+    candidates: list[Uncertainty] = []
     for together in _TOGETHER:
         r, rows = _blocks(residuals[data], together), _blocks(Z[data] / scale, together)
         if together > 1 and not _still_told(r, rows, Z[data] / scale):
             break
         middle, freedom, colored = _spread(r, rows, p)
-        if not found or colored:
+        if not candidates or colored:
             covariance = bread @ (middle + known) @ bread.T
-            found.append(Uncertainty(covariance, freedom, colored))
+            candidates.append(Uncertainty(covariance, freedom, colored))
 
-    def volume(one: Uncertainty) -> float:
-        return float(np.sum(np.log(np.maximum(np.diag(one.covariance), 1e-300))))
+    def volume(candidate: Uncertainty) -> float:
+        return float(np.sum(np.log(np.maximum(np.diag(candidate.covariance), 1e-300))))
 
-    worst = max(found, key=volume)
+    worst = max(candidates, key=volume)
     return Uncertainty(worst.covariance / np.outer(scale, scale), worst.freedom, worst.colored)
 
 
@@ -158,8 +158,9 @@ def autocorrelation(residuals: Array, lags: int) -> Array:
     r = residuals - residuals.mean()
     size = 1 << (2 * r.size - 1).bit_length()
     spectrum = np.fft.rfft(r, size)
-    found = np.fft.irfft(spectrum * spectrum.conj(), size)[: lags + 1]
-    return np.asarray(found / found[0]) if found[0] > 0 else np.eye(1, lags + 1)[0]
+    covariances = np.fft.irfft(spectrum * spectrum.conj(), size)[: lags + 1]
+    alone: Array = np.eye(1, lags + 1)[0]
+    return np.asarray(covariances / covariances[0]) if covariances[0] > 0 else alone
 
 
 def is_white(residuals: Array, lags: int = 20) -> bool:

@@ -57,10 +57,10 @@ def _derivative(values: Array, interval: float) -> Array:
     Second-order ones alone take 0.1 % off an acceleration at a hundredth of the sample rate,
     which is a bias of the inertia.
     """
-    found = np.gradient(values, interval, edge_order=2)
+    slopes = np.gradient(values, interval, edge_order=2)
     if values.size > 2 * _REACH:
-        found[_REACH:-_REACH] = np.convolve(values, _STENCIL, mode="valid") / interval
-    return np.asarray(found)
+        slopes[_REACH:-_REACH] = np.convolve(values, _STENCIL, mode="valid") / interval
+    return np.asarray(slopes)
 
 
 def _centered(values: Array) -> Array:

@@ -60,14 +60,15 @@ class EquationError:
             if u.name not in leaves:
                 raise unknown_name("parameter", u.name, tuple(leaves))
             symbolic[u.name] = s
-        own = par.with_leaves(symbolic)
+        symbols = par.with_leaves(symbolic)
         x, m = SX.sym("x", len(model.State._fields)), SX.sym("m", len(model.Memory._fields))
         rate = SX.sym("rate")
         state, memory = model.State(*scalars(x)), model.Memory(*scalars(m))
         free = tuple(0.0 for group in model.compliance(par) for _ in group)
-        e = model.mass(state, own)[k] * rate - model.balance(state, state, memory, own, free)[k]
+        balance = model.balance(state, state, memory, symbols, free)[k]
+        e = model.mass(state, symbols)[k] * rate - balance
         if equation.state in model.frictions:
-            bounds = model.bounds(state, state, memory, own, free)
+            bounds = model.bounds(state, state, memory, symbols, free)
             low, high = bounds[model.frictions.index(equation.state)]
             e = e - ca.if_else(state[k] > 0, low, high)
         e = column((e,))

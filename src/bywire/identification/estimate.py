@@ -115,13 +115,13 @@ class Estimate:
         """
         bounds = self.at_bounds()
         reach = 0.5 * np.diff(self.intervals(), axis=1).ravel()
-        found = {}
+        reasons = {}
         for u, value, half in zip(self.unknowns, self.values, reach, strict=True):
             if u.label in bounds:
-                found[u.label] = f"lies at its bound, {shown(bounds[u.label], u.unit)}"
+                reasons[u.label] = f"lies at its bound, {shown(bounds[u.label], u.unit)}"
             elif half > abs(value):
-                found[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: that may be nothing"
-        return found
+                reasons[u.label] = f"is {value:.3g} +- {half:.2g} {u.unit}: that may be nothing"
+        return reasons
 
     def noted(self, notes: tuple[str, ...]) -> Estimate:
         """Return the estimate with more notes."""

@@ -46,22 +46,22 @@ class Law:
         F, v = data["friction"].values, np.abs(data["speed"].values)
         force, rate = (str(data[n].attrs.get("units", "1")) for n in ("friction", "speed"))
         size, fast = float(np.mean(np.abs(F))), float(v.max())
-        found = [
+        coulomb = [
             Unknown(name, size, low=0.0, scale=size, unit=force)
             for name in (("F_p", "F_n") if self.asymmetric else ("F_c",))
         ]
         if self.pressure:
             p = float(data["pressure"].values.max())
             f = 0.1 * size / p
-            found.append(Unknown("f", f, scale=10.0 * f, unit=f"{_product(force)}/Pa"))
+            coulomb.append(Unknown("f", f, scale=10.0 * f, unit=f"{_product(force)}/Pa"))
         if self.viscous:
             d = size / fast
-            found.append(Unknown("d", 0.1 * d, scale=d, unit=f"{_product(force)}/({rate})"))
+            coulomb.append(Unknown("d", 0.1 * d, scale=d, unit=f"{_product(force)}/({rate})"))
         if self.stribeck:
             slow = float(np.quantile(v, 0.2))
-            found.append(Unknown("k", 1.5, low=0.0, high=20.0, scale=1.0))
-            found.append(Unknown("v_s", slow, low=0.02 * slow, high=fast, scale=fast, unit=rate))
-        return tuple(found)
+            coulomb.append(Unknown("k", 1.5, low=0.0, high=20.0, scale=1.0))
+            coulomb.append(Unknown("v_s", slow, low=0.02 * slow, high=fast, scale=fast, unit=rate))
+        return tuple(coulomb)
 
     def predict(self, data: xr.Dataset, values: Array) -> tuple[Array, Array]:
         """Return friction and its derivatives, shapes (n,) and (n, p)."""
@@ -149,7 +149,7 @@ def sliding(records: Mapping[str, xr.Dataset], slowest: float) -> dict[str, xr.D
 
 def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> None:
     """Refuse records in which too few samples slide forward, or backward."""
-    v = np.concatenate([one["speed"].values for one in sliding.values()])
+    v = np.concatenate([record["speed"].values for record in sliding.values()])
     counts = {"forward": int(np.sum(v > 0)), "backward": int(np.sum(v < 0))}
     short = [way for way, count in counts.items() if count < _LEAST]
     if short:
@@ -163,7 +163,7 @@ def _require_both_ways(sliding: Mapping[str, xr.Dataset], slowest: float) -> Non
 
 def _require_braking(sliding: Mapping[str, xr.Dataset]) -> None:
     """Refuse friction that gives power: it takes some up, in the mean over the record."""
-    F, v = (np.concatenate([one[n].values for one in sliding.values()])
+    F, v = (np.concatenate([record[n].values for record in sliding.values()])
             for n in ("friction", "speed"))  # fmt: skip
     along = float(F @ v / np.sqrt((F @ F) * (v @ v))) if F.any() else 0.0
     if along < 0.0:

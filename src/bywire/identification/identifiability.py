@@ -15,38 +15,38 @@ _FAR = 10.0  # times the noise: residuals that no noise explains
 _CONTRADICTED = 3.0  # standard deviations of a prior
 
 
-def untold(found: Estimate, J: Array) -> tuple[int, str] | None:
+def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
     """Return the unknown that the data tells least, and why, if there is one."""
-    share = found.singular_values[-1] / max(found.singular_values[0], 1e-300)
-    told = f"smallest singular value {share:.1e} of the largest"
+    share = estimate.singular_values[-1] / max(estimate.singular_values[0], 1e-300)
+    reason = f"smallest singular value {share:.1e} of the largest"
     silent = np.flatnonzero(~J.any(axis=0))
     if silent.size:
         return int(silent[0]), "nothing measured depends on it"
     if share < _FLAT:
         direction = np.linalg.svd(J, full_matrices=False)[2][-1]
-        return int(np.argmax(np.abs(direction))), f"only a combination with others shows ({told})"
-    relative = found.deviations / np.array([u.scale for u in found.unknowns])
+        return int(np.argmax(np.abs(direction))), f"only a combination with others shows ({reason})"
+    relative = estimate.deviations / np.array([u.scale for u in estimate.unknowns])
     index = int(np.argmax(relative))
     if relative[index] <= _TOLD:
         return None
-    unknown = found.unknowns[index]
+    unknown = estimate.unknowns[index]
     return index, (
         f"its standard deviation would be {relative[index]:.2g} times its usual magnitude "
-        f"{shown(float(f'{unknown.scale:.3g}'), unknown.unit)} ({told})"
+        f"{shown(float(f'{unknown.scale:.3g}'), unknown.unit)} ({reason})"
     )
 
 
-def advice(found: Estimate, silent: bool) -> str:
+def advice(estimate: Estimate, silent: bool) -> str:
     """Return what to do where the data tells nothing.
 
     Parameters
     ----------
-    found
+    estimate
         Where the search ended, with its residuals.
     silent
         Whether it is known why nothing depends on the unknown.
     """
-    left = robust_scale(found.residuals)
+    left = robust_scale(estimate.residuals)
     if left > _FAR:
         return (
             f"the model does not fit, it leaves {left:.2g} times the noise at its best: check sign "
@@ -55,15 +55,15 @@ def advice(found: Estimate, silent: bool) -> str:
     return "switch it on, or name another unknown" if silent else "excite the system more"
 
 
-def notes_of(found: Estimate) -> tuple[str, ...]:
+def notes_of(estimate: Estimate) -> tuple[str, ...]:
     """Return what the user should know: what goes together, lies at a bound, or off its prior."""
     notes = [
         f"{a} and {b} go together (correlation {c:.3f}): the data tells their combination better "
         "than either"
-        for a, b, c in found.correlated()
+        for a, b, c in estimate.correlated()
     ]
-    bounds = found.at_bounds()
-    for u, value in zip(found.unknowns, found.values, strict=True):
+    bounds = estimate.at_bounds()
+    for u, value in zip(estimate.unknowns, estimate.values, strict=True):
         if u.label in bounds:
             notes.append(f"{u.label} lies at its bound, {shown(bounds[u.label], u.unit)}")
         if u.prior is None:

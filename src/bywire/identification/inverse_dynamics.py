@@ -106,14 +106,14 @@ def inverse_dynamics(
     e, W = rows(seen)
     Z = W if other is None else rows(other)[1]
     sure = uncertainty(W, e, instruments=None if other is None else Z)
-    found = Estimate(
+    estimate = Estimate(
         unknowns=tuple(unknowns), values=values,
         covariance=sure.covariance * np.outer(scale, scale),
         singular_values=np.asarray(np.linalg.svd(W, compute_uv=False), dtype=float),
         residuals=e / np.sqrt(max(float(e @ e), 1e-300) / max(len(e) - len(values), 1)),
         freedom=sure.freedom, colored=sure.colored,
     )  # fmt: skip
-    return found.noted(notes_of(found))
+    return estimate.noted(notes_of(estimate))
 
 
 def _iv(Z: Array, W: Array, e: Array) -> Array:

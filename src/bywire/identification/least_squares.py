@@ -88,12 +88,12 @@ def solve(
     priors = sum(u.prior is not None for u in unknowns)
     margin = 1e-9
     inner = np.clip(start / scale, low + margin, high - margin)
-    found = optimize.least_squares(
+    ended = optimize.least_squares(
         residuals, inner, jacobian, bounds=(low, high),
         loss=of_data_alone(loss, priors), x_scale="jac",
         xtol=1e-9, ftol=share, gtol=1e-9, max_nfev=most,
     )  # fmt: skip
-    solution = Solution(np.asarray(found.x) * scale, float(found.cost))
+    solution = Solution(np.asarray(ended.x) * scale, float(ended.cost))
     return _at_bounds(problem, solution, loss)
 
 
@@ -117,17 +117,17 @@ def _at_bounds(problem: Problem, solution: Solution, loss: Loss) -> Solution:
 
 def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
     """Return the nearest minimum, or what is no least sum where the Jacobian is an instrument."""
-    found = solve(problem, begin, loss)
+    solution = solve(problem, begin, loss)
     if not problem.instrument:
-        return found
+        return solution
     scale = np.array([u.scale for u in problem.unknowns])
     low, high = (np.array([getattr(u, end) for u in problem.unknowns]) for end in ("low", "high"))
-    values, most = found.values, (1.0 + _WORSE) * found.cost
+    values, most = solution.values, (1.0 + _WORSE) * solution.cost
     for _ in range(_NEWTON):
         r, J = with_priors(problem, values)
         cost = 0.5 * float(r @ r)
         if cost > most:
-            return found
+            return solution
         step = np.linalg.lstsq(J * scale, r)[0]
         values = np.clip(values - step * scale, low, high)
         if np.abs(step).max() < 1e-7:
@@ -156,23 +156,23 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
     origin = problem
     begin = np.array([u.start for u in problem.unknowns]) if start is None else start
     while True:
-        found, J = _at_minimum(problem, _solved(problem, begin, loss), loss)
-        worst = untold(found, J)
+        best, J = _at_minimum(problem, _solved(problem, begin, loss), loss)
+        worst = untold(best, J)
         if worst is None:
-            return replace(found, kept=kept, notes=notes_of(found))
+            return replace(best, kept=kept, notes=notes_of(best))
         index, reason = worst
         unknown = problem.unknowns[index]
         if not J[:, index].any() and unknown.name in problem.silent:
             reason = f"{reason} ({problem.silent[unknown.name]})"
         first = next(u for u in origin.unknowns if u.label == unknown.label)
         kept = (*kept, Kept(first, reason))
-        begin = np.delete(found.values, index)
+        begin = np.delete(best.values, index)
         problem = problem.held(index)
         if not problem.unknowns:
             raise ParameterError(
                 f"the data tells none of {', '.join(k.unknown.label for k in kept)}: of "
                 f"{kept[0].unknown.label}, {kept[0].reason}; "
-                f"{advice(found, kept[0].unknown.name in problem.silent)}"
+                f"{advice(best, kept[0].unknown.name in problem.silent)}"
             )
 
 
@@ -194,7 +194,7 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
     sure = uncertainty(
         rows * scale, np.concatenate((psi, r[r.size - known :])), J * scale, prior_rows=known
     )
-    found = Estimate(
+    best = Estimate(
         unknowns=problem.unknowns,
         values=solution.values,
         covariance=sure.covariance * np.outer(scale, scale),
@@ -203,4 +203,4 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
         freedom=sure.freedom,
         colored=sure.colored,
     )
-    return found, J * scale
+    return best, J * scale

@@ -29,9 +29,9 @@ def rho(z: Array, loss: Loss) -> Array:
     numpy.ndarray
         Shape (3, n), as ``scipy.optimize.least_squares`` wants it.
     """
-    one = np.ones_like(z)
+    ones = np.ones_like(z)
     if loss == "linear":
-        return np.stack((z, one, 0.0 * one))
+        return np.stack((z, ones, 0.0 * ones))
     if loss == "soft_l1":
         root = np.sqrt(1.0 + z)
         return np.stack((2.0 * (root - 1.0), 1.0 / root, -0.5 / root**3))

@@ -117,9 +117,9 @@ def require(data: xr.Dataset, signals: Mapping[str, str], where: str) -> tuple[s
     for name, unit in signals.items():
         if name not in there:
             raise unknown_name(f"signal (needed of {where}; --map can name it)", name, there)
-        found = str(data[name].attrs.get("units", "1"))
-        if unit not in ("", found) and not measures(unit_of_symbol(found), unit):
-            raise UnitError(f"{where}: {name} is in {found}, but {unit} is wanted: check the map")
+        given = str(data[name].attrs.get("units", "1"))
+        if unit not in ("", given) and not measures(unit_of_symbol(given), unit):
+            raise UnitError(f"{where}: {name} is in {given}, but {unit} is wanted: check the map")
     return (*signals, *(("record",) if "record" in there and "record" not in signals else ()))
 
 
@@ -149,16 +149,16 @@ def as_even(
         raise ParameterError("several records in one file cannot be resampled: give a file each")
     if multiple is not None and interval is None:
         step = float(f"{max(round(step / multiple), 1) * multiple:.9g}")
-    found = resample(data, step)
-    for name, signal in found.dataset.data_vars.items():
+    resampled = resample(data, step)
+    for name, signal in resampled.dataset.data_vars.items():
         values = data[name].values[np.isfinite(data[name].values)]
         if values.size >= _FEWEST:
             signal.attrs.setdefault(NOISE_OF_SAMPLES, noise_of(values))
-    return found.dataset, [_said(found.report)]
+    return resampled.dataset, [_said(resampled.report)]
 
 
 def _said(report: AlignmentReport) -> str:
-    missing = max(one.excluded for one in report.channels)
+    missing = max(channel.excluded for channel in report.channels)
     left_out = f"; {missing} of them in gaps and left out" if missing else ""
     return (
         f"resampled to {report.samples} samples every {1e3 * report.interval:.6g} ms (its own "

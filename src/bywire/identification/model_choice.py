@@ -130,14 +130,14 @@ def choose(
     errors = np.array([[_held_out(c, fold, signal) for fold in folds] for c in candidates])
     best = int(np.argmin(np.sqrt(np.mean(errors**2, axis=1))))
     judged = []
-    for k, (candidate, found) in enumerate(zip(candidates, estimates, strict=True)):
+    for k, (candidate, fit) in enumerate(zip(candidates, estimates, strict=True)):
         more = errors[k] - errors[best]
         scatter = float(more.std(ddof=1)) / math.sqrt(len(folds))
-        n, unknowns = left[k].size, len(found.unknowns) + 1  # the noise's variance is one
+        n, unknowns = left[k].size, len(fit.unknowns) + 1  # the noise's variance is one
         s2 = _innovation_variance(left[k], coefficients)
         judged.append(
             Judged(
-                candidate, found, float(np.sqrt(np.mean(left[k] ** 2))),
+                candidate, fit, float(np.sqrt(np.mean(left[k] ** 2))),
                 float(np.sqrt(np.mean(errors[k] ** 2))), float(more.mean()), scatter,
                 n * math.log(s2) + 2 * unknowns, n * math.log(s2) + unknowns * math.log(n),
             )
@@ -155,19 +155,19 @@ class _Fold:
 def _folds(records: Mapping[str, xr.Dataset]) -> tuple[list[_Fold], str]:
     parts = list(records.values())
     if len(parts) >= _RECORDS:
-        found = [_Fold([r for r in parts if r is not one], [one]) for one in parts]
-        return found, f"each of {len(parts)} records in turn"
+        folds = [_Fold([r for r in parts if r is not part], [part]) for part in parts]
+        return folds, f"each of {len(parts)} records in turn"
     blocks = [
-        one.isel(time=rows) for one in parts
-        for rows in np.array_split(np.arange(one.sizes["time"]), _BLOCKS)
+        part.isel(time=rows) for part in parts
+        for rows in np.array_split(np.arange(part.sizes["time"]), _BLOCKS)
     ]  # fmt: skip
     if min(b.sizes["time"] for b in blocks) < 2:
         raise ParameterError("too few samples to hold some out: measure longer, or more records")
-    found = []
+    folds = []
     for k in range(_FOLDS):
         held = [b for j, b in enumerate(blocks) if j % _FOLDS == k]
-        found.append(_Fold([b for j, b in enumerate(blocks) if j % _FOLDS != k], held))
-    return found, f"blocks of {len(parts)} record{'s' * (len(parts) > 1)}, a fifth at a time"
+        folds.append(_Fold([b for j, b in enumerate(blocks) if j % _FOLDS != k], held))
+    return folds, f"blocks of {len(parts)} record{'s' * (len(parts) > 1)}, a fifth at a time"
 
 
 def _fitted(candidate: Candidate, parts: Sequence[xr.Dataset], signal: str) -> Estimate:
@@ -183,25 +183,25 @@ def _fitted(candidate: Candidate, parts: Sequence[xr.Dataset], signal: str) -> E
 
 
 def _left(
-    candidate: Candidate, found: Estimate, parts: Sequence[xr.Dataset], signal: str
+    candidate: Candidate, fit: Estimate, parts: Sequence[xr.Dataset], signal: str
 ) -> Array:
-    values = _values(candidate, found, xr.concat(parts, "time", combine_attrs="override"))
+    values = _values(candidate, fit, xr.concat(parts, "time", combine_attrs="override"))
     return np.concatenate(
-        [one[signal].values - candidate.predict(one, values)[0] for one in parts]
+        [part[signal].values - candidate.predict(part, values)[0] for part in parts]
     )
 
 
-def _values(candidate: Candidate, found: Estimate, whole: xr.Dataset) -> Array:
+def _values(candidate: Candidate, fit: Estimate, whole: xr.Dataset) -> Array:
     """Return all values of a candidate, those that the data does not tell at their starts."""
-    known = dict(zip(found.names, found.values.tolist(), strict=True))
+    known = dict(zip(fit.names, fit.values.tolist(), strict=True))
     return np.array([known.get(u.label, u.start) for u in candidate.unknowns(whole)])
 
 
 def _held_out(candidate: Candidate, fold: _Fold, signal: str) -> float:
-    found = _fitted(candidate, fold.training, signal)
+    fit = _fitted(candidate, fold.training, signal)
     whole = xr.concat(fold.training, "time", combine_attrs="override")
-    values = _values(candidate, found, whole)
-    left = [one[signal].values - candidate.predict(one, values)[0] for one in fold.held]
+    values = _values(candidate, fit, whole)
+    left = [part[signal].values - candidate.predict(part, values)[0] for part in fold.held]
     return float(np.sqrt(np.mean(np.concatenate(left) ** 2)))
 
 

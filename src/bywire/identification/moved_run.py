@@ -74,7 +74,7 @@ def start_slopes(
     """
     rest = {n: v for n, v in values.items() if not n.startswith(_AFTERWARDS)}
     fields = run.model.State._fields
-    found = np.zeros((len(fields) + len(run.memory), len(unknowns)))
+    slopes = np.zeros((len(fields) + len(run.memory), len(unknowns)))
 
     def at(name: str, shift: float) -> tuple[float, Array]:
         try:
@@ -86,7 +86,7 @@ def start_slopes(
     for k, u in enumerate(unknowns):
         if u.name in rest:
             (a, low), (b, high) = (at(u.name, way * _SHIFT * u.scale) for way in (-1.0, 1.0))
-            found[:, k] = (high - low) / (b - a) if b > a else 0.0
+            slopes[:, k] = (high - low) / (b - a) if b > a else 0.0
     fixed = [fields.index(u.name[8:]) for u in unknowns if u.name.startswith("initial.")]
-    found[fixed] = 0.0
-    return found[: len(fields)], found[len(fields) :]
+    slopes[fixed] = 0.0
+    return slopes[: len(fields)], slopes[len(fields) :]

@@ -154,9 +154,9 @@ def _keys(problem: Problem, starts: Sequence[Array], loss: Loss) -> list[str]:
             continue
     keys = []
     for start in starts:
-        own = digest.copy()
-        own.update(start.tobytes())
-        keys.append(own.hexdigest())
+        of_start = digest.copy()
+        of_start.update(start.tobytes())
+        keys.append(of_start.hexdigest())
     return keys
 
 

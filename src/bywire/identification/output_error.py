@@ -120,7 +120,7 @@ def trial(
     return Trial(run, {name: data[name].values for name in outputs}, dict(outputs), label)
 
 
-def initial_states(one: Trial, names: Sequence[str]) -> tuple[Unknown, ...]:
+def initial_states(trial: Trial, names: Sequence[str]) -> tuple[Unknown, ...]:
     """Return initial states of a trial as unknowns that begin where its run begins.
 
     Raises
@@ -128,17 +128,17 @@ def initial_states(one: Trial, names: Sequence[str]) -> tuple[Unknown, ...]:
     UnknownNameError
         When the model has no such state.
     """
-    signals = signals_of(one.run.model.State)
-    found = []
+    signals = signals_of(trial.run.model.State)
+    unknowns = []
     for name in names:
         if name not in signals:
             raise unknown_name("state", name, tuple(signals))
-        start, signal = float(getattr(one.run.state, name)), signals[name]
+        start, signal = float(getattr(trial.run.state, name)), signals[name]
         scale = abs(start) or signal.nominal
-        found.append(
-            Unknown(f"initial.{name}", start, scale=scale, unit=signal.unit, trial=one.label)
+        unknowns.append(
+            Unknown(f"initial.{name}", start, scale=scale, unit=signal.unit, trial=trial.label)
         )
-    return tuple(found)
+    return tuple(unknowns)
 
 
 def even_interval(t: Array) -> float:
@@ -189,25 +189,25 @@ def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Proble
             raise unknown_name("trial", unknown.trial, labels)
 
     def evaluate(values: Array) -> tuple[Array, Array]:
-        parts = [_residuals(one, unknowns, values) for one in trials]
+        parts = [_residuals(trial, unknowns, values) for trial in trials]
         return np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
 
     return Problem(tuple(unknowns), evaluate)
 
 
-def _residuals(one: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[Array, Array]:
+def _residuals(trial: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[Array, Array]:
     """Return computed less measured, over the noise, and its derivatives."""
-    own = [k for k, u in enumerate(unknowns) if u.trial in ("", one.label)]
-    moving = [k for k in own if not unknowns[k].name.startswith("offset.")]
-    signals = tuple(one.measured)
-    computed, slopes = _computed(one, [unknowns[k] for k in moving], values[moving], signals)
+    places = [k for k, u in enumerate(unknowns) if u.trial in ("", trial.label)]
+    moving = [k for k in places if not unknowns[k].name.startswith("offset.")]
+    signals = tuple(trial.measured)
+    computed, slopes = _computed(trial, [unknowns[k] for k in moving], values[moving], signals)
     residuals, jacobians = [], []
     for s, signal in enumerate(signals):
-        rows, weight = one.rows(signal), 1.0 / one.noise[signal]
+        rows, weight = trial.rows(signal), 1.0 / trial.noise[signal]
         J = np.zeros((int(rows.sum()), len(unknowns)))
         J[:, moving] = slopes[rows, s, :] * weight
-        r = computed[rows, s] - one.measured[signal][rows]
-        for k in own:
+        r = computed[rows, s] - trial.measured[signal][rows]
+        for k in places:
             if unknowns[k].name == f"offset.{signal}":
                 r, J[:, k] = r + values[k], weight
         residuals.append(r * weight)
@@ -216,20 +216,20 @@ def _residuals(one: Trial, unknowns: Sequence[Unknown], values: Array) -> tuple[
 
 
 def _computed(
-    one: Trial, unknowns: Sequence[Unknown], values: Array, signals: tuple[str, ...]
+    trial: Trial, unknowns: Sequence[Unknown], values: Array, signals: tuple[str, ...]
 ) -> tuple[Array, Array]:
     """Return the outputs and their derivatives, shapes (rows, signals), (rows, signals, p)."""
     named = {u.name: float(v) for u, v in zip(unknowns, values, strict=True)}
     try:
-        run = moved_run(one.run, named, one.start)
+        run = moved_run(trial.run, named, trial.start)
     except ParameterError as error:  # bounds of several parameters together: a step too far
         raise SolverError(str(error)) from None
     if not unknowns:
         computed = simulate(run, signals).values
         return computed, np.empty((*computed.shape, 0))
-    if one.start is None:
-        found = simulate_with_sensitivities(run, list(named), signals)
+    if trial.start is None:
+        answer = simulate_with_sensitivities(run, list(named), signals)
     else:
-        slopes = start_slopes(one.start, run, unknowns, named)
-        found = simulate_with_sensitivities(run, list(named), signals, *slopes)
-    return found.trajectory.values, found.derivatives
+        slopes = start_slopes(trial.start, run, unknowns, named)
+        answer = simulate_with_sensitivities(run, list(named), signals, *slopes)
+    return answer.trajectory.values, answer.derivatives

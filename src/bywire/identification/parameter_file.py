@@ -43,10 +43,10 @@ def parameter_file(
     notes = comment.splitlines()
     if problem:
         for other in _alternatives(parameters):
-            found, left, trouble = _accepted(other, parameters, changes)
+            accepted, left, trouble = _accepted(other, parameters, changes)
             if not trouble:
                 notes.append(f"experiment {experiment!r} wants more than this file says: {problem}")
-                experiment, wanted, left_out = other, found, left
+                experiment, wanted, left_out = other, accepted, left
                 break
     lines = [f"# {line}" for line in notes]
     lines += [f'experiment = "{experiment}"', f'parameters = "{parameters}"', "", "[set]"]
@@ -68,11 +68,11 @@ def _accepted(
         try:
             Bench(experiment, parameters, overrides=wanted)
         except InputError as error:
-            found = _WITHOUT_EFFECT.match(str(error))
-            if found is None or found[1] not in wanted:
+            refused = _WITHOUT_EFFECT.match(str(error))
+            if refused is None or refused[1] not in wanted:
                 return wanted, left_out, str(error).splitlines()[0]
-            left_out.append(found[1])
-            wanted.pop(found[1])
+            left_out.append(refused[1])
+            wanted.pop(refused[1])
             continue
         return wanted, left_out, ""
 
@@ -80,8 +80,8 @@ def _accepted(
 def _alternatives(parameters: str) -> list[str]:
     """Return the experiments of a parameter set's assembly that bring all they need."""
     assembly = PARAMETER_SETS.find(parameters).assembly
-    return [one.name for one in EXPERIMENTS.all().values()
-            if one.assembly == assembly and one.driven_unit is None]  # fmt: skip
+    return [experiment.name for experiment in EXPERIMENTS.all().values()
+            if experiment.assembly == assembly and experiment.driven_unit is None]  # fmt: skip
 
 
 def _written(name: str, value: Any, par: ParameterSet) -> str:

@@ -41,22 +41,22 @@ def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:
         return records[first]
     wanted = set(map(str, records[first].data_vars))
     parts, times, start = [], [], 0.0
-    for number, (label, one) in enumerate(records.items()):
-        if set(map(str, one.data_vars)) != wanted:
-            differing = ", ".join(sorted(wanted ^ set(map(str, one.data_vars))))
+    for number, (label, record) in enumerate(records.items()):
+        if set(map(str, record.data_vars)) != wanted:
+            differing = ", ".join(sorted(wanted ^ set(map(str, record.data_vars))))
             raise ParameterError(
                 f"records {first} and {label} differ in their signals ({differing}): records of "
                 "one experiment have the same ones"
             )
-        t = one["time"].values - one["time"].values[0]
+        t = record["time"].values - record["time"].values[0]
         times.append(start + t)
         start = float(times[-1][-1] + (t[1] - t[0] if t.size > 1 else 1.0))
-        parts.append(one.assign({RECORD: ("time", np.full(t.size, float(number)))}))
+        parts.append(record.assign({RECORD: ("time", np.full(t.size, float(number)))}))
     whole = xr.concat(parts, "time", combine_attrs="override")
     axis = pd.Index(np.concatenate(times), name="time")
     whole = whole.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
     names = " ".join(label.replace(" ", "_") for label in records)
-    begins = [float(one["time"].values[0]) for one in records.values()]
+    begins = [float(record["time"].values[0]) for record in records.values()]
     whole[RECORD].attrs = {
         "units": "1", "long_name": "record", "flag_meanings": names, "begins": begins
     }  # fmt: skip
@@ -80,15 +80,17 @@ def split(data: xr.Dataset, own_clock: bool = False) -> dict[str, xr.Dataset]:
     numbers = data[RECORD].values
     names = str(data[RECORD].attrs.get("flag_meanings", "")).split()
     begins = np.atleast_1d(data[RECORD].attrs.get("begins", [])) if own_clock else np.empty(0)
-    found = {}
+    records = {}
     for number in np.unique(numbers[np.isfinite(numbers)]):
         k = int(number)
-        one = data.isel(time=np.flatnonzero(numbers == number)).drop_vars(RECORD)
-        t = one["time"].values - one["time"].values[0] + (begins[k] if k < begins.size else 0.0)
+        record = data.isel(time=np.flatnonzero(numbers == number)).drop_vars(RECORD)
+        begin = begins[k] if k < begins.size else 0.0
+        t = record["time"].values - record["time"].values[0] + begin
         axis = pd.Index(np.round(t, 12), name="time")
         label = names[k] if 0 <= k < len(names) else f"record_{k}"
-        found[label] = one.assign_coords(time=("time", axis, {"units": "s", "long_name": "time"}))
-    return found
+        clock = ("time", axis, {"units": "s", "long_name": "time"})
+        records[label] = record.assign_coords(time=clock)
+    return records
 
 
 def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
@@ -110,7 +112,7 @@ def after_one_another(times: Mapping[str, Array]) -> dict[str, Any]:
         "units": "s",
         "long_name": "time, records in a row" if len(times) > 1 else "time",
     }
-    found: dict[str, Any] = {"time": ("time", np.concatenate(axis), attrs)}
+    coordinates: dict[str, Any] = {"time": ("time", np.concatenate(axis), attrs)}
     if len(times) > 1:
-        found["record"] = ("time", np.array(names))
-    return found
+        coordinates["record"] = ("time", np.array(names))
+    return coordinates

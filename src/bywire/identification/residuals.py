@@ -64,15 +64,15 @@ def by_output(
 ) -> Iterator[tuple[Trial, str, NDArray[Any]]]:
     """Yield trial, output and its part of the residuals, in the order of `output_error`."""
     begin = 0
-    for one in trials:
-        for name in one.measured:
-            end = begin + int(one.rows(name).sum())
-            yield one, name, residuals[begin:end]
+    for trial in trials:
+        for name in trial.measured:
+            end = begin + int(trial.rows(name).sum())
+            yield trial, name, residuals[begin:end]
             begin = end
 
 
 def explained(
-    trials: Sequence[Trial], found: Estimate, counted: NDArray[np.bool_] | None = None
+    trials: Sequence[Trial], estimate: Estimate, counted: NDArray[np.bool_] | None = None
 ) -> float:
     """Return the variance accounted for, each record and output about its own mean.
 
@@ -80,16 +80,16 @@ def explained(
     ----------
     trials
         What was fitted.
-    found
+    estimate
         With the residuals that are left.
     counted
         Which residuals count, shape (n,); all by default.
     """
-    counted = np.ones(found.residuals.size, dtype=bool) if counted is None else counted
+    counted = np.ones(estimate.residuals.size, dtype=bool) if counted is None else counted
     total = 0.0
-    for one, name, among in by_output(trials, counted):
-        values = one.measured[name][one.rows(name)][among]
+    for trial, name, among in by_output(trials, counted):
+        values = trial.measured[name][trial.rows(name)][among]
         if values.size:
-            total += float(np.sum(((values - values.mean()) / one.noise[name]) ** 2))
-    left = found.residuals[counted]
+            total += float(np.sum(((values - values.mean()) / trial.noise[name]) ** 2))
+    left = estimate.residuals[counted]
     return 1.0 - float(left @ left) / max(total, 1e-300)

@@ -107,21 +107,21 @@ def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int
     try:
         data = method.synthetic(par, options, seed)
         start = par if par is None else displaced(par, method.unknowns, effort.spread, seed)
-        found = method.identify(data, start, options, replace(effort, seed=seed))
+        identified = method.identify(data, start, options, replace(effort, seed=seed))
     except BywireError as error:
         return Outcome(seed, {}, {}, {}, {}, {}, error=str(error))
     values: dict[str, float] = {}
     deviations, low, high = dict(values), dict(values), dict(values)
     units: dict[str, str] = {}
-    for estimate in found.estimates.values():
+    for estimate in identified.estimates.values():
         values |= dict(zip(estimate.names, estimate.values.tolist(), strict=True))
         deviations |= dict(zip(estimate.names, estimate.deviations.tolist(), strict=True))
         units |= {u.label: u.unit for u in estimate.unknowns}
         ends = estimate.intervals()
         low |= dict(zip(estimate.names, ends[:, 0].tolist(), strict=True))
         high |= dict(zip(estimate.names, ends[:, 1].tolist(), strict=True))
-    kept = tuple(k.unknown.label for e in found.estimates.values() for k in e.kept)
-    checks = tuple(check.name for check in found.checks if not check.holds)
+    kept = tuple(k.unknown.label for e in identified.estimates.values() for k in e.kept)
+    checks = tuple(check.name for check in identified.checks if not check.holds)
     return Outcome(seed, values, deviations, low, high, units, checks, kept)
 
 
@@ -145,9 +145,9 @@ def _prepare_worker(systems: tuple[str, ...]) -> None:
 
 
 def _key(method: Method, par: Any, options: Any, effort: Effort) -> str:
-    own = "" if par is None else par.model_dump_json()
+    values = "" if par is None else par.model_dump_json()
     name = f"{method.name}{method.key}"
-    text = f"{name} {own} {options.model_dump_json()} {effort.starts} {effort.spread}"
+    text = f"{name} {values} {options.model_dump_json()} {effort.starts} {effort.spread}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

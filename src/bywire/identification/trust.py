@@ -154,16 +154,16 @@ def _recovered(
 
     truth = put_in(method, par, options)
     for label in dict.fromkeys(label for o in outcomes for label in o.values if label in truth):
-        told = [o for o in outcomes if label in o.values]
-        values = np.array([o.values[label] for o in told])
-        claimed = math.sqrt(float(np.mean([o.deviations[label] ** 2 for o in told])))
-        inside = sum(o.low[label] <= truth[label] <= o.high[label] for o in told)
-        scatter = float(values.std(ddof=1)) if len(told) > 1 else math.nan
-        error = (scatter if len(told) > 1 else claimed) / math.sqrt(len(told))
+        telling = [o for o in outcomes if label in o.values]
+        values = np.array([o.values[label] for o in telling])
+        claimed = math.sqrt(float(np.mean([o.deviations[label] ** 2 for o in telling])))
+        inside = sum(o.low[label] <= truth[label] <= o.high[label] for o in telling)
+        scatter = float(values.std(ddof=1)) if len(telling) > 1 else math.nan
+        error = (scatter if len(telling) > 1 else claimed) / math.sqrt(len(telling))
         bias = float(values.mean() - truth[label])
-        ends = stats.binomtest(inside, len(told)).proportion_ci(0.95)
+        ends = stats.binomtest(inside, len(telling)).proportion_ci(0.95)
         yield Recovered(
-            label, told[0].units[label], float(truth[label]), len(told), bias,
+            label, telling[0].units[label], float(truth[label]), len(telling), bias,
             bias / error if error > 0.0 else math.copysign(math.inf, bias) if bias else 0.0,
-            inside / len(told), (float(ends.low), float(ends.high)), scatter, claimed,
+            inside / len(telling), (float(ends.low), float(ends.high)), scatter, claimed,
         )  # fmt: skip

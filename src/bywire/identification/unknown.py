@@ -89,7 +89,7 @@ def parameters_of(
         When a start is out of range.
     """
     fields, known = leaf_fields(type(par)), par.leaves()
-    found = []
+    unknowns = []
     for name in names:
         if name not in fields or name not in known:
             raise unknown_name("parameter", name, tuple(n for n in fields if n in known))
@@ -97,8 +97,8 @@ def parameters_of(
         size = abs(start) or abs(known[name]) or field.unit.nominal
         low, high = _inside(field.low, field.low_open, size), min(field.high, _BEYOND * size)
         prior = (priors or {}).get(name)
-        found.append(Unknown(name, start, low, high, size, field.unit.symbol, prior))
-    return tuple(found)
+        unknowns.append(Unknown(name, start, low, high, size, field.unit.symbol, prior))
+    return tuple(unknowns)
 
 
 def _inside(low: float, is_open: bool, size: float) -> float:

@@ -85,15 +85,15 @@ def _known(values: Mapping[str, float], unknown: Unknown) -> Cell:
 def check_table(checks: Sequence[Check]) -> Table:
     """Return the checks with their limits."""
     rows = []
-    for one in checks:
-        sign = ">=" if one.at_least else "<="
-        limit = "-" if one.limit is None else f"{sign} {amount(one.limit, one.unit)}"
+    for check in checks:
+        sign = ">=" if check.at_least else "<="
+        limit = "-" if check.limit is None else f"{sign} {amount(check.limit, check.unit)}"
         verdict = Cell("-")
-        if one.limit is not None:
-            verdict = Cell("ok", "good") if one.holds else Cell("failed", "bad")
+        if check.limit is not None:
+            verdict = Cell("ok", "good") if check.holds else Cell("failed", "bad")
         rows.append(
-            (Cell(clean(one.name)), Cell(amount(one.value, one.unit)), Cell(limit), verdict,
-             Cell(clean(one.note)))
+            (Cell(clean(check.name)), Cell(amount(check.value, check.unit)), Cell(limit), verdict,
+             Cell(clean(check.note)))
         )  # fmt: skip
     return Table(
         (Column("check"), Column("value", numeric=True), Column("limit", numeric=True),
@@ -102,29 +102,30 @@ def check_table(checks: Sequence[Check]) -> Table:
     )  # fmt: skip
 
 
-def figure_table(found: Identified) -> Table:
+def figure_table(identified: Identified) -> Table:
     """Return a method's further results."""
     return Table(
         (Column("result"), Column("value", numeric=True)),
         tuple(
             (Cell(clean(name)), Cell(amount(value, unit, 5)))
-            for name, (value, unit) in found.figures.items()
+            for name, (value, unit) in identified.figures.items()
         ),
     )
 
 
-def trust_table(found: Trust) -> Table:
+def trust_table(trust: Trust) -> Table:
     """Return how well what was put in comes back."""
     rows = []
-    for one in found.recovered:
-        low, high = one.coverage_range
-        ratio = one.claimed / one.scatter if one.scatter > 0.0 else float("nan")
+    for recovered in trust.recovered:
+        low, high = recovered.coverage_range
+        ratio = recovered.claimed / recovered.scatter if recovered.scatter > 0.0 else float("nan")
         rows.append(
-            (Cell(clean(one.label)), Cell(amount(one.truth, one.unit)), Cell(str(one.count)),
-             Cell(f"{one.bias_in_errors:+.2f}"),
-             Cell(f"{100 * one.coverage:.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"),
+            (Cell(clean(recovered.label)), Cell(amount(recovered.truth, recovered.unit)),
+             Cell(str(recovered.count)),
+             Cell(f"{recovered.bias_in_errors:+.2f}"),
+             Cell(f"{100 * recovered.coverage:.1f} % ({100 * low:.0f} to {100 * high:.0f} %)"),
              Cell(f"{ratio:.2f}"),
-             Cell("ok", "good") if one.holds else Cell("failed", "bad"))
+             Cell("ok", "good") if recovered.holds else Cell("failed", "bad"))
         )  # fmt: skip
     return Table(
         (Column("parameter"), Column("put in", numeric=True), Column("count", numeric=True),

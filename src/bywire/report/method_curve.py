@@ -42,9 +42,9 @@ def _beside(curve: Curve) -> Figure:
         at = _abscissa(data, x, k)
         measured, modeled = (_row(data[name], data[x], k) for name in ("measured", "modeled"))
         few = int(np.isfinite(measured).sum()) <= style.FEW
-        own = style.SEQUENCE[k % _MOST] if label else ""
-        _draw_pair(upper, at, (measured, modeled), label, own, few)
-        _draw(lower, at, modeled - measured, few, color=own or style.PURPLE, linewidth=0.9)
+        color = style.SEQUENCE[k % _MOST] if label else ""
+        _draw_pair(upper, at, (measured, modeled), label, color, few)
+        _draw(lower, at, modeled - measured, few, color=color or style.PURPLE, linewidth=0.9)
         sparse = sparse or few
     for name in (str(k) for k in data.data_vars if k not in ("measured", "modeled")):
         look = style.STROKES[style.Role.SECOND]
@@ -80,7 +80,8 @@ def _over_frequency(upper: Axes, lower: Axes, symbol: str) -> None:
 
 
 def _draw_pair(
-    axes: Axes, at: FloatArray, pair: tuple[FloatArray, FloatArray], label: str, own: str, few: bool
+    axes: Axes, at: FloatArray, pair: tuple[FloatArray, FloatArray], label: str, color: str,
+    few: bool,
 ) -> None:
     """Draw measured and modeled; of a family both in its own color, measured pale and wide."""
     for values, role, word in zip(
@@ -89,9 +90,9 @@ def _draw_pair(
         if not np.isfinite(values).any():
             continue
         look = style.STROKES[role]
-        wide = bool(own) and role is style.Role.MEASURED and not few
+        wide = bool(color) and role is style.Role.MEASURED and not few
         _draw(
-            axes, at, values, few and role is style.Role.MEASURED, color=own or look.color,
+            axes, at, values, few and role is style.Role.MEASURED, color=color or look.color,
             zorder=look.zorder, linestyle=look.linestyle, alpha=0.4 if wide else 1.0,
             linewidth=3.0 if wide else look.linewidth,
             label=style.plain(f"{label} {word}".strip()),
@@ -164,8 +165,8 @@ def _family(array: xr.DataArray, x: xr.DataArray) -> list[tuple[int, str]]:
 def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> FloatArray:
     """Return a curve of a family in its display unit."""
     others = [dim for dim in array.dims if dim != x.dims[-1]]
-    one = array.isel({others[0]: k}) if others else array
-    values = np.asarray(one.values, dtype=float)
+    curve = array.isel({others[0]: k}) if others else array
+    values = np.asarray(curve.values, dtype=float)
     symbol = str(array.attrs.get("units", "1"))
     return np.asarray(values * convert(1.0, symbol, display_unit(symbol)))
 

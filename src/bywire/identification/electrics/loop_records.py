@@ -124,54 +124,54 @@ def identified_loop(
     ParameterError
         When nothing can be estimated.
     """
-    found = estimate(output_error(trials, parameters_of(par, names)))
+    fit = estimate(output_error(trials, parameters_of(par, names)))
     return Identified(
-        estimates={"current loop": found}, parameters=believable(found),
-        checks=checks_of(trials, found), curves=tuple(as_curve(t, found) for t in trials),
+        estimates={"current loop": fit}, parameters=believable(fit),
+        checks=checks_of(trials, fit), curves=tuple(as_curve(t, fit) for t in trials),
     )  # fmt: skip
 
 
-def believable(found: Estimate) -> dict[str, float]:
+def believable(fit: Estimate) -> dict[str, float]:
     """Return the parameters by name, less those whose values mean nothing."""
-    vague = found.vague()
-    return {name: value for name, value in found.parameters().items() if name not in vague}
+    vague = fit.vague()
+    return {name: value for name, value in fit.parameters().items() if name not in vague}
 
 
-def checks_of(trials: Sequence[Trial], found: Estimate) -> tuple[Check, ...]:
+def checks_of(trials: Sequence[Trial], fit: Estimate) -> tuple[Check, ...]:
     """Return whether the model explains the current, and whether the values mean something.
 
     Noise alone is no proof of a model: where the record is nothing but noise, noise is what any
     model leaves, one with an answer of zero as well.
     """
-    vague = found.vague()
+    vague = fit.vague()
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
     return (
-        Check("variance_explained", explained(trials, found), limit=_EXPLAINED, at_least=True,
+        Check("variance_explained", explained(trials, fit), limit=_EXPLAINED, at_least=True,
               note="share of the current's variance that the model predicts: do demand and "
               "current belong together?"),
-        Check("residual_over_noise", found.rms, limit=_MISFIT,
+        Check("residual_over_noise", fit.rms, limit=_MISFIT,
               note="1 where nothing but the sensor's noise is left"),
         Check("parameters_without_meaning", float(len(vague)), limit=0.0,
               note=said or "none at its bound, none with a 95 % interval wider than +-100 %"),
     )  # fmt: skip
 
 
-def as_curve(one: Trial, found: Estimate) -> Curve:
+def as_curve(trial: Trial, fit: Estimate) -> Curve:
     """Return the measured current of a trial beside the modeled one."""
-    signal = next(iter(one.measured))
+    signal = next(iter(trial.measured))
     shared = {
         u.name: float(v)
-        for u, v in zip(found.unknowns, found.values, strict=True)
-        if u.trial in ("", one.label)
+        for u, v in zip(fit.unknowns, fit.values, strict=True)
+        if u.trial in ("", trial.label)
     }
-    made = simulate(moved_run(one.run, shared), (signal,))
+    computed = simulate(moved_run(trial.run, shared), (signal,))
     attrs = {"units": "A", "long_name": "current"}
     data = xr.Dataset(
-        {"measured": ("time", one.measured[signal], attrs),
-         "modeled": ("time", np.where(one.rows(signal), made[signal], np.nan), attrs)},
-        {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
+        {"measured": ("time", trial.measured[signal], attrs),
+         "modeled": ("time", np.where(trial.rows(signal), computed[signal], np.nan), attrs)},
+        {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
     )  # fmt: skip
-    name = f"current-{one.label}" if one.label else "current"
+    name = f"current-{trial.label}" if trial.label else "current"
     return Curve(name, "Current: measured, and modeled where it counts.", data, "time")
 
 

@@ -84,12 +84,13 @@ class BenchFit:
         """
         bench = self.moved(par)
         records = {
-            label: self.record(bench, one, options) for label, one in split(data, True).items()
+            label: self.record(bench, signals, options)
+            for label, signals in split(data, True).items()
         }
-        trials = [self.trial(one, label) for label, one in records.items()]
+        trials = [self.trial(record, label) for label, record in records.items()]
         unknowns = list(unknowns_of(case_of(bench, self.asked.case), bench.par, self.asked))
-        for one, trial in zip(records.values(), trials, strict=True):
-            unknowns += self.starts(one, trial)
+        for record, trial in zip(records.values(), trials, strict=True):
+            unknowns += self.starts(record, trial)
         problem = replace(
             output_error(trials, unknowns),
             silent=switched_off(bench.par, unknowns, exact_laws(type(bench.par))),
@@ -102,21 +103,21 @@ class BenchFit:
             # A loss that redescends has far minima wherever the record is missed altogether.
             partial(_nearer, problem) if options.loss == "cauchy" else None,
         )  # fmt: skip
-        found = estimate(problem, options.loss, led.best.values)
-        reached = _reached(led, found)
+        fit = estimate(problem, options.loss, led.best.values)
+        reached = _reached(led, fit)
         shown = [
-            compared(one, trial, found)
-            for one, trial in zip(records.values(), trials, strict=True)
+            compared(record, trial, fit)
+            for record, trial in zip(records.values(), trials, strict=True)
         ]
-        held = self._held_out(bench, found, options)
-        uneven = any(resampled(one) for one in records.values())
-        checks = checks_of(trials, found, options, uneven)
+        held = self._held_out(bench, fit, options)
+        uneven = any(resampled(record) for record in records.values())
+        checks = checks_of(trials, fit, options, uneven)
         doubtful = overestimated(
-            list(records.values()), trials, found.residuals, self.asked.outputs
+            list(records.values()), trials, fit.residuals, self.asked.outputs
         )
         return Identified(
-            estimates={"output error": found},
-            parameters=believable(found),
+            estimates={"output error": fit},
+            parameters=believable(fit),
             figures=figures_of(shown, trials),
             checks=(
                 *checks, *noise_check(doubtful, self.asked.outputs),
@@ -124,7 +125,7 @@ class BenchFit:
                 *(() if held is None else validation_of(held, options)),
             ),
             curves=(
-                *(curve for one in shown for curve in one.curves("fit")),
+                *(curve for record in shown for curve in record.curves("fit")),
                 *(() if held is None else held.curves("validation")),
             ),
             notes=(
@@ -148,37 +149,38 @@ class BenchFit:
             settle=not self.asked.states, between=options.between,
         )  # fmt: skip
 
-    def trial(self, one: MeasuredRun, label: str) -> Trial:
+    def trial(self, measured: MeasuredRun, label: str) -> Trial:
         """Return a record beside its run; while the run settles nothing is compared."""
-        before = np.full(one.settled, np.nan)
-        smooth = exact_laws(type(one.case.par))
-        values = {name: one.data[name].values for name in one.compared}
+        before = np.full(measured.settled, np.nan)
+        smooth = exact_laws(type(measured.case.par))
+        values = {name: measured.data[name].values for name in measured.compared}
         return Trial(
-            replace(one.run, par=one.run.par.replace(smooth)),
+            replace(measured.run, par=measured.run.par.replace(smooth)),
             {name: np.concatenate((before, row)) for name, row in values.items()},
-            {name: output_noise(one, name, self.asked.outputs[name]) for name in values},
+            {name: output_noise(measured, name, self.asked.outputs[name]) for name in values},
             label,
-            start=None if one.bench.definition.preview else partial(_begun, one.bench, one.case),
+            start=None if measured.bench.definition.preview
+            else partial(_begun, measured.bench, measured.case),
         )
 
-    def starts(self, one: MeasuredRun, trial: Trial) -> tuple[Unknown, ...]:
+    def starts(self, measured: MeasuredRun, trial: Trial) -> tuple[Unknown, ...]:
         """Return a record's own unknowns: initial states, and a start told by a noisy sample."""
-        fields = leaf_fields(one.bench.definition.options)
-        found = []
-        for name, signal in one.begun_at.items():
-            value = float(one.bench.options[name])
+        fields = leaf_fields(measured.bench.definition.options)
+        unknowns = []
+        for name, signal in measured.begun_at.items():
+            value = float(measured.bench.options[name])
             if trial.start is not None and value > _AT_REST * trial.noise[signal]:
                 unit = fields[name].unit.symbol
-                found.append(Unknown(f"start.{name}", value, 0.0, scale=value, unit=unit,
+                unknowns.append(Unknown(f"start.{name}", value, 0.0, scale=value, unit=unit,
                                      trial=trial.label))  # fmt: skip
-        return (*found, *initial_states(trial, self.asked.states))
+        return (*unknowns, *initial_states(trial, self.asked.states))
 
-    def _held_out(self, bench: Bench, found: Estimate, options: Options) -> Compared | None:
+    def _held_out(self, bench: Bench, fit: Estimate, options: Options) -> Compared | None:
         if self.asked.holdout is None:
             return None
-        one = self.record(bench, self.asked.holdout, options)
+        held = self.record(bench, self.asked.holdout, options)
         # A label that no record has: only what all records share is known of it.
-        return compared(one, self.trial(one, "held out"), found)
+        return compared(held, self.trial(held, "held out"), fit)
 
 
 def _nearer(problem: Problem, start: Array) -> Array:
@@ -186,21 +188,21 @@ def _nearer(problem: Problem, start: Array) -> Array:
     return solve(problem, solve(problem, start, share=_ROUGH).values, "huber", share=_ROUGH).values
 
 
-def _reached(led: Search, found: Estimate) -> int:
+def _reached(led: Search, fit: Estimate) -> int:
     """Return how many starts came within 1 % of the lowest minimum, or of what noise leaves."""
-    size = 0.5 * found.residuals.size
+    size = 0.5 * fit.residuals.size
     lowest = led.best.cost
-    return sum(one.cost <= lowest + 0.01 * max(lowest, size) for one in led.solutions)
+    return sum(solution.cost <= lowest + 0.01 * max(lowest, size) for solution in led.solutions)
 
 
 def _begun(bench: Bench, case: Any, values: Mapping[str, float]) -> tuple[Any, Any]:
     """Return where the experiment begins with other parameters and options of the start."""
     options = {n.removeprefix("start."): v for n, v in values.items() if n.startswith("start.")}
-    own = {n: v for n, v in values.items() if not n.startswith("start.")}
-    par, chosen = bench.par.replace(own), bench.chosen_options.replace(options)
-    made = bench.cases_with(par, chosen)
-    (one,) = (k for k in made if k.label == case.label)
-    return one.state, one.memory
+    parameters = {n: v for n, v in values.items() if not n.startswith("start.")}
+    par, chosen = bench.par.replace(parameters), bench.chosen_options.replace(options)
+    cases = bench.cases_with(par, chosen)
+    (begun,) = (k for k in cases if k.label == case.label)
+    return begun.state, begun.memory
 
 
 def exact_laws(cls: type[ParameterSet]) -> dict[str, str]:
@@ -225,10 +227,14 @@ def _smoothed(bench: Bench) -> tuple[str, ...]:
 
 def _said(records: Mapping[str, MeasuredRun], options: Options, coarse: bool) -> list[str]:
     """Return what the user should know of the records, and of coarse inputs where asked."""
-    said = [f"{k}: {note}" if k else note for k, one in records.items() for note in one.notes]
-    one = next(iter(records.values()))
-    said.append("driven by " + ", ".join(f"{name} = {v}" for name, v in one.driven.items()))
-    interval, period = one.run.record, min(k.period for k in one.case.model.tasks(one.case.par))
+    said = [
+        f"{label}: {note}" if label else note
+        for label, record in records.items() for note in record.notes
+    ]
+    measured = next(iter(records.values()))
+    said.append("driven by " + ", ".join(f"{name} = {v}" for name, v in measured.driven.items()))
+    case, interval = measured.case, measured.run.record
+    period = min(task.period for task in case.model.tasks(case.par))
     if coarse and options.between == "held" and period < 0.5 * interval:
         said.append(
             f"inputs are held for {1e3 * interval:.4g} ms from sample to sample, but act every "

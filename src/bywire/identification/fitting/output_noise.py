@@ -32,18 +32,18 @@ def noise_given(name: str, text: str, unit: str) -> float:
     UnitError, ParameterError
         When it is no quantity of that unit, or not > 0.
     """
-    found = number(text, unit, f"noise of {name}")
-    if not found > 0.0:
+    noise = number(text, unit, f"noise of {name}")
+    if not noise > 0.0:
         raise ParameterError(f"noise of {name} = {text} is not admissible: it must be > 0 {unit}")
-    return found
+    return noise
 
 
-def output_noise(one: MeasuredRun, name: str, text: str) -> float:
+def output_noise(measured: MeasuredRun, name: str, text: str) -> float:
     """Return the standard deviation of an output's noise, as given or of the record.
 
     Parameters
     ----------
-    one
+    measured
         The record.
     name
         Output.
@@ -56,8 +56,8 @@ def output_noise(one: MeasuredRun, name: str, text: str) -> float:
         When the record does not tell it: too short, or at rest.
     """
     if text:
-        return noise_given(name, text, signals_of(one.case.model.Output)[name].unit)
-    there = _finite(one.data[name])
+        return noise_given(name, text, signals_of(measured.case.model.Output)[name].unit)
+    there = _finite(measured.data[name])
     if there.size < _FEWEST:
         raise ParameterError(
             f"{name} has {there.size} samples: {_FEWEST} at least are needed to tell its noise"
@@ -69,13 +69,13 @@ def output_noise(one: MeasuredRun, name: str, text: str) -> float:
             "excite the system"
         )
     # Between uneven samples lie means of two, whose noise is smaller and no longer white.
-    before = one.data[name].attrs.get(NOISE_OF_SAMPLES)
+    before = measured.data[name].attrs.get(NOISE_OF_SAMPLES)
     return max(noise_of(there) if before is None else float(before), _FINEST * span)
 
 
-def resampled(one: MeasuredRun) -> bool:
+def resampled(measured: MeasuredRun) -> bool:
     """Return whether a record's outputs lie between the samples that were measured."""
-    return any(NOISE_OF_SAMPLES in one.data[name].attrs for name in one.compared)
+    return any(NOISE_OF_SAMPLES in measured.data[name].attrs for name in measured.compared)
 
 
 def overestimated(
@@ -95,8 +95,8 @@ def overestimated(
     given
         Noise by output, where it was given.
     """
-    runs = {trial.label: one for one, trial in zip(records, trials, strict=True)}
-    found = {}
+    runs = {trial.label: measured for measured, trial in zip(records, trials, strict=True)}
+    doubtful = {}
     for trial, name, r in by_output(trials, residuals):
         values = _finite(runs[trial.label].data[name])
         if given[name] or trial.noise[name] <= 1.01 * _FINEST * float(np.ptp(values)):
@@ -112,11 +112,11 @@ def overestimated(
         unit = signals_of(runs[trial.label].case.model.Output)[name].unit
         size = shown(float(f"{trial.noise[name]:.3g}"), unit)
         key = f"{trial.label}:{name}" if trial.label else name
-        found[key] = (
+        doubtful[key] = (
             f"{key} {why}, {size} is not its noise alone: give it, "
             f'--output "{name}=NOISE {display_unit(unit)}"'
         )
-    return found
+    return doubtful
 
 
 def _finite(signal: xr.DataArray) -> Array:

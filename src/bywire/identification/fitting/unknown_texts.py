@@ -108,50 +108,51 @@ def _bare(
     return parameters_of(case.par, [name])[0]
 
 
-def _with_texts(one: Unknown, within: str, prior: str, leaf: Leaf | None) -> Unknown:
+def _with_texts(unknown: Unknown, within: str, prior: str, leaf: Leaf | None) -> Unknown:
     if prior:
-        one = replace(one, prior=_prior(one, prior))
+        unknown = replace(unknown, prior=_prior(unknown, prior))
     if not within:
-        return one
-    low, high = _pair(one, within, within.split(".."), "range", "..")
+        return unknown
+    low, high = _pair(unknown, within, within.split(".."), "range", "..")
     if not low < high:
         raise ParameterError(
-            f"range of {one.name}: {quoted(within)} is empty; the lower end comes first"
+            f"range of {unknown.name}: {quoted(within)} is empty; the lower end comes first"
         )
     if leaf is not None and (low < leaf.low or high > leaf.high):
         raise ParameterError(
-            f"range of {one.name}: {quoted(within)} is not admissible: {one.name} must be "
+            f"range of {unknown.name}: {quoted(within)} is not admissible: {unknown.name} must be "
             f"{leaf.range_text}"
         )
-    low = low if low > one.low or leaf is None or not leaf.low_open else max(low, _OPEN * high)
+    low = low if low > unknown.low or leaf is None or not leaf.low_open else max(low, _OPEN * high)
     # Where the bench's own value lies outside, the search begins in the middle.
-    start = one.start if low <= one.start <= high else 0.5 * (low + high)
-    return replace(one, low=low, high=high, start=start)
+    start = unknown.start if low <= unknown.start <= high else 0.5 * (low + high)
+    return replace(unknown, low=low, high=high, start=start)
 
 
-def _prior(one: Unknown, text: str) -> tuple[float, float]:
-    mean, deviation = _pair(one, text, _BETWEEN.split(text), "prior", " +- ")
+def _prior(unknown: Unknown, text: str) -> tuple[float, float]:
+    mean, deviation = _pair(unknown, text, _BETWEEN.split(text), "prior", " +- ")
     if not deviation > 0.0:
-        raise ParameterError(f"prior of {one.name}: {quoted(text)} wants a deviation > 0")
+        raise ParameterError(f"prior of {unknown.name}: {quoted(text)} wants a deviation > 0")
     return mean, deviation
 
 
 def _pair(
-    one: Unknown, text: str, parts: Sequence[str], kind: str, sign: str
+    unknown: Unknown, text: str, parts: Sequence[str], kind: str, sign: str
 ) -> tuple[float, float]:
     """Return two quantities; a unit that only the second one has counts for both."""
     if len(parts) != 2 or not all(part.strip() for part in parts):
         raise ParameterError(
-            f"{kind} of {one.name}: {quoted(text)} cannot be read; write for instance "
-            f"'{sign.join(shown(k * one.scale, one.unit) for k in _EXAMPLES[kind])}'"
+            f"{kind} of {unknown.name}: {quoted(text)} cannot be read; write for instance "
+            f"'{sign.join(shown(k * unknown.scale, unknown.unit) for k in _EXAMPLES[kind])}'"
         )
     first, second = (part.strip() for part in parts)
     unit = split(second)[1]
     if unit and not split(first)[1]:
         first = f"{first} {unit}"
-    what = f"{kind} of {one.name}"
+    what = f"{kind} of {unknown.name}"
     return (
-        number(first, one.unit, what, one.scale), number(second, one.unit, what, one.scale)
+        number(first, unknown.unit, what, unknown.scale),
+        number(second, unknown.unit, what, unknown.scale),
     )  # fmt: skip
 
 
@@ -192,10 +193,10 @@ def switched_off(
     """
     choices = {n: c for n, c in known.choices().items() if isinstance(c, str)}
     choices |= {name: c for name, c in fitted.items() if name in choices}
-    found = {}
-    for one in unknowns:
-        group = one.name.rpartition(".")[0]
+    silent = {}
+    for unknown in unknowns:
+        group = unknown.name.rpartition(".")[0]
         beside = [f"{n} = {c}" for n, c in choices.items() if n.rpartition(".")[0] == group]
         if beside:
-            found[one.name] = f"here {', '.join(beside)}"
-    return found
+            silent[unknown.name] = f"here {', '.join(beside)}"
+    return silent

@@ -63,47 +63,48 @@ class Compared:
 
     def curves(self, role: str) -> tuple[Curve, ...]:
         """Return measured beside modeled, a curve for each output."""
-        own = f"-{_file_name(self.label)}" if self.label else ""
+        suffix = f"-{_file_name(self.label)}" if self.label else ""
         said = f" in {self.label}" if self.label else ""
         return tuple(
-            Curve(f"{role}-{name}{own}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
+            Curve(f"{role}-{name}{suffix}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
             for name, pair in self.pairs.items()
         )
 
 
-def compared(one: MeasuredRun, trial: Trial, found: Estimate) -> Compared:
+def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Compared:
     """Return a record beside the model with the estimates.
 
     Parameters
     ----------
-    one, trial
+    measured, trial
         The record; unknowns of its own carry its label, which is empty where it was fitted alone.
-    found
+    fit
         The estimates; what the data does not tell stays where it was.
     """
     values = {
         u.name: float(v)
         for u, v in (
-            *zip(found.unknowns, found.values, strict=True),
-            *((k.unknown, k.unknown.start) for k in found.kept),
+            *zip(fit.unknowns, fit.values, strict=True),
+            *((k.unknown, k.unknown.start) for k in fit.kept),
         )
         if u.trial == trial.label or not (u.trial or u.name.startswith(_OWN))
     }
     moving = {name: v for name, v in values.items() if not name.startswith("offset.")}
-    made = simulate(moved_run(trial.run, moving, trial.start), one.compared)
+    computed = simulate(moved_run(trial.run, moving, trial.start), measured.compared)
     return Compared(
         trial.label,
         {
             name: beside(
-                one.data, name, made[name][one.settled:] + values.get(f"offset.{name}", 0.0)
+                measured.data, name,
+                computed[name][measured.settled:] + values.get(f"offset.{name}", 0.0),
             )
-            for name in one.compared
+            for name in measured.compared
         },
     )  # fmt: skip
 
 
 def checks_of(
-    trials: Sequence[Trial], found: Estimate, options: Options, resampled: bool = False
+    trials: Sequence[Trial], fit: Estimate, options: Options, resampled: bool = False
 ) -> tuple[Check, ...]:
     """Return whether the model explains the records, and whether the values mean something.
 
@@ -112,26 +113,26 @@ def checks_of(
 
     Parameters
     ----------
-    trials, found
+    trials, fit
         What was fitted, and how.
     options
         Loss and limits.
     resampled
         Whether outputs were measured at uneven instants.
     """
-    vague = {n: why for n, why in found.vague().items() if _of_bench(found, n)}
+    vague = {n: why for n, why in fit.vague().items() if _of_bench(fit, n)}
     said = "; ".join(f"{label} {reason}" for label, reason in vague.items())
-    untold = [k.unknown.label for k in found.kept]
-    far = outliers(found.residuals)
+    untold = [k.unknown.label for k in fit.kept]
+    far = outliers(fit.residuals)
     robust = options.loss != "linear"
     counted = ~far if robust else np.ones_like(far)
-    left = math.sqrt(float(np.mean(found.residuals[counted] ** 2)))
+    left = math.sqrt(float(np.mean(fit.residuals[counted] ** 2)))
     return (
         Check("residual_over_noise", left, limit=options.most_residual,
               note="1 where nothing but the sensors' noise is left"
-              + _few(found.residuals, far, robust) + (_BETWEEN if resampled else "")),
+              + _few(fit.residuals, far, robust) + (_BETWEEN if resampled else "")),
         *((_outliers(far, options),) if robust else ()),
-        Check("variance_explained", explained(trials, found, counted), limit=_EXPLAINED,
+        Check("variance_explained", explained(trials, fit, counted), limit=_EXPLAINED,
               at_least=True,
               note="share of the outputs' variance, over their noise, that the model predicts"),
         Check("parameters_without_meaning", float(len(vague)), limit=0.0,
@@ -183,19 +184,19 @@ def starts_check(reached: int, starts: int) -> tuple[Check, ...]:
     return (Check("starts_at_minimum", float(reached), limit=_MET, at_least=True, note=note),)
 
 
-def _of_bench(found: Estimate, label: str) -> bool:
+def _of_bench(fit: Estimate, label: str) -> bool:
     """Return whether a label is that of a parameter; offsets and starts may be near zero."""
-    one = found.unknowns[found.names.index(label)]
-    return is_parameter(one.name) and not one.name.startswith(_OWN)
+    unknown = fit.unknowns[fit.names.index(label)]
+    return is_parameter(unknown.name) and not unknown.name.startswith(_OWN)
 
 
-def believable(found: Estimate) -> dict[str, float]:
+def believable(fit: Estimate) -> dict[str, float]:
     """Return the parameters by name, less those whose values mean nothing."""
-    vague = found.vague()
+    vague = fit.vague()
     return {
         u.name: float(v)
-        for u, v in zip(found.unknowns, found.values, strict=True)
-        if _of_bench(found, u.label) and u.label not in vague
+        for u, v in zip(fit.unknowns, fit.values, strict=True)
+        if _of_bench(fit, u.label) and u.label not in vague
     }
 
 
@@ -219,18 +220,18 @@ def figures_of(
     records: Sequence[Compared], trials: Sequence[Trial]
 ) -> dict[str, tuple[float, str]]:
     """Return noise, variance accounted for and error of every output in every record."""
-    found: dict[str, tuple[float, str]] = {}
-    for one, trial in zip(records, trials, strict=True):
-        for name, pair in one.pairs.items():
-            key = f"{one.label}:{name}" if one.label else name
-            figures = one.figures(name)
+    values: dict[str, tuple[float, str]] = {}
+    for compared_run, trial in zip(records, trials, strict=True):
+        for name, pair in compared_run.pairs.items():
+            key = f"{compared_run.label}:{name}" if compared_run.label else name
+            figures = compared_run.figures(name)
             unit = str(pair["measured"].attrs.get("units", "1"))
-            found |= {
+            values |= {
                 f"{key}.noise": (trial.noise[name], unit),
                 f"{key}.vaf": (figures["vaf"], "%"),
                 f"{key}.nrmse": (figures["nrmse"], "%"),
             }
-    return found
+    return values
 
 
 def _file_name(label: str) -> str:

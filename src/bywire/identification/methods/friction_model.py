@@ -119,12 +119,12 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     )  # fmt: skip
 
 
-def _driving(found: Estimate) -> Check:
+def _driving(fit: Estimate) -> Check:
     """Return whether a part of the law drives: its 95 % interval lies below zero."""
-    highest = dict(zip(found.names, found.intervals()[:, 1], strict=True))
+    highest = dict(zip(fit.names, fit.intervals()[:, 1], strict=True))
     below = [n for n, high in highest.items() if high < 0.0]
-    unit = {u.label: u.unit for u in found.unknowns}
-    said = "; ".join(f"{n} = {shown(float(f'{found[n]:.3g}'), unit[n])} drives" for n in below)
+    unit = {u.label: u.unit for u in fit.unknowns}
+    said = "; ".join(f"{n} = {shown(float(f'{fit[n]:.3g}'), unit[n])} drives" for n in below)
     return Check(
         "terms_that_drive", float(len(below)), limit=0.0,
         note=said or "no part of the law has a sign that friction cannot have",
@@ -133,13 +133,13 @@ def _driving(found: Estimate) -> Check:
 
 def _figures(choice: Choice, unit: str) -> dict[str, tuple[float, str]]:
     lowest = [min(getattr(j, name) for j in choice.judged) for name in ("aic", "bic")]
-    found = {}
-    for one in choice.judged:
-        name = one.candidate.name
-        found[f"{name}: held-out error"] = (one.validation_error, unit)
-        found[f"{name}: AIC less the least"] = (one.aic - lowest[0], "1")
-        found[f"{name}: BIC less the least"] = (one.bic - lowest[1], "1")
-    return found
+    figures = {}
+    for judged in choice.judged:
+        name = judged.candidate.name
+        figures[f"{name}: held-out error"] = (judged.validation_error, unit)
+        figures[f"{name}: AIC less the least"] = (judged.aic - lowest[0], "1")
+        figures[f"{name}: BIC less the least"] = (judged.bic - lowest[1], "1")
+    return figures
 
 
 def _misfit(whole: xr.Dataset, predicted: Array) -> float:
@@ -149,15 +149,15 @@ def _misfit(whole: xr.Dataset, predicted: Array) -> float:
     """
     F, v = whole["friction"].values, whole["speed"].values
     keys = [np.abs(v)] + ([whole["pressure"].values] if "pressure" in whole else [])
-    found = []
+    errors = []
     for key in keys:
         means = []
         for way in (v > 0, v < 0):
             order = np.flatnonzero(way)[np.argsort(key[way], kind="stable")]
             means += [float(np.mean((F - predicted)[part]))
                       for part in np.array_split(order, _BINS) if part.size]  # fmt: skip
-        found.append(float(np.sqrt(np.mean(np.square(means)))))
-    return max(found) / float(np.sqrt(np.mean(F**2)))
+        errors.append(float(np.sqrt(np.mean(np.square(means)))))
+    return max(errors) / float(np.sqrt(np.mean(F**2)))
 
 
 def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Array) -> Curve:
@@ -168,7 +168,7 @@ def _curve(records: Mapping[str, xr.Dataset], whole: xr.Dataset, predicted: Arra
         xr.Dataset(
             {"measured": ("time", whole["friction"].values, attrs),
              "modeled": ("time", predicted, attrs)},
-            after_one_another({name: one["time"].values for name, one in records.items()}),
+            after_one_another({name: record["time"].values for name, record in records.items()}),
         ),
         "time",
     )  # fmt: skip
@@ -194,9 +194,9 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
 
 def known_values(par: None, options: Options) -> dict[str, float]:
     """Return what simulated records are made of, under the laws' names."""
-    found = options.truth.leaves()
-    found.pop("noise")
-    return found | {"F_c": options.truth.F_p}
+    values = options.truth.leaves()
+    values.pop("noise")
+    return values | {"F_c": options.truth.F_p}
 
 
 METHOD = Method(

@@ -48,17 +48,17 @@ def simulated(bench: Bench, asked: Asked, options: Options, seed: int) -> xr.Dat
         Over ``time`` [s], as far before zero as the experiment records.
     """
     bench = replace(bench, seed=seed)
-    number = [one.label for one in bench.cases()].index(case_of(bench, asked.case).label)
+    number = [begun.label for begun in bench.cases()].index(case_of(bench, asked.case).label)
     case = bench.cases()[number]
     run = as_run(case, bench.step, seed=(seed, number))
-    made = simulate(run, tuple(asked.outputs))
-    kept = made.time >= case.settle - case.keep - 1e-9
-    t = np.round(made.time[kept] - case.settle, 12)
+    computed = simulate(run, tuple(asked.outputs))
+    kept = computed.time >= case.settle - case.keep - 1e-9
+    t = np.round(computed.time[kept] - case.settle, 12)
     random = np.random.default_rng([seed, 1])
     known = signals_of(run.model.Output)
     rows = {}
     for name, text in asked.outputs.items():
-        values = made[name][kept]
+        values = computed[name][kept]
         sigma = (
             noise_given(name, text, known[name].unit) if text
             else options.noise * float(np.ptp(values))

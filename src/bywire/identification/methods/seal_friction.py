@@ -93,7 +93,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     """
     records = split(data)
     how = ((options.x_low, options.x_high), options.slowest, options.cutoff)
-    groups = [g for one in records.values() for g in grouped(one, *how)]
+    groups = [g for record in records.values() for g in grouped(record, *how)]
     require_told(groups)
     s, p, F = (np.array([getattr(g, n) for g in groups]) for n in ("direction", "p", "F"))
     columns = {"A": p, "F_0": s.astype(float), "f": s * p}
@@ -104,15 +104,15 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     start = np.linalg.lstsq(W, F, rcond=None)[0]
     unknowns = tuple(_unknown(n, v, F, p) for n, v in zip(columns, start, strict=True))
     problem = Problem(unknowns, lambda values: ((W @ values - F) / sigma, W / sigma))
-    found = estimate(problem)
-    friction = float(np.mean(found["F_0"] + found["f"] * p))
-    require_signs(found["A"], friction)
+    fit = estimate(problem)
+    friction = float(np.mean(fit["F_0"] + fit["f"] * p))
+    require_signs(fit["A"], friction)
     loop = np.polyfit(*half_widths(groups), 1)
     return Identified(
-        estimates={"seal friction": found},
+        estimates={"seal friction": fit},
         parameters={},
         figures={
-            "force_over_pressure": (found["A"], "N/Pa"),
+            "force_over_pressure": (fit["A"], "N/Pa"),
             "loop_half_width_at_0": (float(loop[1]), "N"),
             "loop_half_width_over_pressure": (float(loop[0]), "N/Pa"),
             "pressure_between_directions": (pressure_between(groups), "Pa"),
@@ -123,7 +123,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
             Check("stroke_scatter", float(np.sqrt(np.mean([g.scatter**2 for g in groups]))), "N",
                   note="from stroke to stroke"),
         ),
-        curves=(friction_line(found, groups), sliding_force(records, found, *how)),
+        curves=(friction_line(fit, groups), sliding_force(records, fit, *how)),
         notes=(f"{sum(g.count for g in groups)} strokes in {len(groups)} groups of record and "
                "direction",
                "loop half widths leave out that the pressure differs between the directions"),
@@ -153,10 +153,10 @@ def synthetic(par: None, options: Options, seed: int) -> xr.Dataset:
     stroke = np.floor(t / 5.0).astype(int)
     records = {}
     for k, level in enumerate(options.pressures):
-        own = truth.sigma_group * random.standard_normal(2)[(s > 0).astype(int)]
+        scatter = truth.sigma_group * random.standard_normal(2)[(s > 0).astype(int)]
         each = truth.sigma_stroke * random.standard_normal(stroke[-1] + 1)[stroke]
         p = level + 1e3 * random.standard_normal(t.size) + 3e3 * s
-        F = truth.A * p + s * (truth.F_0 + truth.f * p) + own + each
+        F = truth.A * p + s * (truth.F_0 + truth.f * p) + scatter + each
         F = F + truth.sigma_F * random.standard_normal(t.size)
         records[f"level_{k}"] = xr.Dataset(
             {"x": ("time", x, {"units": "m"}), "p": ("time", p, {"units": "Pa"}),

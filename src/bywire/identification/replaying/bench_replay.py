@@ -62,24 +62,25 @@ def replay(
     """
     if RECORD in data:
         raise ParameterError("replay takes one record, and this measurement has several")
-    found = measured_run(bench, data, inputs, outputs, case)
-    modeled = simulate(found.run, found.compared)
+    measured = measured_run(bench, data, inputs, outputs, case)
+    modeled = simulate(measured.run, measured.compared)
     return Replayed(
-        _driving(found),
-        {name: beside(found.data, name, modeled[name][found.settled:]) for name in found.compared},
-        found.run, (*found.notes, *missed_samples(found.data, found.compared)),
+        _driving(measured),
+        {name: beside(measured.data, name, modeled[name][measured.settled:])
+         for name in measured.compared},
+        measured.run, (*measured.notes, *missed_samples(measured.data, measured.compared)),
     )  # fmt: skip
 
 
-def _driving(found: MeasuredRun) -> xr.Dataset:
-    signals = signals_of(found.case.model.Stimulus)
+def _driving(measured: MeasuredRun) -> xr.Dataset:
+    signals = signals_of(measured.case.model.Stimulus)
     return xr.Dataset(
         {
-            name: ("time", found.data[signal].values,
+            name: ("time", measured.data[signal].values,
                    {"units": signals[name].unit, "long_name": signals[name].label})
-            for name, signal in found.driven.items()
+            for name, signal in measured.driven.items()
         },
-        {"time": found.data["time"]},
+        {"time": measured.data["time"]},
     )  # fmt: skip
 
 

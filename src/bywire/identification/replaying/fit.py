@@ -117,12 +117,12 @@ def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
     reach = max(_FIRST_LAG * step, 0.02 * most)
     while reach < most:
         try:
-            found = estimate_lag(part, "measured", "modeled", largest=reach, interval=step)
+            peak = estimate_lag(part, "measured", "modeled", largest=reach, interval=step)
         except ParameterError as error:
             return math.nan, str(error)
-        if not found.at_limit and found.correlation > 0.0:
-            value = found.value if abs(found.value) > _NO_LAG * step else 0.0
-            return value, f"correlation {found.correlation:.4f}"
+        if not peak.at_limit and peak.correlation > 0.0:
+            value = peak.value if abs(peak.value) > _NO_LAG * step else 0.0
+            return value, f"correlation {peak.correlation:.4f}"
         reach *= 2.0
     return math.nan, "no lag stands out"
 
@@ -142,14 +142,14 @@ def judged(
     UnknownNameError
         When a tolerance names no figure or signal.
     """
-    found = []
+    fits = []
     for segment in segments:
         figures = {name: fit_figures(pair, segment) for name, pair in outputs.items()}
         require_known(segment.tolerances, figures)
         for name, kpis in figures.items():
             verdicts = judge_fit(segment.tolerances, name, kpis)
-            found.append(SegmentFit(segment, name, kpis, verdicts))
-    return tuple(found)
+            fits.append(SegmentFit(segment, name, kpis, verdicts))
+    return tuple(fits)
 
 
 def undefined(fits: Sequence[SegmentFit]) -> tuple[str, ...]:

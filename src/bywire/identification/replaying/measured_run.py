@@ -138,12 +138,12 @@ def case_of(bench: Bench, label: str) -> Case:
     ParameterError
         When the experiment makes no run.
     """
-    found = {one.label: one for one in bench.cases()}
-    if not found:
+    cases = {case.label: case for case in bench.cases()}
+    if not cases:
         raise ParameterError(f"experiment {bench.experiment!r} makes no run: take another one")
-    if label and label not in found:
-        raise unknown_name(f"run of {bench.experiment}", label, found)
-    return found[label] if label else next(iter(found.values()))
+    if label and label not in cases:
+        raise unknown_name(f"run of {bench.experiment}", label, cases)
+    return cases[label] if label else next(iter(cases.values()))
 
 
 def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> dict[str, str]:
@@ -173,9 +173,9 @@ def _started(
             first = data[signal].values[np.isfinite(data[signal].values)][:1]
             leaf = leaf_fields(bench.definition.options)[option]
             start = max(float(first[0]), leaf.low) if first.size else leaf.low
-            own = replace(bench, options={**bench.options, option: start})
+            started = replace(bench, options={**bench.options, option: start})
             said = f"starts at the measured {signal}, {start:.5g} {leaf.unit.symbol}"
-            return own, {option: signal}, (said,)
+            return started, {option: signal}, (said,)
     return bench, {}, ()
 
 

@@ -97,7 +97,7 @@ def kalman(
     n, p = regressors.shape
     values, sure = np.empty((n, p)), np.empty((n, p))
     innovations, spreads = np.full(n, np.nan), np.full(n, np.nan)
-    one = np.eye(p)
+    identity = np.eye(p)
     counts = np.isfinite(targets) & np.isfinite(regressors).all(axis=1)
     for k in range(n):
         if k:
@@ -108,7 +108,7 @@ def kalman(
             gain = P @ phi / spread
             error = float(targets[k] - phi @ theta)
             theta = theta + gain * error
-            left = one - np.outer(gain, phi)
+            left = identity - np.outer(gain, phi)
             P = left @ P @ left.T + variance * np.outer(gain, gain)
             innovations[k], spreads[k] = error / math.sqrt(spread), spread
         values[k], sure[k] = theta, np.sqrt(np.diag(P))
@@ -215,18 +215,18 @@ def likeliest(
         return Walk(math.exp(x[1]) * deviation, math.hypot(least, rough * math.exp(x[0])))
 
     def loss(x: Array) -> float:
-        found = kalman(regressors, targets, interval, walk(x), start, deviation)
-        there = np.flatnonzero(np.isfinite(found.innovations))[_BURN_IN * p :]
-        nu, spread = found.innovations[there], found.spreads[there]
+        tracked = kalman(regressors, targets, interval, walk(x), start, deviation)
+        there = np.flatnonzero(np.isfinite(tracked.innovations))[_BURN_IN * p :]
+        nu, spread = tracked.innovations[there], tracked.spreads[there]
         return float(np.sum(np.log(spread) + nu**2))
 
     grid = [(loss(np.array([a, b])), a, b) for a in (-2.0, 0.0) for b in (-8.0, -5.0, -2.0)]
     _, a, b = min(grid)
-    found = optimize.minimize(
+    ended = optimize.minimize(
         loss, np.array([a, b]), method="Nelder-Mead",
         options={"xatol": 0.02, "fatol": 1e-3, "maxiter": 80},
     )  # fmt: skip
-    return walk(found.x)
+    return walk(ended.x)
 
 
 def _require_shapes(regressors: Array, targets: Array, start: Array) -> None:

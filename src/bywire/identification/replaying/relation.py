@@ -88,20 +88,20 @@ def find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
         When what it needs is not measured, or the brake is another one.
     """
     known = {relation.parameter for relation in RELATIONS.all().values()}
-    found = [
+    relations = [
         r for r in RELATIONS.all().values()
         if name in (r.parameter, r.parameter.rpartition(".")[2])
     ]
-    if not found:
+    if not relations:
         raise unknown_name("parameter to track", name, known)
-    found = [r for r in found if r.parameter in par.flat()]
-    if not found:
+    relations = [r for r in relations if r.parameter in par.flat()]
+    if not relations:
         raise ParameterError(f"{name} is tracked on brakes that have it; the parameters lack it")
-    for relation in found:
+    for relation in relations:
         if all(signal in data for signal in relation.signals):
             return relation
-    wanted = " or ".join(", ".join(r.signals) for r in found)
+    wanted = " or ".join(", ".join(r.signals) for r in relations)
     raise ParameterError(
-        f"tracking {found[0].parameter} needs the measured signals {wanted}; measured are "
+        f"tracking {relations[0].parameter} needs the measured signals {wanted}; measured are "
         f"{', '.join(map(str, data.data_vars))}"
     )

@@ -80,14 +80,14 @@ def found_in(demand: xr.DataArray, tolerances: Mapping[str, str]) -> list[Segmen
             "stretches that matter in a file, --segments FILE"
         )
     counts = {"hold": 0, "move": 0}
-    found = []
+    segments = []
     for a, b in pairwise(merged):
         kind = "move" if moving[a:b].mean() > 0.5 else "hold"
         counts[kind] += 1
-        found.append(
+        segments.append(
             Segment(f"{kind}-{counts[kind]}", float(time[a]), float(time[b]), dict(tolerances))
         )
-    return found
+    return segments
 
 
 def read_segments(path: str | Path, tolerances: Mapping[str, str]) -> list[Segment]:
@@ -124,22 +124,22 @@ def _from(content: Mapping[str, Any], tolerances: Mapping[str, str]) -> list[Seg
     sections = _table(content.get("segments", {}), "segments")
     if not sections:
         raise ParameterError("no segment: write [segments.NAME] with start and stop")
-    found = []
+    segments = []
     for name, section in sections.items():
-        one = _table(section, f"segments.{name}")
-        for key in one:
+        entry = _table(section, f"segments.{name}")
+        for key in entry:
             if key not in _KEYS:
                 raise unknown_name(f"key in [segments.{name}]", key, _KEYS)
         ends = []
         for key in ("start", "stop"):
-            if key not in one:
+            if key not in entry:
                 raise ParameterError(f"segments.{name}.{key} is missing: write {key} = \"1 s\"")
-            ends.append(parse(one[key], "s", f"segments.{name}.{key}"))
+            ends.append(parse(entry[key], "s", f"segments.{name}.{key}"))
         if not ends[0] < ends[1]:
             raise ParameterError(f"segments.{name}: start must lie before stop")
-        own = _texts(one.get("tolerances", {}), f"segments.{name}.tolerances")
-        found.append(Segment(name, ends[0], ends[1], {**shared, **own}))
-    return found
+        limits = _texts(entry.get("tolerances", {}), f"segments.{name}.tolerances")
+        segments.append(Segment(name, ends[0], ends[1], {**shared, **limits}))
+    return segments
 
 
 def _table(value: Any, name: str) -> Mapping[str, Any]:

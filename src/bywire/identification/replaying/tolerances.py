@@ -69,7 +69,7 @@ def judge_fit(
     UnitError
         When its unit measures something else than the figure.
     """
-    by_name = {one.name: one for one in kpis}
+    by_name = {kpi.name: kpi for kpi in kpis}
     wanted = {key: key for key in tolerances if "." not in key}
     for key in tolerances:
         if key.startswith(f"{signal}."):
@@ -102,10 +102,10 @@ def require_known(tolerances: Mapping[str, str], figures: Mapping[str, Sequence[
 
 
 def _verdicts(key: str, text: str, kpi: Kpi) -> list[Verdict]:
-    limits = [_limit(key, one, kpi.unit) for one in _BOTH.split(text.strip())]
+    limits = [_limit(key, limit, kpi.unit) for limit in _BOTH.split(text.strip())]
     magnitude = kpi.name in SIGNED and not any(sign.startswith(">") for sign, *_ in limits)
     value = abs(kpi.value) if magnitude else kpi.value
-    found = []
+    verdicts = []
     for sign, bound, written in limits:
         if magnitude and bound < 0.0:
             raise ParameterError(
@@ -114,8 +114,8 @@ def _verdicts(key: str, text: str, kpi: Kpi) -> list[Verdict]:
             )
         met = {"<=": value <= bound, ">=": value >= bound, "<": value < bound, ">": value > bound}
         holds = met[sign] and not math.isnan(value)
-        found.append(Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note))
-    return found
+        verdicts.append(Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note))
+    return verdicts
 
 
 def _limit(key: str, text: str, unit: str) -> tuple[str, float, str]:

@@ -80,11 +80,11 @@ def track(name: str, data: xr.Dataset, par: Any, block: float | None = None) -> 
     step = width * interval
     least = _scatter(all_rows, width, used)
     walk = likeliest(rows.regressors, rows.targets, step, start, deviation, least)
-    found = kalman(rows.regressors, rows.targets, step, walk, start, deviation)
+    tracked = kalman(rows.regressors, rows.targets, step, walk, start, deviation)
     times = data["time"].values[0] + (np.arange(used.size) + 0.5) * step
     return Track(
-        relation, _dataset(relation, times, found, used), walk.drift, walk.noise,
-        found.consistency(),
+        relation, _dataset(relation, times, tracked, used), walk.drift, walk.noise,
+        tracked.consistency(),
     )  # fmt: skip
 
 
@@ -112,26 +112,26 @@ def _blocks(rows: Rows, width: int) -> tuple[Rows, NDArray[np.int64]]:
 def _scatter(rows: Rows, width: int, used: NDArray[np.int64]) -> float:
     """Return the standard error of a block's mean that the scatter within blocks tells."""
     p = rows.regressors.shape[1]
-    found = []
+    variances = []
     for k in np.flatnonzero(used > 2 * p):
         part = slice(k * width, (k + 1) * width)
         y, phi = rows.targets[part], rows.regressors[part]
         there = np.isfinite(y) & np.isfinite(phi).all(axis=1)
         left = y[there] - phi[there] @ np.linalg.lstsq(phi[there], y[there], rcond=None)[0]
-        found.append(float(left @ left) / (there.sum() - p) / there.sum())
-    return math.sqrt(float(np.median(found))) if found else 0.0
+        variances.append(float(left @ left) / (there.sum() - p) / there.sum())
+    return math.sqrt(float(np.median(variances))) if variances else 0.0
 
 
 def _dataset(
-    relation: Relation, times: Array, found: Tracked, used: NDArray[np.int64]
+    relation: Relation, times: Array, tracked: Tracked, used: NDArray[np.int64]
 ) -> xr.Dataset:
-    reach = 1.959964 * found.deviations
+    reach = 1.959964 * tracked.deviations
     axes = ("time", "parameter")
     return xr.Dataset(
         {
-            "value": (axes, found.values),
-            "low": (axes, found.values - reach),
-            "high": (axes, found.values + reach),
+            "value": (axes, tracked.values),
+            "low": (axes, tracked.values - reach),
+            "high": (axes, tracked.values + reach),
             "used": ("time", used),
         },
         {"time": ("time", times, {"units": "s"}), "parameter": list(relation.names),

@@ -14,16 +14,16 @@ from bywire.identification.records import after_one_another
 from bywire.identification.sealing.strokes import Group, find_strokes, velocity
 
 
-def friction_line(found: Estimate, groups: Sequence[Group]) -> Curve:
+def friction_line(fit: Estimate, groups: Sequence[Group]) -> Curve:
     """Return friction over pressure with its band, and what each group says of it."""
-    offset = found["F_off"] if "F_off" in found.names else 0.0
-    seen = {g.p: g.direction * (g.F - found["A"] * g.p - offset) for g in groups}
+    offset = fit["F_off"] if "F_off" in fit.names else 0.0
+    seen = {g.p: g.direction * (g.F - fit["A"] * g.p - offset) for g in groups}
     p = np.union1d(np.linspace(0.0, 1.1 * max(seen), 60), list(seen))
-    places = [found.names.index(n) for n in ("F_0", "f") if n in found.names]
+    places = [fit.names.index(n) for n in ("F_0", "f") if n in fit.names]
     rows = np.column_stack((np.ones(p.size), p))[:, : len(places)]
-    value = rows @ found.values[places]
-    variance = np.einsum("ni,ij,nj->n", rows, found.covariance[np.ix_(places, places)], rows)
-    half = 0.5 * float(np.diff(found.intervals()[0])[0]) / float(found.deviations[0])
+    value = rows @ fit.values[places]
+    variance = np.einsum("ni,ij,nj->n", rows, fit.covariance[np.ix_(places, places)], rows)
+    half = 0.5 * float(np.diff(fit.intervals()[0])[0]) / float(fit.deviations[0])
     reach = half * np.sqrt(variance)
     attrs = {"units": "N", "long_name": "friction"}
     return Curve(
@@ -41,23 +41,23 @@ def friction_line(found: Estimate, groups: Sequence[Group]) -> Curve:
 
 def sliding_force(
     records: Mapping[str, xr.Dataset],
-    found: Estimate,
+    fit: Estimate,
     stretch: tuple[float, float],
     slowest: float,
     cutoff: float,
 ) -> Curve:
     """Return the force while it slides, measured and modeled, record after record."""
-    offset = found["F_off"] if "F_off" in found.names else 0.0
+    offset = fit["F_off"] if "F_off" in fit.names else 0.0
     measured, modeled, times = [], [], {}
-    for name, one in records.items():
-        x, p, F = (one[n].values for n in ("x", "p", "F"))
-        times[name] = one["time"].values - one["time"].values[0]
-        v = velocity(x, even_interval(one["time"].values), cutoff)
+    for name, record in records.items():
+        x, p, F = (record[n].values for n in ("x", "p", "F"))
+        times[name] = record["time"].values - record["time"].values[0]
+        v = velocity(x, even_interval(record["time"].values), cutoff)
         model = np.full(F.size, np.nan)
         for stroke in find_strokes(x, v, *stretch, slowest):
             k = stroke.rows
-            rubs = found["F_0"] + found["f"] * p[k]
-            model[k] = found["A"] * p[k] + stroke.direction * rubs + offset
+            rubs = fit["F_0"] + fit["f"] * p[k]
+            model[k] = fit["A"] * p[k] + stroke.direction * rubs + offset
         measured.append(np.where(np.isfinite(model), F, np.nan))
         modeled.append(model)
     attrs = {"units": "N", "long_name": "force"}

@@ -67,7 +67,7 @@ def find_strokes(x: Array, v: Array, low: float, high: float, slowest: float) ->
     """
     inside = np.isfinite(x) & (x > low) & (x < high)
     edges = np.flatnonzero(np.diff(np.concatenate(([0], inside.astype(int), [0]))))
-    found = []
+    strokes = []
     for begin, end in edges.reshape(-1, 2).tolist():
         travel = float(x[end - 1] - x[begin])
         if abs(travel) < _CROSSED * (high - low):
@@ -75,8 +75,8 @@ def find_strokes(x: Array, v: Array, low: float, high: float, slowest: float) ->
         direction = 1 if travel > 0 else -1
         rows = begin + np.flatnonzero(direction * v[begin:end] > slowest)
         if rows.size:
-            found.append(Stroke(direction, rows))
-    return found
+            strokes.append(Stroke(direction, rows))
+    return strokes
 
 
 @dataclass(frozen=True)
@@ -103,13 +103,13 @@ class Group:
 
 
 def grouped(
-    one: xr.Dataset, stretch: tuple[float, float], slowest: float, cutoff: float
+    record: xr.Dataset, stretch: tuple[float, float], slowest: float, cutoff: float
 ) -> list[Group]:
     """Return the groups of a record, outward first.
 
     Parameters
     ----------
-    one
+    record
         ``x`` [m], ``p`` [Pa] and ``F`` [N] over ``time`` [s], evenly spaced.
     stretch
         Travels between which strokes count [m].
@@ -118,10 +118,10 @@ def grouped(
     cutoff
         Corner of the low-pass before the travel is differentiated [Hz].
     """
-    x, p, F = (one[name].values for name in ("x", "p", "F"))
-    v = velocity(x, even_interval(one["time"].values), cutoff)
+    x, p, F = (record[name].values for name in ("x", "p", "F"))
+    v = velocity(x, even_interval(record["time"].values), cutoff)
     strokes = find_strokes(x, v, *stretch, slowest)
-    found = []
+    groups = []
     for direction in (1, -1):
         means = np.array([
             (np.nanmean(p[s.rows]), np.nanmean(F[s.rows]))
@@ -130,8 +130,8 @@ def grouped(
         if means.size:
             scatter = float(means[:, 1].std(ddof=1)) if len(means) > 1 else 0.0
             p_mean, F_mean = means.mean(axis=0).tolist()
-            found.append(Group(direction, p_mean, F_mean, scatter, len(means)))
-    return found
+            groups.append(Group(direction, p_mean, F_mean, scatter, len(means)))
+    return groups
 
 
 def require_told(groups: Sequence[Group]) -> None:

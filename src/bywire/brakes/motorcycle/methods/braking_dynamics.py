@@ -94,11 +94,11 @@ def identify(
     figures: dict[str, tuple[float, str]] = {}
     checks: list[Check] = []
     for k, region in enumerate(regions):
-        found = fit(region, par, joint=options.fit == "joint", turns=round(options.turns),
+        estimate = fit(region, par, joint=options.fit == "joint", turns=round(options.turns),
                     pair=options.model == "eq-22")  # fmt: skip
-        estimates[region.name] = found
-        figures |= _figures(region, found)
-        checks += _checks(region, found)
+        estimates[region.name] = estimate
+        figures |= _figures(region, estimate)
+        checks += _checks(region, estimate)
         if effort.progress is not None:
             effort.progress("regions", (k + 1) / len(regions))
     return Identified(
@@ -109,7 +109,7 @@ def identify(
 
 
 def _without_pair(estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
-    names = [region for region, found in estimates.items() if not pair_shows(found)]
+    names = [region for region, estimate in estimates.items() if not pair_shows(estimate)]
     if not names:
         return ()
     return (
@@ -118,15 +118,15 @@ def _without_pair(estimates: Mapping[str, Estimate]) -> tuple[str, ...]:
     )
 
 
-def pair_shows(found: Estimate) -> bool:
+def pair_shows(estimate: Estimate) -> bool:
     """Return whether the slow pair's zero and pole differ by more than twice what noise makes."""
-    names = [u.name for u in found.unknowns]
+    names = [u.name for u in estimate.unknowns]
     if not {"tau_L", "T_L"} <= set(names):
-        return not {"tau_L", "T_L"} & {k.unknown.name for k in found.kept}
+        return not {"tau_L", "T_L"} & {k.unknown.name for k in estimate.kept}
     contrast = np.zeros(len(names))
     contrast[names.index("tau_L")], contrast[names.index("T_L")] = 1.0, -1.0
-    deviation = math.sqrt(max(float(contrast @ found.covariance @ contrast), 0.0))
-    return abs(float(contrast @ found.values)) > 2.0 * deviation
+    deviation = math.sqrt(max(float(contrast @ estimate.covariance @ contrast), 0.0))
+    return abs(float(contrast @ estimate.values)) > 2.0 * deviation
 
 
 def _described(region: Region) -> str:
@@ -138,20 +138,20 @@ def _described(region: Region) -> str:
     )
 
 
-def _figures(region: Region, found: Estimate) -> dict[str, tuple[float, str]]:
+def _figures(region: Region, estimate: Estimate) -> dict[str, tuple[float, str]]:
     """Return the gain, and the corner frequencies as Table 4 has them."""
-    five = five_of(found)
+    five = five_of(estimate)
     figures = {f"{region.name}.K": (five["K"], "Pa/A")}
     for name, T in list(five.items())[1:]:
         figures[f"{region.name}.f_{name}"] = (1.0 / (2.0 * math.pi * T), "Hz")
     return figures
 
 
-def _checks(region: Region, found: Estimate) -> list[Check]:
+def _checks(region: Region, estimate: Estimate) -> list[Check]:
     """Return how well eq. (22) describes the records."""
     name = region.name
-    five = list(five_of(found).values())
-    rests = [found[label] for label in found.names if label.endswith(":p_rest")]
+    five = list(five_of(estimate).values())
+    rests = [estimate[label] for label in estimate.names if label.endswith(":p_rest")]
     values = np.array([*five, *rests])
     whole = unknowns_of(region, dict(zip(NAMES, five, strict=True)))
     parts = [
@@ -202,15 +202,15 @@ def truth(par: MotorcycleParameters, options: Options) -> Mapping[str, float]:
             "the whole brake has no true values of eq. (22): set plant = 'eq-22' to study what "
             "the method gives back of what is put in"
         )
-    found = {}
+    values = {}
     for region, p in _pressures(options).items():
         model = eq22_of(par, p, options.f_zero, options.f_pole)
         pole, slow, fast = sorted(model.poles_hz)
         corners = {"tau_L": float(model.zeros_hz[0]), "T1": slow, "T2": fast, "T_L": pole}
-        found[f"{region}:K"] = model.gain
+        values[f"{region}:K"] = model.gain
         for name, f in corners.items():
-            found[f"{region}:{name}"] = 1.0 / (2.0 * math.pi * float(f))
-    return found
+            values[f"{region}:{name}"] = 1.0 / (2.0 * math.pi * float(f))
+    return values
 
 
 METHOD = Method(

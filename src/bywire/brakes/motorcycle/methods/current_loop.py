@@ -75,7 +75,7 @@ def identify(
     ----------
     Dardanelli, Alli, Savaresi (2010), section 3.1, Fig. 3.
     """
-    trials = [_trial(one, par, options, label) for label, one in split(data).items()]
+    trials = [_trial(record, par, options, label) for label, record in split(data).items()]
     return identified_loop(trials, par, options.names(_GAINS, _WINDING))
 
 
@@ -83,36 +83,37 @@ def _trial(
     data: xr.Dataset, par: MotorcycleParameters, options: Options, label: str
 ) -> Trial:
     require_steps(data, "i_set", "i", label)
-    own = par.replace(
+    loop_par = par.replace(
         {"drive.mode": "current-direct", "adc.law": "ideal", "seal.T_pr": options.T_hold}
     )
     i = data["i"].values
     sigma = noise_of_levels(i, data["i_set"].values)
-    found = trial(
-        MotorcycleBrake(), own, data.assign(i_meas=("time", i)), {"i_set": "i_set"},
-        {"i_meas": sigma}, state=state_at(0.0, own), memory=memory_at(0.0, own), label=label,
+    beside = trial(
+        MotorcycleBrake(), loop_par, data.assign(i_meas=("time", i)), {"i_set": "i_set"},
+        {"i_meas": sigma}, state=state_at(0.0, loop_par), memory=memory_at(0.0, loop_par),
+        label=label,
     )  # fmt: skip
-    return without_lead(found, data, options.lead)
+    return without_lead(beside, data, options.lead)
 
 
 def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Dataset:
     """Return steps of the demand on the whole brake, the piston stuck, with noise in the loop."""
     span = par.current_sensor.i_high - par.current_sensor.i_low
-    own = par.replace({"adc.noise": options.sigma_i / span})
-    hold = holding_current(options.p_start, own)
-    T = own.ecu.T_s
+    noisy_par = par.replace({"adc.noise": options.sigma_i / span})
+    hold = holding_current(options.p_start, noisy_par)
+    T = noisy_par.ecu.T_s
     demand = levels(
         hold - options.i_low, hold + options.i_high, options.duration, options.dwell, T, seed=1
     )
     case = case_from_rest(
-        "run", own, "current-direct", options.p_start, lambda t: {"i_set": demand(t)},
+        "run", noisy_par, "current-direct", options.p_start, lambda t: {"i_set": demand(t)},
         options.duration, record=T,
     )  # fmt: skip
-    made = simulate(as_run(case, 20e-6, seed=(seed,)), ("i_meas",))
+    computed = simulate(as_run(case, 20e-6, seed=(seed,)), ("i_meas",))
     return xr.Dataset(
-        {"i_set": ("time", demand(made.time), {"units": "A", "long_name": "current demand"}),
-         "i": ("time", made["i_meas"], {"units": "A", "long_name": "measured current"})},
-        {"time": ("time", np.asarray(made.time), {"units": "s", "long_name": "time"})},
+        {"i_set": ("time", demand(computed.time), {"units": "A", "long_name": "current demand"}),
+         "i": ("time", computed["i_meas"], {"units": "A", "long_name": "measured current"})},
+        {"time": ("time", np.asarray(computed.time), {"units": "s", "long_name": "time"})},
     )  # fmt: skip
 
 

@@ -97,11 +97,11 @@ def identify(
     shots = shots_of(data, options)
     require_reachable(shots, par)
     require_calm(shots, noise_of(data["i"].values), _LIMIT_RIPPLE * options.ripple)
-    found, best = _fitted(data, par, options, effort)
+    led, best = _fitted(data, par, options, effort)
     values = best.parameters()
-    own = par.replace(values)
+    identified_par = par.replace(values)
     zero = best[_ZERO] if _ZERO in best.names else 0.0
-    whole = replayed(data.assign(i=data["i"] - zero), own, options.step)
+    whole = replayed(data.assign(i=data["i"] - zero), identified_par, options.step)
     error = whole["modeled"] - whole["measured"]
     nrmse = float(np.sqrt((error**2).mean()) / np.ptp(data["p_mc"].values))
     return Identified(
@@ -115,15 +115,15 @@ def identify(
             Check("zero_over_usual", abs(zero) / options.zero, limit=_LIMIT_ZERO,
                   note="reading of the current's sensor without current, over its usual size: more "
                   "may also be the zero of the pressure's sensor, a unit, or the torque constant"),
-            Check("starts_at_minimum", found.reached / effort.starts),
+            Check("starts_at_minimum", led.reached / effort.starts),
         ),
         curves=(
             Curve("ramp", "Pressure on the ramp: measured, and modeled with the estimates.",
                   whole, "time"),
-            _stribeck(own, best),
+            _stribeck(identified_par, best),
         ),
         notes=(
-            _counted(shots), f"{found.reached} of {effort.starts} starts reached the minimum",
+            _counted(shots), f"{led.reached} of {effort.starts} starts reached the minimum",
         ),
     )  # fmt: skip
 
@@ -141,18 +141,18 @@ def _fitted(
         _problem(data, par, _quick(options, length), unknowns)
         for length in (_BEGINNING, _QUICK_LENGTH)
     )
-    found = search(
+    led = search(
         longer, scattered(unknowns, effort.starts, effort.spread, effort.seed), "linear",
         effort.progress, effort.store, effort.threads, partial(nearer, beginning, _HARDLY_TOLD),
     )  # fmt: skip
-    at = found.best.values
+    at = led.best.values
     best = estimate(_problem(data, par, options, unknowns, at), start=at)
     if not any(name.startswith("seal.") for name in best.names):
         raise ParameterError(
             "the slips tell nothing of the seal's friction with this current: check the units of "
             "i and p_mc, and motor.K_e, gear and cylinder, which are taken as known"
         )
-    return found, best
+    return led, best
 
 
 def _quick(options: Options, length: float) -> Options:
@@ -203,11 +203,11 @@ def _counted(shots: Sequence[Shot]) -> str:
     return f"slips: {up} up, {len(shots) - up} down"
 
 
-def _stribeck(par: MotorcycleParameters, found: Estimate) -> Curve:
+def _stribeck(par: MotorcycleParameters, fit: Estimate) -> Curve:
     return Curve(
         "stribeck",
         "Identified Stribeck curves with 95 % bands (Fig. 4).",
-        stribeck_band(par.seal, found, (2e5, 20e5, 40e5), np.linspace(-2.0, 2.0, 201)),
+        stribeck_band(par.seal, fit, (2e5, 20e5, 40e5), np.linspace(-2.0, 2.0, 201)),
         "omega",
     )
 
@@ -216,16 +216,16 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
     """Return the ramp of eq. (17) without dither, simulated, with the sensors' noise."""
     sensor = par.current_sensor
     share = options.sigma_i / (sensor.i_high - sensor.i_low)
-    own = par.replace({"adc.noise": float(np.hypot(par.adc.noise, share))})
-    case = friction_ramp.EXPERIMENT.cases(own, friction_ramp.EXPERIMENT.defaults, None)[0]
-    made = simulate(as_run(case, 20e-6, seed=(seed,)), ("i", "p_mc"))
+    noisy_par = par.replace({"adc.noise": float(np.hypot(par.adc.noise, share))})
+    case = friction_ramp.EXPERIMENT.cases(noisy_par, friction_ramp.EXPERIMENT.defaults, None)[0]
+    computed = simulate(as_run(case, 20e-6, seed=(seed,)), ("i", "p_mc"))
     random = np.random.default_rng(seed)
-    noise = random.normal(0.0, options.sigma_p, made.time.size)
-    noise_i = random.normal(random.normal(0.0, options.zero), options.sigma_i, made.time.size)
+    noise = random.normal(0.0, options.sigma_p, computed.time.size)
+    noise_i = random.normal(random.normal(0.0, options.zero), options.sigma_i, computed.time.size)
     return xr.Dataset(
-        {"i": ("time", made["i"] + noise_i, {"units": "A"}),
-         "p_mc": ("time", made["p_mc"] + noise, {"units": "Pa"})},
-        {"time": ("time", made.time, {"units": "s"})},
+        {"i": ("time", computed["i"] + noise_i, {"units": "A"}),
+         "p_mc": ("time", computed["p_mc"] + noise, {"units": "Pa"})},
+        {"time": ("time", computed.time, {"units": "s"})},
     )  # fmt: skip
 
 

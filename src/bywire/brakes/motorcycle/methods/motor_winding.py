@@ -83,20 +83,20 @@ def identify(
     """
     records = split(data)
     trials = []
-    for label, one in records.items():
-        require_steps(one, "v", "i", label)
-        sigma = noise_of_levels(one["i"].values, one["v"].values)
+    for label, record in records.items():
+        require_steps(record, "v", "i", label)
+        sigma = noise_of_levels(record["i"].values, record["v"].values)
         names = {"v": "v", "omega": "omega", "i": "i"}
-        trials.append(winding_trial(par.motor, one, names, par.anti_alias.f_aa, sigma, label))
-    turning = any(float(np.ptp(one["omega"].values)) > _TURNS for one in records.values())
+        trials.append(winding_trial(par.motor, record, names, par.anti_alias.f_aa, sigma, label))
+    turning = any(float(np.ptp(record["omega"].values)) > _TURNS for record in records.values())
     unknowns = parameters_of(par, _NAMES if turning else _NAMES[:2])
-    found = estimate(output_error(trials, unknowns))
+    fit = estimate(output_error(trials, unknowns))
     notes = () if turning else (
         "the shaft does not turn: nothing tells K_e; let it turn, and measure its speed",
     )  # fmt: skip
     return Identified(
-        estimates={"winding": found}, parameters=believable(found),
-        checks=checks_of(trials, found), curves=tuple(as_curve(t, found) for t in trials),
+        estimates={"winding": fit}, parameters=believable(fit),
+        checks=checks_of(trials, fit), curves=tuple(as_curve(t, fit) for t in trials),
         notes=notes,
     )  # fmt: skip
 
@@ -105,26 +105,26 @@ def synthetic(par: MotorcycleParameters, options: Options, seed: int) -> xr.Data
     """Return steps of the voltage on the whole brake, simulated, with the sensors' noise."""
     random = np.random.default_rng(seed)
     stuck = options.rotor == "stuck"
-    own = par.replace({"drive.T_source": options.interval, "adc.law": "ideal"})
+    source_par = par.replace({"drive.T_source": options.interval, "adc.law": "ideal"})
     p = options.p_start if stuck else 0.0
     low, high = 0.0, options.v_high
     if stuck:
-        hold, R = holding_current(p, own), own.motor.R_m
+        hold, R = holding_current(p, source_par), source_par.motor.R_m
         low, high = R * (hold - options.i_low), R * (hold + options.i_high)
     v = levels(low, high, options.duration, options.dwell, options.interval, seed=1)
     case = case_from_rest(
-        "run", own, "voltage-source", p, lambda t: {"v_set": v(t)}, options.duration,
+        "run", source_par, "voltage-source", p, lambda t: {"v_set": v(t)}, options.duration,
         record=options.interval,
     )  # fmt: skip
-    made = simulate(as_run(case, _STEP), ("i_meas", "omega"))
-    n = made.time.size
-    omega = made["omega"] + (0.0 if stuck else random.normal(0.0, options.sigma_omega, n))
+    computed = simulate(as_run(case, _STEP), ("i_meas", "omega"))
+    n = computed.time.size
+    omega = computed["omega"] + (0.0 if stuck else random.normal(0.0, options.sigma_omega, n))
     return xr.Dataset(
-        {"v": ("time", v(made.time), {"units": "V", "long_name": "motor voltage"}),
+        {"v": ("time", v(computed.time), {"units": "V", "long_name": "motor voltage"}),
          "omega": ("time", omega, {"units": "rad/s", "long_name": "motor speed"}),
-         "i": ("time", made["i_meas"] + random.normal(0.0, options.sigma_i, n),
+         "i": ("time", computed["i_meas"] + random.normal(0.0, options.sigma_i, n),
                {"units": "A", "long_name": "measured current"})},
-        {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
+        {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
     )  # fmt: skip
 
 

@@ -91,7 +91,7 @@ def identify(
             "revolutions, or raise options.highest"
         )
     best = estimate(cogging_problem(turning, orders))
-    found = CoggingFit(turning, orders, best)
+    cogging = CoggingFit(turning, orders, best)
     main = orders[0]
     figures = {"order": (float(main), "1")}
     for k, order in enumerate(orders[1:], 2):
@@ -103,8 +103,8 @@ def identify(
         estimates={"cogging and friction": best},
         parameters={"motor_1.T_cog": best["motor_1.T_cog"], "motor_1.N_cog": float(main)},
         figures=figures,
-        checks=(same_both_ways(found), slope_as_known(found, _slope(par, turning))),
-        curves=(_folded(found),),
+        checks=(same_both_ways(cogging), slope_as_known(cogging, _slope(par, turning))),
+        curves=(_folded(cogging),),
         notes=_notes(best, orders),
     )
 
@@ -177,19 +177,19 @@ def _turning(data: xr.Dataset, par: WedgeParameters, options: Options) -> Turnin
                    lambda n: (passed(np.cos(n * angle)), passed(np.sin(n * angle))))  # fmt: skip
 
 
-def _folded(found: CoggingFit) -> Curve:
+def _folded(cogging: CoggingFit) -> Curve:
     """Return torque over one period of the main order, friction taken off, both ways."""
-    turning, order = found.turning, found.orders[0]
+    turning, order = cogging.turning, cogging.orders[0]
     x = np.mod(order * turning.angle, 2.0 * np.pi)
     middle = (np.arange(_BINS) + 0.5) * 2.0 * np.pi / _BINS
     bins = np.minimum((x / (2.0 * np.pi) * _BINS).astype(int), _BINS - 1)
-    rest = turning.torque - found.friction
+    rest = turning.torque - cogging.friction
     table = np.full((2, _BINS), np.nan)
     for k, way in enumerate((1.0, -1.0)):
         for b in range(_BINS):
-            own = rest[(bins == b) & (turning.way == way)]
-            table[k, b] = own.mean() if own.size else np.nan
-    amplitude, phase = found.estimate["motor_1.T_cog"], found.estimate["phase"]
+            in_bin = rest[(bins == b) & (turning.way == way)]
+            table[k, b] = in_bin.mean() if in_bin.size else np.nan
+    amplitude, phase = cogging.estimate["motor_1.T_cog"], cogging.estimate["phase"]
     model = np.tile(amplitude * np.sin(middle + phase), (2, 1))
     attrs = {"units": "N*m", "long_name": "torque against cogging"}
     dims = ("direction", "x")

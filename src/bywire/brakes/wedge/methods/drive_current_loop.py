@@ -67,16 +67,18 @@ def identify(
     ----------
     Roberts et al. (2003), sections "Current controller" and "Motor current loop".
     """
-    trials = [_trial(one, par, options, label) for label, one in split(data).items()]
+    trials = [_trial(record, par, options, label) for label, record in split(data).items()]
     return identified_loop(trials, par, options.names(_GAINS, _WINDING))
 
 
 def _trial(data: xr.Dataset, par: WedgeParameters, options: Options, label: str) -> Trial:
     require_steps(data, "i_1_set", "i_1", label)
-    own = par.replace({**_CLAMPED, "encoder.law": "ideal"})
+    clamped_par = par.replace({**_CLAMPED, "encoder.law": "ideal"})
     sigma = noise_of_levels(data["i_1"].values, data["i_1_set"].values)
-    found = trial(ShaftRig(), own, data, {"i_1_set": "i_1_set"}, {"i_1": sigma}, label=label)
-    return without_lead(found, data, options.lead)
+    beside = trial(
+        ShaftRig(), clamped_par, data, {"i_1_set": "i_1_set"}, {"i_1": sigma}, label=label
+    )
+    return without_lead(beside, data, options.lead)
 
 
 def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
@@ -88,12 +90,12 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
         "run", par, lambda t: {"i_1_set": demand(t)}, options.duration, _CLAMPED,
         record=options.interval,
     )  # fmt: skip
-    made = simulate(as_run(case, 20e-6), ("i_1",))
-    noise = np.random.default_rng(seed).normal(0.0, options.sigma_i, made.time.size)
+    computed = simulate(as_run(case, 20e-6), ("i_1",))
+    noise = np.random.default_rng(seed).normal(0.0, options.sigma_i, computed.time.size)
     return xr.Dataset(
-        {"i_1_set": ("time", demand(made.time), {"units": "A", "long_name": "current demand"}),
-         "i_1": ("time", made["i_1"] + noise, {"units": "A", "long_name": "motor current"})},
-        {"time": ("time", np.asarray(made.time), {"units": "s", "long_name": "time"})},
+        {"i_1_set": ("time", demand(computed.time), {"units": "A", "long_name": "current demand"}),
+         "i_1": ("time", computed["i_1"] + noise, {"units": "A", "long_name": "motor current"})},
+        {"time": ("time", np.asarray(computed.time), {"units": "s", "long_name": "time"})},
     )  # fmt: skip
 
 

@@ -61,30 +61,30 @@ def identify(
     Roberts et al. (2003), section "Rollerscrew and bearings": loss of the screw, bearing friction.
     """
     reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
-    one = squeeze(data, par, reading, "the record")
+    cycle = squeeze(data, par, reading, "the record")
     unknowns = force_current.unknowns(par) + cogging_waves.unknowns(par, "sensor")
-    scatter = _scatter(one)
+    scatter = _scatter(cycle)
 
     def evaluate(values: Array) -> tuple[Array, Array]:
-        i, columns, _ = law(one.F, one.way, values)
-        e = i + one.waves @ values[_LAW:] - one.i
-        return e / scatter, np.hstack((columns, one.waves)) / scatter
+        i, columns, _ = law(cycle.F, cycle.way, values)
+        e = i + cycle.waves @ values[_LAW:] - cycle.i
+        return e / scatter, np.hstack((columns, cycle.waves)) / scatter
 
     best = estimate(Problem(unknowns, evaluate))
-    told = {u.label: u.start for u in unknowns} | dict(zip(best.names, best.values, strict=True))
-    values = np.array([told[u.label] for u in unknowns])
+    known = {u.label: u.start for u in unknowns} | dict(zip(best.names, best.values, strict=True))
+    values = np.array([known[u.label] for u in unknowns])
     return Identified(
         estimates={"force over current": best},
         parameters={},
-        figures=_figures(values, one, par),
+        figures=_figures(values, cycle, par),
         checks=(
             lack_of_fit(
-                "current_left_over", evaluate(values)[0], np.ones(one.i.size),
-                np.hstack((branches(one, 3, one.F), one.waves)), len(best.values),
+                "current_left_over", evaluate(values)[0], np.ones(cycle.i.size),
+                np.hstack((branches(cycle, 3, cycle.F), cycle.waves)), len(best.values),
                 "whether current over force bends in a way that the law does not",
             ),
         ),
-        curves=(_curve(one, values),),
+        curves=(_curve(cycle, values),),
         notes=(
             "half widths hold at the mean speed of the test; at rest the force may be anywhere "
             "between",
@@ -93,15 +93,17 @@ def identify(
     )  # fmt: skip
 
 
-def _scatter(one: Squeeze) -> float:
+def _scatter(cycle: Squeeze) -> float:
     """Return a rough scatter of the current; it drops out of the result."""
-    return max(float(np.median(np.abs(np.diff(one.i)))), 1e-9)
+    return max(float(np.median(np.abs(np.diff(cycle.i)))), 1e-9)
 
 
-def _figures(values: Array, one: Squeeze, par: WedgeParameters) -> dict[str, tuple[float, str]]:
+def _figures(
+    values: Array, cycle: Squeeze, par: WedgeParameters
+) -> dict[str, tuple[float, str]]:
     K = 0.5 * sum(servo_motor.torque_constant(m) for m in (par.motor_1, par.motor_2))
     per = K / roller_screw.slope(par.screw)
-    top = float(np.abs(one.F).max())
+    top = float(np.abs(cycle.F).max())
     half = float(values[2] + values[3] * top + values[4] * top**2)
     return {
         "force_per_current": (float(values[1]), "N/A"),
@@ -112,16 +114,16 @@ def _figures(values: Array, one: Squeeze, par: WedgeParameters) -> dict[str, tup
     }
 
 
-def _curve(one: Squeeze, values: Array) -> Curve:
-    measured = one.i - one.waves @ values[_LAW:]
+def _curve(cycle: Squeeze, values: Array) -> Curve:
+    measured = cycle.i - cycle.waves @ values[_LAW:]
     places, rows = [], []
     for sign in (1.0, -1.0):
-        F, i = one.F[one.way == sign], measured[one.way == sign]
+        F, i = cycle.F[cycle.way == sign], measured[cycle.way == sign]
         # A gap at zero force: nothing was read right at the kink there.
         places.append(np.append(F, 0.0))
-        own = np.array((i, law(F, np.full(F.size, sign), values)[0]))
-        rows.append(np.append(own, _GAP, axis=1))
-    line = np.array((one.F.min(), 0.0, one.F.max()))
+        branch = np.array((i, law(F, np.full(F.size, sign), values)[0]))
+        rows.append(np.append(branch, _GAP, axis=1))
+    line = np.array((cycle.F.min(), 0.0, cycle.F.max()))
     places.append(line)
     rows.append(np.array((np.full(3, np.nan), law(line, np.zeros(3), values)[0])))
     F, table = at_own_places(places, rows)

@@ -85,21 +85,21 @@ def identify(
     Roberts et al. (2003), sections "Motor", "Rollerscrew and bearings".
     """
     reading = Reading(options.cutoff, options.slowest, options.margin, options.window)
-    runs = [read_run(label or "run", one, par, reading) for label, one in split(data).items()]
+    runs = [read_run(label or "run", record, par, reading) for label, record in split(data).items()]
     names = NAMES if scale_is_told(runs) else NAMES[1:]
     best = fitted(runs, names)
-    told = INERTIA in best.names
-    if not told and INERTIA in names:
+    is_scaled = INERTIA in best.names
+    if not is_scaled and INERTIA in names:
         best = fitted(runs, NAMES[1:])
-    sources = by_source(runs) if told else {}
+    sources = by_source(runs) if is_scaled else {}
     return Identified(
-        estimates={"inertia and friction" if told else "friction at the given inertia": best},
-        parameters=best.parameters() if told else {},
+        estimates={"inertia and friction" if is_scaled else "friction at the given inertia": best},
+        parameters=best.parameters() if is_scaled else {},
         figures=_ratios(best, par)
         | {f"inertia_by_{k}": (value, "kg*m**2") for k, (value, _) in sources.items()},
         checks=(_fits(runs, best), *_agreement(sources)),
         curves=(_curve(runs, best),),
-        notes=() if told else (_untold(par),),
+        notes=() if is_scaled else (_untold(par),),
     )
 
 
@@ -128,9 +128,9 @@ def _fits(runs: Sequence[RunDown], best: Estimate) -> Check:
     begin = 0
     for run, e in zip(runs, left, strict=True):
         speed = run.motion.means(run.motion.data["omega"].values)
-        own = np.zeros((rows, 4))
-        own[begin : begin + e.size] = np.vander(speed / np.abs(speed).max(), 4)
-        columns.append(own)
+        cubic = np.zeros((rows, 4))
+        cubic[begin : begin + e.size] = np.vander(speed / np.abs(speed).max(), 4)
+        columns.append(cubic)
         weights.append(np.full(e.size, 1.0 / max(float(np.std(e)), 1e-300)))
         begin += e.size
     return lack_of_fit(
@@ -181,10 +181,11 @@ def synthetic(par: WedgeParameters, options: Options, seed: int) -> xr.Dataset:
     sensors = {"q_1": Sensor("q_1", options.sigma_q), "i_1": Sensor("i_1", options.sigma_i)}
     records = {}
     for case in experiment.cases(par, experiment.defaults, None):
-        one = sensed(turned(case, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
+        record = sensed(turned(case, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
         more = case.par.rig.J_dummy - par.rig.J_dummy  # type: ignore[attr-defined]
         attrs = {"units": "kg*m**2", "long_name": "added inertia"}
-        records[case.label] = one.assign(J_added=("time", np.full(one.sizes["time"], more), attrs))
+        added = np.full(record.sizes["time"], more)
+        records[case.label] = record.assign(J_added=("time", added, attrs))
     return joined(records)
 
 

@@ -75,10 +75,10 @@ def identify(
     Roberts et al. (2003), sections "Rollerscrew and bearings", "Roller-screw efficiency".
     """
     # Cogging is faster than the low-pass, and averages out over a window.
-    own = par.replace({"rig.load": "screw", "motor_1.T_cog": 0.0})
-    unknowns = parameters_of(own, _NAMES)
+    rig_par = par.replace({"rig.load": "screw", "motor_1.T_cog": 0.0})
+    unknowns = parameters_of(rig_par, _NAMES)
     equation = Equation(DrivenShaft(), "omega", "alpha", options.slowest)
-    shafts = [_moved(data, own, side, options) for side in ("1", "2")]
+    shafts = [_moved(data, rig_par, side, options) for side in ("1", "2")]
     for side, shaft in zip(("1", "2"), shafts, strict=True):
         if not shaft.windows:
             raise ParameterError(
@@ -86,22 +86,22 @@ def identify(
                 f"{_ADVICE}"
             )
     _require_loads(shafts)
-    _require_losses(shafts, own)
-    parts = [window_residuals(equation, own, unknowns, shaft) for shaft in shafts]
+    _require_losses(shafts, rig_par)
+    parts = [window_residuals(equation, rig_par, unknowns, shaft) for shaft in shafts]
     best = steady_dynamics(parts, unknowns, _ADVICE)
     values = best.parameters()
-    found = own.replace(values)
-    full = np.array([found.leaves()[name] for name in _NAMES])
-    made = [
+    identified_par = rig_par.replace(values)
+    full = np.array([identified_par.leaves()[name] for name in _NAMES])
+    strokes_read = [
         stroke for part, shaft, side in zip(parts, shafts, (1, 2), strict=True)
-        for stroke in strokes(shaft, part.evaluate(full)[0], found, side)
+        for stroke in strokes(shaft, part.evaluate(full)[0], identified_par, side)
     ]  # fmt: skip
     return Identified(
         estimates={"screw and bearings": best},
         parameters=values,
-        figures=_figures(found, made),
-        checks=(fits(made, best),),
-        curves=(_curve(made),),
+        figures=_figures(identified_par, strokes_read),
+        checks=(fits(strokes_read, best),),
+        curves=(_curve(strokes_read),),
         notes=(
             "a part of the bearings' friction that grows in proportion to the force (C_1) shows "
             f"as loss of the screw: taken as {shown(par.bearing.C_1, 'N*m/N')}",
@@ -132,8 +132,8 @@ def _require_loads(shafts: list[Motions]) -> None:
     for shaft in shafts:
         F = shaft.means(shaft.data["F"].values)
         drives = F * shaft.means(shaft.data["omega"].values) < 0.0
-        for kind, found in forces.items():
-            found += np.abs(F[drives == kind]).tolist()
+        for kind, levels in forces.items():
+            levels += np.abs(F[drives == kind]).tolist()
     for kind, name in ((True, "eta_f"), (False, "eta_b")):
         seen = forces[kind]
         if not seen or max(seen) < _SPREAD * min(seen):
@@ -161,22 +161,22 @@ def _require_losses(shafts: list[Motions], par: WedgeParameters) -> None:
                 )  # fmt: skip
 
 
-def _figures(par: WedgeParameters, made: list[Stroke]) -> dict[str, tuple[float, str]]:
+def _figures(par: WedgeParameters, strokes_read: list[Stroke]) -> dict[str, tuple[float, str]]:
     """Return the whole drive's efficiency at the largest load, bearings included."""
     k = roller_screw.slope(par.screw)
-    top = max((s for s in made if s.drives), key=lambda s: s.F, default=None)
-    speed = float(np.median([abs(s.omega) for s in made]))
+    top = max((s for s in strokes_read if s.drives), key=lambda s: s.F, default=None)
+    speed = float(np.median([abs(s.omega) for s in strokes_read]))
     bearing = axial_bearing.friction(axial_bearing.Input(0.0, speed), par.bearing)
-    found = {"bearing_torque_without_load": (float(bearing), "N*m")}
+    figures = {"bearing_torque_without_load": (float(bearing), "N*m")}
     if top is not None:
-        found["eta_with_bearings"] = (k * top.F / (top.torque - top.error), "1")
-        found["eta_with_bearings_at"] = (top.F, "N")
-    return found
+        figures["eta_with_bearings"] = (k * top.F / (top.torque - top.error), "1")
+        figures["eta_with_bearings_at"] = (top.F, "N")
+    return figures
 
 
-def _curve(made: list[Stroke]) -> Curve:
+def _curve(strokes_read: list[Stroke]) -> Curve:
     """Return motor torque over force, both ways."""
-    ways = [[s for s in made if s.drives is drives] for drives in (True, False)]
+    ways = [[s for s in strokes_read if s.drives is drives] for drives in (True, False)]
     F, table = at_own_places(
         [np.array([s.F for s in way]) for way in ways],
         [np.array([(s.torque, s.torque + s.error) for s in way]).T for way in ways],

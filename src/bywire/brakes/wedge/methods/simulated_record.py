@@ -50,14 +50,14 @@ def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generato
         Where the noise comes from.
     """
     run = as_run(case, _STEP)
-    made = simulate(run, tuple({s.output for s in sensors.values()}))
+    computed = simulate(run, tuple({s.output for s in sensors.values()}))
     known = signals_of(run.model.Output)
     settled = run.duration - case.duration
-    kept = made.time >= settled - 1e-9
-    axis = pd.Index(np.round(made.time[kept] - settled, 12), name="time")
+    kept = computed.time >= settled - 1e-9
+    axis = pd.Index(np.round(computed.time[kept] - settled, 12), name="time")
     rows = {}
     for name, sensor in sensors.items():
-        values = made[sensor.output][kept] + random.normal(0.0, sensor.sigma, int(kept.sum()))
+        values = computed[sensor.output][kept] + random.normal(0.0, sensor.sigma, int(kept.sum()))
         attrs = {"units": known[sensor.output].unit, "long_name": known[sensor.output].label}
         rows[name] = ("time", values, attrs)
     return xr.Dataset(rows, {"time": ("time", axis, {"units": "s", "long_name": "time"})})

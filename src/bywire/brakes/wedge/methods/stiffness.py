@@ -111,9 +111,9 @@ def _fitted(
         clear = heart.only(two_stages.clear_of(contacts, heart))
         stages = TwoStages(par, sensor, clear, contacts)
         best = steady_dynamics(stages.parts(), stages.unknowns, _ADVICE)
-        told = {u.label: u.start for u in stages.unknowns}
-        told |= dict(zip(best.names, best.values.tolist(), strict=True))
-        values = np.array([told[u.label] for u in stages.unknowns])
+        known = {u.label: u.start for u in stages.unknowns}
+        known |= dict(zip(best.names, best.values.tolist(), strict=True))
+        values = np.array([known[u.label] for u in stages.unknowns])
         contacts = stages.touching(values)
         heart = heart.under(stages.heart_force(values, heart)[0], par)
     return stages, best, values, heart
@@ -154,7 +154,7 @@ def synthetic(par: WedgeParameters, options: RigOptions, seed: int) -> xr.Datase
     first = sensed(turned(on_sensor, random.uniform(0.0, 2.0 * np.pi)), sensors, random)
     angles = {f"q_{k}": Sensor(f"theta_{k}") for k in (1, 2)}
     away = random.uniform(-_WITHIN, _WITHIN) * par.caliper.clearance / slope_of(par)
-    rest = {name: one for name, one in sensors.items() if name != "y_F"}
+    rest = {name: sensor for name, sensor in sensors.items() if name != "y_F"}
     second = sensed(turned(in_heart, away), rest | angles, random)
     for name in angles:
         angle: Any = second[name].values

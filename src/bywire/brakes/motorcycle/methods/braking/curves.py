@@ -39,25 +39,25 @@ def curves_of(
     """
     curves: list[Curve] = []
     for region in regions:
-        found = estimates[region.name]
+        estimate = estimates[region.name]
         if region.points.frequencies.size:
-            curves += _bode(region, found, par)
+            curves += _bode(region, estimate, par)
         curves += [
             Curve(
                 f"{region.name}-step" if len(region.steps) == 1 else f"{region.name}-step-{k + 1}",
                 f"Step of the current at {region.name} pressure, dither averaged: measured, "
                 "identified, and eq. (15).",
-                _step(step, found, par, region.pressure), "time",
+                _step(step, estimate, par, region.pressure), "time",
             )
             for k, step in enumerate(region.steps)
         ]  # fmt: skip
     return tuple(curves)
 
 
-def _bode(region: Region, found: Estimate, par: MotorcycleParameters) -> list[Curve]:
+def _bode(region: Region, estimate: Estimate, par: MotorcycleParameters) -> list[Curve]:
     f = region.points.frequencies
     measured = np.exp(region.points.log_gain)
-    modeled = with_slow_pair(*five_of(found).values()).response(f)
+    modeled = with_slow_pair(*five_of(estimate).values()).response(f)
     theory = theoretical(par, region.pressure, travel_at(region.pressure, par)).response(f)
     parts = {"measured": measured, "modeled": modeled, "theoretical": theory}
     caption = f"Pressure over current at {region.name} pressure: measured, identified, eq. (15)."
@@ -81,10 +81,10 @@ def _degrees(G: NDArray[np.complex128]) -> Array:
 
 
 def _step(
-    step: StepRecord, found: Estimate, par: MotorcycleParameters, p: float
+    step: StepRecord, estimate: Estimate, par: MotorcycleParameters, p: float
 ) -> xr.Dataset:
-    rest = found[f"{step.label or 'step'}:p_rest"]
-    y, _ = response(np.array(list(five_of(found).values())), step.u, step.interval, step.block)
+    rest = estimate[f"{step.label or 'step'}:p_rest"]
+    y, _ = response(np.array(list(five_of(estimate).values())), step.u, step.interval, step.block)
     middle = np.arange(y.size) * step.block + 0.5 * (step.block - 1)
     t = np.asarray((middle - step.before) * step.interval, dtype=float)
     height = float(np.mean(step.u[step.before :]))

@@ -34,10 +34,10 @@ def demands(
     i_step: float, amplitude: float, frequencies: tuple[float, ...]
 ) -> dict[str, tuple[Demand, float, float]]:
     """Return changes of the current demand [A] by record, with the times before and after zero."""
-    found: dict[str, tuple[Demand, float, float]] = {"step": (partial(_step, i_step), REST, STEP)}
+    chosen: dict[str, tuple[Demand, float, float]] = {"step": (partial(_step, i_step), REST, STEP)}
     for f in frequencies:
-        found[f"{f:g}_Hz"] = (partial(_sine, amplitude, f), 0.0, SINES)
-    return found
+        chosen[f"{f:g}_Hz"] = (partial(_sine, amplitude, f), 0.0, SINES)
+    return chosen
 
 
 def _step(height: float, t: Array) -> Array:
@@ -71,25 +71,25 @@ def of_brake(
     span = par.pressure_sensor.p_high - par.pressure_sensor.p_low
     reach = par.current_sensor.i_high - par.current_sensor.i_low
     share_p, share_i = sigma_p / span, sigma_i / reach
-    own = par.replace({"adc.noise": 1.0})  # the stimulus' noise is scaled, each channel apart
+    noisy_par = par.replace({"adc.noise": 1.0})  # the stimulus' noise is scaled, each channel apart
     jobs: list[tuple[str, Case, int]] = []
     for region, p in pressures.items():
         start = settled_start(p, par, _SETTLE)
         hold = holding_current(start, par)
         for name, (change, before, after) in changes.items():
-            case = _case(own, start, hold, change, before, after)
+            case = _case(noisy_par, start, hold, change, before, after)
             jobs.append((f"{region}_{name}", case, len(jobs)))
 
-    def made(job: tuple[str, Case, int]) -> tuple[str, xr.Dataset]:
+    def computed(job: tuple[str, Case, int]) -> tuple[str, xr.Dataset]:
         label, case, number = job
         run = as_run(case, 20e-6, seed=(seed, number))
         scaled = _scaled(run, {"noise_p": share_p, "noise_i": share_i})
-        found = simulate(replace(run, stimulus=scaled), ("i_meas", "p_meas"))
-        keep = found.time >= case.settle - case.keep - 1e-9
-        return label, _dataset(found["i_meas"][keep], found["p_meas"][keep])
+        read = simulate(replace(run, stimulus=scaled), ("i_meas", "p_meas"))
+        keep = read.time >= case.settle - case.keep - 1e-9
+        return label, _dataset(read["i_meas"][keep], read["p_meas"][keep])
 
     with ThreadPoolExecutor() as pool:
-        return dict(pool.map(made, jobs))
+        return dict(pool.map(computed, jobs))
 
 
 def _case(
@@ -108,10 +108,10 @@ def _scaled(run: Run, shares: Mapping[str, float]) -> Demand:
     columns = {run.model.Stimulus._fields.index(name): share for name, share in shares.items()}
 
     def rows(t: Array) -> Array:
-        found = run.stimulus(t)
+        stimulus = run.stimulus(t)
         for column, share in columns.items():
-            found[:, column] *= share
-        return found
+            stimulus[:, column] *= share
+        return stimulus
 
     return rows
 
@@ -130,7 +130,7 @@ def of_eq22(
     from scipy import signal
 
     random = np.random.default_rng(seed)
-    found = {}
+    signals = {}
     for region, (p, model) in models.items():
         amplitude = breakaway_current(p, par.ecu.est_par) * par.ecu.dither.gain
         for name, (change, before, after) in changes.items():
@@ -144,8 +144,8 @@ def of_eq22(
             i = holding_current(p, par) + u + random.normal(0.0, sigma_i, t.size)
             pressure = p + np.asarray(y) + random.normal(0.0, sigma_p, t.size)
             keep = t >= -before - 1e-9
-            found[f"{region}_{name}"] = _dataset(i[keep], pressure[keep])
-    return found
+            signals[f"{region}_{name}"] = _dataset(i[keep], pressure[keep])
+    return signals
 
 
 def sampled(model: Rational, interval: float) -> tuple[Array, Array]:

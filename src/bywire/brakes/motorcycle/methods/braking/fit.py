@@ -181,9 +181,9 @@ def fit(
     near = np.array(list(starts.values()))
     unknowns = unknowns_of(region, starts)
     for _ in range(_WEIGHED):
-        found = _fitted(region, unknowns, near, turns=0 if joint else turns, pair=pair)
-        near = np.array(list(five_of(found).values()))
-    return found
+        best = _fitted(region, unknowns, near, turns=0 if joint else turns, pair=pair)
+        near = np.array(list(five_of(best).values()))
+    return best
 
 
 def _fitted(
@@ -197,17 +197,17 @@ def _fitted(
         return in_turn((time, frequency), (by_steps, [2, 3]), turns)
 
     def evaluate(values: Array) -> tuple[Array, Array]:
-        parts = [one.evaluate(values) for one in (time, frequency)]
+        parts = [problem.evaluate(values) for problem in (time, frequency)]
         return np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
 
     starts = np.array([u.start for u in unknowns])
     return estimate(restricted(Problem(unknowns, evaluate), sorted([*by_steps, 2, 3]), starts))
 
 
-def five_of(found: Estimate) -> dict[str, float]:
+def five_of(fitted: Estimate) -> dict[str, float]:
     """Return K, tau_L, T1, T2 and T_L of an estimate, those that were kept included."""
-    values = {u.name: float(v) for u, v in zip(found.unknowns, found.values, strict=True)}
-    values |= {k.unknown.name: k.unknown.start for k in found.kept}
+    values = {u.name: float(v) for u, v in zip(fitted.unknowns, fitted.values, strict=True)}
+    values |= {k.unknown.name: k.unknown.start for k in fitted.kept}
     if "T_L" not in values and "tau_L" not in values:  # eq. (21): any pair that cancels
         values["tau_L"] = values["T_L"] = 1.0
     return {name: values[name] for name in NAMES}

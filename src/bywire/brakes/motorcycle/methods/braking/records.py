@@ -210,20 +210,20 @@ def _around_line(means: Array) -> float:
 
 def _sines(label: str, i: Array, p: Array, interval: float, f_dit: float | None) -> Points:
     others = () if f_dit is None else (f_dit,)
-    found = lines(i, interval, *BAND, others)
-    if not found.size:
+    spectrum = lines(i, interval, *BAND, others)
+    if not spectrum.size:
         raise ParameterError(
             f"the current of record {label} neither steps nor has a sine within {BAND[0]:g} and "
             f"{BAND[1]:g} Hz: nothing can be learned from it; step or shake the current demand"
         )
-    return measured_points(i, p, interval, found, others)
+    return measured_points(i, p, interval, spectrum, others)
 
 
 def _together(points: Sequence[Points]) -> Points:
     if not points:
         return Points(np.empty(0), np.empty(0, complex), np.empty(0))
     f, log_gain, deviation = (
-        np.concatenate([getattr(one, name) for one in points])
+        np.concatenate([getattr(points_of, name) for points_of in points])
         for name in ("frequencies", "log_gain", "deviation")
     )
     order = np.argsort(f)

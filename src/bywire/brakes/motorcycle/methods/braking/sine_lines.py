@@ -97,8 +97,8 @@ def _centered(rows: int, interval: float) -> Array:
 
 def _harmonics(frequencies: Sequence[float], interval: float) -> Array:
     """Return harmonics [rad/s] below half the sample rate."""
-    found = [k * f for f in frequencies for k in range(1, _HARMONICS + 1)]
-    return 2.0 * math.pi * np.array([f for f in found if f < 0.5 / interval])
+    orders = [k * f for f in frequencies for k in range(1, _HARMONICS + 1)]
+    return 2.0 * math.pi * np.array([f for f in orders if f < 0.5 / interval])
 
 
 def _waves(w: Array, t: Array) -> Array:
@@ -107,9 +107,9 @@ def _waves(w: Array, t: Array) -> Array:
     return np.stack((np.cos(angle), np.sin(angle)), axis=2).reshape(t.size, -1)
 
 
-def _mixed(carriers: Array, own: Array) -> Array:
+def _mixed(carriers: Array, alone: Array) -> Array:
     """Return carriers and their side bands [rad/s]: a dither's size follows the pressure."""
-    sides = [np.concatenate((w - own, [w], w + own)) for w in carriers]
+    sides = [np.concatenate((w - alone, [w], w + alone)) for w in carriers]
     return np.concatenate(sides) if sides else np.empty(0)
 
 
@@ -130,15 +130,15 @@ def measured_points(
         Further lines of both signals, with three harmonics, such as a dither [Hz].
     """
     t = _centered(u.size, interval)
-    own = 2.0 * math.pi * frequencies
-    w = np.concatenate((own, _mixed(_harmonics(others, interval), own)))
+    omega = 2.0 * math.pi * frequencies
+    w = np.concatenate((omega, _mixed(_harmonics(others, interval), omega)))
     columns = np.column_stack((_waves(w, t), np.ones(t.size), t))
     both = np.column_stack((u, y))
-    found, _, _, _ = np.linalg.lstsq(columns, both, rcond=None)
-    left = both - columns @ found
+    coefficients, _, _, _ = np.linalg.lstsq(columns, both, rcond=None)
+    left = both - columns @ coefficients
     variance = np.sum(left**2, axis=0) / max(u.size - columns.shape[1], 1)
     n = frequencies.size
-    amplitude = found[: 2 * n : 2] - 1j * found[1 : 2 * n : 2]
+    amplitude = coefficients[: 2 * n : 2] - 1j * coefficients[1 : 2 * n : 2]
     relative = 2.0 * variance / u.size / np.abs(amplitude) ** 2
     # Of a complex amplitude's error, half of the variance lies in each part.
     return Points(

@@ -18,7 +18,7 @@ _SETTLED = 1e-6  # of a value
 
 
 def in_turn(
-    problems: tuple[Problem, Problem], own: tuple[Sequence[int], Sequence[int]], most: int
+    problems: tuple[Problem, Problem], groups: tuple[Sequence[int], Sequence[int]], most: int
 ) -> Estimate:
     r"""Estimate some unknowns by one fit and the others by another, each with the other's values.
 
@@ -30,7 +30,7 @@ def in_turn(
     ----------
     problems
         Both with the same unknowns.
-    own
+    groups
         Which of them either fit estimates; together all.
     most
         Turns at most; one is what leaves the second fit's values unknown to the first.
@@ -47,7 +47,7 @@ def in_turn(
     while turns < most and change > _SETTLED:
         before = values.copy()
         parts = []
-        for problem, mine in zip(problems, own, strict=True):
+        for problem, mine in zip(problems, groups, strict=True):
             part = estimate(restricted(problem, mine, values))
             values[[_index(problem, label) for label in part.names]] = part.values
             parts.append(part)
@@ -55,14 +55,14 @@ def in_turn(
         change, turns = float(np.max(np.abs(values - before) / size)), turns + 1
     notes = [f"{turns} turn{'s' if turns > 1 else ''} of two steps"]
     if change <= _SETTLED:
-        found = _combined(problems, parts, values)
+        best = _combined(problems, parts, values)
     else:
-        found = _apart(problems, parts)
+        best = _apart(problems, parts)
         notes.append(
             f"the two steps do not agree yet: the last turn changed the values by {change:.2g} of "
             "their size; each step's intervals take the other step's values as known"
         )
-    return found.noted((*notes, *notes_of(found)))
+    return best.noted((*notes, *notes_of(best)))
 
 
 def _index(problem: Problem, label: str) -> int:
@@ -117,8 +117,8 @@ def _original(problem: Problem, parts: Sequence[Estimate]) -> tuple[Unknown, ...
 
 def _kept(problem: Problem, parts: Sequence[Estimate]) -> tuple[Kept, ...]:
     first = {u.label: u for u in problem.unknowns}
-    own = [k for part in parts for k in part.kept]
-    return tuple(replace(k, unknown=first[k.unknown.label]) for k in own)
+    already = [k for part in parts for k in part.kept]
+    return tuple(replace(k, unknown=first[k.unknown.label]) for k in already)
 
 
 def _combined(

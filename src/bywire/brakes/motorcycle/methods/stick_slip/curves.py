@@ -21,7 +21,7 @@ _SHARE = 1e-6
 
 
 def stribeck_band(
-    par: seal_friction.Parameters, found: Estimate, pressures: Sequence[float], omega: Array
+    par: seal_friction.Parameters, estimate: Estimate, pressures: Sequence[float], omega: Array
 ) -> xr.Dataset:
     """Return friction torque over speed at several pressures, with 95 % bands.
 
@@ -29,7 +29,7 @@ def stribeck_band(
     ----------
     par
         The identified friction.
-    found
+    estimate
         Estimate of ``seal.*`` parameters.
     pressures
         [Pa].
@@ -46,8 +46,8 @@ def stribeck_band(
     ----------
     Dardanelli, Alli, Savaresi (2010), eq. (16), Fig. 4.
     """
-    seal = [k for k, u in enumerate(found.unknowns) if u.name.startswith("seal.")]
-    unknowns = [found.unknowns[k] for k in seal]
+    seal = [k for k, u in enumerate(estimate.unknowns) if u.name.startswith("seal.")]
+    unknowns = [estimate.unknowns[k] for k in seal]
     names = [u.name.removeprefix("seal.") for u in unknowns]
     value = np.array([[_torque(par, w, p) for w in omega] for p in pressures])
     slopes = []
@@ -57,8 +57,8 @@ def stribeck_band(
         moved = np.array([[_torque(up, w, p) for w in omega] for p in pressures])
         slopes.append((moved - value) / by)
     G = np.array(slopes)
-    variance = np.einsum("ipw,ij,jpw->pw", G, found.covariance[np.ix_(seal, seal)], G)
-    half = 0.5 * np.diff(found.intervals(), axis=1).ravel() / found.deviations
+    variance = np.einsum("ipw,ij,jpw->pw", G, estimate.covariance[np.ix_(seal, seal)], G)
+    half = 0.5 * np.diff(estimate.intervals(), axis=1).ravel() / estimate.deviations
     reach = float(half[0]) * np.sqrt(np.maximum(variance, 0.0))
     axes = ("pressure", "omega")
     attrs = {"units": "N*m", "long_name": "friction torque"}
@@ -87,11 +87,11 @@ def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dat
     step
         Substep [s].
     """
-    own = par.replace({"drive.mode": "current-source"})
+    driven_par = par.replace({"drive.mode": "current-source"})
     start = max(float(data["p_mc"][0]), 0.0)
     whole = trial(
-        MotorcycleBrake(), own, data, {"i_set": "i"}, {"p_mc": 1.0}, state=state_at(start, own),
-        memory=memory_at(start, own), step=step,
+        MotorcycleBrake(), driven_par, data, {"i_set": "i"}, {"p_mc": 1.0},
+        state=state_at(start, driven_par), memory=memory_at(start, driven_par), step=step,
     )  # fmt: skip
     modeled = simulate(whole.run, ("p_mc",))["p_mc"]
     attrs = {"units": "Pa", "long_name": "master-cylinder pressure"}

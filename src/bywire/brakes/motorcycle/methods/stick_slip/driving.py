@@ -66,11 +66,11 @@ def driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
     measured = moving_mean(shot.current - zero, width)
     sampled, more, first, onset = ramp, np.zeros(middle.size), 0, BEFORE
     for _ in range(_ALIGNED):
-        found = simulate(sampled, ("p_mc", "i", "omega"))
-        p, i = found["p_mc"], moving_mean(found["i"], width)
+        computed = simulate(sampled, ("p_mc", "i", "omega"))
+        p, i = computed["p_mc"], moving_mean(computed["i"], width)
         shift = best_shift(shot, p, shot.steep)
-        rests = max(int(np.argmax(found["omega"] != 0.0)) - 1, 0)
-        onset = float(shot.clock[rests] + (current - found["i"][rests]) / shot.rate)
+        rests = max(int(np.argmax(computed["omega"] != 0.0)) - 1, 0)
+        onset = float(shot.clock[rests] + (current - computed["i"][rests]) / shot.rate)
         travel = np.abs(p - p[0])
         first = int(np.argmax(travel > min(_BEGUN * travel.max(), _BEGUN_AT)))
         wanted = np.interp(np.asarray(middle + shift), shot.clock, measured)

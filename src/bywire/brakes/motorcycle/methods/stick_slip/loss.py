@@ -31,10 +31,10 @@ class Whitening:
         where none does.
     """
 
-    def __init__(self, one: Fitted, sigma: float, sigma_i: float) -> None:
-        self._block = max(-(-one.residuals.size // _BLOCKS), 1)
+    def __init__(self, fitted: Fitted, sigma: float, sigma_i: float) -> None:
+        self._block = max(-(-fitted.residuals.size // _BLOCKS), 1)
         self._sigma = sigma / np.sqrt(self._block)
-        self._root = self._root_of(one, sigma_i) if sigma_i > 0.0 else None
+        self._root = self._root_of(fitted, sigma_i) if sigma_i > 0.0 else None
 
     def __call__(self, values: Array) -> Array:
         """Return residuals or their Jacobian, shape (n,) or (n, p), as fewer independent rows."""
@@ -45,13 +45,13 @@ class Whitening:
             return means
         return np.asarray(linalg.solve_triangular(self._root, means, lower=True))
 
-    def _root_of(self, one: Fitted, sigma_i: float) -> Array:
+    def _root_of(self, fitted: Fitted, sigma_i: float) -> Array:
         """Return the root of the covariance, in units of the pressure's noise."""
-        answer = np.diff(self._means(one.answer), prepend=0.0)
+        answer = np.diff(self._means(fitted.answer), prepend=0.0)
         count = answer.size
         back = np.arange(count)[:, None] - np.arange(count)[None, :]
         H = np.where(back >= 0, answer[np.clip(back, 0, count - 1)], 0.0)
-        v = self._means(one.speed)
+        v = self._means(fitted.speed)
         H -= np.outer(v, v @ H) / max(float(v @ v), 1e-300)
         H *= sigma_i / (np.sqrt(self._block) * self._sigma)
         covariance = H @ H.T
@@ -116,7 +116,7 @@ class SlipLoss:
         if weighted_at is not None:
             zero = float(weighted_at[-2])
             fits = (shooting.fit(s, weighted_at[: shooting.count], zero) for s in shots)
-            self._whitenings = [Whitening(one, noise.pressure, noise.current) for one in fits]
+            self._whitenings = [Whitening(fitted, noise.pressure, noise.current) for fitted in fits]
 
     def __call__(self, values: Array) -> tuple[Array, Array]:
         """Return residuals and Jacobian: the slips' shapes, then one row for every beginning.
@@ -131,16 +131,16 @@ class SlipLoss:
         driven = zero if self._whitenings is not None else None
         residuals, slopes, begun, begun_slopes = [], [], [], []
         for k, shot in enumerate(self._shots):
-            one, way = self._shooting.fit(shot, seal, driven), shot.slip.direction
+            fitted, way = self._shooting.fit(shot, seal, driven), shot.slip.direction
             whiten = (
-                Whitening(one, self._noise.pressure, 0.0)
+                Whitening(fitted, self._noise.pressure, 0.0)
                 if self._whitenings is None
                 else self._whitenings[k]
             )
             sure = self._noise.of_breakaway(shot)
-            residuals.append(whiten(one.residuals))
-            none = np.zeros(one.residuals.size)
-            slopes.append(whiten(np.column_stack((one.slopes, -one.by_current, none))))
-            begun.append((one.breakaway - zero + way * ripple) / sure)
-            begun_slopes.append(np.array([*one.breakaway_slopes, -1.0, way]) / sure)
+            residuals.append(whiten(fitted.residuals))
+            none = np.zeros(fitted.residuals.size)
+            slopes.append(whiten(np.column_stack((fitted.slopes, -fitted.by_current, none))))
+            begun.append((fitted.breakaway - zero + way * ripple) / sure)
+            begun_slopes.append(np.array([*fitted.breakaway_slopes, -1.0, way]) / sure)
         return np.concatenate((*residuals, begun)), np.vstack((*slopes, *begun_slopes))

@@ -139,10 +139,10 @@ class Shooting:
         if driven is not None:
             run = driven.calm
         state, memory = self._start_slopes(run, shot)
-        found = simulate_with_sensitivities(
+        computed = simulate_with_sensitivities(
             run, [*self.names, "stimulus.i_set"], ("p_mc",), state, memory
         )
-        p = found.trajectory["p_mc"]
+        p = computed.trajectory["p_mc"]
         answer = np.zeros(p.size)
         if driven is not None:
             offset = np.where(np.arange(p.size) >= driven.first, _MORE, 0.0)
@@ -151,8 +151,8 @@ class Shooting:
             p = simulate(driven.sampled, ("p_mc",))["p_mc"]
         r, v, shift = overlaid(shot, p)
         # the demand begins at the breakaway current, and goes on as measured
-        own, all_along = found.derivatives[:, 0, :-1], found.derivatives[:, 0, -1]
-        slopes = own + np.outer(all_along - answer, current_slopes)
+        by_parameters, all_along = computed.derivatives[:, 0, :-1], computed.derivatives[:, 0, -1]
+        slopes = by_parameters + np.outer(all_along - answer, current_slopes)
         at = shot.clock - shift
         kept = np.column_stack([np.interp(at, shot.clock, c) for c in (*slopes.T, answer)])
         kept[at < 0.0] = 0.0

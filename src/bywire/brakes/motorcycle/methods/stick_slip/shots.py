@@ -89,7 +89,7 @@ def cut_out(
             f"a sample every {1e3 * interval:.3g} ms does not show how slips begin: measure at "
             f"{1.0 / _COARSEST:g} Hz or faster"
         )
-    found = []
+    shots = []
     lead, most, rested = (int(span / interval) for span in (LEAD, longest, _RESTED))
     seen = max(round(_SEEN / interval), 4)
     smooth = moving_mean(pressure, max(round(_SMOOTHED / interval), 1))
@@ -108,19 +108,19 @@ def cut_out(
         rate = float(line.deriv()(time[first]))
         if rate * slip.direction <= 0.0:
             continue
-        own = replace(slip, rest=float(pressure[rest].mean()))
+        from_rest = replace(slip, rest=float(pressure[rest].mean()))
         shot = Shot(
-            own, time[rows], pressure[rows], current[rows], rate, unrest, level, slope / interval,
-            seen, min(half, last) - first,
+            from_rest, time[rows], pressure[rows], current[rows], rate, unrest, level,
+            slope / interval, seen, min(half, last) - first,
         )  # fmt: skip
-        found.append(shot)
-    if not found:
+        shots.append(shot)
+    if not shots:
         raise ParameterError(
             f"none of the {len(slips)} slips has {_LEAST} samples, a rest before it, and a current "
             "that ramps toward it: they are noise, or the signal's unit is wrong; check the unit, "
             "and raise what counts as a slip (--option least=...)"
         )
-    return found
+    return shots
 
 
 def _passed(values: Array, slip: Slip, rest: int, share: float) -> int:

@@ -75,13 +75,13 @@ def moving_mean(values: Array, width: int) -> Array:
 
 def _stretches(moving: NDArray[np.bool_], pause: int) -> list[tuple[int, int]]:
     edges = np.flatnonzero(np.diff(np.concatenate(([0], moving.astype(int), [0]))))
-    found: list[tuple[int, int]] = []
+    stretches: list[tuple[int, int]] = []
     for begin, end in edges.reshape(-1, 2).tolist():
-        if found and begin - found[-1][1] <= pause:
-            found[-1] = (found[-1][0], end)
+        if stretches and begin - stretches[-1][1] <= pause:
+            stretches[-1] = (stretches[-1][0], end)
         else:
-            found.append((begin, end))
-    return found
+            stretches.append((begin, end))
+    return stretches
 
 
 def _one_way(values: Array, begin: int, end: int, least: float) -> list[tuple[int, int]]:

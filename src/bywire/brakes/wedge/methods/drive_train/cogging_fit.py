@@ -84,8 +84,8 @@ class CoggingFit:
     @property
     def friction(self) -> Array:
         """Friction torque, shape (n,)."""
-        told = [self.estimate[n] if n in self.estimate.names else 0.0 for n in _FRICTION]
-        return np.asarray(self.turning.friction_columns @ np.array(told))
+        values = [self.estimate[n] if n in self.estimate.names else 0.0 for n in _FRICTION]
+        return np.asarray(self.turning.friction_columns @ np.array(values))
 
 
 def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
@@ -126,7 +126,7 @@ def cogging_problem(turning: Turning, orders: tuple[int, ...]) -> Problem:
     return Problem(tuple(unknowns), evaluate)
 
 
-def same_both_ways(found: CoggingFit) -> Check:
+def same_both_ways(cogging: CoggingFit) -> Check:
     r"""Return whether the main order changes with the direction, as cogging does not.
 
     Two more columns, cosine and sine with the sign of the direction, on what is left over: their
@@ -135,10 +135,10 @@ def same_both_ways(found: CoggingFit) -> Check:
     """
     from scipy import stats
 
-    turning = found.turning
-    cosine, sine = turning.waves(found.orders[0])
+    turning = cogging.turning
+    cosine, sine = turning.waves(cogging.orders[0])
     columns = np.column_stack((turning.way * cosine, turning.way * sine))
-    e = found.estimate.residuals
+    e = cogging.estimate.residuals
     c = np.linalg.lstsq(columns, e, rcond=None)[0]
     sure = uncertainty(columns, e - columns @ c)
     value = 0.5 * float(c @ np.linalg.solve(sure.covariance, c))
@@ -147,7 +147,7 @@ def same_both_ways(found: CoggingFit) -> Check:
     return Check("cogging_same_both_ways", value, limit=limit, note=note)
 
 
-def slope_as_known(found: CoggingFit, known: float) -> Check:
+def slope_as_known(cogging: CoggingFit, known: float) -> Check:
     """Return how much of the ripple is left to a slope of the friction that is not the known one.
 
     Friction that depends on the angle, and friction that falls with the speed while cogging makes
@@ -159,10 +159,10 @@ def slope_as_known(found: CoggingFit, known: float) -> Check:
     known
         Slope of the friction over speed by its law [N m s/rad].
     """
-    told = found.estimate
-    slope = told["friction_slope"] if "friction_slope" in told.names else known
-    ripple = float(np.sqrt(2.0) * np.std(found.turning.friction_columns[:, 2]))
-    share = abs(slope - known) * ripple / max(told["motor_1.T_cog"], 1e-300)
+    fit = cogging.estimate
+    slope = fit["friction_slope"] if "friction_slope" in fit.names else known
+    ripple = float(np.sqrt(2.0) * np.std(cogging.turning.friction_columns[:, 2]))
+    share = abs(slope - known) * ripple / max(fit["motor_1.T_cog"], 1e-300)
     note = "ripple given to the friction's slope beyond its law, over the cogging: angular friction"
     return Check("slope_beyond_law", share, limit=_OTHER, note=note)
 
@@ -177,13 +177,13 @@ def amplitudes(angle: Array, torque: Array, highest: int) -> Array:
     torque
         Its mean taken off, shape (n,).
     """
-    found = np.empty(highest)
+    sizes = np.empty(highest)
     turn = np.exp(-1j * angle)
     wave = np.ones_like(turn)
     for order in range(highest):
         wave = wave * turn
-        found[order] = 2.0 * abs(np.mean(wave * torque))
-    return found
+        sizes[order] = 2.0 * abs(np.mean(wave * torque))
+    return sizes
 
 
 def standing_out(angle: Array, torque: Array, highest: int) -> tuple[int, ...]:

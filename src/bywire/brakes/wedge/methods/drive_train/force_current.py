@@ -72,8 +72,8 @@ class Squeeze:
 
     def only(self, rows: NDArray[np.bool_]) -> Squeeze:
         """Return some of the windows."""
-        own = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "speed"}
-        return replace(self, **own)
+        columns = {f.name: getattr(self, f.name)[rows] for f in fields(self) if f.name != "speed"}
+        return replace(self, **columns)
 
     def under(self, F: Array, par: WedgeParameters) -> Squeeze:
         """Return the same with forces that no sensor told, and the current stated anew for them."""
@@ -127,11 +127,11 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
     interval = even_interval(data["time"].values)
     q_1, q_2 = data["q_1"].values, data["q_2"].values
     speed = np.gradient(low_passed(q_1 - q_2, interval, reading.cutoff), interval)
-    found = windows(speed, interval, reading.slowest, reading.margin, reading.length)
+    steady = windows(speed, interval, reading.slowest, reading.margin, reading.length)
     side = np.sign(low_passed(data["y_F"].values, interval, reading.cutoff))
     # Where the force changes its sign, friction has a kink, and a mean over it is none of the law.
-    found = [w for w in found if abs(float(side[w.rows].mean())) in (0.0, 1.0)]
-    ways = np.array([np.sign(speed[w.rows].mean()) for w in found])
+    steady = [w for w in steady if abs(float(side[w.rows].mean())) in (0.0, 1.0)]
+    ways = np.array([np.sign(speed[w.rows].mean()) for w in steady])
     if not (np.any(ways > 0) and np.any(ways < 0)):
         raise ParameterError(
             f"{where}: the screws do not move both toward each other and apart at more than "
@@ -140,7 +140,7 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
         )
 
     def means(values: Array) -> Array:
-        return np.array([values[w.rows].mean(axis=0) for w in found])
+        return np.array([values[w.rows].mean(axis=0) for w in steady])
 
     # The sensor's amplifier lags, one way while the force rises, the other while it falls.
     lag = 1.0 / (2.0 * np.pi * par.rig.sensor.f_F)
@@ -159,7 +159,7 @@ def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str
         d=means(d),
         way=ways,
         waves=means(waves(q_1, q_2, par.motor_1.N_cog)),
-        reach=np.array([(d[w.rows.start - skip], d[w.rows.stop - 1]) for w in found]),
+        reach=np.array([(d[w.rows.start - skip], d[w.rows.stop - 1]) for w in steady]),
         each=each,
         speed=stated,
     )
@@ -224,9 +224,11 @@ def law(F: Array, way: Array, values: Array) -> tuple[Array, Array, Array]:
     return i, columns, 1.0 / c + way * np.sign(F) * (w_1 + 2.0 * w_2 * size)
 
 
-def branches(one: Squeeze, power: int, x: Array) -> Array:
+def branches(squeezed: Squeeze, power: int, x: Array) -> Array:
     """Return polynomials over x of their own for closing and opening, below, at and above zero."""
     scaled = x / max(float(np.abs(x).max()), 1e-300)
-    groups = [(one.way == way) & (np.sign(x) == side) for way in (1, -1) for side in (1, 0, -1)]
-    own = [g[:, None] * np.vander(scaled, power + 1) for g in groups if g.any()]
-    return np.hstack(own)
+    groups = [
+        (squeezed.way == way) & (np.sign(x) == side) for way in (1, -1) for side in (1, 0, -1)
+    ]
+    of_groups = [g[:, None] * np.vander(scaled, power + 1) for g in groups if g.any()]
+    return np.hstack(of_groups)

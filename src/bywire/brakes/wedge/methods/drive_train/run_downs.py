@@ -78,13 +78,13 @@ def read_run(label: str, data: xr.Dataset, par: WedgeParameters, reading: Readin
             f"windows of {1e3 * reading.length:g} ms: too few; {_ADVICE}"
         )
     added = float(data["J_added"].values[0])
-    own = par.replace(
+    run_par = par.replace(
         {"rig.load": "dummy", "rig.J_dummy": par.rig.J_dummy + added, "motor_1.T_cog": 0.0}
     )
     K_T = servo_motor.torque_constant(par.motor_1)
     torque = K_T * float(np.mean(motion.means(moved["i"].values)))
     equation = Equation(DrivenShaft(), "omega", "alpha", reading.slowest)
-    return RunDown(label, own, motion, added, torque, equation)
+    return RunDown(label, run_par, motion, added, torque, equation)
 
 
 def fitted(runs: Sequence[RunDown], names: Sequence[str]) -> Estimate:
@@ -118,15 +118,15 @@ def by_source(runs: Sequence[RunDown]) -> dict[str, tuple[float, float]]:
     bare = [run for run in runs if abs(run.torque) <= quiet + small]
     first = min(run.added for run in runs)
     same = [run for run in runs if run.added == first]
-    found = {}
+    inertias = {}
     for name, chosen in (("added_inertia", bare), ("current", same)):
         if not 1 < len(chosen) < len(runs) or not scale_is_told(chosen):
             continue
-        one = fitted(chosen, NAMES)
-        if INERTIA in one.names:
-            deviation = float(one.deviations[one.names.index(INERTIA)])
-            found[name] = (one[INERTIA], deviation)
-    return found
+        best = fitted(chosen, NAMES)
+        if INERTIA in best.names:
+            deviation = float(best.deviations[best.names.index(INERTIA)])
+            inertias[name] = (best[INERTIA], deviation)
+    return inertias
 
 
 def left_over(runs: Sequence[RunDown], best: Estimate) -> list[Array]:

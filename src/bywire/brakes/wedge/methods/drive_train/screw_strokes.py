@@ -45,28 +45,30 @@ class Stroke:
 
 def strokes(shaft: Motions, residuals: Array, par: WedgeParameters, side: int) -> list[Stroke]:
     """Return a shaft's motions with the residual torque of each."""
-    K_T, found = servo_motor.torque_constant(par.motor_1), []
+    K_T, read = servo_motor.torque_constant(par.motor_1), []
     motion = np.array([w.motion for w in shaft.windows])
     for number in np.unique(motion):
-        own = [w.rows for w in shaft.windows if w.motion == number]
-        rows = shaft.data.isel(time=slice(own[0].start, own[-1].stop))
+        rows_of = [w.rows for w in shaft.windows if w.motion == number]
+        rows = shaft.data.isel(time=slice(rows_of[0].start, rows_of[-1].stop))
         omega, F = float(rows["omega"].mean()), float(rows["F"].mean())
         sign = 1.0 if omega > 0.0 else -1.0
         torque = sign * K_T * float(rows["i"].mean())
         error = sign * float(residuals[motion == number].mean())
-        found.append(Stroke(side, omega, abs(F), F * omega < 0.0, torque, error))
-    return found
+        read.append(Stroke(side, omega, abs(F), F * omega < 0.0, torque, error))
+    return read
 
 
-def fits(made: list[Stroke], best: Estimate) -> Check:
+def fits(strokes_read: list[Stroke], best: Estimate) -> Check:
     """Return whether a curve of its own for every shaft and direction would fit better."""
-    F = np.array([s.F for s in made]) / max(s.F for s in made)
-    kind = [(s.side, s.drives) for s in made]
-    groups = [np.array([one == k for one in kind], dtype=float) for k in sorted(set(kind))]
-    e = np.array([s.error for s in made])
-    scatter = {k: np.sqrt(np.mean([s.error**2 for s in made if s.side == k])) for k in (1, 2)}
+    F = np.array([s.F for s in strokes_read]) / max(s.F for s in strokes_read)
+    kind = [(s.side, s.drives) for s in strokes_read]
+    groups = [np.array([each == k for each in kind], dtype=float) for k in sorted(set(kind))]
+    e = np.array([s.error for s in strokes_read])
+    scatter = {
+        k: np.sqrt(np.mean([s.error**2 for s in strokes_read if s.side == k])) for k in (1, 2)
+    }
     return lack_of_fit(
-        "torque_left_over", e, np.array([1.0 / scatter[s.side] for s in made]),
+        "torque_left_over", e, np.array([1.0 / scatter[s.side] for s in strokes_read]),
         np.column_stack([g * F**power for g in groups for power in (0, 1, 2)]), len(best.values),
         "whether torque over force curves or shifts in a way that the laws do not have",
     )  # fmt: skip

@@ -63,17 +63,17 @@ def windows(
     way = np.where(np.abs(omega) > slowest, np.sign(omega), 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0.0], way, [0.0]))))
     skip, size = round(margin / interval), max(round(length / interval), _FEWEST)
-    found, motion = [], 0
+    steady, motion = [], 0
     for begin, end in pairwise(edges):
         count = (end - begin - 2 * skip) // size
         if way[begin] == 0.0 or count < 1:
             continue
-        found += [
+        steady += [
             Window(slice(begin + skip + k * size, begin + skip + (k + 1) * size), motion)
             for k in range(int(count))
         ]
         motion += 1
-    return found
+    return steady
 
 
 @dataclass(frozen=True)
@@ -106,14 +106,14 @@ def window_residuals(
     equation: Equation, par: ParameterSet, unknowns: Sequence[Unknown], moved: Motions
 ) -> Problem:
     """Return the equation's error, averaged over windows, as a problem of least squares."""
-    own = EquationError(equation, par, unknowns)
+    error = EquationError(equation, par, unknowns)
     rows = np.concatenate([np.arange(w.rows.start, w.rows.stop) for w in moved.windows])
     size = [w.rows.stop - w.rows.start for w in moved.windows]
     starts = np.concatenate(([0], np.cumsum(size)[:-1]))
-    columns = own.columns(moved.data)[:, rows]
+    columns = error.columns(moved.data)[:, rows]
 
     def evaluate(values: Array) -> tuple[Array, Array]:
-        e, W = own(columns, values)
+        e, W = error(columns, values)
         each = np.array(size, dtype=float)
         return np.add.reduceat(e, starts) / each, np.add.reduceat(W, starts) / each[:, None]
 
@@ -142,9 +142,9 @@ def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advic
     weights = np.ones(len(parts))
     try:
         for _ in range(2):
-            found = estimate(Problem(tuple(unknowns), partial(_weighted, parts, weights)))
+            best = estimate(Problem(tuple(unknowns), partial(_weighted, parts, weights)))
             values = {u.label: u.start for u in unknowns} | dict(
-                zip(found.names, found.values.tolist(), strict=True)
+                zip(best.names, best.values.tolist(), strict=True)
             )
             final = np.array([values[u.label] for u in unknowns])
             weights = np.array([1.0 / _scatter(p.evaluate(final)[0]) for p in parts])

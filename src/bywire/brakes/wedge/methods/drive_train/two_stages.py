@@ -55,7 +55,7 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
     """
     values = np.array([u.start for u in force_current.unknowns(par)])
     friction = values[2]
-    found = []
+    unknowns = []
     for way, what in ((1.0, "tip to tip"), (-1.0, "through the wedge")):
         level = way * heart.i
         loading = (heart.way == way) & (level > _SHARE * np.abs(sensor.i).max())
@@ -64,13 +64,13 @@ def started(par: WedgeParameters, sensor: Squeeze, heart: Squeeze, advice: str) 
                 f"record heart: the screws do not load each other {what}: travel further; {advice}"
             )
         slope, start = np.polyfit(heart.d[loading], level[loading], 1)
-        found.append(float((friction - start) / slope))
-    if not found[0] > found[1]:
+        unknowns.append(float((friction - start) / slope))
+    if not unknowns[0] > unknowns[1]:
         raise ParameterError(
             "record heart: closing and opening load the screws at the same travel: there is no "
             "free-play to find, or the currents' signs are wrong"
         )
-    return Contacts(*found)
+    return Contacts(*unknowns)
 
 
 def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
@@ -137,24 +137,24 @@ class TwoStages:
 
     def sensor_force(self, values: Array) -> tuple[Array, Array]:
         """Return the straight line less the sensor's force, and its derivatives."""
-        one, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
+        stage, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
         K = 1.0 / (2.0 / values[_S] + 1.0 / self.par.rig.sensor.K_F)
-        away = one.d + one.way * values[_LOOP] - values[_ZERO]
+        away = stage.d + stage.way * values[_LOOP] - values[_ZERO]
         J[:, _S] = away * K**2 * 2.0 / values[_S] ** 2
         J[:, _ZERO] = -K
-        J[:, _LOOP] = K * one.way
-        return K * away - one.F, J
+        J[:, _LOOP] = K * stage.way
+        return K * away - stage.F, J
 
     def sensor_current(self, values: Array) -> tuple[Array, Array]:
         """Return the law's current at the sensor's force less the measured one."""
-        one, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
-        i, J[:, _LAW], _ = law(one.F, one.way, values[_LAW])
-        J[:, _SENSOR] = one.waves
-        return i + one.waves @ values[_SENSOR] - one.i, J
+        stage, J = self.sensor, np.zeros((self.sensor.d.size, len(values)))
+        i, J[:, _LAW], _ = law(stage.F, stage.way, values[_LAW])
+        J[:, _SENSOR] = stage.waves
+        return i + stage.waves @ values[_SENSOR] - stage.i, J
 
-    def heart_force(self, values: Array, one: Squeeze) -> tuple[Array, Array]:
+    def heart_force(self, values: Array, stage: Squeeze) -> tuple[Array, Array]:
         """Return the force in the heart by the travel, and its derivatives."""
-        d, J = one.d + one.way * values[_LOOP], np.zeros((one.d.size, len(values)))
+        d, J = stage.d + stage.way * values[_LOOP], np.zeros((stage.d.size, len(values)))
         K_c, K_t = self.slopes(values)
         close = np.maximum(d - values[_CLOSED], 0.0)
         apart = np.maximum(values[_CLOSED] - values[_PLAY] - d, 0.0)
@@ -163,18 +163,18 @@ class TwoStages:
         J[:, _C] = close * K_c**2 / values[_C] ** 2
         J[:, _CLOSED] = -K_c * (close > 0.0) - K_t * (apart > 0.0)
         J[:, _PLAY] = K_t * (apart > 0.0)
-        J[:, _LOOP] = one.way * (K_c * (close > 0.0) + K_t * (apart > 0.0))
+        J[:, _LOOP] = stage.way * (K_c * (close > 0.0) + K_t * (apart > 0.0))
         return K_c * close - K_t * apart, J
 
     def heart_current(self, values: Array) -> tuple[Array, Array]:
         """Return the law's current at that force less the measured one."""
-        one = self.heart
-        F, J_F = self.heart_force(values, one)
-        i, columns, slope = law(F, one.way, values[_LAW])
+        stage = self.heart
+        F, J_F = self.heart_force(values, stage)
+        i, columns, slope = law(F, stage.way, values[_LAW])
         J = slope[:, None] * J_F
         J[:, _LAW] = columns
-        J[:, _HEART] = one.waves
-        return i + one.waves @ values[_HEART] - one.i, J
+        J[:, _HEART] = stage.waves
+        return i + stage.waves @ values[_HEART] - stage.i, J
 
     def force_by_current(self, values: Array) -> Array:
         """Return the force that the heart's current says, to first order around the fit."""
