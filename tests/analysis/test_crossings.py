@@ -70,6 +70,10 @@ def test_margin_of_a_measured_response() -> None:
     L = power(COARSE, -1.0, -150.0)
     margin = measured_margin(COARSE, L)
     assert (margin.crossover, margin.phase) == pytest.approx((10.0, 30.0))
+    assert measured_margin(COARSE[:3], L[:3]) == margin  # only the last point lies below
+    f, angles = np.array([1.0, 2.0, 4.0, 8.0]), np.radians([-100.0, -100.0, -140.0, -140.0])
+    several = measured_margin(f, np.array([2.0, 0.5, 2.0, 0.5]) * np.exp(1j * angles))
+    assert (several.crossover, several.phase) == pytest.approx((2.0**2.5, 40.0))
     beyond = measured_margin(COARSE, -L)  # -330 degree: 150 below -1 is 150 above it
     assert beyond.phase == pytest.approx(150.0)
     ended = measured_margin(COARSE[:2], L[:2])
