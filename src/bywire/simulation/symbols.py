@@ -25,11 +25,44 @@ def symbol_tuple(tuple_type: type, vector: Any) -> Any:
     return tuple_type(*scalars(vector))
 
 
+_JUMPS = frozenset(
+    (ca.OP_FLOOR, ca.OP_CEIL, ca.OP_SIGN, ca.OP_LT, ca.OP_LE, ca.OP_EQ, ca.OP_NE, ca.OP_NOT)
+)
+"""operations whose derivative is zero wherever it exists"""
+
+
 def nonlinear(expression: Any, variables: Any) -> list[bool]:
-    """Return for each variable whether the expression is nonlinear in it."""
+    """Return for each variable whether the expression is nonlinear in it, or jumps with it."""
     if expression.shape[0] == 0 or variables.shape[0] == 0:
         return [False] * int(variables.shape[0])
-    return [bool(b) for b in ca.which_depends(expression, variables, 2, False)]
+    curved = ca.which_depends(expression, variables, 2, False)
+    jumps = _jumping(expression, variables)
+    return [bool(bent) or k in jumps for k, bent in enumerate(curved)]
+
+
+def _jumping(expression: Any, variables: Any) -> set[int]:
+    """Return the variables that an expression jumps with: no derivative of any order tells."""
+    others = [each for each in ca.symvar(expression) if not depends(each, variables)]
+    function = ca.Function("jumps", [variables, ca.vertcat(*others)], [ca.densify(expression)])
+    codes = range(function.n_instructions())
+    if not any(function.instruction_id(k) in _JUMPS for k in codes):
+        return set()
+    reads: dict[int, frozenset[int]] = {}  # by register
+    found: set[int] = set()
+    for k in codes:
+        code = function.instruction_id(k)
+        if code == ca.OP_OUTPUT:
+            continue
+        into = function.instruction_output(k)[0]
+        if code == ca.OP_INPUT:
+            place, entry = function.instruction_input(k)
+            reads[into] = frozenset((entry,) if place == 0 else ())
+            continue
+        sources = function.instruction_input(k) if code != ca.OP_CONST else []
+        reads[into] = frozenset().union(*(reads.get(source, frozenset()) for source in sources))
+        if code in _JUMPS:
+            found |= reads[into]
+    return found
 
 
 def depends(expression: Any, variables: Any) -> bool:
