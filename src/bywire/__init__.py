@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from bywire.api.identify import identify
     from bywire.api.linearize import linearize
     from bywire.api.margins import margins
+    from bywire.api.new import NewBrake, new
     from bywire.api.overview import overview
     from bywire.api.replay import Replay, replay
     from bywire.api.reproduce import reproduce
@@ -79,6 +80,8 @@ _HOMES = {
     "describe": "api.describe",
     "overview": "api.overview",
     "margins": "api.margins",
+    "new": "api.new",
+    "NewBrake": "api.new",
     "run": "api.run",
     "simulate": "simulation.run",
     "simulate_ensemble": "simulation.ensemble",
@@ -98,6 +101,7 @@ __all__ = [
     "Conversion",
     "Ensemble",
     "Identification",
+    "NewBrake",
     "Replay",
     "Run",
     "Sensitivity",
@@ -114,6 +118,7 @@ __all__ = [
     "load",
     "load_system",
     "margins",
+    "new",
     "overview",
     "parameters",
     "read_measurement",

@@ -29,3 +29,16 @@ def check_command(
     from bywire.api.check import check
 
     show(lambda progress: check(name, system=system, progress=progress), out, json)
+
+
+def new_command(
+    name: Annotated[str, typer.Argument(help="Name of the brake, e.g. my-brake.")],
+    folder: Annotated[
+        Path, typer.Option("--in", metavar="PATH", help="Folder in which its own is made.")
+    ] = Path(),
+    json: JsonFlag = False,
+) -> None:
+    """Write a package for a brake of your own, with tests, that passes bywire check."""
+    from bywire.api.new import new
+
+    show(lambda progress: new(name, folder), None, json)

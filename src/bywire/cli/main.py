@@ -17,7 +17,7 @@ from bywire.cli.bench_commands import (
     reproduce_command,
     run,
 )
-from bywire.cli.brake_commands import check_command
+from bywire.cli.brake_commands import check_command, new_command
 from bywire.cli.data_commands import convert
 from bywire.cli.identification_commands import identify, replay
 from bywire.cli.loop_commands import (
@@ -56,6 +56,7 @@ app.command("convert")(convert)
 app.command("identify")(identify)
 app.command("replay")(replay)
 app.command("check")(check_command)
+app.command("new")(new_command)
 
 
 @app.callback(invoke_without_command=True)

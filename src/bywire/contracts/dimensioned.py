@@ -118,7 +118,8 @@ def fits(value: Any, unit: str) -> bool:
     """Tell whether a result has the dimension of a unit; a plain zero has that of any."""
     if isinstance(value, Dimensioned):
         return value.has_unit(unit)
-    return value == 0 or Dimensioned(value).has_unit(unit)
+    plain = _is_nothing(value) or _is_unknown(value)
+    return plain or Dimensioned(value).has_unit(unit)
 
 
 def _quantity(value: Any) -> Any:

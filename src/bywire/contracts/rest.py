@@ -17,14 +17,16 @@ from bywire.simulation.contact_set import contact_forces
 from bywire.simulation.run import simulate
 from bywire.simulation.symbols import SX
 
-SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4, 0.0)
+SHARES = (1.0, 0.1, 1e-2, 1e-3, 1e-4)
 """of the controllers' moves, until what has dry friction rests all through the run"""
 INSIDE = 0.9
 """of a friction's bounds: a force within holds at the start"""
-NEAR = 1e-4
-"""of a usual speed: what is so slow feels a smooth force of next to nothing"""
-HIDDEN = 0.03
-"""of the force's change up to the usual speed, that may come within `NEAR`"""
+SLOW = (1e-4, 1e-3, 1e-2)
+"""of a usual speed: what is so slow feels next to nothing of a smooth force"""
+HIDDEN = 0.1
+"""of the force up to the usual speed, by which it may come sooner than in proportion to speed"""
+GROWN = 0.3
+"""the same of a dry friction's bounds, up to a tenth of the usual speed"""
 
 
 def rests_exactly(trial: Trial) -> Iterator[Evidence]:
@@ -33,6 +35,7 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
     if not trial.model.frictions:
         raise NotCheckedError("the model declares no dry friction")
     names = start.state._fields
+    yield from _contain_zero(trial)
     holds = _holds_at_start(trial)
     waiting = {name for name, share in holds.items() if share < INSIDE}
     if not waiting:
@@ -47,8 +50,8 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
     for name in sorted(waiting):  # what else loads it may move it later, as a disc's run-out does
         first = float(run[1, names.index(name)])
         text = (
-            f"{name} is {first:.2g} after a sample time without any move of the controllers, where "
-            f"{holds[name]:.2g} of its friction would hold it"
+            f"{name} is {first:.2g} after a sample time at {SHARES[-1]:g} of the controllers' "
+            f"moves, where {holds[name]:.2g} of its friction would hold it"
         )
         yield Evidence(first == 0.0, text, place=place)
 
@@ -79,24 +82,39 @@ def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
         yield _same_at_rest(trial, name)
     place = trial.place("balance", "wire")
     for name in speeds:
-        near, far = (_change(trial, name, r * state[name].nominal) for r in (NEAR, 1.0))
-        share = near / far if far else 0.0
-        text = f"{share:.2g} of the smooth force against {name} comes below {NEAR:g} of its speed"
-        if share > HIDDEN:
+        far = _change(trial, name, state[name].nominal)
+        shares = [_change(trial, name, r * state[name].nominal) / far if far else 0.0 for r in SLOW]
+        sooner = max(share - r for share, r in zip(shares, SLOW, strict=True))
+        text = f"the smooth force against {name} comes {sooner:.2g} sooner than with its speed"
+        if sooner > HIDDEN:
             text += ": declare this friction in frictions and bounds, and it will not creep"
-        yield measured(share, HIDDEN, text, place)
+        yield measured(sooner, HIDDEN, text, place)
+
+
+def _contain_zero(trial: Trial) -> Iterator[Evidence]:
+    """Yield whether the bounds of every friction have zero between them."""
+    start, model = trial.start, trial.model
+    contact = _forces(trial, SX(ca.DM(list(start.state))))
+    bounds = model.bounds(start.state, start.state, start.memory, start.par, contact)
+    for name, pair in zip(model.frictions, bounds, strict=True):
+        low, high = (float(ca.evalf(SX(value))) for value in pair)
+        text = f"the friction of {name} is between {low:.3g} and {high:.3g}"
+        if not low <= 0.0 <= high:
+            text += ": wanted is low <= 0 <= high"
+        yield Evidence(low <= 0.0 <= high, text, place=trial.place("bounds", "friction"))
 
 
 def _same_at_rest(trial: Trial, name: str) -> Evidence:
-    """Return whether bounds that are zero at rest come up at once when something moves."""
+    """Return whether bounds come up with speed that are not there at rest."""
     nominal = signals_of(trial.model.State)[name].nominal
     k = trial.model.frictions.index(name)
-    rest, near, far = (_bounds_at(trial, r * nominal)[k] for r in (0.0, NEAR, 1.0))
-    share = (near - rest) / far if far else 0.0
-    text = f"the bounds of {name} grow by {share:.2g} of themselves below {NEAR:g} of its speed"
-    if share > HIDDEN:
+    rest, far = (_bounds_at(trial, r * nominal)[k] for r in (0.0, 1.0))
+    slow = {r: _bounds_at(trial, r * nominal)[k] for r in (*SLOW, 0.1)}
+    sooner = max((width - rest) / far - r if far else 0.0 for r, width in slow.items())
+    text = f"the bounds of {name} grow by {sooner:.2g} more than with its speed"
+    if sooner > GROWN:
         text += ": so it creeps; a friction must hold as much at rest"
-    return measured(share, HIDDEN, text, trial.place("bounds", "friction"))
+    return measured(sooner, GROWN, text, trial.place("bounds", "friction"))
 
 
 def _bounds_at(trial: Trial, speed: float) -> list[float]:

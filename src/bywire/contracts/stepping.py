@@ -14,6 +14,7 @@ from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.probe import states
 from bywire.contracts.start import Start
 from bywire.contracts.trial import LARGE, Trial, constants, lanes
+from bywire.core.errors import SolverError
 from bywire.core.signals import signals_of
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
@@ -24,8 +25,11 @@ ORDER = 2.0
 SHORTFALL = 0.3
 """by how much the observed order may fall short of two; a model of first order is off by one"""
 HALVINGS = 4
-SHARES = (1.0, 0.8, 0.6, 0.45, 0.35, 0.25, 0.15, 0.1)
-"""of the controllers' moves: instants of stick and slip scatter, many runs tell by how much"""
+SMOOTH_SHARES = (1.0, 0.3, 0.1)
+SHARES = (1.0, 0.5, 0.25, 0.12, 0.06, 0.03)
+"""of the controllers' moves: where stick and slip change instants, one run's errors scatter"""
+SCATTER = 0.2
+"""least standard error of the order of one run: a few errors may lie on a line by chance"""
 ROUNDING = 1e-12
 """of a state's largest or usual magnitude: differences below it tell nothing of the step"""
 AGREEMENT = 1e-9
@@ -35,31 +39,52 @@ _VIRTUAL = 0.02  # length [s] of the run that is repeated without a compiler
 
 
 def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
-    """Find whether every state of the plant converges with the square of the substep."""
+    """Find whether every state of the plant converges with the square of the substep.
+
+    That is what it does without dry friction. Where a velocity with dry friction turns round, the
+    instant falls somewhere within a substep: there at least the first order is wanted.
+    """
+    told = list(_orders(trial, False, ORDER))
+    if not told:
+        raise NotCheckedError(f"from {trial.start.known} no state moves enough to tell it")
+    yield from told
+    if trial.model.frictions:
+        yield from _orders(trial, True, 1.0)
+
+
+def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
+    """Yield what is found of every state that moves enough to tell it."""
     start = trial.start
     steps = [start.step / 2**k for k in range(HALVINGS + 1)]
     names = start.state._fields
     nominal = np.array([abs(s.nominal) for s in signals_of(trial.model.State).values()])
     errors = []
-    for share in SHARES:
-        runs = [states(simulate(trial.drive.run(share, step)), names) for step in steps]
+    for share in SHARES if frictions else SMOOTH_SHARES:
+        try:
+            runs = [
+                states(simulate(trial.drive.run(share, step, frictions)), names) for step in steps
+            ]
+        except SolverError:  # what runs away without its friction
+            continue
         floor = ROUNDING * np.maximum(np.abs(runs[-1]).max(axis=0), nominal)
         changes = [np.sqrt(np.mean((a - b) ** 2, axis=0)) for a, b in pairwise(runs)]
         errors.append(np.where(changes > floor, changes, np.nan))
-    place = trial.place("balance", "wire")
-    told = 0
-    for k, name in enumerate(names):
+    for k, name in enumerate(names if errors else ()):
         order, doubt = _observed(np.array(errors)[:, :, k])
         if doubt < SHORTFALL:
-            told += 1
-            text = f"{name} converges with order {order:.2f} +- {doubt:.2f} in the substep"
-            yield measured(ORDER - order - doubt, SHORTFALL, f"{text}, wanted is {ORDER:g}", place)
-    if not told:
-        raise NotCheckedError(f"from {start.known} no state moves enough to tell it")
+            how = "with" if frictions else "without"
+            text = (
+                f"{name} converges with order {order:.2f} +- {doubt:.2f} in the substep {how} dry "
+                f"friction, wanted is {wanted:g}"
+            )
+            place = trial.place("balance", "wire")
+            yield measured(wanted - order - doubt, SHORTFALL, text, place)
 
 
 def _observed(errors: Array) -> tuple[float, float]:
     """Return the order with which errors fall, and twice its standard error.
+
+    The mean over the runs, those counting most whose errors lie on a line.
 
     Parameters
     ----------
@@ -73,9 +98,10 @@ def _observed(errors: Array) -> tuple[float, float]:
     halving = np.arange(HALVINGS) - 0.5 * (HALVINGS - 1)
     spread = float(np.sum(halving**2))
     slopes = logs @ halving / spread
-    rest = logs - logs.mean(axis=1, keepdims=True) - slopes.mean() * halving
-    variance = float(np.sum(rest**2)) / max(rest.size - len(rest) - 1, 1)
-    return -float(slopes.mean()), 2.0 * math.sqrt(variance / (spread * len(rest)))
+    rest = logs - logs.mean(axis=1, keepdims=True) - slopes[:, None] * halving
+    variances = np.sum(rest**2, axis=1) / (HALVINGS - 2) / spread + SCATTER**2
+    total = float(np.sum(1.0 / variances))
+    return -float(np.sum(slopes / variances)) / total, 2.0 / math.sqrt(total)
 
 
 def has_agreeing_engines(trial: Trial) -> Iterator[Evidence]:

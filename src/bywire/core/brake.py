@@ -158,7 +158,8 @@ def _imported(place: Path, source: Path) -> ModuleType:
     if not name.isidentifier():
         raise ModelError(f"{place}: its name must be one that Python can import, like servo_axis")
     there = sys.modules.get(name)
-    if there is None and importlib.util.find_spec(name) is not None:
+    elsewhere = importlib.util.find_spec(name) if there is None else None
+    if elsewhere is not None and elsewhere.origin is not None:  # not a mere folder of that name
         there = ModuleType(name)
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
         raise ModelError(

@@ -1,0 +1,1 @@
+"""The package that ``bywire new`` writes, and what writes it."""

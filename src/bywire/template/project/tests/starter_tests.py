@@ -1,0 +1,47 @@
+"""The brake starter keeps what every brake has to keep, and does what it is for."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import bywire
+from bywire.core.brake import brakes, load_system
+
+PACKAGE = Path(__file__).parents[1] / "src" / "bywire.template.starter"
+
+
+@pytest.fixture(autouse=True, scope="module")
+def known() -> None:
+    """Have the brake known, installed or not."""
+    if "starter" not in brakes():
+        load_system(PACKAGE)
+
+
+@pytest.fixture(scope="module")
+def recording() -> xr.Dataset:
+    """Return the recording of a braking."""
+    return bywire.run("starter-clamp").recordings["run"]
+
+
+def test_every_contract_holds() -> None:
+    """Hold all that ``bywire check`` looks at."""
+    check = bywire.check("starter")
+    assert check.holds, "\n".join(map(str, check.broken))
+
+
+def test_demanded_force_is_reached(recording: xr.Dataset) -> None:
+    """Clamp with what is demanded, to 1 %."""
+    assert float(recording["F"].sel(time=0.59, method="nearest")) == pytest.approx(15e3, rel=0.01)
+
+
+def test_release_opens(recording: xr.Dataset) -> None:
+    """Let go of the disc."""
+    assert float(recording["F"][-1]) < 100.0
+
+
+def test_loop_has_margins() -> None:
+    """Have at least 45 degrees of phase margin at every point that is usual."""
+    assert bywire.margins("starter-force").holds

@@ -1,0 +1,1 @@
+"""Physical elements, one file each; ``bywire check`` finds and tests them."""

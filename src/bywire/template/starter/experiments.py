@@ -1,0 +1,70 @@
+"""Experiments of the brake starter, for ``bywire run``; generic ones need none, see the README."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import step_response
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Unit
+from bywire.core.signals import zeros
+from bywire.template.starter.model import Memory, StarterActuator
+from bywire.template.starter.parameters import Parameters
+
+
+class Options(ParameterSet):
+    """The braking."""
+
+    F_set: Annotated[float, Unit("N", 1e4), Field(gt=0, allow_inf_nan=False)]
+    """demanded clamp force"""
+    duration: Duration
+    """time for which it is demanded"""
+    release: Duration
+    """time recorded after it is let go"""
+
+
+def cases(par: Parameters, options: Options, _: Any) -> tuple[Case, ...]:
+    """Return the one run: from the open caliper to the force, and back."""
+
+    def stimulus(t: np.ndarray) -> dict[str, np.ndarray]:
+        return {"F_set": np.where((t >= 0.0) & (t < options.duration), options.F_set, 0.0)}
+
+    model = StarterActuator()
+    return (
+        Case(
+            "run", model, par, zeros(model.State), zeros(Memory), stimulus,
+            duration=options.duration + options.release,
+        ),
+    )  # fmt: skip
+
+
+def step(options: Options) -> step_response.Setting:
+    """Return the step of the clamp force, judged where it is held."""
+    window = (0.8 * options.duration, options.duration)
+    return step_response.Setting("F", 0.0, 0.0, options.F_set, window)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the key figures of the braking."""
+    held = recordings["run"].sel(time=slice(None, options.duration - 1e-9))
+    return tuple(evaluate("step_response", held, step(options)).values())
+
+
+EXPERIMENT = Experiment(
+    name="starter-clamp",
+    assembly="starter-actuator",
+    summary="clamp across the clearance, hold, release",
+    options=Options,
+    defaults=Options(F_set=15e3, duration=0.6, release=0.4),
+    cases=cases,
+    judge=judge,
+    kpis=units_of("step_response", resolved={"level": "N"}),
+    figures=("step-response", "time-traces"),
+    step=step,
+)

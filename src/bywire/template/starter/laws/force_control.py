@@ -1,0 +1,59 @@
+"""Clamp-force control: a proportional law asks for a speed, a PI gives the motor's voltage."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Unit, Voltage
+from bywire.core.signals import Signal, Speed
+
+
+class Parameters(ParameterSet):
+    """Force and speed are measured without delay and noise."""
+
+    k_F: Annotated[float, Unit("rad/(s*N)", 0.05), Field(ge=0, allow_inf_nan=False)]
+    """speed per force error"""
+    omega_max: Annotated[float, Unit("rad/s", 200.0), Field(gt=0, allow_inf_nan=False)]
+    """largest speed that is asked for"""
+    k_p: Annotated[float, Unit("V*s/rad", 0.05), Field(ge=0, allow_inf_nan=False)]
+    """voltage per speed error"""
+    k_i: Annotated[float, Unit("V/rad", 2.0), Field(ge=0, allow_inf_nan=False)]
+    """voltage per integrated speed error"""
+    v_max: Voltage
+    """limit of the voltage's magnitude"""
+
+
+class State(NamedTuple):
+    """Integral part of the speed control."""
+
+    v_i: Annotated[float, Signal("V", "integral part", 1.0)]
+
+
+class Input(NamedTuple):
+    """Demanded force, measured force and speed."""
+
+    F_set: Annotated[float, Signal("N", "demanded clamp force", 1e4)]
+    F: Annotated[float, Signal("N", "clamp force", 1e4)]
+    omega: Speed
+
+
+class Output(NamedTuple):
+    """Voltage of the motor."""
+
+    v: Annotated[float, Signal("V", "motor voltage", 6.0)]
+
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Field(gt=0)]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    """Advance the controller by one sample; the integral waits while the voltage is limited."""
+    wanted = ops.clip(par.k_F * (u.F_set - u.F), -par.omega_max, par.omega_max)
+    error = wanted - u.omega
+    v = par.k_p * error + x.v_i
+    growth = ops.where(ops.fabs(v) < par.v_max, par.k_i * error, 0.0)
+    return State(x.v_i + T * growth), Output(ops.clip(v, -par.v_max, par.v_max))

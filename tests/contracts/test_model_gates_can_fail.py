@@ -1,0 +1,129 @@
+"""Every contract of a model refuses the template's brake with a seeded mistake."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import pytest
+
+from bywire.contracts import stepping
+from bywire.contracts.evidence import Evidence, examine
+from bywire.contracts.model_contracts import OF_A_MODEL
+from bywire.contracts.subjects import demands_on
+from bywire.simulation.compiler import find_compiler
+from bywire.template.new import write_package
+from systems.loading import loaded
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+OPS = (
+    "from bywire.core.model import Bounds",
+    "from bywire.core import ops\nfrom bywire.core.model import Bounds",
+)
+STAIRS = (
+    "w.F = caliper_spring.output(w.caliper.u, w.caliper.par)",
+    "w.F = 200.0 * ops.floor(caliper_spring.output(w.caliper.u, w.caliper.par) / 200.0)",
+)
+
+
+class Mistake(NamedTuple):
+    """What is changed in a file of the template, and the contract that must notice."""
+
+    contract: str
+    file: str
+    changes: tuple[tuple[str, str], ...]
+
+
+MISTAKES = {
+    "wrong sign in a balance": Mistake(
+        "energy of a run", "model", (("spindle.Input(torque, w.F)", "spindle.Input(torque, -w.F)"),)
+    ),
+    "loss counted twice": Mistake(
+        "energy of a run", "model", ((": -w.reaction[0] *", ": -2.0 * w.reaction[0] *"),)
+    ),
+    "loss that gives": Mistake(
+        "energy of a run", "model", ((": -w.reaction[0] *", ": w.reaction[0] *"),)
+    ),
+    "source with half the voltage": Mistake(
+        "energy of a run", "model", (("w.m.v * w.motor.x.i", "0.5 * w.m.v * w.motor.x.i"),)
+    ),
+    "loss left out": Mistake(
+        "energy of a run",
+        "elements/spindle",
+        (("return par.d * x.omega * x.omega", "return 0.0 * par.d * x.omega * x.omega"),),
+    ),
+    "force of first order": Mistake("order of the step", "model", (OPS, STAIRS)),
+    "force without slope": Mistake("derivatives of a run", "model", (OPS, STAIRS)),
+    "friction that creeps": Mistake(
+        "hidden friction",
+        "model",
+        (OPS, ("return ((-T, T),)", "T = T * ops.fmin(ops.fabs(w.spindle.x.omega), 1.0)\n"
+                                    "        return ((-T, T),)")),
+    ),
+    "friction in the balance": Mistake(
+        "hidden friction",
+        "elements/spindle",
+        (("- par.d * x.omega)", "- par.T_0 * x.omega / (abs(x.omega) + 1e-3))"),),
+    ),
+    "bounds the wrong way round": Mistake(
+        "exact rest", "model", (("return ((-T, T),)", "return ((T, -T),)"),)
+    ),
+    "kink where it rests": Mistake(
+        "linear model",
+        "model",
+        (OPS, ("dc_motor.Input(w.m.v,", "dc_motor.Input(0.53 + ops.fabs(w.m.v - 0.53),")),
+    ),
+    "torque and force mixed up": Mistake(
+        "units", "model", (("spindle.Input(torque, w.F)", "spindle.Input(w.F, torque)"),)
+    ),
+}  # fmt: skip
+
+
+@contextmanager
+def seeded(folder: Path, name: str, mistake: Mistake | None = None) -> Iterator[Any]:
+    """Yield the trial of a template's brake with a mistake; nobody knows it afterwards."""
+    package = write_package(name, folder) / "src" / name.replace("-", "_")
+    if mistake is not None:
+        source = package / f"{mistake.file}.py"
+        text = source.read_text(encoding="utf-8")
+        for right, wrong in mistake.changes:
+            assert text.count(right) == 1, "the place of the mistake has moved"
+            text = text.replace(right, wrong)
+        source.write_text(text, encoding="utf-8")
+    with loaded(package):
+        yield next(demand.on for demand in demands_on(f"{name}-actuator", None))
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_gate_refuses(mistake: str, tmp_path: Path) -> None:
+    wanted = MISTAKES[mistake]
+    name = f"seeded-{list(MISTAKES).index(mistake)}"
+    with seeded(tmp_path, name, wanted) as subject:
+        found = examine(OF_A_MODEL[wanted.contract], subject, subject.place())
+    assert not found.holds, found.text
+
+
+def test_every_gate_lets_the_right_brake_pass(tmp_path: Path) -> None:
+    with seeded(tmp_path, "seeded-none") as subject:
+        found = {name: examine(contract, subject) for name, contract in OF_A_MODEL.items()}
+    assert {name: each.text for name, each in found.items() if not each.holds} == {}
+
+
+@pytest.mark.parametrize("contract", ["engines", "lanes"])
+def test_engines_that_differ_are_refused(
+    contract: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def off(run: Any, *rest: Any, engine: str = "auto") -> Any:
+        found = original(run, *rest, engine=engine)
+        if engine != "compiled":
+            found.values[-1] *= 1.0 + 1e-6
+        return found
+
+    original = stepping.simulate
+    monkeypatch.setattr(stepping, "simulate", off)
+    with seeded(tmp_path, f"seeded-{contract}") as subject:
+        found: Evidence = examine(OF_A_MODEL[contract], subject)
+    assert not found.holds
