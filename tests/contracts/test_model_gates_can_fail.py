@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from bywire.api.new import write_package
 from bywire.contracts import stepping
 from bywire.contracts.evidence import Evidence, examine
 from bywire.contracts.model_contracts import OF_A_MODEL
 from bywire.contracts.subjects import demands_on
 from bywire.simulation.compiler import find_compiler
-from bywire.template.new import write_package
 from systems.loading import loaded
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -94,7 +94,7 @@ def seeded(folder: Path, name: str, mistake: Mistake | None = None) -> Iterator[
             text = text.replace(right, wrong)
         source.write_text(text, encoding="utf-8")
     with loaded(package):
-        yield next(demand.on for demand in demands_on(f"{name}-actuator", None))
+        yield next(demand.on for demand in demands_on(f"{name}-actuator"))
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)

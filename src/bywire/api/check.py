@@ -9,7 +9,7 @@ from typing import Any
 
 from bywire.contracts.finding import Finding
 from bywire.contracts.subjects import demands_on
-from bywire.core.brake import load_system
+from bywire.core.brake import brakes, load_system, loaded_files
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Banner, Document, Flat, Listing, Section, TableBlock
 from bywire.report.tables import Cell, Column, Table
@@ -118,7 +118,7 @@ def check(
     ----------
     name
         Of a brake, a model, an element, a control law or a parameter set; by default the brake of
-        ``system``, else everything that is installed.
+        ``system``, else those that were loaded from files, else everything that is installed.
     system
         File or folder of a brake to load first; its code is run.
     progress
@@ -136,9 +136,14 @@ def check(
     >>> check("plant.pedal").holds
     True
     """
-    brake = None if system is None else load_system(system)
-    subject = name or (brake.name if brake is not None else "everything installed")
-    demands = list(demands_on(name, brake))
+    if system is not None:
+        named = [load_system(system).name]
+    else:
+        files = loaded_files()
+        named = [brake.name for brake in brakes().values() if brake.file in files]
+    names: list[str | None] = [name] if name is not None else [*named] or [None]
+    demands = [demand for each in names for demand in demands_on(each)]
+    subject = ", ".join(each or "everything installed" for each in names)
     findings = []
     for k, demand in enumerate(demands):
         if progress is not None:

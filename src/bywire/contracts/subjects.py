@@ -16,15 +16,14 @@ from bywire.core.errors import unknown_name
 from bywire.core.model import ASSEMBLIES
 
 
-def demands_on(name: str | None, brake: Brake | None) -> Iterator[Demand]:
+def demands_on(name: str | None) -> Iterator[Demand]:
     """Yield every contract that something has to keep.
 
     Parameters
     ----------
     name
-        Of a brake, a model, an element, a control law or a parameter set.
-    brake
-        What is meant where there is no name; everything installed where there is neither.
+        Of a brake, a model, an element, a control law or a parameter set; everything installed
+        where there is none.
 
     Raises
     ------
@@ -32,10 +31,9 @@ def demands_on(name: str | None, brake: Brake | None) -> Iterator[Demand]:
         With the nearest known names.
     """
     if name is None:
-        known = every_element() if brake is None else elements_of(brake)
-        yield from _on_elements(known.values())
-        for each in brakes().values() if brake is None else (brake,):
-            yield from _on_brake(each)
+        yield from _on_elements(every_element().values())
+        for brake in brakes().values():
+            yield from _on_brake(brake)
     elif name in brakes():
         yield from _on_elements(elements_of(brakes()[name]).values())
         yield from _on_brake(brakes()[name])

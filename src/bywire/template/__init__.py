@@ -1,1 +1,1 @@
-"""The package that ``bywire new`` writes, and what writes it."""
+"""What ``bywire new`` writes: a brake, its project's files, its tests, under other names."""
