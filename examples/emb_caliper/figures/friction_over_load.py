@@ -8,13 +8,16 @@ from bywire.bench.result import Result
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
 
+_STEADY = 0.02  # of the speed demand: what is farther from it accelerates
+
 
 def _draw(result: Result) -> list[Shown]:
     run = result.recordings["run"]
     figure, axes = style.new_figure(3.4, (1.0,))
-    F, T, omega = (run[name].values for name in ("F_cl", "torque", "omega"))
+    F, T, omega, asked = (run[name].values for name in ("F_cl", "torque", "omega", "omega_ref"))
+    steady = np.abs(omega - asked) < _STEADY * np.abs(asked)
     for label, color, way in (("apply", style.BLUE, 1.0), ("release", style.VERMILLION, -1.0)):
-        moving = np.sign(omega) == way
+        moving = steady & (np.sign(omega) == way)
         axes[0].plot(1e-3 * F[moving], T[moving], ".", color=color, markersize=2.0, label=label)
     axes[0].set_xlabel(style.axis_label("clamp force", "kN"))
     axes[0].set_ylabel(style.axis_label("motor torque", "N*m"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from itertools import pairwise
 from typing import Annotated
 
@@ -31,6 +32,7 @@ MotorSpeed = Annotated[float, Unit("rad/s", 5.0), Field(gt=0, allow_inf_nan=Fals
 
 _NAMES = ("friction.C", "friction.G", "rotor.D")
 _STEP = 20e-6
+_SMALL = 1e-3  # of the friction: what is left over below that is not judged
 _SPREAD = 1.5  # by which loads, and speeds, have to differ for their parts of the friction to part
 _ADVICE = "go up to a high clamp force and back at two speeds, as 'bywire run slow-strokes' does"
 
@@ -101,6 +103,10 @@ def identify(
         "torque_left_over", fitted - torque, np.full(torque.size, 1.0 / scatter), richer,
         len(_NAMES), "whether the friction bends over the load, or its slope changes with speed",
     )  # fmt: skip
+    if scatter < _SMALL * float(np.median(np.abs(torque))):
+        # A record without noise: anything shows, and nothing of it matters.
+        small = f"less than {100 * _SMALL:g} % of the friction is left over: not judged"
+        check = replace(check, limit=None, note=f"{check.note}; {small}")
     return Identified(
         estimates={"friction": best}, parameters=best.parameters(), checks=(check,),
         curves=(_curve(mean["F_cl"], torque, fitted),),

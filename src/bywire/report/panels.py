@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _NO_PANEL = ("E_", "W_", "t_", "noise_")  # beginnings of names: what only accumulates, and noise
 _LINES = 2  # of a panel, set points apart: one look for each
+_LONGEST = 20  # characters along a low panel
 
 
 @dataclass(frozen=True)
@@ -120,11 +121,16 @@ def _is_drawn(recording: xr.Dataset, name: str) -> bool:
 
 
 def _quantity(recording: xr.Dataset, names: Sequence[str]) -> str:
-    """Return what an ordinate says: a label, or the last words that two labels have in common."""
+    """Return what an ordinate says: a label, or the last words that two labels have in common.
+
+    Where that is too long for a panel's height, the signals' names stand in its place; the legend
+    has the labels.
+    """
     labels = [clean(recording[name].attrs.get("long_name", name)).split() for name in names]
     shared: list[str] = []
     for words in zip(*(reversed(label) for label in labels), strict=False):
         if len(set(words)) > 1:
             break
         shared.insert(0, words[0])
-    return " ".join(shared or labels[0])
+    text = " ".join(shared or labels[0])
+    return text if len(text) <= _LONGEST else ", ".join(names)

@@ -37,6 +37,23 @@ def test_bench_with_requirements(command: Any, tmp_path: Path) -> None:
     assert any("step-response" in name for name in names)
 
 
+@pytest.mark.parametrize("name", ["step_from_5kN", "hysteresis", "follow_sine"])
+def test_benches_of_generic_experiments_run(name: str, command: Any, caliper: Path) -> None:
+    code, out, err = command("run", caliper / "benches" / f"{name}.toml")
+    assert code == 0, err
+    assert "peak_current" in out
+
+
+def test_its_own_recording_is_replayed(command: Any, caliper: Path, tmp_path: Path) -> None:
+    bench = caliper / "benches" / "follow_sine.toml"
+    assert command("run", bench, "--out", tmp_path)[0] == 0
+    code, out, err = command(
+        "replay", tmp_path / "run.nc", "--bench", bench, "--input", "F_set=F_ref", "--json"
+    )
+    assert code == 0, err
+    assert "F_cl" in out
+
+
 def test_linearize_and_margins(command: Any) -> None:
     code, out, _ = command("linearize", "emb-plant", "--at", "7.5 A", "--json")
     assert code == 0
