@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 import bywire
+from bywire.bench.energy_ledger import role_attributes
 from bywire.bench.recording import energy_residual, parameter_hash
 from bywire.core.errors import FileError
 from bywire.core.parameters import ParameterSet
@@ -61,7 +62,8 @@ def test_signals_are_those_of_the_model(recording):
     declared = signals_of(braking().cases()[0].model.Output)
     assert set(recording.data_vars) == set(declared)
     for name, signal in declared.items():
-        assert recording[name].attrs == {"units": signal.unit, "long_name": signal.label}
+        said = {"units": signal.unit, "long_name": signal.label}
+        assert recording[name].attrs == said | role_attributes(signal.role)
         assert np.all(np.isfinite(recording[name].values))
 
 

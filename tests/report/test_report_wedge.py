@@ -10,7 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bywire.bench.energy_ledger import role_attributes
 from bywire.core.model import ASSEMBLIES
+from bywire.core.signals import signals_of
 from bywire.report.energy_balance import energy_balance
 from bywire.report.panels import PANELS
 from bywire.report.time_traces import time_traces
@@ -62,7 +64,12 @@ def legend(axes: Axes) -> list[str]:
 def energies(**changes: float) -> xr.Dataset:
     """Return a recording in which every energy grows from zero to its value."""
     ramp = T / T[-1]
-    return recording({name: ("J", name, value * ramp) for name, value in changes.items()})
+    found = recording({name: ("J", name, value * ramp) for name, value in changes.items()})
+    model = ASSEMBLIES.find("wedge-brake" if "W_disc" in changes else "screw-rig")
+    for name, signal in signals_of(model.Output).items():
+        if name in changes:
+            found[name].attrs |= role_attributes(signal.role)
+    return found
 
 
 def test_panels_are_stacked_as_in_the_paper() -> None:
