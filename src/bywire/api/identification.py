@@ -6,14 +6,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
 from bywire.api import earlier_result
 from bywire.api.method_choice import ChosenMethod
 from bywire.identification.estimate import Estimate, as_object
-from bywire.identification.method import Curve, Identified
+from bywire.identification.method import Identified
 from bywire.identification.parameter_file import parameter_file
 from bywire.report.answer import Answer
 from bywire.report.document import (
@@ -34,9 +34,6 @@ from bywire.report.estimate_tables import check_table, estimate_table, figure_ta
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.subject import Subject
 from bywire.report.tables import parameter_table
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)
@@ -135,14 +132,7 @@ class Identification(Answer):
         return Document(
             f"Identification {method.name}",
             method.summary if subject is None else subject.line,
-            sections=lambda: [
-                Section("Parameters", [b for b in self._parameters() if not isinstance(b, str)]),
-                *self._curves(),
-                Section("Residuals", self._residuals()),
-                Section("Correlations", self._correlations()),
-                Section("Data", [Paragraph(f"Measurement: {self.source}."), *self._data_notes()]),
-                self._made(subject),
-            ],
+            sections=lambda: self._sections(subject),
             brief=spaced([head, *self._parameters()]),
             data=self._data(),
             banner=self._banner(),
@@ -158,7 +148,24 @@ class Identification(Answer):
             return None
         return Subject(method.name, method.summary, self.chosen.name, par)
 
-    def _parameters(self) -> Iterator[str | Flat]:
+    def _sections(self, subject: Subject | None) -> list[Section]:
+        from bywire.report.method_curve import method_curve
+
+        curves = [
+            FigureBlock(partial(method_curve, curve), curve.caption, curve.name)
+            for curve in self.identified.curves
+        ]
+        data: list[Block] = [Paragraph(f"Measurement: {self.source}.")]
+        return [
+            Section("Parameters", list(self._parameters())),
+            *([Section("Curves", curves)] if curves else []),
+            Section("Residuals", self._residuals()),
+            Section("Correlations", self._correlations()),
+            Section("Data", [*data, *([Listing(self.data_notes)] if self.data_notes else [])]),
+            self._made(subject),
+        ]
+
+    def _parameters(self) -> Iterator[Flat]:
         for name, estimate in self.identified.estimates.items():
             table = estimate_table(estimate, self.start, self.put_in)
             texts = [f"{k.unknown.label} is not told by the data: {k.reason}"
@@ -173,21 +180,20 @@ class Identification(Answer):
         if self.identified.notes:
             yield Listing(self.identified.notes)
 
-    def _curves(self) -> list[Section]:
-        curves = self.identified.curves
-        blocks = [FigureBlock(partial(_curve, c), c.caption, c.name) for c in curves]
-        return [Section("Curves", blocks)] if blocks else []
-
     def _residuals(self) -> list[Block]:
+        from bywire.report.residual_figure import residual_figure
+
         return [
-            FigureBlock(partial(_residual_figure, estimate), _residual_caption(name, estimate), key)
+            FigureBlock(partial(residual_figure, estimate), _residual_caption(name, estimate), key)
             for key, name, estimate in self._keyed("residuals") if estimate.residuals.size > 1
         ]  # fmt: skip
 
     def _correlations(self) -> list[Block]:
+        from bywire.report.correlation_matrix import correlation_matrix
+
         blocks: list[Block] = [
             FigureBlock(
-                partial(_correlations, estimate),
+                partial(correlation_matrix, estimate),
                 f"{name}: correlations of the estimates. Near 1 or -1 the data tells a "
                 "combination of the two rather than either.",
                 key,
@@ -201,9 +207,6 @@ class Identification(Answer):
         several = len(self.identified.estimates) > 1
         for k, (name, estimate) in enumerate(self.identified.estimates.items(), 1):
             yield f"{kind}-{k}" if several else kind, f"{name[:1].upper()}{name[1:]}", estimate
-
-    def _data_notes(self) -> list[Block]:
-        return [Listing(self.data_notes)] if self.data_notes else []
 
     def _made(self, subject: Subject | None) -> Section:
         method, options = self.chosen.method, self.chosen.options
@@ -299,21 +302,3 @@ def _write_text(text: str, path: Path) -> Path:
     from bywire.report.files import write_bytes
 
     return write_bytes(path, text.encode())
-
-
-def _curve(curve: Curve) -> Figure:
-    from bywire.report.method_curve import method_curve
-
-    return method_curve(curve)
-
-
-def _residual_figure(estimate: Estimate) -> Figure:
-    from bywire.report.residual_figure import residual_figure
-
-    return residual_figure(estimate)
-
-
-def _correlations(estimate: Estimate) -> Figure:
-    from bywire.report.correlation_matrix import correlation_matrix
-
-    return correlation_matrix(estimate)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import xarray as xr
 
@@ -43,9 +43,6 @@ from bywire.report.document import (
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean, duration
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
@@ -106,23 +103,14 @@ class Replay(Answer):
         )  # fmt: skip
         table = TableBlock(fit_table(self.fits), width=110)
         definitions = [f"{k.name}: {k.definition}" for k in self.fits[0].kpis] if self.fits else []
-        tracked = [
-            FigureBlock(
-                partial(_track_figure, each, self.replayed.run.par.leaves()),
-                f"{each.relation.parameter} tracked from {', '.join(each.relation.signals)}: "
-                f"{each.relation.assumption}.",
-                f"track-{each.relation.parameter}",
-            )
-            for each in self.tracks
-        ]
         head = f"{self.source} drives {bench.experiment} of {bench.parameters} by {inputs}"
         return Document(
             f"Replay of {self.source}",
             subject.line,
             sections=lambda: [
                 Section("How well it fits", [table, Listing(definitions)]),
-                Section("Measured and simulated", list(self._figures())),
-                *([Section("Tracked parameters", tracked)] if tracked else []),
+                Section("Measured and simulated", self._figures()),
+                *([Section("Tracked parameters", self._track_figures())] if self.tracks else []),
                 subject.made(f"Measurement: {self.source}.",
                              *(f"{note[:1].upper()}{note[1:]}." for note in self.notes)),
             ],
@@ -133,15 +121,33 @@ class Replay(Answer):
             record="replay.json",
         )  # fmt: skip
 
-    def _figures(self) -> Iterator[FigureBlock]:
-        for name, pair in self.replayed.outputs.items():
-            fits = [fit for fit in self.fits if fit.signal == name]
-            yield FigureBlock(
-                partial(_replay_figure, name, pair, self.replayed.inputs, fits),
+    def _figures(self) -> list[FigureBlock]:
+        from bywire.report.replay_figure import replay_figure
+
+        return [
+            FigureBlock(
+                partial(replay_figure, name, pair, self.replayed.inputs,
+                        [fit for fit in self.fits if fit.signal == name]),
                 f"{name}: measured (solid), simulated (dashed), and their difference; the demand "
                 "above.",
                 name,
             )
+            for name, pair in self.replayed.outputs.items()
+        ]  # fmt: skip
+
+    def _track_figures(self) -> list[FigureBlock]:
+        from bywire.report.track_figure import track_figure
+
+        known = self.replayed.run.par.leaves()
+        return [
+            FigureBlock(
+                partial(track_figure, each, known.get(each.relation.parameter)),
+                f"{each.relation.parameter} tracked from {', '.join(each.relation.signals)}: "
+                f"{each.relation.assumption}.",
+                f"track-{each.relation.parameter}",
+            )
+            for each in self.tracks
+        ]
 
     def _tracked_texts(self) -> Iterator[str]:
         for each in self.tracks:
@@ -325,16 +331,3 @@ def _tracked(track: Track) -> dict[str, Any]:
         "used": data["used"].values.tolist(),
     }
 
-
-def _track_figure(track: Track, known: Mapping[str, float]) -> Figure:
-    from bywire.report.track_figure import track_figure
-
-    return track_figure(track, known.get(track.relation.parameter))
-
-
-def _replay_figure(
-    name: str, pair: xr.Dataset, inputs: xr.Dataset, fits: Sequence[SegmentFit]
-) -> Figure:
-    from bywire.report.replay_figure import replay_figure
-
-    return replay_figure(name, pair, inputs, fits)
