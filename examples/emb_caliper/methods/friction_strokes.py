@@ -17,11 +17,11 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.identification.differentiation import differentiated
-from bywire.identification.lack_of_fit import lack_of_fit
 from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.residuals import lack_of_fit
 from bywire.identification.unknown import parameters_of
-from bywire.identification.wrong_sign import wrong_sign
 from bywire.simulation.run import simulate
 from emb_caliper.ecu import travel_per_angle
 from emb_caliper.experiments import slow_strokes
