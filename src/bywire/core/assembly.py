@@ -9,25 +9,25 @@ would fight the diagonal mass form of ``core.model``, which stays below this for
 from __future__ import annotations
 
 import types
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from functools import cache
 from itertools import islice, repeat
-from typing import Annotated, Any, ClassVar, Generic, NamedTuple, Self, TypeVar
+from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
 import numpy as np
 
 from bywire.core.errors import ModelError, unknown_name
+from bywire.core.gathering import AnyPart, contacts, gather, stores
 from bywire.core.model import Bounds, Matrix, Model
-from bywire.core.parts import Instant, Integral, Part, Shown, Wire, Wired, instant_of
-from bywire.core.signals import Role, Signal, signals_of, zeros
+from bywire.core.parts import Part
+from bywire.core.signals import zeros
+from bywire.core.wired import Instant, Wired, instant_of
+from bywire.core.wires import Integral, Shown, Wire
 
 ParT = TypeVar("ParT")
 MemoryT = TypeVar("MemoryT")
-AnyPart = Part[Any, Any, Any, Any]
 
 _NAN = float("nan")
-STORED = Signal("J", "stored energy", role=Role("sink", "stored"))
-"""what every assembly can record as ``E_stored``"""
 
 
 class Assembly(Model, Generic[ParT, MemoryT]):
@@ -53,7 +53,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         """Gather what follows from the parts."""
         super().__init_subclass__(**options)
         if not at_an_instant and isinstance(cls.Memory, type):  # else there is more to come
-            _gather(cls)
+            gather(cls)
 
     # What an assembly writes.
 
@@ -137,7 +137,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
     ) -> Self:
         each: dict[str, tuple[float, ...]] = {}
         left = iter(contact) if contact is not None else repeat(_NAN)
-        for part in _contacts(type(self)):
+        for part in contacts(type(self)):
             each[part.name] = tuple(islice(left, len(part.element.Forces._fields)))
         fields = {"x": x, "xe": x, "memory": memory, "par": par, "shared": self.shared}
         w: Self = object.__new__(_at_an_instant(type(self)))
@@ -148,7 +148,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         """Return the factor of each state's derivative."""
         w = self.at(xe, self._nothing(), par)
         rows: list[float] = []
-        for part in _stores(type(self)):
+        for part in stores(type(self)):
             count = len(part.element.State._fields)
             if part.has("mass"):
                 rows += _row(_wired(w, part).call(part.element.mass))
@@ -162,7 +162,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         """Return the smooth right-hand sides."""
         w = self.at(x, memory, par, contact, xe=xe)
         rows: list[float] = []
-        for part in _stores(type(self)):
+        for part in stores(type(self)):
             name = "balance" if part.has("balance") else "rate"
             rows += _row(_wired(w, part).call(part.function(name)))
         return self.State._make(rows)
@@ -178,7 +178,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         state = self.State._make(_NAN for _ in self.State._fields)
         w = self._unwired(state, self._nothing(), par, None)
         groups: list[Matrix] = []
-        for part in _contacts(type(self)):
+        for part in contacts(type(self)):
             wired = _wired(w, part)
             if part.has("matrix"):
                 groups.append(wired.call(part.element.matrix))
@@ -191,7 +191,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         """Return the damped overlaps, group by group."""
         w = self.at(x, self._nothing(), par, xe=xe)
         groups: list[tuple[float, ...]] = []
-        for part in _contacts(type(self)):
+        for part in contacts(type(self)):
             overlaps = _row(_wired(w, part).call(part.function("overlaps")))
             groups += (overlaps,) if part.has("matrix") else ((each,) for each in overlaps)
         return tuple(groups)
@@ -201,7 +201,7 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         """Per contact group, whether it rarely touches."""
         return tuple(
             part.rarely
-            for part in _contacts(type(self))
+            for part in contacts(type(self))
             for _ in range(1 if part.has("matrix") else len(part.element.Forces._fields))
         )
 
@@ -344,72 +344,6 @@ def _filled(model: Assembly[Any, Any], method: str, kind: Any, values: Mapping[s
                 f"add it to what {method} returns"
             )
     return kind(**{name: values[name] for name in kind._fields})
-
-
-def _stores(cls: type[Assembly[Any, Any]]) -> Iterator[AnyPart]:
-    return (part for part in cls.parts.values() if part.has("State"))
-
-
-def _contacts(cls: type[Assembly[Any, Any]]) -> Iterator[AnyPart]:
-    return (part for part in cls.parts.values() if part.has("Forces"))
-
-
-def _gather(cls: type[Assembly[Any, Any]]) -> None:
-    """Derive State, Flow and Output of an assembly from its declarations."""
-    declared = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
-    cls.parts = {k: v for k, v in declared.items() if isinstance(v, Part)}
-    states: dict[str, Signal] = {}
-    for part in _stores(cls):
-        if part.has("balance") and not part.has("mass"):
-            raise ModelError(
-                f"{part.where}: {part.kind} has states and a balance, but no mass: define mass "
-                "there, or name the function rate where it returns derivatives"
-            )
-        if not (part.has("balance") or part.has("rate")):
-            raise ModelError(f"{part.where}: {part.kind} has states, but no balance and no rate")
-        for name, signal in part.states().items():
-            if name in states:
-                raise ModelError(
-                    f"{part.where}: another part has a state {name!r} too: give this one a suffix "
-                    "or another name, Part(..., suffix='_2') or Part(..., state={...})"
-                )
-            states[name] = signal
-    flows: dict[str, Signal] = {}
-    shown: dict[str, Signal] = {}
-    for name, value in declared.items():
-        if isinstance(value, Part):
-            flows |= {k: s for k, s in value.energies.items() if k not in flows}
-            shown |= value.outputs() | value.kept
-        elif isinstance(value, Integral):
-            flows[name] = value.signal
-        elif isinstance(value, (Wire, Shown)):
-            shown[name] = value.signal
-    for kind, signals in (("State", states), ("Flow", flows)):
-        if _derives(declared.get(kind)):
-            setattr(cls, kind, _named_tuple(cls, kind, signals))
-    if _derives(declared.get("Output")):
-        known = signals_of(cls.State) | signals_of(cls.Memory) | signals_of(cls.Flow)
-        known |= {"E_stored": STORED} | shown
-        names = cls.records or tuple(known)
-        for name in names:
-            if name not in known:
-                raise ModelError(f"{cls.__name__}.records: {unknown_name('signal', name, known)}")
-        cls.Output = _named_tuple(cls, "Output", {name: known[name] for name in names})
-
-
-def _derives(kind: Any) -> bool:
-    """Tell whether a signal tuple follows from the parts: the class has none of its own."""
-    return not isinstance(kind, type) or hasattr(kind, "derived")
-
-
-def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
-    """Return a signal tuple that can be pickled as an attribute of its assembly."""
-    make: Callable[..., Any] = NamedTuple
-    made = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
-    made.__module__, made.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"
-    made.__doc__ = f"{kind} of {owner.__name__}, gathered from its parts."
-    made.derived = True
-    return made
 
 
 @cache

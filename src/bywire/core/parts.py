@@ -1,21 +1,20 @@
-"""Parts and signals of an assembly: what its class declares, and what its equations see of them."""
+"""Parts of an assembly: elements by their modules, typed by what these define."""
 
 from __future__ import annotations
 
-import inspect
 import typing
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
-from typing import Any, Generic, NamedTuple, Protocol, Self, TypedDict, TypeVar, Unpack, overload
+from dataclasses import replace
+from functools import cached_property
+from typing import Any, Generic, Protocol, Self, TypedDict, TypeVar, Unpack, overload
 
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.signals import Signal, signal_in, signals_of
+from bywire.core.wired import F, Instant, P, U, Wired, X, instant_of
+from bywire.core.wires import Integral, Shown, Wire
 
-X = TypeVar("X")
-U = TypeVar("U")
-F = TypeVar("F")
-P = TypeVar("P")
+__all__ = ["OPTIONS", "Integral", "Part", "PartOptions", "Shown", "Wire"]
+
 X_co = TypeVar("X_co", covariant=True)
 U_co = TypeVar("U_co", covariant=True)
 F_co = TypeVar("F_co", covariant=True)
@@ -58,131 +57,6 @@ class _Plain(Protocol[P_co]):
 
     @property
     def Parameters(self) -> Callable[..., P_co]: ...
-
-
-class Wired(Generic[X, U, F, P]):
-    """A part at an instant: its state, input, contact forces and parameters.
-
-    Parameters
-    ----------
-    part
-        What is declared.
-    instant
-        Where the model is evaluated.
-    """
-
-    def __init__(self, part: Part[X, U, F, P], instant: Instant) -> None:
-        self._part, self._instant = part, instant
-        self._input: Any = None
-
-    @property
-    def x(self) -> X:
-        """State."""
-        return self._part.state_at(self._instant, ())  # type: ignore[no-any-return]
-
-    @property
-    def xe(self) -> X:
-        """State, value-only."""
-        return self._part.state_at(self._instant, None)  # type: ignore[no-any-return]
-
-    @property
-    def par(self) -> P:
-        """Parameters."""
-        value = self._instant.par
-        for name in self._part.path.split("."):
-            value = getattr(value, name, None)
-        if value is None:
-            raise ModelError(
-                f"{self._part.where}: the parameters have no {self._part.path!r}: say where they "
-                f"stand, Part({self._part.kind}, par='...')"
-            )
-        return value  # type: ignore[no-any-return]
-
-    @property
-    def f(self) -> F:
-        """Contact forces."""
-        return self._part.forces_at(self._instant, self.par)  # type: ignore[no-any-return]
-
-    @property
-    def u(self) -> U:
-        """Input, as it was wired."""
-        if self._input is None:
-            raise ModelError(
-                f"{self._part.where}: its input is read before it is wired: assign "
-                f"w.{self._part.name}.u = {self._part.kind}.Input(...) in wire, above that"
-            )
-        return self._input  # type: ignore[no-any-return]
-
-    @u.setter
-    def u(self, value: U) -> None:
-        wanted = getattr(self._part.element, "Input", None)
-        if wanted is None or not isinstance(value, wanted):
-            takes = "no input" if wanted is None else f"a {self._part.kind}.Input"
-            raise ModelError(
-                f"{self._part.where}: {_line()} assigns a {type(value).__module__}."
-                f"{type(value).__name__} as its input, but it takes {takes}"
-            )
-        if self._input is not None:
-            raise ModelError(
-                f"{self._part.where}: {_line()} assigns its input a second time: wire it once"
-            )
-        self._input = value
-        self._instant.note(f"{self._part.name}.u")
-
-    def call(self, function: Callable[..., Any], **more: Any) -> Any:
-        """Return what a function of the element gives, its arguments taken by their names."""
-        return function(*(
-            more[name] if name in more else self._argument(name, function)
-            for name in _arguments(function)
-        ))  # fmt: skip
-
-    def _argument(self, name: str, function: Callable[..., Any]) -> Any:
-        if name == "x":
-            return self._part.state_at(self._instant, self._part.fixed)
-        if name in ("xe", "u", "f", "par"):
-            return getattr(self, name)
-        if name in self._instant.shared:
-            return getattr(self._instant.par, name)
-        raise ModelError(
-            f"{self._part.where}: {self._part.kind}.{function.__name__} takes {name!r}, which no "
-            f"assembly knows: x, u, f and par are, and parameters that it names in shared "
-            f"({', '.join(self._instant.shared) or 'none now'})"
-        )
-
-
-@dataclass
-class Instant:
-    """Where and with what a model is evaluated.
-
-    Parameters
-    ----------
-    x, xe
-        State, and the same value-only.
-    shared
-        Groups of parameters that elements take by name.
-    contact
-        Contact forces by part.
-    lines
-        File and line in which every wire and input was set, where that is wanted.
-    """
-
-    x: Any
-    xe: Any
-    memory: Any
-    par: Any
-    shared: tuple[str, ...]
-    contact: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
-    reaction: tuple[float, ...] = ()
-    rate: Any = None
-    flow: Any = None
-    wires: dict[str, Any] = field(default_factory=dict)
-    parts: dict[str, Wired[Any, Any, Any, Any]] = field(default_factory=dict)
-    lines: dict[str, str] | None = None
-
-    def note(self, name: str) -> None:
-        """Remember where a signal was set."""
-        if self.lines is not None:
-            self.lines[name] = _line()
 
 
 class PartOptions(TypedDict, total=False):
@@ -394,88 +268,3 @@ class Part(Generic[X, U, F, P]):
             raise ModelError(f"{self.where}: {self.kind} has no contact forces")
         forces = self.element.Forces(*instant.contact[self.name])
         return self.element.bent(forces, par) if self.has("bent") else forces
-
-
-class _Named:
-    """A signal that the class of an assembly declares."""
-
-    name: str
-    where: str
-
-    def __init__(self, unit: str, label: str, nominal: float = 1.0, role: Any = None) -> None:
-        self.signal = Signal(unit, label, nominal, role=role)
-
-    def __set_name__(self, owner: type, name: str) -> None:
-        self.name, self.where = name, f"{owner.__name__}.{name}"
-
-
-class Wire(_Named):
-    """A signal between parts that ``wire`` sets once; it can be recorded."""
-
-    @overload
-    def __get__(self, instance: None, owner: type) -> Self: ...
-    @overload
-    def __get__(self, instance: Any, owner: type) -> float: ...
-    def __get__(self, instance: Any, owner: type) -> Any:
-        """Return the wire, or of an assembly at an instant its value."""
-        if instance is None:
-            return self
-        wires = instant_of(instance, self.where).wires
-        if self.name not in wires:
-            raise ModelError(
-                f"{self.where} is read before it is set: assign w.{self.name} = ... in wire, "
-                "above that"
-            )
-        return wires[self.name]
-
-    def __set__(self, instance: Any, value: float) -> None:
-        instant = instant_of(instance, self.where)
-        if self.name in instant.wires:
-            raise ModelError(f"{self.where}: {_line()} sets it a second time: set a wire once")
-        instant.wires[self.name] = value
-        instant.note(self.name)
-
-
-class Integral(_Named):
-    """What is integrated along with the states; ``power`` returns its rate."""
-
-
-class Shown(_Named):
-    """What is recorded and is no state, wire or integral; ``record`` returns it."""
-
-
-class StateFields(NamedTuple):
-    """Where a state of an assembly comes from."""
-
-    part: Part[Any, Any, Any, Any]
-    name: str
-
-
-def instant_of(instance: Any, where: str) -> Instant:
-    """Return the instant at which an assembly is evaluated.
-
-    Raises
-    ------
-    ModelError
-        When it is not: its parts have values at an instant only.
-    """
-    instant = vars(instance).get("_instant")
-    if instant is None:
-        raise ModelError(
-            f"{where} has no value here: within wire and its like take it from w, elsewhere from "
-            "model.at(state, memory, par)"
-        )
-    return typing.cast(Instant, instant)
-
-
-@cache
-def _arguments(function: Callable[..., Any]) -> tuple[str, ...]:
-    return tuple(inspect.signature(function).parameters)
-
-
-def _line() -> str:
-    """Return file and line of the equation that is being evaluated: the first beyond this room."""
-    frame = inspect.currentframe()
-    while frame is not None and frame.f_globals.get("__package__") == __package__:
-        frame = frame.f_back
-    return f"{frame.f_code.co_filename}, line {frame.f_lineno}," if frame else ""

@@ -11,8 +11,9 @@ from bywire.core.assembly import Assembly
 from bywire.core.dimensions import Dimension, fits
 from bywire.core.errors import ModelError, UnitError
 from bywire.core.parameters import ParameterSet, leaf_fields
-from bywire.core.parts import Instant, Wire, instant_of
 from bywire.core.signals import signals_of
+from bywire.core.wired import Instant, instant_of
+from bywire.core.wires import Wire
 
 AnyAssembly = Assembly[Any, Any]
 

@@ -7,8 +7,8 @@ from typing import Annotated, Literal, NamedTuple
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.control import position_pd
 from bywire.core.model import Bounds
-from bywire.core.parts import Wired
 from bywire.core.signals import Signal
+from bywire.core.wired import Wired
 from bywire.plant import axial_bearing, current_drive, roller_screw, servo_motor
 
 Par = WedgeParameters

@@ -1,0 +1,84 @@
+"""What follows from the declarations of an assembly: its State, Flow and Output."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from typing import Annotated, Any, NamedTuple
+
+from bywire.core.errors import ModelError, unknown_name
+from bywire.core.parts import Part
+from bywire.core.signals import Role, Signal, signals_of
+from bywire.core.wires import Integral, Shown, Wire
+
+AnyPart = Part[Any, Any, Any, Any]
+
+STORED = Signal("J", "stored energy", role=Role("sink", "stored"))
+"""what every assembly can record as ``E_stored``"""
+
+
+def gather(cls: type[Any]) -> None:
+    """Derive State, Flow and Output of an assembly from its declarations."""
+    declared = {k: v for base in reversed(cls.__mro__) for k, v in vars(base).items()}
+    cls.parts = {k: v for k, v in declared.items() if isinstance(v, Part)}
+    states: dict[str, Signal] = {}
+    for part in stores(cls):
+        if part.has("balance") and not part.has("mass"):
+            raise ModelError(
+                f"{part.where}: {part.kind} has states and a balance, but no mass: define mass "
+                "there, or name the function rate where it returns derivatives"
+            )
+        if not (part.has("balance") or part.has("rate")):
+            raise ModelError(f"{part.where}: {part.kind} has states, but no balance and no rate")
+        for name, signal in part.states().items():
+            if name in states:
+                raise ModelError(
+                    f"{part.where}: another part has a state {name!r} too: give this one a suffix "
+                    "or another name, Part(..., suffix='_2') or Part(..., state={...})"
+                )
+            states[name] = signal
+    flows: dict[str, Signal] = {}
+    shown: dict[str, Signal] = {}
+    for name, value in declared.items():
+        if isinstance(value, Part):
+            flows |= {k: s for k, s in value.energies.items() if k not in flows}
+            shown |= value.outputs() | value.kept
+        elif isinstance(value, Integral):
+            flows[name] = value.signal
+        elif isinstance(value, (Wire, Shown)):
+            shown[name] = value.signal
+    for kind, signals in (("State", states), ("Flow", flows)):
+        if _derives(declared.get(kind)):
+            setattr(cls, kind, _named_tuple(cls, kind, signals))
+    if _derives(declared.get("Output")):
+        known = signals_of(cls.State) | signals_of(cls.Memory) | signals_of(cls.Flow)
+        known |= {"E_stored": STORED} | shown
+        names = cls.records or tuple(known)
+        for name in names:
+            if name not in known:
+                raise ModelError(f"{cls.__name__}.records: {unknown_name('signal', name, known)}")
+        cls.Output = _named_tuple(cls, "Output", {name: known[name] for name in names})
+
+
+def _derives(kind: Any) -> bool:
+    """Tell whether a signal tuple follows from the parts: the class has none of its own."""
+    return not isinstance(kind, type) or hasattr(kind, "derived")
+
+
+def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
+    """Return a signal tuple that can be pickled as an attribute of its assembly."""
+    make: Callable[..., Any] = NamedTuple
+    made = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
+    made.__module__, made.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"
+    made.__doc__ = f"{kind} of {owner.__name__}, gathered from its parts."
+    made.derived = True
+    return made
+
+
+def stores(cls: type[Any]) -> Iterator[AnyPart]:
+    """Yield the parts of an assembly that have states."""
+    yield from (part for part in cls.parts.values() if part.has("State"))
+
+
+def contacts(cls: type[Any]) -> Iterator[AnyPart]:
+    """Yield the parts of an assembly that have contact forces."""
+    yield from (part for part in cls.parts.values() if part.has("Forces"))
