@@ -115,18 +115,20 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
 def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
     """Return the shortest bench file of an experiment; nothing where there is a file instead."""
     name = str(file)
-    known = EXPERIMENTS.all()
-    if not _NAME.fullmatch(name) or file.is_file() or name not in {*known, *_any_brake()}:
+    if not _NAME.fullmatch(name) or file.is_file():
+        return {}
+    definition = EXPERIMENTS.guess(name) or EXPERIMENTS.all().get(name)
+    if definition is None and name not in _any_brake():
         return {}
     if "parameters" in changes:
         return {"experiment": name}
-    if name not in known:
+    if definition is None:
         sets = ", ".join(PARAMETER_SETS.all())
         raise ParameterError(
             f"experiment {name!r} is for any brake: say for which, with --set parameters=NAME "
             f"({sets})"
         )
-    return {"experiment": name, "parameters": main_set(known[name].assembly)}
+    return {"experiment": name, "parameters": main_set(definition.assembly)}
 
 
 def _any_brake() -> Mapping[str, GenericExperiment]:

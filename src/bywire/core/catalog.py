@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from bywire.core.brake import brakes
 from bywire.core.errors import ModelError
 from bywire.core.parameters import ParameterSet, require_units
 from bywire.core.provenance import Cited, chosen
@@ -63,9 +64,10 @@ def main_set(assembly: str) -> str:
     ModelError
         When there is none.
     """
-    for name, cited in PARAMETER_SETS.all().items():
-        if cited.assembly == assembly:
-            return name
+    for brake in brakes().values():  # as many as it takes: their models are loaded with them
+        for name, cited in PARAMETER_SETS.of(brake.module).items():
+            if cited.assembly == assembly:
+                return name
     raise ModelError(
         f"there is no parameter set for a {assembly}: declare a bywire.CitedSet of that assembly"
     )

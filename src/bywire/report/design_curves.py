@@ -14,6 +14,7 @@ from matplotlib.ticker import MultipleLocator, NullFormatter
 from bywire.analysis.loop_curves import LoopCurve
 from bywire.report import style
 from bywire.report.channel import FloatArray
+from bywire.report.line_role import Role
 from bywire.report.sensitivity import MOST_S, MOST_T
 
 _LOWEST = -60.0  # what is drawn, dB
@@ -68,7 +69,7 @@ def loop_gains(found: Sequence[DesignCurve], phase_margin: float | None) -> Figu
     upper.axhline(0.0, color=style.GRAY, linewidth=0.8, zorder=1)
     lower.axhline(-180.0, color=style.GRAY, linewidth=0.8, zorder=1)
     if phase_margin is not None:
-        look = style.STROKES[style.Role.LIMIT]
+        look = style.STROKES[Role.LIMIT]
         lower.axhline(phase_margin - 180.0, color=look.color, linestyle=look.linestyle,
                       linewidth=look.linewidth)  # fmt: skip
         upper.plot([], [], color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
@@ -93,7 +94,7 @@ def sensitivities(found: Sequence[DesignCurve]) -> Figure:
     """
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
-        look = style.STROKES[style.Role.LIMIT]
+        look = style.STROKES[Role.LIMIT]
         axes.axhline(20.0 * math.log10(limit), color=look.color, linestyle=look.linestyle,
                      linewidth=look.linewidth, label=f"usual limit {limit:g}")  # fmt: skip
         axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
@@ -134,7 +135,7 @@ def steps(found: Sequence[DesignCurve], overshoot: float | None) -> Figure:
             axes.plot(time, np.append(one.step, one.step[-1]), line, color=color, linewidth=1.6,
                       label=one.label)  # fmt: skip
     if overshoot is not None:
-        look = style.STROKES[style.Role.LIMIT]
+        look = style.STROKES[Role.LIMIT]
         axes.axhline(1.0 + 0.01 * overshoot, color=look.color, linestyle=look.linestyle,
                      linewidth=look.linewidth,
                      label=f"required overshoot {overshoot:.3g} %")  # fmt: skip

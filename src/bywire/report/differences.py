@@ -11,6 +11,7 @@ from matplotlib.ticker import NullFormatter
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import FloatArray
+from bywire.report.line_role import Role
 
 _DASHES: tuple[style.Dash, ...] = ("-", "--", ":")
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
@@ -41,7 +42,7 @@ def differences(
     if not found:
         raise ParameterError("differences: nothing given: give at least one cause")
     figure, panels = style.new_figure(5.2, (1.0, 1.0))
-    look = style.STROKES[style.Role.LIMIT]
+    look = style.STROKES[Role.LIMIT]
     for n, (axes, label) in enumerate(zip(panels, ("gain [dB]", "phase [°]"), strict=True)):
         floor = _LEAST * tolerance[n]
         for k, (name, values) in enumerate(found.items()):

@@ -15,6 +15,7 @@ from bywire.report import style
 from bywire.report.band_width import LINE, band_label
 from bywire.report.channel import FloatArray
 from bywire.report.decimation import kept_samples
+from bywire.report.line_role import Role
 from bywire.report.record_marks import mark_records
 from bywire.report.wording import amount
 
@@ -47,7 +48,7 @@ def _beside(curve: Curve) -> Figure:
         _draw(lower, at, modeled - measured, few, color=color or style.PURPLE, linewidth=0.9)
         sparse = sparse or few
     for name in (str(k) for k in data.data_vars if k not in ("measured", "modeled")):
-        look = style.STROKES[style.Role.SECOND]
+        look = style.STROKES[Role.SECOND]
         upper.plot(
             *_drawn(_abscissa(data, x, 0), _row(data[name], data[x], 0)), color=look.color,
             zorder=look.zorder, linestyle=look.linestyle, linewidth=look.linewidth,
@@ -85,7 +86,7 @@ def _draw_pair(
 ) -> None:
     """Draw measured and modeled; of a family both in its own color, measured pale and wide."""
     for values, role, word in zip(
-        pair, (style.Role.MEASURED, style.Role.SIMULATED), ("measured", "modeled"), strict=True
+        pair, (Role.MEASURED, Role.SIMULATED), ("measured", "modeled"), strict=True
     ):
         if not np.isfinite(values).any():
             continue
@@ -93,6 +94,8 @@ def _draw_pair(
         wide = bool(color) and role is style.Role.MEASURED and not few
         _draw(
             axes, at, values, few and role is style.Role.MEASURED, color=color or look.color,
+        wide = bool(own) and role is Role.MEASURED and not few
+            axes, at, values, few and role is Role.MEASURED, color=own or look.color,
             zorder=look.zorder, linestyle=look.linestyle, alpha=0.4 if wide else 1.0,
             linewidth=3.0 if wide else look.linewidth,
             label=style.plain(f"{label} {word}".strip()),

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bywire.core.registry import Kind, instances
-from bywire.report.style import Role
+from bywire.report.line_role import Role
 from bywire.report.wording import clean
 
 if TYPE_CHECKING:

@@ -15,6 +15,7 @@ from bywire.identification.replaying.fit import SegmentFit
 from bywire.report import style
 from bywire.report.channel import channel
 from bywire.report.decimation import decimate
+from bywire.report.line_role import Role
 
 _NAMED = 8  # segments up to which there is room for their names
 
@@ -42,7 +43,7 @@ def replay_figure(
     for k, stimulus in enumerate(map(str, inputs.data_vars)):
         shown = channel(inputs, stimulus)
         color = style.SEQUENCE[k % len(style.SEQUENCE)] if len(inputs.data_vars) > 1 else None
-        look = style.STROKES[style.Role.SET_POINT]
+        look = style.STROKES[Role.SET_POINT]
         top.plot(
             *decimate(scale * shown.time, shown.values), color=color or look.color,
             linewidth=look.linewidth, label=style.plain(shown.label),
@@ -51,8 +52,8 @@ def replay_figure(
     symbol = str(pair["measured"].attrs.get("units", "1"))
     factor = convert(1.0, symbol, display_unit(symbol))
     for values, role, word in (
-        (pair["measured"].values, style.Role.MEASURED, "measured"),
-        (pair["modeled"].values, style.Role.SIMULATED, "simulated"),
+        (pair["measured"].values, Role.MEASURED, "measured"),
+        (pair["modeled"].values, Role.SIMULATED, "simulated"),
     ):
         look = style.STROKES[role]
         middle.plot(

@@ -13,6 +13,7 @@ from bywire.analysis.loop_curves import Family, LoopCurve
 from bywire.report import style
 from bywire.report.channel import FloatArray
 from bywire.report.curve_family import draw_family, value_bar
+from bywire.report.line_role import Role
 
 MOST_S, MOST_T = 2.0, 1.25
 """usual limits of max |S| and max |T|: S. Skogestad, I. Postlethwaite, "Multivariable Feedback
@@ -48,7 +49,7 @@ def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
     def points(curve: LoopCurve) -> tuple[FloatArray, FloatArray]:
         return curve.frequency, 20.0 * np.log10(np.abs(getattr(curve, quantity)))
 
-    look = style.STROKES[style.Role.LIMIT]
+    look = style.STROKES[Role.LIMIT]
     axes.axhline(20.0 * math.log10(limit), color=look.color, linestyle=look.linestyle,
                  linewidth=look.linewidth, label=f"usual limit {limit:g}")  # fmt: skip
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)

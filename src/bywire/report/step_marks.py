@@ -10,7 +10,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel
-from bywire.report.style import Role
+from bywire.report.line_role import Role
 
 
 @dataclass(frozen=True)

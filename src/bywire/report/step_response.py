@@ -15,8 +15,8 @@ from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
 from bywire.report.decimation import decimate
+from bywire.report.line_role import Role
 from bywire.report.step_marks import StepFacts, StepLimits, draw_limits
-from bywire.report.style import Role
 from bywire.report.wording import duration
 
 if TYPE_CHECKING:

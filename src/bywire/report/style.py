@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -19,6 +18,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from bywire.core.quantities import display_unit
 from bywire.report.channel import Channel, FloatArray
 from bywire.report.decimation import decimate
+from bywire.report.line_role import Role
 from bywire.report.ripple import inside
 from bywire.report.wording import clean, duration, unit_text
 
@@ -51,17 +51,6 @@ _EMS_BESIDE_TEXT = 4.4  # handle, its gap and the gap between columns in a legen
 
 Dash = str | tuple[float, tuple[float, ...]]
 """a line style of matplotlib"""
-
-
-class Role(Enum):
-    """What a line means; the same meaning looks the same in every figure."""
-
-    MAIN = "main"
-    SECOND = "second"
-    SET_POINT = "set point"
-    MEASURED = "measured"
-    SIMULATED = "simulated"
-    LIMIT = "limit"
 
 
 @dataclass(frozen=True)

@@ -15,9 +15,9 @@ from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
 from bywire.report.decimation import phases
+from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
 from bywire.report.step_marks import StepLimits, draw_limits
-from bywire.report.style import Role
 
 if TYPE_CHECKING:
     import xarray as xr

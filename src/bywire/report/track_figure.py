@@ -9,6 +9,7 @@ from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 from bywire.identification.replaying.tracking import Track
 from bywire.report import style
+from bywire.report.line_role import Role
 
 
 def track_figure(track: Track, known: float | None = None) -> Figure:
@@ -39,7 +40,7 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
         label="where the relation holds",
     )  # fmt: skip
     if known is not None:
-        look = style.STROKES[style.Role.SET_POINT]
+        look = style.STROKES[Role.SET_POINT]
         axes.axhline(
             factor * known, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
             label="parameter set",

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import channel
-from bywire.report.style import Role
+from bywire.report.line_role import Role
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Panels, Trace
-from bywire.report.style import Role
 
 BRAKING = Panels(
     "wedge",

@@ -14,7 +14,7 @@ from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
 from bywire.report.channel import FloatArray
-from bywire.report.style import Role
+from bywire.report.line_role import Role
 
 FARTHEST = 60.0
 """brake factor at which the ordinate ends: at the neutral point it has no bound"""
