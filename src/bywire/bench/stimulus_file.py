@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.core.errors import FileError, ParameterError, quoted
-from bywire.data.trace import read_trace, trace_names
 
 _FILE = ("format", "rate", "start", "decimal", "skip_lines")
 _CLOCK = {"time": "column", "time_unit": "unit"}  # a table of a stimulus would be another one
@@ -37,6 +36,8 @@ def with_nodes(values: Mapping[str, Any], level_unit: str) -> dict[str, Any]:
     """
     if "file" not in values:
         return dict(values)
+    from bywire.data.trace import read_trace, trace_names  # most benches have no file
+
     keys = ("file", "max_gap", *_FILE, *_CLOCK, *_SIGNAL)
     rest = {key: value for key, value in values.items() if key not in keys}
     if "times" in rest or "values" in rest:
