@@ -91,11 +91,9 @@ def _draw_pair(
         if not np.isfinite(values).any():
             continue
         look = style.STROKES[role]
-        wide = bool(color) and role is style.Role.MEASURED and not few
+        wide = bool(color) and role is Role.MEASURED and not few
         _draw(
-            axes, at, values, few and role is style.Role.MEASURED, color=color or look.color,
-        wide = bool(own) and role is Role.MEASURED and not few
-            axes, at, values, few and role is Role.MEASURED, color=own or look.color,
+            axes, at, values, few and role is Role.MEASURED, color=color or look.color,
             zorder=look.zorder, linestyle=look.linestyle, alpha=0.4 if wide else 1.0,
             linewidth=3.0 if wide else look.linewidth,
             label=style.plain(f"{label} {word}".strip()),
