@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Panels, Trace
-from bywire.report.style import Role
 
 PANELS = Panels(
     "emb-caliper",
