@@ -90,6 +90,10 @@ def test_a_fall_is_read_exactly_and_the_ends_have_their_say() -> None:
     gain = 10.0 / COARSE
     assert fall(gain, COARSE) == pytest.approx(10.0 / DROP)
     assert fall(3.0 * gain, COARSE, start=3.0) == pytest.approx(10.0 / DROP)
+    ends = COARSE[[0, 2]]  # far apart, where nothing is straight: solved
+    lag = np.sqrt(2.0) / np.hypot(1.0, ends)
+    solved = fall(lag, ends, response=lambda f: np.sqrt(2.0) / (1.0 + 1j * f))
+    assert solved == pytest.approx(math.sqrt(3.0))
     assert fall(0.05 * gain, COARSE) == 0.0  # below from the first point on
     assert fall(20.0 * gain, COARSE) == math.inf
     assert fall(np.array([1.0, 1.0, math.nan, math.nan]), COARSE) == 4.0  # stuck from there on
