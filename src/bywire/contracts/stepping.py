@@ -78,7 +78,7 @@ def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:
                 f"friction, wanted is {wanted:g}"
             )
             place = trial.place("balance", "wire")
-            yield measured(wanted - order - doubt, SHORTFALL, text, place)
+            yield measured(max(wanted - order - doubt, 0.0), SHORTFALL, text, place)
 
 
 def _observed(errors: Array) -> tuple[float, float]:
