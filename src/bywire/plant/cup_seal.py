@@ -1,0 +1,71 @@
+"""Friction of a piston's cup seal: a force that grows with pressure, with a Stribeck peak."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import BreakawayFactor, Damping, Force, Unit
+from bywire.core.signals import Power, Signal
+
+ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
+SlidingSpeed = Annotated[float, Unit("m/s", 1e-3), Field(gt=0, allow_inf_nan=False)]
+
+
+class Parameters(ParameterSet):
+    """Asymmetric Stribeck friction on the piston; `seal_friction` is the same at a motor's shaft.
+
+    Valid for pressures >= 0. At rest the friction is set-valued.
+    """
+
+    F_pr: Force
+    """friction of the preload, at zero pressure"""
+    f_p: ForcePerPressure
+    """growth of the Coulomb friction with pressure, toward clamping"""
+    f_n: ForcePerPressure
+    """growth of the Coulomb friction with pressure, releasing"""
+    k_brk: BreakawayFactor
+    """breakaway over Coulomb friction"""
+    v_S: SlidingSpeed
+    """speed over which the Stribeck peak falls"""
+    mu: Damping
+    """viscous friction per speed"""
+
+
+class Input(NamedTuple):
+    """Speed of the piston and chamber pressure."""
+
+    v: Annotated[float, Signal("m/s", "piston speed", 1e-3)]
+    p: Annotated[float, Signal("Pa", "chamber pressure", 2e6)]
+
+
+class Output(NamedTuple):
+    """Magnitudes of the friction force in both directions, at the same speed."""
+
+    F_p: Annotated[float, Signal("N", "seal friction, toward clamping", 30.0)]
+    F_n: Annotated[float, Signal("N", "seal friction, releasing", 30.0)]
+
+
+def output(u: Input, par: Parameters) -> Output:
+    r"""Return the magnitudes of the friction force on the piston.
+
+    .. math:: F = (F_{pr} + f p) (1 + (k_{brk} - 1) e^{-|v|/v_S}) + \mu |v|
+
+    with f of the direction. At rest these are the breakaway forces.
+    """
+    speed, p = ops.fabs(u.v), ops.fmax(u.p, 0.0)
+    peak = 1.0 + (par.k_brk - 1.0) * ops.decay(speed / par.v_S)
+    viscous = par.mu * speed
+    return Output(
+        F_p=(par.F_pr + par.f_p * p) * peak + viscous,
+        F_n=(par.F_pr + par.f_n * p) * peak + viscous,
+    )
+
+
+def power_loss(u: Input, par: Parameters) -> Power:
+    """Return the heat of the sliding friction, >= 0."""
+    friction = output(u, par)
+    return ops.where(u.v > 0, friction.F_p, friction.F_n) * ops.fabs(u.v)
