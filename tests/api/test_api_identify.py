@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bywire
+from bywire.identification.method import METHODS
 from bywire.report.answer import AnswerWarning
 
 SHORT = {"duration": "0.1 s"}
@@ -66,6 +68,24 @@ def test_trust_goes_on_from_its_folder(tmp_path: Path) -> None:
     assert again.trust == first.trust
     assert [path.name for path in first.write(tmp_path)] == ["study.json"]
     assert set(first.tables()["seal-friction"]["parameter"]) == {"A", "F_0", "f"}
+
+
+def test_an_interrupt_says_where_it_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    bywire.trust("seal-friction", 2, folder=tmp_path, processes=1)
+    with monkeypatch.context() as stop:
+        stop.setattr("bywire.identification.trust.experiments", stopped)
+        with pytest.raises(KeyboardInterrupt, match=r"experiments\.jsonl: the same command goes on"):
+            bywire.trust("seal-friction", 4, folder=tmp_path)
+    (tmp_path / "starts.jsonl").write_text("")
+    method = replace(METHODS.find("seal-friction"), identify=stopped)
+    monkeypatch.setattr("bywire.api.method_choice.find_method", lambda _: method)
+    with pytest.raises(KeyboardInterrupt, match="finished starts are in"):
+        bywire.identify("seal-friction", synthetic=1, folder=tmp_path)
 
 
 def test_a_recording_is_replayed_from_memory(tmp_path: Path) -> None:

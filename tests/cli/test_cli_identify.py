@@ -142,6 +142,9 @@ def test_refusals(bywire: Bywire, tmp_path: Path) -> None:
     refused(bywire("identify", "seal-friction"), "needs one of", "F [N], x [m], p [Pa]")
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--study", "5"),
             "give only one of")  # fmt: skip
+    for flag in ("--map", "--holdout"):
+        refused(bywire("identify", "seal-friction", "--study", "5", flag, "x.csv"),
+                f"{flag} is for measurement files")  # fmt: skip
     refused(bywire("identify", "seal-friction", "--synthetic", "1", "--set", "a.b=1"), "--set")
     refused(
         bywire("identify", "seal-friction", "--synthetic", "1", "--option", "x_lo=1 mm"), "x_low",
