@@ -11,7 +11,8 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Length, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
-from bywire.core.validity import Array, first, outside
+from bywire.core.typing import Array
+from bywire.core.validity import first, outside
 
 Quadratic = Annotated[float, Unit("N/m**2", 3e10), Field(ge=0, allow_inf_nan=False)]
 Cubic = Annotated[float, Unit("N/m**3", 7e12), Field(allow_inf_nan=False)]

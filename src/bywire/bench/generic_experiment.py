@@ -12,8 +12,6 @@ from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field, create_model
 from pydantic.fields import FieldInfo
 
@@ -28,8 +26,8 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.quantities import Unit
 from bywire.core.registry import Kind, instances
 from bywire.core.signals import Signal, signals_of, zeros
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Course = Callable[[Array], Array]
 
 InputLevel = Annotated[float, Unit("input"), Field(allow_inf_nan=False)]

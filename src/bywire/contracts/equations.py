@@ -7,7 +7,6 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.contracts.dimensioned import Dimensioned, fits
 from bywire.contracts.elements import flat, numbers, signature_of
@@ -22,8 +21,8 @@ from bywire.contracts.sampling import (
     flattened,
     traced,
 )
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Function = Callable[..., Any]
 
 SAMPLES = 30

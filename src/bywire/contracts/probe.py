@@ -8,14 +8,12 @@ from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.contracts.start import Start
 from bywire.core.model import Bounds, Matrix, Model, Task
 from bywire.core.signals import Signal, signals_of
+from bywire.core.typing import Array
 from bywire.simulation.run import Run, Trajectory, simulate
-
-Array = NDArray[np.float64]
 
 
 class Clock(NamedTuple):

@@ -6,7 +6,6 @@ import warnings
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.trial import Trial, constants, lanes
@@ -16,8 +15,6 @@ from bywire.core.signals import signals_of
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import Run
 from bywire.simulation.sensitivity import simulate_with_sensitivities
-
-Array = NDArray[np.float64]
 
 PARAMETERS = 8
 """how many parameters are tried: those that move the states most"""

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 from bywire.analysis.linear.linear_model import LinearModel
@@ -15,9 +14,8 @@ from bywire.contracts.probe import states
 from bywire.contracts.trial import Trial
 from bywire.core.errors import InputError, SolverError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 SMALL = (1e-4, 1e-5)
 """of the controllers' moves: what is nonlinear falls from one to the next"""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
 from bywire.bench.experiment import EXPERIMENTS
@@ -15,9 +14,8 @@ from bywire.core.errors import InputError, ParameterError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of, zeros
+from bywire.core.typing import Array
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 STEP = 20e-6
 """substep [s] of the runs, or the next smaller one that divides the sample times"""

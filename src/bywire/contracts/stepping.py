@@ -8,7 +8,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.contracts.evidence import Evidence, NotCheckedError, measured
 from bywire.contracts.probe import states
@@ -16,10 +15,9 @@ from bywire.contracts.start import Start
 from bywire.contracts.trial import LARGE, Trial, constants, lanes
 from bywire.core.errors import SolverError
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 ORDER = 2.0
 SHORTFALL = 0.3

@@ -10,18 +10,16 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.contracts.evidence import NotCheckedError, Place, place_of
 from bywire.contracts.probe import Drive, Probe, drive_of
 from bywire.contracts.start import Start
 from bywire.core.errors import BywireError, ParameterError, RunError
 from bywire.core.model import Model
+from bywire.core.typing import Array
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 LARGE = 0.5
 """amplitude of the stimulus in large runs, of the signals' usual magnitudes"""

@@ -9,7 +9,8 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Length
 from bywire.core.signals import FlowResistance, Role, Signal
-from bywire.core.validity import Array, highest
+from bywire.core.typing import Array
+from bywire.core.validity import highest
 from bywire.plant import brake_fluid
 
 Loss = Annotated[float, Signal("W", "loss in the pipeline", role=Role("sink", "pipeline"))]

@@ -10,7 +10,8 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import SignedPressure
 from bywire.core.signals import Signal
-from bywire.core.validity import Array, first, outside
+from bywire.core.typing import Array
+from bywire.core.validity import first, outside
 
 AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
 Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]

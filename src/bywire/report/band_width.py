@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
-from bywire.report.channel import FloatArray
+from bywire.core.typing import Array
 from bywire.report.wording import amount, in_display_unit
 
 LINE = 1.3
 """width of the line in the middle of a band [pt]"""
 
 
-def band_label(axes: Axes, half: FloatArray, symbol: str) -> str:
+def band_label(axes: Axes, half: Array, symbol: str) -> str:
     """Return the entry of a 95 % band: how wide it is, and whether the line hides it.
 
     Parameters

@@ -13,8 +13,8 @@ from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.wording import clean
 
 
@@ -35,7 +35,7 @@ class Response:
     """
 
     label: str
-    frequency: FloatArray
+    frequency: Array
     value: NDArray[np.complexfloating[Any, Any]]
     measured: bool = False
 
@@ -52,13 +52,13 @@ class Response:
             )
 
     @property
-    def magnitude_db(self) -> FloatArray:
+    def magnitude_db(self) -> Array:
         """Magnitude [dB]; NaN where the response is 0."""
         size = np.abs(self.value)
         return 20.0 * np.log10(np.where(size > 0, size, np.nan))
 
     @property
-    def phase_deg(self) -> FloatArray:
+    def phase_deg(self) -> Array:
         """Phase [degree] without jumps, above -180 and at most 180 at the lowest frequency."""
         phase = np.full(np.shape(self.value), np.nan)
         known = np.isfinite(self.value)

@@ -6,17 +6,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.quantities import display_unit
+from bywire.core.typing import Array
 from bywire.core.units import convert
 from bywire.report.wording import clean
 
 if TYPE_CHECKING:
     import xarray as xr
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,8 +41,8 @@ class Channel:
     label: str
     symbol: str
     unit: str
-    time: FloatArray
-    values: FloatArray
+    time: Array
+    values: Array
 
 
 def channel(recording: xr.Dataset, name: str) -> Channel:

@@ -15,8 +15,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.wording import in_display_unit
 from bywire.synthesis.study import Map
 
@@ -99,7 +99,7 @@ def levels_between(low: float, high: float) -> list[float]:
 
 
 def _limits(
-    axes: Axes, data: xr.Dataset, shown: Map, x: FloatArray, y: FloatArray
+    axes: Axes, data: xr.Dataset, shown: Map, x: Array, y: Array
 ) -> list[Line2D | Patch]:
     """Draw the borders of what is possible, hatched beyond; return the legend's entries."""
     handles: list[Line2D | Patch] = []
@@ -160,7 +160,7 @@ def _marks(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
     return handles
 
 
-def _displayed(variable: xr.DataArray) -> FloatArray:
+def _displayed(variable: xr.DataArray) -> Array:
     factor, _ = in_display_unit(1.0, str(variable.attrs["units"]))
     return factor * np.asarray(variable.values, dtype=float)
 

@@ -12,11 +12,11 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from bywire.analysis.loop_curves import Family, LoopCurve
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.wording import amount, in_display_unit
 
-Points = Callable[[LoopCurve], tuple[FloatArray, FloatArray]]
+Points = Callable[[LoopCurve], tuple[Array, Array]]
 _COLORS = "cividis"  # made for any kind of color vision
 _BRIGHTEST = 0.9  # of the color map: what is brighter cannot be seen on white
 

@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from bywire.core.typing import Array
+
 IntArray = NDArray[np.intp]
 
 COLUMNS = 700
 """pixel columns of a figure on a screen: finer detail than this is not visible"""
 
 
-def kept_samples(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> IntArray:
+def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     """Return the positions of at most five samples per pixel column that draw the same line.
 
     Of every column the first, the lowest, the highest and the last sample stay, so that a line
@@ -50,14 +51,14 @@ def kept_samples(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> IntArr
     return np.unique(np.concatenate([starts, lowest, highest, ends, gap]))
 
 
-def decimate(x: FloatArray, y: FloatArray, columns: int = COLUMNS) -> tuple[FloatArray, FloatArray]:
+def decimate(x: Array, y: Array, columns: int = COLUMNS) -> tuple[Array, Array]:
     """Return the points of :func:`kept_samples`."""
     kept = kept_samples(x, y, columns)
     return x[kept], y[kept]
 
 
 def phases(
-    time: FloatArray, active: NDArray[np.bool_], columns: int = COLUMNS
+    time: Array, active: NDArray[np.bool_], columns: int = COLUMNS
 ) -> list[tuple[float, float]]:
     """Return the time spans in which a mode is active, no finer than the eye can tell.
 
@@ -90,7 +91,7 @@ def phases(
     return _spans(edges, np.append(share >= 0.5, False))
 
 
-def _columns(x: FloatArray, columns: int) -> IntArray:
+def _columns(x: Array, columns: int) -> IntArray:
     span = x[-1] - x[0]
     if not span > 0:
         return np.zeros(len(x), dtype=np.intp)
@@ -98,13 +99,13 @@ def _columns(x: FloatArray, columns: int) -> IntArray:
     return np.minimum(column, columns - 1)
 
 
-def _first_of_each(column: IntArray, key: FloatArray) -> IntArray:
+def _first_of_each(column: IntArray, key: Array) -> IntArray:
     """Return the position of the smallest key in every column."""
     order: IntArray = np.lexsort((key, column)).astype(np.intp)
     return order[np.flatnonzero(np.diff(column[order], prepend=-1))]
 
 
-def _spans(time: FloatArray, active: NDArray[np.bool_]) -> list[tuple[float, float]]:
+def _spans(time: Array, active: NDArray[np.bool_]) -> list[tuple[float, float]]:
     padded = np.concatenate([[False], active, [False]]).astype(np.int8)
     change = np.diff(padded)
     starts = np.flatnonzero(change == 1)

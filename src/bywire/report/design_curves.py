@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
 from bywire.analysis.loop_curves import LoopCurve
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.line_role import Role
 from bywire.report.sensitivity import MOST_S, MOST_T
 
@@ -40,8 +40,8 @@ class DesignCurve:
 
     label: str
     curve: LoopCurve
-    time: FloatArray
-    step: FloatArray
+    time: Array
+    step: Array
     span: float
 
 

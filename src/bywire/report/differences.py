@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.line_role import Role
 
 _DASHES: tuple[style.Dash, ...] = ("-", "--", ":")
@@ -19,8 +19,8 @@ _LEAST = 0.01  # of the tolerance: smaller differences are drawn at the lower ed
 
 
 def differences(
-    frequency: FloatArray,
-    found: Mapping[str, tuple[FloatArray, FloatArray]],
+    frequency: Array,
+    found: Mapping[str, tuple[Array, Array]],
     tolerance: tuple[float, float],
 ) -> Figure:
     """Draw the size of differences of gain and phase over frequency, logarithmically.

@@ -13,8 +13,9 @@ from matplotlib.lines import Line2D
 
 from bywire.bench.kpis.smoothing import smoothed
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import Channel, FloatArray, channel
+from bywire.report.channel import Channel, channel
 from bywire.report.decimation import kept_samples
 from bywire.report.wording import duration
 
@@ -87,7 +88,7 @@ def hysteresis_loop(
     return figure
 
 
-def _turn(values: FloatArray) -> int:
+def _turn(values: Array) -> int:
     """Return the middle of the samples at the maximum, so that a plateau is shared fairly."""
     if bool(np.all(np.isnan(values))):
         return 0
@@ -120,7 +121,7 @@ def _draw_branch(
             )
 
 
-def _length_along(x: FloatArray, y: FloatArray) -> FloatArray:
+def _length_along(x: Array, y: Array) -> Array:
     """Return the share of the drawn length up to every point, 0 to 1."""
     steps = np.hypot(*(np.diff(v) / (float(np.ptp(v)) or 1.0) for v in (x, y)))
     length = np.concatenate([[0.0], np.cumsum(np.nan_to_num(steps))])

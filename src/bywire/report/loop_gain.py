@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MultipleLocator, NullFormatter
 
 from bywire.analysis.loop_curves import Family, LoopCurve
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.curve_family import draw_family, value_bar
 
 
@@ -66,9 +66,9 @@ def _line(upper: Axes, lower: Axes, frequency: float, color: str, text: str) -> 
                      label=text if axes is upper else "_")  # fmt: skip
 
 
-def _magnitude(curve: LoopCurve) -> tuple[FloatArray, FloatArray]:
+def _magnitude(curve: LoopCurve) -> tuple[Array, Array]:
     return curve.frequency, 20.0 * np.log10(np.abs(curve.L))
 
 
-def _phase(curve: LoopCurve) -> tuple[FloatArray, FloatArray]:
+def _phase(curve: LoopCurve) -> tuple[Array, Array]:
     return curve.frequency, curve.phase

@@ -9,11 +9,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from bywire.core.quantities import display_unit
+from bywire.core.typing import Array
 from bywire.core.units import convert
 from bywire.identification.method import Curve
 from bywire.report import style
 from bywire.report.band_width import LINE, band_label
-from bywire.report.channel import FloatArray
 from bywire.report.decimation import kept_samples
 from bywire.report.line_role import Role
 from bywire.report.record_marks import mark_records
@@ -81,7 +81,7 @@ def _over_frequency(upper: Axes, lower: Axes, symbol: str) -> None:
 
 
 def _draw_pair(
-    axes: Axes, at: FloatArray, pair: tuple[FloatArray, FloatArray], label: str, color: str,
+    axes: Axes, at: Array, pair: tuple[Array, Array], label: str, color: str,
     few: bool,
 ) -> None:
     """Draw measured and modeled; of a family both in its own color, measured pale and wide."""
@@ -100,7 +100,7 @@ def _draw_pair(
         )  # fmt: skip
 
 
-def _draw(axes: Axes, at: FloatArray, values: FloatArray, alone: bool, **look: object) -> None:
+def _draw(axes: Axes, at: Array, values: Array, alone: bool, **look: object) -> None:
     """Draw a line, or points that stand alone."""
     if alone:
         look |= {"linestyle": "none", "marker": "o", "markersize": 3.5}
@@ -141,7 +141,7 @@ def _bands(axes: Axes, curve: Curve) -> None:
     style.legend_above(axes, entries)
 
 
-def _drawn(at: FloatArray, values: FloatArray) -> tuple[FloatArray, ...]:
+def _drawn(at: Array, values: Array) -> tuple[Array, ...]:
     """Return a line with fewer points where its abscissa does not turn back."""
     if np.all(np.diff(at) >= 0.0):
         keep = kept_samples(at, values)
@@ -163,7 +163,7 @@ def _family(array: xr.DataArray, x: xr.DataArray) -> list[tuple[int, str]]:
     ]
 
 
-def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> FloatArray:
+def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> Array:
     """Return a curve of a family in its display unit."""
     others = [dim for dim in array.dims if dim != x.dims[-1]]
     curve = array.isel({others[0]: k}) if others else array
@@ -172,7 +172,7 @@ def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> FloatArray:
     return np.asarray(values * convert(1.0, symbol, display_unit(symbol)))
 
 
-def _abscissa(data: xr.Dataset, x: str, k: int) -> FloatArray:
+def _abscissa(data: xr.Dataset, x: str, k: int) -> Array:
     """Return where a curve was read, in the display unit: all at the same places, or each alone."""
     symbol = str(data[x].attrs.get("units", "s" if x == "time" else "1"))
     factor = convert(1.0, symbol, display_unit(symbol))

@@ -12,8 +12,8 @@ from matplotlib.patches import Patch
 from matplotlib.ticker import MultipleLocator
 
 from bywire.analysis.loop_curves import Family, LoopCurve
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.curve_family import draw_family, value_bar
 
 CONTOURS = (-20.0, -12.0, -6.0, -3.0, -1.0, 0.0, 1.0, 3.0, 6.0, 12.0)
@@ -81,7 +81,7 @@ def _phases(family: Family) -> tuple[float, float]:
     )
 
 
-def _points(curve: LoopCurve) -> tuple[FloatArray, FloatArray]:
+def _points(curve: LoopCurve) -> tuple[Array, Array]:
     return curve.phase, 20.0 * np.log10(np.abs(curve.L))
 
 

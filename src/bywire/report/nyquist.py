@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from bywire.analysis.loop_curves import Family, LoopCurve, disk
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.curve_family import draw_family, value_bar
 
 _LEFT, _RIGHT, _HALF = -3.2, 1.6, 1.9  # what of the plane is shown
@@ -52,7 +52,7 @@ def nyquist(family: Family) -> Figure:
     return figure
 
 
-def _points(curve: LoopCurve) -> tuple[FloatArray, FloatArray]:
+def _points(curve: LoopCurve) -> tuple[Array, Array]:
     return curve.L.real, curve.L.imag
 
 

@@ -7,10 +7,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from bywire.core.typing import Array
 from bywire.identification.confidence import autocorrelation
 from bywire.identification.estimate import Estimate
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.decimation import decimate
 
 _LAGS = 60
@@ -56,7 +56,7 @@ def residual_figure(estimate: Estimate) -> Figure:
     return figure
 
 
-def _histogram(axes: Axes, r: FloatArray) -> None:
+def _histogram(axes: Axes, r: Array) -> None:
     size = float(r.std()) or 1.0
     axes.hist(r, bins=min(max(r.size // 20, 8), 60), density=True, color=style.SKY)
     at = np.linspace(float(r.min()), float(r.max()), 200)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from bywire.bench.kpis.smoothing import smoothed
-from bywire.report.channel import Channel, FloatArray
+from bywire.core.typing import Array
+from bywire.report.channel import Channel
 from bywire.report.decimation import COLUMNS, decimate
 
 FASTEST = 3 * COLUMNS
@@ -21,7 +22,7 @@ def is_band(shown: Channel) -> bool:
     return FASTEST < kept < len(shown.values)
 
 
-def averaging_time(time: FloatArray) -> float:
+def averaging_time(time: Array) -> float:
     """Return 1, 2 or 5 times a power of ten [s], at least one pixel column wide.
 
     Examples

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullFormatter
 
 from bywire.analysis.loop_curves import Family, LoopCurve
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.curve_family import draw_family, value_bar
 from bywire.report.line_role import Role
 
@@ -46,7 +46,7 @@ def sensitivity(family: Family) -> Figure:
 
 
 def _panel(axes: Axes, family: Family, quantity: str, limit: float) -> None:
-    def points(curve: LoopCurve) -> tuple[FloatArray, FloatArray]:
+    def points(curve: LoopCurve) -> tuple[Array, Array]:
         return curve.frequency, 20.0 * np.log10(np.abs(getattr(curve, quantity)))
 
     look = style.STROKES[Role.LIMIT]

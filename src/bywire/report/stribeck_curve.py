@@ -9,8 +9,8 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.channel import FloatArray
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ def stribeck_curve(
     curve: xr.Dataset,
     *,
     friction: str = "",
-    measured: Mapping[float, tuple[FloatArray, FloatArray]] | None = None,
+    measured: Mapping[float, tuple[Array, Array]] | None = None,
 ) -> Figure:
     """Draw dry friction over speed, one line per level.
 

@@ -16,7 +16,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from bywire.core.quantities import display_unit
-from bywire.report.channel import Channel, FloatArray
+from bywire.core.typing import Array
+from bywire.report.channel import Channel
 from bywire.report.decimation import decimate
 from bywire.report.line_role import Role
 from bywire.report.ripple import inside
@@ -165,7 +166,7 @@ def channel_label(shown: Channel) -> str:
     return axis_label(shown.label, shown.symbol)
 
 
-def time_scale(time: FloatArray) -> tuple[float, str]:
+def time_scale(time: Array) -> tuple[float, str]:
     """Return factor and unit of a time axis: ms for recordings of up to 0.2 s."""
     short = len(time) > 0 and float(time[-1] - time[0]) <= 0.2
     return (1e3, "ms") if short else (1.0, "s")

@@ -6,14 +6,13 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import SolverError
+from bywire.core.typing import Array
 from bywire.simulation.emission import Layout
 from bywire.simulation.engine import Engine
 from bywire.simulation.native import Request
 
-Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 _CHUNK_SECONDS = 0.1

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
@@ -30,8 +31,6 @@ from bywire.simulation.run import (
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import build_stages
 from bywire.simulation.variations import Variations, case_matrix
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -10,14 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.simulation.compiler import PLAIN, Compiler, compile_library
 from bywire.simulation.emission import Layout, layout_of
 from bywire.simulation.emit_single import emit_single
 from bywire.simulation.program import Program
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import build_stages
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

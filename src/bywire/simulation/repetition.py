@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import StepError
+from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.emission import Layout
@@ -22,7 +23,6 @@ from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.window import Stimuli, advance_window, given_rows, one_by_one
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 Figures = Callable[[Array], Complex]
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.simulation.advance import Progress, advance_all
 from bywire.simulation.emission import Layout
 from bywire.simulation.engine import prepare
@@ -19,7 +20,6 @@ from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule, plan
 from bywire.simulation.stiff_contacts import unresolved
 
-Array = NDArray[np.float64]
 Status = Literal["done", "interrupted", "unsettled"]
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
+from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
 from bywire.simulation.emission import Layout, layout_of
@@ -29,7 +30,6 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.stages import Stages, build_stages
 
-Array = NDArray[np.float64]
 DIRECTIONS = 8
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError, ParameterError
+from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.engine import prepare
@@ -26,8 +27,6 @@ from bywire.simulation.reversals import reversals
 from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.sensitivity import DIRECTIONS, TangentKernel
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

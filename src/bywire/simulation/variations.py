@@ -7,13 +7,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.simulation.run import Run
 
-Array = NDArray[np.float64]
 Variations = Mapping[str, Array | Sequence[float]]
 
 

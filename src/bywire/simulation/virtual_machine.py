@@ -6,13 +6,11 @@ import threading
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from bywire.core.typing import Array
 from bywire.simulation.emission import CAP, Layout
 from bywire.simulation.native import Request
 from bywire.simulation.program import Program
-
-Array = NDArray[np.float64]
 
 
 class VirtualMachine:

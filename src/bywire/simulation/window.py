@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.simulation.engine import prepare
 from bywire.simulation.native import Request
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import Schedule
 
-Array = NDArray[np.float64]
 Stimuli = Callable[[NDArray[np.int64], int, int], Array]
 """``stimuli(cases, first, last)``: these rows of some cases, shape (cases, last - first, nu)"""
 Advance = Callable[[Array, Array, Array, Array, int], None]

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -24,8 +23,8 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, TimeConstant, Unit
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Count = Annotated[int, Unit("1", 5.0), Field(ge=1, le=1000)]
 
 _LEAST_ROWS = 8  # of the recording in the shortest period

@@ -10,7 +10,6 @@ from typing import Annotated, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
@@ -21,8 +20,8 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Speed = Annotated[float, Unit("friction"), Field(gt=0, allow_inf_nan=False)]
 Levels = Annotated[
     tuple[Annotated[float, Field(allow_inf_nan=False)], ...], Unit("along"), Field(min_length=1)

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Array, Undefined, defect, integral, measure, signal
+from bywire.bench.kpis.kpi import Undefined, defect, integral, measure, signal
+from bywire.core.typing import Array
 
 
 @dataclass(frozen=True)

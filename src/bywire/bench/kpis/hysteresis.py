@@ -17,8 +17,9 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Array, Undefined, defect, measure, signal
+from bywire.bench.kpis.kpi import Undefined, defect, measure, signal
 from bywire.bench.kpis.smoothing import smoothed, treatment
+from bywire.core.typing import Array
 
 _OPEN = 0.05  # of the drive's range: more than this between both ends is no closed loop
 _LEFT = 0.01  # of the response's range: from here on a rest at the end is noted

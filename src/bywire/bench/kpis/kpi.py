@@ -15,11 +15,9 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError, unknown_name
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.bench.kpis.kpi import Array
+from bywire.core.typing import Array
 
 
 def smoothed(t: Array, y: Array, period: float) -> Array:

@@ -16,8 +16,9 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Array, Undefined, defect, integral, measure, signal
+from bywire.bench.kpis.kpi import Undefined, defect, integral, measure, signal
 from bywire.bench.kpis.smoothing import smoothed, treatment
+from bywire.core.typing import Array
 
 _DEAD, _BAND = 0.05, 0.02  # of the step height: end of the dead time; half settling band
 _LAST = 0.2  # of the time after the step: the window of the steady state, by default

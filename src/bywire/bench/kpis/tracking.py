@@ -9,8 +9,9 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Array, Undefined, defect, measure, signal
+from bywire.bench.kpis.kpi import Undefined, defect, measure, signal
 from bywire.bench.kpis.smoothing import smoothed, treatment
+from bywire.core.typing import Array
 
 _LONGEST_LAG = 0.3  # s: longer delays are not looked for
 

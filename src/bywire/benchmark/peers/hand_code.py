@@ -14,11 +14,10 @@ from numpy.typing import NDArray
 from bywire.benchmark.peers.hand_source import Subject
 from bywire.core.errors import CompilerError
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
 from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 THREADS = ("-O2", "-fopenmp")
 WITHOUT_SUMS = ("-DWITHOUT_SUMS",)

@@ -6,11 +6,9 @@ from itertools import combinations
 from typing import Any, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.loop import Point
-
-Array = NDArray[np.float64]
+from bywire.core.typing import Array
 
 
 def nonlinear_system(point: Point) -> Any:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case
 from bywire.bench.kpis.kpi import Kpi
@@ -19,8 +18,8 @@ from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rows import along_disc
 from bywire.brakes.wedge.start import memory_at
+from bywire.core.typing import Array
 
-Array = NDArray[np.float64]
 Signals = Mapping[str, Array]
 
 UNITS = {

@@ -11,12 +11,13 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Recordings
 from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import parameters_of, peak, shaft_case, share_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.core.typing import Array
 
 SomeAngle = Annotated[float, Unit("rad", 0.5), Field(gt=0, le=100, allow_inf_nan=False)]
 

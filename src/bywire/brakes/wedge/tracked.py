@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.identification.replaying.relation import Relation, Rows
-
-Array = NDArray[np.float64]
 
 _PRESSED = 0.1  # of the largest force: below it, the relation tells little
 _STEADY = 0.02  # of the largest force per sensor's time constant: faster, its lag would show

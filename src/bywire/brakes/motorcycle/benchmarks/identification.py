@@ -7,7 +7,6 @@ from statistics import median
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import optimize
 
 from bywire.bench.experiment import as_run
@@ -21,11 +20,10 @@ from bywire.brakes.motorcycle.methods.stick_slip.shooting import Shooting
 from bywire.brakes.motorcycle.methods.stick_slip.shots import BEFORE, Shot, onset_of
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
+from bywire.core.typing import Array
 from bywire.identification.method import Effort
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 STARTS = 16
 _ROUNDS, _PEER_STARTS = 3, 2

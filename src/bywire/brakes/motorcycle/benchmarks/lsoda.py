@@ -12,13 +12,13 @@ from scipy.integrate import odeint
 
 from bywire.brakes.motorcycle.benchmarks.problem import (
     DURATION,
-    Array,
     Demand,
     Solution,
     march,
 )
 from bywire.brakes.motorcycle.benchmarks.symbolic import slope_and_jacobian
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.typing import Array
 
 WIDTH = 3e-4
 TOLERANCE = 1e-7

@@ -8,7 +8,6 @@ import numpy as np
 
 from bywire.brakes.motorcycle.benchmarks.problem import (
     SCALE,
-    Array,
     Demand,
     Solution,
     march,
@@ -16,6 +15,7 @@ from bywire.brakes.motorcycle.benchmarks.problem import (
 )
 from bywire.brakes.motorcycle.benchmarks.symbolic import slope_and_jacobian
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.typing import Array
 
 DURATION = 0.3
 WIDTH = 3e-4

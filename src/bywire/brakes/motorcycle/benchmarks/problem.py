@@ -14,7 +14,6 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.brakes.motorcycle import ecu as motorcycle_ecu
 from bywire.brakes.motorcycle.ecu import Memory, Readings, Stimulus
@@ -22,10 +21,10 @@ from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core import ops
 from bywire.core.signals import signals_of, zeros
+from bywire.core.typing import Array
 from bywire.plant import current_sensor, pressure_sensor
 from bywire.simulation.run import Run, simulate
 
-Array = NDArray[np.float64]
 Demand = Callable[[Array], Array]
 Advance = Callable[[Array, float], Array]
 

@@ -8,9 +8,10 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from bywire.brakes.motorcycle.benchmarks.problem import Array, rates
+from bywire.brakes.motorcycle.benchmarks.problem import rates
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.typing import Array
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.kpis import step_response
 from bywire.bench.result import Result
@@ -15,14 +14,13 @@ from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.paper.identified import identified_model
 from bywire.brakes.motorcycle.paper.runs import BAR, MAIN, SETS, Runs, before, parameters
 from bywire.brakes.motorcycle.paper.table4 import step_peak
+from bywire.core.typing import Array
 from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Trace
 from bywire.report.time_traces import time_traces
 from bywire.reproduction.item import Fact, Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import kpis, selected
-
-Array = NDArray[np.float64]
 
 HEIGHT = facts.FIG6_STEP.value
 START = facts.FIG6_START.value * BAR

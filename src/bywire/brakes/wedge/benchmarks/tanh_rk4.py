@@ -7,16 +7,12 @@ import time
 from dataclasses import replace
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from bywire.benchmark.peers.hand_code import arrays, load, plan_arguments
 from bywire.brakes.wedge.benchmarks.hand_wedge import SUBJECT
+from bywire.core.typing import Array
 from bywire.simulation.compiler import PLAIN
 from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
-
-Array = NDArray[np.float64]
 
 SIGNALS = ("x", "y_M")
 

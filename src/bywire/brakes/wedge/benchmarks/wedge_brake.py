@@ -7,7 +7,6 @@ from statistics import median
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import as_run
 from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS
@@ -19,11 +18,10 @@ from bywire.brakes.wedge.benchmarks.hand_wedge import HandWrittenWedge
 from bywire.brakes.wedge.experiments import moment_pulses
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
+from bywire.core.typing import Array
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.variations import case_matrix
-
-Array = NDArray[np.float64]
 
 STEP = 20e-6
 FINE = 1e-6

@@ -10,13 +10,14 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
+from bywire.core.typing import Array
 
 _Shares = tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...]
 ThreeFactors = Annotated[_Shares, Unit("1", 2.0), Field(min_length=3, max_length=3)]

@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -26,6 +26,7 @@ from bywire.brakes.wedge.rigs.rig_case import (
 from bywire.brakes.wedge.start import memory_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Length
+from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
 LABELS = ("sensor", "heart")

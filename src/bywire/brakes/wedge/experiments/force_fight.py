@@ -9,13 +9,14 @@ import numpy as np
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.position_steps import SomeAngle
 from bywire.brakes.wedge.rigs.rig_case import mean_between, peak, screw_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
+from bywire.core.typing import Array
 
 Share = Annotated[float, Unit("1", 0.05), Field(gt=-1, le=10, allow_inf_nan=False)]
 SomeSpeed = Annotated[float, Unit("rad/s", 50.0), Field(gt=0, allow_inf_nan=False)]

@@ -13,7 +13,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.experiments.moment_pulses import Count
 from bywire.brakes.wedge.experiments.screw_efficiency import SlowSpeed
@@ -28,6 +28,7 @@ from bywire.brakes.wedge.rigs.rig_case import (
 )
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration
+from bywire.core.typing import Array
 
 _TURN = 0.2  # of a stroke's time, at rest after it, while the current changes
 _RAMP = 0.2  # of a stroke's time, in which the speed rises, and falls again

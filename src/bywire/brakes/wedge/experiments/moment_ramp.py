@@ -11,12 +11,13 @@ from pydantic import model_validator
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.case import UNITS, Array, braking, case_from_parked, figure, steps
+from bywire.brakes.wedge.case import UNITS, braking, case_from_parked, figure, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rows import along_disc, too_coarse
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+from bywire.core.typing import Array
 
 _ROWS = 10  # fewest on the ramp
 

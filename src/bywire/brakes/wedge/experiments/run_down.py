@@ -12,7 +12,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
@@ -24,6 +24,7 @@ from bywire.brakes.wedge.rigs.rig_case import (
 )
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Inertia
+from bywire.core.typing import Array
 
 LABELS = ("free", "added", "braked")
 _HALF = 0.5  # of the first speed, down to which decelerations are taken

@@ -14,7 +14,7 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
@@ -29,6 +29,7 @@ from bywire.brakes.wedge.rigs.rig_case import (
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
 from bywire.core.signals import Signal
+from bywire.core.typing import Array
 
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 

@@ -11,12 +11,13 @@ import math
 import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import parameters_of, shaft_case, torque_constant_of
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
 _STARTED = 0.05  # of a stroke, after which the motion counts as steady

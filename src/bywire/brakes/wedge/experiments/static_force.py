@@ -15,7 +15,7 @@ import xarray as xr
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.case import Array, case_from_parked, parameters_of
+from bywire.brakes.wedge.case import case_from_parked, parameters_of
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.panels import COMPARED
@@ -23,6 +23,7 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.series import FRICTIONLESS, Coefficients, tag, with_friction
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+from bywire.core.typing import Array
 
 FREE, DRY = "frictionless", "friction"
 _SHARE = 0.2  # of the moment: how far the ramps go to either side

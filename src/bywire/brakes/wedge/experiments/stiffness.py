@@ -16,7 +16,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Array, Kpi
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -24,6 +24,7 @@ from bywire.brakes.wedge.rigs.rig_case import check_current, parameters_of, scre
 from bywire.brakes.wedge.start import memory_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration
+from bywire.core.typing import Array
 from bywire.plant import shaft_encoder
 
 _UPPER = 0.35  # of the largest current: below, bearings and free-play bend the line

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from bywire.bench.result import Result
 from bywire.brakes.wedge.series import tag
 from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
-from bywire.report.channel import FloatArray
 from bywire.report.line_role import Role
 
 FARTHEST = 60.0
@@ -91,7 +91,7 @@ def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
     return figure
 
 
-def _shown(mu: FloatArray, ratio: FloatArray, over: bool) -> FloatArray:
+def _shown(mu: Array, ratio: Array, over: bool) -> Array:
     """Return the force ratio, or the brake factor where it has room."""
     if not over:
         return ratio

@@ -16,6 +16,7 @@ from bywire.brakes.wedge.paper import frequency_facts as stated
 from bywire.brakes.wedge.paper import jump as roberts2003_jump
 from bywire.brakes.wedge.paper.fig5 import friction
 from bywire.brakes.wedge.paper.tolerances import ALIKE, SAME_GAIN, SAME_PHASE
+from bywire.core.typing import Array
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs
@@ -25,7 +26,6 @@ _SMALL = 0.1  # rad: clear of the current limit up to 60 Hz where the screw lose
 _SEEN = (1.0, 10.0, 60.0, 100.0)  # Hz
 _LAWS = {"load": "friction by the axial force", "drive": "loss by the motor's torque"}
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

@@ -14,12 +14,12 @@ from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
 from bywire.brakes.wedge.paper.runs import parameters
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
 from bywire.report.bode import Response, bode
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 BANDWIDTHS = {"low": 12.0, "high": 60.0}

@@ -6,15 +6,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.harmonics import amplitudes
 from bywire.brakes.wedge.paper.frequency import changed
+from bywire.core.typing import Array
 from bywire.reproduction.item import Item, found
 from bywire.simulation.run import simulate
-
-Array = NDArray[np.float64]
 
 AMPLITUDE, FREQUENCY, ABOVE = 1.0, 20.0, 30.0  # rad, Hz, Hz
 _FALL, _SEEN = 3.0, 1.0  # s

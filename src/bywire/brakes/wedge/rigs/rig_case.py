@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from bywire.bench.experiment import Case
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -16,9 +15,9 @@ from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
+from bywire.core.typing import Array
 from bywire.plant import roller_screw
 
-Array = NDArray[np.float64]
 Stimuli = Callable[[Array], Mapping[str, Array]]
 
 
