@@ -64,7 +64,10 @@ class Check(Answer):
         shown = [f for f in self.findings if f.figure is not None and "(" in f.subject]
         brief: list[str | Flat] = [TableBlock(_figures(shown)), ""] if shown else []
         if self.not_checked:
-            texts = [f"{f.subject}: {f.contract}: {f.text}" for f in self.not_checked]
+            reasons: dict[tuple[str, str], list[str]] = {}
+            for f in self.not_checked:
+                reasons.setdefault((f.subject, f.text), []).append(f.contract)
+            texts = [f"{who}: {', '.join(what)}: {why}" for (who, why), what in reasons.items()]
             brief += [Listing(texts, "not checked, because"), ""]
         return Document(
             f"Check of {self.subject}",

@@ -41,10 +41,10 @@ def has_its_units(trial: Trial) -> Iterator[Evidence]:
     powers = model.powers(x, x, rates, m, par, contact, reaction)
     for name, signal in signals_of(model.Flow).items():
         unit = f"({signal.unit})/s"
-        yield _fits(f"power of {name}", getattr(powers, name), unit, trial, "powers")
+        yield _fits(f"power of {name}", getattr(powers, name), unit, trial, "powers", "power")
     flow = _carrying(model.Flow, {n: 0.1 * s.nominal for n, s in signals_of(model.Flow).items()})
     recorded = model.output(x, m, par, contact, reaction, flow)
-    yield from _all_fit("recorded ", recorded, signals_of(model.Output), trial, "output")
+    yield from _all_fit("recorded ", recorded, signals_of(model.Output), trial, "record")
     u = _moved(start.stimulus)
     for task in model.tasks(start.par):
         held = task.tick(x, m, u, par)
@@ -91,7 +91,7 @@ def _all_fit(
     prefix: str, values: Sequence[Any], known: Mapping[str, Signal], trial: Trial, member: str
 ) -> Iterator[Evidence]:
     for (name, signal), value in zip(known.items(), values, strict=True):
-        yield _fits(f"{prefix}{name}", value, signal.unit, trial, member)
+        yield _fits(f"{prefix}{name}", value, signal.unit, trial, "output", member)
 
 
 def _fits(what: str, value: Any, unit: str, trial: Trial, *members: str) -> Evidence:

@@ -22,7 +22,7 @@ def closes_its_energy(trial: Trial) -> Iterator[Evidence]:
     The step's own error falls with its square: of the residuals at two steps the difference tells
     it, and it is taken off.
     """
-    place = trial.place("powers", "energy")
+    place = trial.place("powers", "power")
     for share in SHARES:
         run = trial.start.run(share)
         coarse, fine = (_ledger(replace(run, step=run.step / n)) for n in (1, 2))

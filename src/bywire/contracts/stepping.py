@@ -136,4 +136,4 @@ def _agree(
         scale = max(float(np.abs(first[:, k]).max()), 1e-3 * abs(signal.nominal))
         off = float(np.abs(first[:, k] - second[:, k]).max()) / scale
         text = f"{name} of {what} is off by {off:.1e} of its largest value"
-        yield measured(off, AGREEMENT, text, trial.place("output"))
+        yield measured(off, AGREEMENT, text, trial.place("output", "record"))
