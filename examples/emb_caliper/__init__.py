@@ -4,7 +4,7 @@ Motor, planetary gear and ball screw press the pads of a floating caliper togeth
 and current are controlled in a cascade. See the README beside this file.
 """
 
-from bywire.core.brake import Brake
+from bywire.authoring import Brake
 
 BRAKE = Brake(
     "emb-caliper", "motor, planetary gear, ball screw, floating caliper, cascaded control", __name__

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case
+from bywire.authoring import Case
 from emb_caliper.model import EmbCaliper
 from emb_caliper.parameters import CaliperBrakeParameters, DriveMode
 from emb_caliper.trim import memory_at, state_at

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Any, NamedTuple
 
+from bywire.authoring import Signal
 from bywire.control import current_pi
 from bywire.core import ops
-from bywire.core.signals import Signal
 from bywire.plant import adc, h_bridge
 from emb_caliper.elements import ball_screw, floating_caliper, planetary_gear
 from emb_caliper.laws import limited_pi

@@ -5,11 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
+from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Shown, Task, Wire
 from bywire.core import ops
-from bywire.core.assembly import Assembly
-from bywire.core.model import Bounds, Task
-from bywire.core.parts import Integral, Part, Shown, Wire
-from bywire.core.signals import Role
 from bywire.plant import battery_supply, dc_motor, end_stop, h_bridge
 from emb_caliper import ecu
 from emb_caliper.elements import (

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.report.line_role import Role
-from bywire.report.panels import Panel, Panels, Trace
+from bywire.authoring import LineRole, Panel, Panels, Trace
 
 PANELS = Panels(
     "emb-caliper",
@@ -11,16 +10,18 @@ PANELS = Panels(
     (
         Panel(
             "clamp force",
-            (Trace("F_cl"), Trace("F_meas", Role.SECOND), Trace("F_ref", Role.SET_POINT)),
+            (Trace("F_cl"), Trace("F_meas", LineRole.SECOND), Trace("F_ref", LineRole.SET_POINT)),
             height=1.8,
         ),
         Panel(
             "motor speed",
-            (Trace("omega"), Trace("omega_ref", Role.SET_POINT)),
+            (Trace("omega"), Trace("omega_ref", LineRole.SET_POINT)),
             saturation="sat_speed",
         ),
-        Panel("current", (Trace("i"), Trace("i_ref", Role.SET_POINT)), saturation="sat_current"),
-        Panel("torque", (Trace("torque"), Trace("T_fr", Role.SECOND))),
+        Panel(
+            "current", (Trace("i"), Trace("i_ref", LineRole.SET_POINT)), saturation="sat_current"
+        ),
+        Panel("torque", (Trace("torque"), Trace("T_fr", LineRole.SECOND))),
         Panel("power", (Trace("P_el"),)),
     ),
 )

@@ -6,9 +6,8 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from bywire.authoring import Duration, ParameterSet, Unit
 from bywire.control import current_pi
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Unit
 from bywire.plant import adc, battery_supply, dc_motor, end_stop, h_bridge
 from emb_caliper.elements import (
     ball_screw,

@@ -6,8 +6,7 @@ from typing import Any
 
 from scipy.optimize import brentq
 
-from bywire.core.errors import ParameterError
-from bywire.core.signals import zeros
+from bywire.authoring import ParameterError, zeros
 from bywire.plant import dc_motor
 from emb_caliper.ecu import Memory, travel_per_angle
 from emb_caliper.elements import floating_caliper, rotor

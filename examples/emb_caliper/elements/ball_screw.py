@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Length
-from bywire.core.signals import Signal
+from bywire.authoring import Length, ParameterSet, Signal
 
 
 class Parameters(ParameterSet):

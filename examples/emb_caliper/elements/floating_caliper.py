@@ -7,12 +7,21 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
+from bywire.authoring import (
+    Array,
+    ContactCompliance,
+    Energy,
+    Length,
+    Overlap,
+    ParameterSet,
+    Role,
+    Signal,
+    Stiffness,
+    TimeConstant,
+    Unit,
+    validity,
+)
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Length, Stiffness, TimeConstant, Unit
-from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
-from bywire.core.typing import Array
-from bywire.core.validity import first, outside
 
 Quadratic = Annotated[float, Unit("N/m**2", 3e10), Field(ge=0, allow_inf_nan=False)]
 Cubic = Annotated[float, Unit("N/m**3", 7e12), Field(allow_inf_nan=False)]
@@ -144,4 +153,4 @@ def watch(u: Input, par: Parameters, t: Array) -> list[str]:
     text = (
         f"the pads were pressed beyond the measured curve, caliper.n_max = {1e3 * par.n_max:g} mm,"
     )
-    return first(t, outside(depth(u, par), -math.inf, par.n_max), text)
+    return validity.first(t, validity.outside(depth(u, par), -math.inf, par.n_max), text)

@@ -6,10 +6,8 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
+from bywire.authoring import ParameterSet, Power, Signal, Torque, Unit
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Torque, Unit
-from bywire.core.signals import Power, Signal
 
 TorquePerForce = Annotated[float, Unit("N*m/N", 1e-5), Field(ge=0, allow_inf_nan=False)]
 StribeckSpeed = Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]

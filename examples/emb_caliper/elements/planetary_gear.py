@@ -6,9 +6,7 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field, model_validator
 
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Unit
-from bywire.core.signals import Signal
+from bywire.authoring import ParameterSet, Signal, Unit
 
 Teeth = Annotated[float, Unit("1", 30.0), Field(ge=6, le=500, allow_inf_nan=False)]
 Speed = Annotated[float, Signal("rad/s", "speed", 100.0)]

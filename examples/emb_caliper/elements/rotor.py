@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Inertia, RotaryDamping
-from bywire.core.signals import Energy, Power, Role, Signal
+from bywire.authoring import Energy, Inertia, ParameterSet, Power, Role, RotaryDamping, Signal
 
 Loss = Annotated[
     float, Signal("W", "loss of the viscous friction", role=Role("sink", "viscous friction"))

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis import effort, occupation
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.authoring import (
+    Case,
+    Duration,
+    Experiment,
+    Kpi,
+    ParameterSet,
+    Recordings,
+    Stimulus,
+    effort,
+    evaluate,
+    occupation,
+    units_of,
+)
 from emb_caliper.case import Array, case_from_rest
 from emb_caliper.experiments.slow_strokes import TopForce
 from emb_caliper.parameters import CaliperBrakeParameters

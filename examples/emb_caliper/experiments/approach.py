@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Length
+from bywire.authoring import (
+    Case,
+    Duration,
+    Experiment,
+    Kpi,
+    Length,
+    ParameterSet,
+    Recordings,
+    Stimulus,
+    evaluate,
+    step_response,
+    units_of,
+)
 from emb_caliper.case import step_at_zero
 from emb_caliper.rigs.approach import Approach, ApproachParameters, at_rest
 

@@ -6,13 +6,22 @@ from typing import Annotated
 
 from pydantic import Field
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis import effort, occupation, step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, TimeConstant, Unit
+from bywire.authoring import (
+    Case,
+    Duration,
+    Experiment,
+    Kpi,
+    ParameterSet,
+    Recordings,
+    Stimulus,
+    TimeConstant,
+    Unit,
+    effort,
+    evaluate,
+    occupation,
+    step_response,
+    units_of,
+)
 from emb_caliper.case import case_from_rest, step_at_zero
 from emb_caliper.parameters import CaliperBrakeParameters
 

@@ -6,11 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.authoring import Case, Duration, Experiment, Kpi, ParameterSet, Recordings, Stimulus
 from emb_caliper.case import case_from_rest, step_at_zero
 from emb_caliper.ecu import travel_per_angle
 from emb_caliper.experiments.slow_strokes import TopForce

@@ -9,11 +9,17 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Nodes, Unit
+from bywire.authoring import (
+    Case,
+    Duration,
+    Experiment,
+    Kpi,
+    Nodes,
+    ParameterSet,
+    Recordings,
+    Stimulus,
+    Unit,
+)
 from emb_caliper.case import Array, case_from_rest
 from emb_caliper.parameters import CaliperBrakeParameters
 from emb_caliper.trim import state_at

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from bywire.bench.result import Result
-from bywire.report import style
-from bywire.report.bench_figures import FigureKind, Shown
+from bywire.authoring import FigureKind, Result, ShownFigure, style
 
 _STEADY = 0.02  # of the speed demand: what is farther from it accelerates
 
 
-def _draw(result: Result) -> list[Shown]:
+def _draw(result: Result) -> list[ShownFigure]:
     run = result.recordings["run"]
     figure, axes = style.new_figure(3.4, (1.0,))
     F, T, omega, asked = (run[name].values for name in ("F_cl", "torque", "omega", "omega_ref"))
@@ -23,7 +21,7 @@ def _draw(result: Result) -> list[Shown]:
     axes[0].set_ylabel(style.axis_label("motor torque", "N*m"))
     style.legend_above(axes[0])
     caption = "Motor torque over clamp force: half the distance of the branches is friction."
-    return [Shown("friction-over-load", figure, caption)]
+    return [ShownFigure("friction-over-load", figure, caption)]
 
 
 FIGURE = FigureKind("friction-over-load", _draw)

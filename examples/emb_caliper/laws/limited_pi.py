@@ -11,10 +11,8 @@ from typing import Annotated, NamedTuple
 from annotated_types import Gt
 from pydantic import Field
 
+from bywire.authoring import Current, ParameterSet, Signal, Unit
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Current, Unit
-from bywire.core.signals import Signal
 
 SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 MotorSpeed = Annotated[float, Unit("rad/s", 300.0), Field(gt=0, allow_inf_nan=False)]

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.analysis.loop import Loop, Point
-from bywire.core.parameters import ParameterSet
+from bywire.authoring import Loop, ParameterSet, Point
 from emb_caliper.loops.points import CAUSES, FORCE, point
 
 

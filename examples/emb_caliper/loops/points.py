@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, cast
 
-from bywire.analysis.loop import Point, Quantity
-from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
-from bywire.core.signals import zeros
+from bywire.authoring import ParameterError, ParameterSet, Point, Quantity, zeros
 from emb_caliper.ecu import Stimulus
 from emb_caliper.model import EmbCaliper
 from emb_caliper.parameters import CaliperBrakeParameters, DriveMode

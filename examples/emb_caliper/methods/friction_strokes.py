@@ -12,17 +12,25 @@ import xarray as xr
 from numpy.typing import NDArray
 from pydantic import Field
 
-from bywire.bench.experiment import as_run
-from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Frequency, Unit
-from bywire.identification.differentiation import differentiated
-from bywire.identification.least_squares import Problem, estimate
-from bywire.identification.measured import wrong_sign
-from bywire.identification.method import Curve, Effort, Identified, Method
-from bywire.identification.residuals import lack_of_fit
-from bywire.identification.unknown import parameters_of
-from bywire.simulation.run import simulate
+from bywire.authoring import (
+    Curve,
+    Duration,
+    Effort,
+    Frequency,
+    Identified,
+    Method,
+    ParameterError,
+    ParameterSet,
+    Problem,
+    Unit,
+    as_run,
+    differentiated,
+    estimate,
+    lack_of_fit,
+    parameters_of,
+    simulate,
+    wrong_sign,
+)
 from emb_caliper.ecu import travel_per_angle
 from emb_caliper.experiments import slow_strokes
 from emb_caliper.parameters import CaliperBrakeParameters

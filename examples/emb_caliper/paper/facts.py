@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.reproduction.item import Fact
+from bywire.authoring import Fact
 
 _ABSTRACT = "Line, Manzie, Good (2008), abstract"
 LIMITED = "standard cascaded PI control has limited performance under nonlinear stiffness"

@@ -7,12 +7,19 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from bywire.bench.running import Progress
-from bywire.core.catalog import parameters
-from bywire.report import style
-from bywire.reproduction.item import compared, found
-from bywire.reproduction.reproduction import Exhibit, Part, Reproduction, Source
-from bywire.reproduction.runs import Runs, kpis
+from bywire.authoring import (
+    Exhibit,
+    Progress,
+    Reproduction,
+    Runs,
+    Source,
+    SourcePart,
+    compared,
+    found,
+    kpis,
+    parameters,
+    style,
+)
 from emb_caliper.elements import floating_caliper
 from emb_caliper.experiments.power_off import held_force
 from emb_caliper.paper import facts
@@ -27,7 +34,7 @@ def _rise(runs: Runs, name: str, low: float) -> float:
     return kpis(runs.bench("clamp-step", name, options=options))["rise_time"]
 
 
-def _envelope(runs: Runs) -> Part:
+def _envelope(runs: Runs) -> SourcePart:
     """Return how small steps differ over the clamp force, without and with gain scheduling."""
     ratio = {name: _rise(runs, name, 1e3) / _rise(runs, name, 19e3) for name in (MAIN, MODIFIED)}
     uneven = {name: abs(float(np.log(value))) for name, value in ratio.items()}
@@ -37,11 +44,11 @@ def _envelope(runs: Runs) -> Part:
         compared("envelope.scheduled", facts.IMPROVED, uneven[MODIFIED] / uneven[MAIN], "<=",
                  "logarithm of that ratio with scheduling over that without"),
     )  # fmt: skip
-    return Part("Small steps over the clamp force", "Fixed gains meet a stiffness that grows "
+    return SourcePart("Small steps over the clamp force", "Fixed gains meet a stiffness that grows "
                 "ninefold; gains that follow it make small steps more alike.", items)  # fmt: skip
 
 
-def _large(runs: Runs) -> Part:
+def _large(runs: Runs) -> SourcePart:
     """Return large steps, their saturation, and the figure."""
     results = [runs.bench("clamp-step", MAIN, options={"F_to": F}) for F in STEPS]
     limit = parameters(MAIN).leaves()["ecu.speed.i_max"]
@@ -58,7 +65,7 @@ def _large(runs: Runs) -> Part:
                   for F, r in zip(STEPS, results, strict=True)}  # fmt: skip
     exhibit = Exhibit("steps", _drawn(recordings), "Steps of the force demand, standard cascade.")
     text = "The paper's own steps were not at hand: 5, 15 and 25 kN are chosen."
-    return Part("Large steps", text, tuple(items), (exhibit,), recordings)
+    return SourcePart("Large steps", text, tuple(items), (exhibit,), recordings)
 
 
 def _drawn(recordings: dict[str, xr.Dataset]) -> Any:
@@ -75,7 +82,7 @@ def _drawn(recordings: dict[str, xr.Dataset]) -> Any:
     return figure
 
 
-def _mechanism(runs: Runs) -> Part:
+def _mechanism(runs: Runs) -> SourcePart:
     """Return friction over load, the stiffness curve, and what force stays without current."""
     strokes = runs.bench("slow-strokes", MAIN)
     run, par = strokes.recordings["run"], parameters(MAIN)
@@ -94,7 +101,9 @@ def _mechanism(runs: Runs) -> Part:
     axes[0].set_xlabel(style.axis_label("overlap of pads and disc", "mm"))
     axes[0].set_ylabel(style.axis_label("clamp force", "kN"))
     exhibit = Exhibit("stiffness", figure, "Clamp force over overlap: the caliper stiffens.")
-    return Part("Friction and stiffness", "Strokes at three constant speeds.", items, (exhibit,))
+    return SourcePart(
+        "Friction and stiffness", "Strokes at three constant speeds.", items, (exhibit,)
+    )
 
 
 def _width(run: xr.Dataset, level: float) -> float:

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
-from bywire.analysis.linear.linearize import linearize
-from bywire.bench.running import Progress
-from bywire.core.catalog import parameters
-from bywire.reproduction.item import compared
-from bywire.reproduction.reproduction import Part, Reproduction, Source
-from bywire.reproduction.runs import Runs, kpis
+from bywire.authoring import (
+    Progress,
+    Reproduction,
+    Runs,
+    Source,
+    SourcePart,
+    compared,
+    kpis,
+    linearize,
+    parameters,
+)
 from emb_caliper.paper import facts
 from emb_caliper.rigs.approach import Approach, at_rest
 from emb_caliper.sets.strathmann2015 import SOURCE as CITATION
@@ -33,7 +38,7 @@ def reproduce(progress: Progress | None = None) -> Reproduction:
                               f"coefficient of the current -{rate:g} 1/s"))  # fmt: skip
     runs.report("approach", 1.0)
     text = "Sampled exactly as stated; the simulation's step is a fifth of the sample time."
-    part = Part("Closing the clearance", text, tuple(items))
+    part = SourcePart("Closing the clearance", text, tuple(items))
     return Reproduction(MAIN, CITATION, (part,), sets={"": "The benchmark"})
 
 

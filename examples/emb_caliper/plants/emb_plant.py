@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.linearize import linearize
-from bywire.analysis.linear.plant import Plant, PlantPoint
-from bywire.analysis.loop import Quantity
-from bywire.core.parameters import ParameterSet
+from bywire.authoring import LinearModel, ParameterSet, Plant, PlantPoint, Quantity, linearize
 from emb_caliper.ecu import travel_per_angle
 from emb_caliper.loops.points import FORCE, point
 from emb_caliper.parameters import CaliperBrakeParameters

@@ -11,10 +11,17 @@ from typing import Annotated, Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
-from bywire.core.model import Model, Task
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Length, RotaryDamping, Unit
-from bywire.core.signals import Signal, zeros
+from bywire.authoring import (
+    Duration,
+    Length,
+    Model,
+    ParameterSet,
+    RotaryDamping,
+    Signal,
+    Task,
+    Unit,
+    zeros,
+)
 from bywire.plant import dc_motor
 
 Ratio = Annotated[float, Unit("rad/m", 1e3), Field(gt=0, allow_inf_nan=False)]

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import math
 
-from bywire.core.catalog import CitedSet
-from bywire.core.provenance import chosen, derived
+from bywire.authoring import CitedSet, chosen, derived
 from emb_caliper.parameters import CaliperBrakeParameters
 
 SOURCE = (

@@ -7,8 +7,7 @@ read as decimeters: x0 = 0.05 is a clearance of 5 mm.
 
 from __future__ import annotations
 
-from bywire.core.catalog import CitedSet
-from bywire.core.provenance import paper
+from bywire.authoring import CitedSet, paper
 from emb_caliper.rigs.approach import ApproachParameters
 
 SOURCE = (

@@ -8,15 +8,24 @@ import numpy as np
 import xarray as xr
 from pydantic import Field, model_validator
 
-from bywire.bench.experiment import as_run
-from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.core.errors import ParameterError
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Length, Unit
-from bywire.core.typing import Progress
-from bywire.simulation.run import simulate
-from bywire.synthesis.study import Cut, Findings, Map, Mark, Study, require_ranges, variable
+from bywire.authoring import (
+    Cut,
+    Findings,
+    Kpi,
+    Length,
+    Map,
+    Mark,
+    ParameterError,
+    ParameterSet,
+    Progress,
+    Study,
+    Unit,
+    as_run,
+    require_ranges,
+    simulate,
+    step_response,
+    variable,
+)
 from emb_caliper.experiments import clamp_step
 from emb_caliper.experiments.slow_strokes import TopForce
 from emb_caliper.parameters import CaliperBrakeParameters
