@@ -12,12 +12,20 @@ import numpy as np
 import xarray as xr
 
 import bywire
+from bywire.authoring import (
+    Angle,
+    Duration,
+    Model,
+    ParameterError,
+    ParameterSet,
+    Signal,
+    Speed,
+    Task,
+    Unit,
+    moved_run,
+    zeros,
+)
 from bywire.core import ops
-from bywire.core.errors import ParameterError
-from bywire.core.model import Model, Task
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Unit
-from bywire.core.signals import Angle, Signal, Speed, zeros
 from bywire.identification import (
     Equation,
     differentiated,
@@ -28,7 +36,6 @@ from bywire.identification import (
     parameters_of,
     trial,
 )  # fmt: skip
-from bywire.identification.moved_run import moved_run
 
 Volt = Annotated[float, Unit("V")]
 

@@ -18,13 +18,21 @@ from matplotlib.figure import Figure
 from pydantic import Field
 
 import bywire
+from bywire.authoring import (
+    Angle,
+    Assembly,
+    Duration,
+    Integral,
+    ParameterSet,
+    Part,
+    Role,
+    Signal,
+    Task,
+    Torque,
+    Unit,
+    Voltage,
+)
 from bywire.core import ops
-from bywire.core.assembly import Assembly
-from bywire.core.model import Task
-from bywire.core.parameters import ParameterSet
-from bywire.core.parts import Integral, Part
-from bywire.core.quantities import Duration, Torque, Unit, Voltage
-from bywire.core.signals import Angle, Role, Signal
 from bywire.plant import dc_motor, shaft
 
 

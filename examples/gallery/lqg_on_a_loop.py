@@ -19,8 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import bywire
-from bywire.analysis.linear.closed_loop import closed_loop
-from bywire.analysis.loop import LOOPS
+from bywire.authoring import LOOPS, closed_loop
 
 parser = ArgumentParser(description="Design an LQG regulator for the pressure loop.")
 parser.add_argument("--out", type=Path, help="folder for the figure")

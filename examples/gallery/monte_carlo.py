@@ -16,7 +16,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import bywire
-from bywire.bench.experiment import as_run
+from bywire.authoring import as_run
 
 parser = ArgumentParser(description="Show how far the pressure spreads with the seals' friction.")
 parser.add_argument("--out", type=Path, help="folder for the figure")

@@ -14,9 +14,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from bywire.identification.measured import measured
-from bywire.identification.method import Effort
-from bywire.identification.methods.seal_friction import METHOD
+from bywire.authoring import METHODS, Effort, measured
 
 parser = ArgumentParser(description="Identify the friction of a sealed piston.")
 parser.add_argument("--data", type=Path, nargs="+", help="records, one per pressure")
@@ -24,12 +22,13 @@ parser.add_argument("--map", type=Path, help="what their columns mean")
 parser.add_argument("--out", type=Path, help="folder for the figure")
 arguments = parser.parse_args()
 
-options = METHOD.defaults
+method = METHODS.find("seal-friction")
+options = method.defaults
 if arguments.data:
-    data = measured(arguments.data, arguments.map, METHOD.signals, gaps=True).data
+    data = measured(arguments.data, arguments.map, method.signals, gaps=True).data
 else:
-    data = METHOD.synthetic(None, options, 1)
-result = METHOD.identify(data, None, options, Effort())
+    data = method.synthetic(None, options, 1)
+result = method.identify(data, None, options, Effort())
 found = result.estimates["seal friction"]
 print(found)
 loop_0, loop_f, between = (

@@ -18,7 +18,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import bywire
-from bywire.bench.experiment import as_run
+from bywire.authoring import as_run
 
 parser = ArgumentParser(description="Show which parameters move the pressure.")
 parser.add_argument("--out", type=Path, help="folder for the figure")

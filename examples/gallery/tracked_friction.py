@@ -13,7 +13,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import bywire
-from bywire.identification.replaying.tracking import track
+from bywire.authoring import track
 
 parser = ArgumentParser(description="Track friction that fades from braking to braking.")
 parser.add_argument("--out", type=Path, help="folder for the figure")

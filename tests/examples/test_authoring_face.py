@@ -1,4 +1,4 @@
-"""What a brake is written with: one place to import from, and the caliper needs no other."""
+"""What a brake is written with: one place to import from, and examples need no deeper one."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import pytest
 from bywire import authoring
 
 ROOT = Path(__file__).parents[2]
-CALIPER = sorted((ROOT / "examples" / "emb_caliper").rglob("*.py"))
+EXAMPLES = sorted((ROOT / "examples").rglob("*.py"))
 DEEP = re.compile(r"^\s*(?:from|import)\s+bywire\.\w+\.\w+", re.MULTILINE)
 
 
@@ -51,6 +51,6 @@ def test_a_name_loads_its_home_alone() -> None:
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
-@pytest.mark.parametrize("file", CALIPER, ids=lambda file: file.stem)
-def test_the_caliper_imports_two_levels_deep(file: Path) -> None:
+@pytest.mark.parametrize("file", EXAMPLES, ids=lambda file: file.stem)
+def test_examples_import_two_levels_deep(file: Path) -> None:
     assert DEEP.findall(file.read_text(encoding="utf-8")) == []

@@ -16,10 +16,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from bywire.analysis.linear.closed_loop import closed_loop
     from bywire.analysis.linear.linear_model import LinearModel
     from bywire.analysis.linear.linearize import linearize
     from bywire.analysis.linear.plant import Plant, PlantPoint
-    from bywire.analysis.loop import Loop, Point, Quantity
+    from bywire.analysis.loop import LOOPS, Loop, Point, Quantity
     from bywire.bench.bench import Bench
     from bywire.bench.experiment import Case, Experiment, Recordings, as_run, fixed
     from bywire.bench.kpis import effort, hysteresis, occupation, step_response
@@ -87,8 +88,10 @@ if TYPE_CHECKING:
     from bywire.identification.differentiation import differentiated
     from bywire.identification.estimate import Estimate
     from bywire.identification.least_squares import Problem, estimate
-    from bywire.identification.measured import wrong_sign
-    from bywire.identification.method import Check, Curve, Effort, Identified, Method
+    from bywire.identification.measured import measured, wrong_sign
+    from bywire.identification.method import METHODS, Check, Curve, Effort, Identified, Method
+    from bywire.identification.moved_run import moved_run
+    from bywire.identification.replaying.tracking import track
     from bywire.identification.residuals import lack_of_fit
     from bywire.identification.unknown import Unknown, parameters_of
     from bywire.report import style
@@ -144,7 +147,8 @@ _HOMES = {
     "report.panels": "Panel Panels Trace",
     "report.line_role": "Role:LineRole",
     # loops, plants, studies
-    "analysis.loop": "Loop Point Quantity",
+    "analysis.loop": "LOOPS Loop Point Quantity",
+    "analysis.linear.closed_loop": "closed_loop",
     "analysis.linear.linear_model": "LinearModel",
     "analysis.linear.linearize": "linearize",
     "analysis.linear.plant": "Plant PlantPoint",
@@ -154,8 +158,10 @@ _HOMES = {
     "identification.differentiation": "differentiated",
     "identification.estimate": "Estimate",
     "identification.least_squares": "Problem estimate",
-    "identification.measured": "wrong_sign",
-    "identification.method": "Check Curve Effort Identified Method",
+    "identification.measured": "measured wrong_sign",
+    "identification.moved_run": "moved_run",
+    "identification.replaying.tracking": "track",
+    "identification.method": "METHODS Check Curve Effort Identified Method",
     "identification.residuals": "lack_of_fit",
     "identification.unknown": "Unknown parameters_of",
     # what sources state
@@ -185,24 +191,24 @@ _PLACES = {
 }
 
 __all__ = [
-    "Angle", "Area", "Array", "Assembly", "Bench", "Bounds", "Brake", "BreakawayFactor", "Case",
-    "Check", "CitedSet", "Conductance", "ContactCompliance", "Current", "Curve", "Cut", "Damping",
-    "Density", "Duration", "DutyPerCurrent", "DutyPerCurrentTime", "Effort", "Energy", "Estimate",
-    "Exhibit", "Experiment", "Fact", "Factor", "FigureKind", "Findings", "Force", "Fraction",
-    "Frequency", "Gain", "GearRatio", "Identified", "Inductance", "Inertia", "Integral",
-    "InternalResistance", "Item", "Kpi", "Length", "LineRole", "LinearModel", "Loop", "Map",
-    "Mark", "Mass", "Matrix", "Method", "Model", "ModelError", "Nodes", "Overlap", "Panel",
-    "Panels", "ParameterError", "ParameterSet", "Part", "Plant", "PlantPoint", "Point",
-    "Position", "Power", "Pressure", "Problem", "Progress", "Quantity", "Recordings",
-    "Reproduction", "Resistance", "Result", "Role", "RootCause", "RotaryDamping", "Run", "Runs",
-    "Shown", "ShownFigure", "Signal", "SignedCurrent", "Source", "SourcePart", "Speed",
-    "Stiffness", "Stimulus", "Study", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace",
-    "Undefined", "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated",
-    "chosen", "compared", "derived", "differentiated", "effort", "estimate", "evaluate", "fixed",
-    "found", "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "occupation", "paper",
-    "parameters", "parameters_of", "quantities", "require_ranges", "signals", "simulate",
-    "step_response", "style", "units_of", "validity", "variable", "variables", "wrong_sign",
-    "zeros",
+    "LOOPS", "METHODS", "Angle", "Area", "Array", "Assembly", "Bench", "Bounds", "Brake",
+    "BreakawayFactor", "Case", "Check", "CitedSet", "Conductance", "ContactCompliance", "Current",
+    "Curve", "Cut", "Damping", "Density", "Duration", "DutyPerCurrent", "DutyPerCurrentTime",
+    "Effort", "Energy", "Estimate", "Exhibit", "Experiment", "Fact", "Factor", "FigureKind",
+    "Findings", "Force", "Fraction", "Frequency", "Gain", "GearRatio", "Identified", "Inductance",
+    "Inertia", "Integral", "InternalResistance", "Item", "Kpi", "Length", "LineRole",
+    "LinearModel", "Loop", "Map", "Mark", "Mass", "Matrix", "Method", "Model", "ModelError",
+    "Nodes", "Overlap", "Panel", "Panels", "ParameterError", "ParameterSet", "Part", "Plant",
+    "PlantPoint", "Point", "Position", "Power", "Pressure", "Problem", "Progress", "Quantity",
+    "Recordings", "Reproduction", "Resistance", "Result", "Role", "RootCause", "RotaryDamping",
+    "Run", "Runs", "Shown", "ShownFigure", "Signal", "SignedCurrent", "Source", "SourcePart",
+    "Speed", "Stiffness", "Stimulus", "Study", "Task", "TimeConstant", "Torque", "TorqueConstant",
+    "Trace", "Undefined", "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run",
+    "calibrated", "chosen", "closed_loop", "compared", "derived", "differentiated", "effort",
+    "estimate", "evaluate", "fixed", "found", "hysteresis", "kpis", "lack_of_fit", "linearize",
+    "measure", "measured", "moved_run", "occupation", "paper", "parameters", "parameters_of",
+    "quantities", "require_ranges", "signals", "simulate", "step_response", "style", "track",
+    "units_of", "validity", "variable", "variables", "wrong_sign", "zeros",
 ]  # fmt: skip
 
 
