@@ -151,9 +151,14 @@ def _gathered(entries: list[Entry], total: float) -> list[Entry]:
 
 
 def _colors(sinks: Sequence[str]) -> dict[str, str]:
-    """Return a color for every variable; unknown ones take those that are left over."""
-    left = cycle([color for name, color in COLORS.items() if name not in sinks] or [style.BLACK])
-    return {name: COLORS[name] if name in COLORS else next(left) for name in sinks}
+    """Return a color for every variable, no two alike while there are any left over."""
+    known = {COLORS[name] for name in sinks if name in COLORS}
+    left = cycle([c for c in dict.fromkeys(COLORS.values()) if c not in known] or [style.BLACK])
+    found: dict[str, str] = {}
+    for name in sinks:
+        usual = COLORS.get(name)
+        found[name] = next(left) if usual is None or usual in found.values() else usual
+    return found
 
 
 def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:

@@ -66,8 +66,9 @@ def test_linearize_and_margins(command: Any) -> None:
     assert crossovers == pytest.approx([7.49, 30.0, 257.0], rel=0.01)  # [Hz], a cascade
 
 
-def test_current_loop_agrees_with_its_linear_model(caliper: Path) -> None:
-    found = toolkit.agreement("motor-current", parameters="emb42v")
+@pytest.mark.parametrize("loop", ["clamp-force", "motor-speed", "motor-current"])
+def test_loops_agree_with_their_linear_models(loop: str, caliper: Path) -> None:
+    found = toolkit.agreement(loop, parameters="emb42v")
     assert found.holds
     assert "dry friction" in found.differences.largest
 
@@ -140,3 +141,13 @@ def test_sources_agree(source: str, agreeing: int, command: Any) -> None:
 def test_check_finds_nothing_broken(caliper: Path) -> None:
     found = toolkit.check("emb-caliper", system=caliper)
     assert not [str(f) for f in found.findings if f.outcome == "broken"]
+
+
+def test_energies_of_a_brake_of_ones_own_have_colors_of_their_own() -> None:
+    from bywire.report.energy_balance import COLORS, _colors
+
+    sinks = ("E_supply", "E_copper_moving", "E_copper_holding", "E_viscous", "E_friction",
+             "E_caliper", "E_stored")  # fmt: skip
+    colors = _colors(sinks)
+    assert len(set(colors.values())) == len(sinks)
+    assert colors["E_copper_moving"] == COLORS["E_copper_moving"]
