@@ -8,7 +8,8 @@ import pytest
 import xarray as xr
 
 import bywire
-from bywire.core.brake import brakes, load_system
+from bywire import load_system
+from bywire.core import brake
 
 PACKAGE = Path(__file__).parents[1] / "src" / "bywire.template.starter"
 
@@ -16,7 +17,7 @@ PACKAGE = Path(__file__).parents[1] / "src" / "bywire.template.starter"
 @pytest.fixture(autouse=True, scope="module")
 def known() -> None:
     """Have the brake known, installed or not."""
-    if "starter" not in brakes():
+    if "starter" not in brake.brakes():
         load_system(PACKAGE)
 
 

@@ -7,13 +7,19 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration, Unit
-from bywire.core.signals import zeros
+from bywire.authoring import (
+    Case,
+    Duration,
+    Experiment,
+    Kpi,
+    ParameterSet,
+    Recordings,
+    Unit,
+    evaluate,
+    step_response,
+    units_of,
+    zeros,
+)
 from bywire.template.starter.model import Memory, StarterActuator
 from bywire.template.starter.parameters import Parameters
 

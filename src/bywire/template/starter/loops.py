@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import cast
 
-from bywire.analysis.loop import Loop, Point, Quantity
-from bywire.core.parameters import ParameterSet
+from bywire.authoring import Loop, ParameterSet, Point, Quantity
 from bywire.template.starter.model import StarterActuator, Stimulus
 from bywire.template.starter.parameters import Parameters
 from bywire.template.starter.point import at_force

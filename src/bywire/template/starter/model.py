@@ -7,10 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
-from bywire.core.assembly import Assembly
-from bywire.core.model import Bounds, Task
-from bywire.core.parts import Integral, Part, Wire
-from bywire.core.signals import Role, Signal
+from bywire.authoring import Assembly, Bounds, Integral, Part, Role, Signal, Task, Wire
 from bywire.plant import dc_motor
 from bywire.template.starter.elements import caliper_spring, spindle
 from bywire.template.starter.laws import force_control

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.authoring import Duration, ParameterSet
 from bywire.plant import dc_motor
 from bywire.template.starter.elements import caliper_spring, spindle
 from bywire.template.starter.laws import force_control

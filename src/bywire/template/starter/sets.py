@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.core.catalog import CitedSet
-from bywire.core.provenance import chosen, derived
+from bywire.authoring import CitedSet, chosen, derived
 from bywire.template.starter.parameters import Parameters
 
 _MOTOR = "a motor of some 200 W at 12 V"

@@ -6,10 +6,8 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
+from bywire.authoring import Energy, ParameterSet, Power, Signal, Stiffness, Unit
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Stiffness, Unit
-from bywire.core.signals import Energy, Power, Signal
 
 
 class Parameters(ParameterSet):

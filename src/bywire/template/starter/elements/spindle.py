@@ -6,10 +6,20 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import GearRatio, Inertia, RotaryDamping, Torque, Unit
-from bywire.core.signals import Angle, Energy, Power, Signal, Speed
-from bywire.core.signals import Torque as TorqueSignal
+from bywire.authoring import (
+    Angle,
+    Energy,
+    GearRatio,
+    Inertia,
+    ParameterSet,
+    Power,
+    RotaryDamping,
+    Signal,
+    Speed,
+    Torque,
+    Unit,
+    signals,
+)
 
 
 class Parameters(ParameterSet):
@@ -45,7 +55,7 @@ class Balance(NamedTuple):
     """What drives angle and speed."""
 
     theta: Speed
-    omega: TorqueSignal
+    omega: signals.Torque
 
 
 class Input(NamedTuple):

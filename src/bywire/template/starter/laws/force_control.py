@@ -6,10 +6,8 @@ from typing import Annotated, NamedTuple
 
 from pydantic import Field
 
+from bywire.authoring import ParameterSet, Signal, Speed, Unit, Voltage
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Unit, Voltage
-from bywire.core.signals import Signal, Speed
 
 
 class Parameters(ParameterSet):
