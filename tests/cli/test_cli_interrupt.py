@@ -155,7 +155,7 @@ def test_interrupt_while_graphs_are_built_is_not_lost(
         signal.raise_signal(signal.SIGINT)
         return build_program(*arguments)
 
-    monkeypatch.setattr("bywire.simulation.engine.build_program", interrupted_build)
+    monkeypatch.setattr("bywire.simulation.program.build_program", interrupted_build)
     monkeypatch.setattr(machine, "last", 10**9)
     outcome = bywire("run", bench(), "--out", tmp_path / "out", "--json")
     assert outcome.status == 130

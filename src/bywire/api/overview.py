@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
 import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from textwrap import wrap
 from typing import Any
 
-import bywire.core
 from bywire.core.brake import brakes
+from bywire.core.sources import source_state
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Listing, Section
 
@@ -58,11 +56,11 @@ def overview() -> Overview:
     Making it loads every brake and all that it brings; the index is kept in the folder of compiled
     kernels, so that a listing need not.
     """
-    from bywire.simulation.kernel_cache import usable_folder
+    from bywire.simulation.kernel_cache import keep_text, usable_folder
 
     names = hashlib.sha256(" ".join(brakes()).encode()).hexdigest()[:8]
     index = usable_folder() / f"overview-{names}.json"
-    state = _state()
+    state = source_state().digest
     try:
         kept = json.loads(index.read_text(encoding="utf-8"))
         if kept["state"] == state:
@@ -72,35 +70,8 @@ def overview() -> Overview:
     from bywire.api.things import all_things
 
     things = all_things()
-    _keep(index, json.dumps({"state": state, "things": things}))
+    keep_text(index, json.dumps({"state": state, "things": things}))
     return Overview(things)
-
-
-def _state() -> str:
-    """Return a digest of name, size and time of change of every file that declares something."""
-    digest = hashlib.sha256()
-    for path in _sources():
-        found = path.stat()
-        digest.update(f"{path}\0{found.st_size}\0{found.st_mtime_ns}\n".encode())
-    return digest.hexdigest()
-
-
-def _sources() -> Iterator[Path]:
-    package = Path(bywire.core.__file__ or "").parents[1]
-    yield from sorted(package.rglob("*.py"))
-    for brake in brakes().values():
-        file = Path(brake.file)
-        if file.is_relative_to(package):
-            continue
-        yield from sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
-
-
-def _keep(index: Path, text: str) -> None:
-    from bywire.core.errors import FileError
-    from bywire.report.files import write_bytes
-
-    with contextlib.suppress(FileError):  # then the next listing makes it again
-        write_bytes(index, text.encode())
 
 
 def _entry(name: str, about: str | Iterable[str]) -> list[str]:

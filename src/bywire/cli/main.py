@@ -89,8 +89,11 @@ def _root(
 
 def main() -> None:
     """Run the command line; errors meant for the user become one message and an exit status."""
+    from bywire.core.sources import command
+
     open_streams()
-    status = _status()
+    with command():
+        status = _status()
     flush()
     raise SystemExit(status)
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from bywire.core.errors import SolverError
 from bywire.core.typing import Array
-from bywire.simulation.emission import Layout
 from bywire.simulation.engine import Engine
+from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
 
 Progress = Callable[[float], None]

@@ -4,37 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass
 
 from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, as_number, needed, text
 from bywire.simulation.graph import Graph
+from bywire.simulation.layout import CAP, Layout
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
-
-CAP = 8  # passes through one substep before it is counted as unsettled
 
 # plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
 # row, frames a recorded row, first recorded row, recorded signals, frames a tick of each task.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5], row0 = plan[6], chosen = plan[7];"""
 """C text that reads a run's plan"""
-
-
-@dataclass(frozen=True)
-class Layout:
-    """Where the parts of the state vector start.
-
-    The vector holds x, d, r, q, the memory m, and two counters: substeps that did not
-    settle, substeps that were repeated.
-    """
-
-    start: dict[str, int]
-    length: dict[str, int]
-
-    @property
-    def total(self) -> int:
-        """Length of the state vector."""
-        return self.start["counters"] + 2
 
 
 def unread(stages: Stages) -> frozenset[str]:

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
-    Layout,
     branching_statements,
     exact_pass,
     indented,
@@ -17,6 +16,7 @@ from bywire.simulation.emission import (
     unread,
 )
 from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
+from bywire.simulation.layout import Layout
 from bywire.simulation.modes import modes
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages

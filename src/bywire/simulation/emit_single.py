@@ -5,7 +5,6 @@ from __future__ import annotations
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     PLAN,
-    Layout,
     branching_statements,
     exact_pass,
     indented,
@@ -17,6 +16,7 @@ from bywire.simulation.emission import (
 )
 from bywire.simulation.expressions import Namer, as_number, condition, needed
 from bywire.simulation.graph import Graph
+from bywire.simulation.layout import Layout
 from bywire.simulation.modes import Modes, modes
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages

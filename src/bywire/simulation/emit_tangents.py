@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     PLAN,
-    Layout,
     exact_pass,
     indented,
     layout_of,
@@ -17,6 +16,7 @@ from bywire.simulation.emission import (
 )
 from bywire.simulation.exact_tangents import exact_tangents, settle_statements
 from bywire.simulation.expressions import as_number, needed
+from bywire.simulation.layout import Layout
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
 from bywire.simulation.turning_tangents import TURNS, declare_turns, mend_turns, watch_turns

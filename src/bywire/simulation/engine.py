@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Mapping
 from functools import cache
-from typing import Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +15,15 @@ from bywire.core.errors import CompilerError, unknown_name
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.compiler import find_compiler
-from bywire.simulation.emission import Layout
+from bywire.core.signals import Signal, signals_of
+from bywire.simulation.compiler import Compiler, find_compiler
+from bywire.simulation.kept_kernel import Identity, place_of
+from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request, SingleKernel
-from bywire.simulation.program import Program, build_program
 from bywire.simulation.virtual_machine import VirtualMachine
+
+if TYPE_CHECKING:
+    from bywire.simulation.program import Program
 
 KINDS = ("auto", "compiled", "virtual-machine")
 
@@ -43,12 +47,46 @@ class Engine(Protocol):
 
 
 class Prepared:
-    """Programs and engines of one structure of a model, built on demand."""
+    """Program and engines of one structure of a model.
+
+    The program is built at once, so that a model that fails a check fails here, unless an earlier
+    command did so and kept the kernel; else when it is asked for.
+    """
 
     def __init__(self, model: Model, par: ParameterSet) -> None:
         self.model = model  # alive as long as what is known by its identity
-        self.program: Program = build_program(model, par)
+        self._par = par
+        self._program: Program | None = None
         self._engines: dict[str, Engine] = {}
+        self._place = place_of(model, structure_of(model, par))
+        self._kept = None if self._place is None else self._place.kept()
+        if self._kept is None:
+            self._program = self._built()
+
+    @property
+    def program(self) -> Program:
+        """All symbolic functions."""
+        with _LOCK:
+            if self._program is None:
+                self._program = self._built()
+            return self._program
+
+    def _built(self) -> Program:
+        from bywire.simulation.program import build_program
+
+        with interrupts_deferred():
+            return build_program(self.model, self._par)
+
+    @property
+    def outputs(self) -> dict[str, Signal]:
+        """Recorded signals, in order."""
+        return signals_of(self.model.Output)
+
+    @property
+    def contact_jacobians(self) -> Any:
+        """As in ``Program``."""
+        kept = self._kept
+        return self.program.contact_jacobians if kept is None else kept.contact_jacobians
 
     def engine(self, kind: str = "auto") -> Engine:
         """Return the engine for single runs.
@@ -75,7 +113,7 @@ class Prepared:
     def _build(self, kind: str) -> Engine:
         compiler = None if kind == "virtual-machine" else find_compiler()
         if compiler is not None:
-            return SingleKernel(self.program, compiler)
+            return self._kernel(compiler)
         if kind == "compiled":
             raise CompilerError(
                 "there is no C compiler: install one, or the extra bywire[compiler], or take "
@@ -84,6 +122,15 @@ class Prepared:
         if kind == "auto":
             _warn_once()
         return VirtualMachine(self.program)
+
+    def _kernel(self, compiler: Compiler) -> SingleKernel:
+        kept = self._kept
+        if kept is not None and kept.compiler == compiler.label:
+            return SingleKernel(kept.layout, kept.library, compiler)
+        kernel = SingleKernel.of(self.program, compiler)
+        if self._place is not None:
+            self._place.keep(kernel, self.program.contact_jacobians)
+        return kernel
 
 
 _PREPARED: dict[tuple[object, ...], Prepared] = {}
@@ -95,8 +142,7 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
     key = structure_of(model, par)
     with _LOCK:
         if key not in _PREPARED:
-            with interrupts_deferred():
-                _PREPARED[key] = Prepared(model, par)
+            _PREPARED[key] = Prepared(model, par)
         return _PREPARED[key]
 
 
@@ -118,7 +164,7 @@ def _fingerprint(value: object) -> object:
         return tuple(_fingerprint(v) for v in value)
     if isinstance(value, Mapping):
         return tuple((str(k), _fingerprint(v)) for k, v in value.items())
-    return id(value)  # kept alive by the model that Prepared holds
+    return Identity(id(value))  # kept alive by the model that Prepared holds
 
 
 @cache

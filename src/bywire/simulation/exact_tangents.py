@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from bywire.simulation.emission import CAP, Layout, indented, leaf_namer, statements
+from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
+from bywire.simulation.layout import CAP, Layout
 from bywire.simulation.stages import SEEDS, STATE, Stages
 
 

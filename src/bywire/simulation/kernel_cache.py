@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import hashlib
 import os
 import stat
@@ -59,6 +60,19 @@ def _private(folder: Path) -> bool:
     found = folder.stat()
     own = found.st_uid == os.getuid()
     return own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+
+
+def keep_text(path: Path, text: str) -> None:
+    """Write a file of the folder whole or not at all; where that fails, nothing is kept."""
+    with contextlib.suppress(OSError):
+        number, name = tempfile.mkstemp(dir=path.parent)
+        partial = Path(name)
+        try:
+            with open(number, "w", encoding="utf-8") as stream:
+                stream.write(text)
+            os.replace(partial, path)
+        finally:
+            partial.unlink(missing_ok=True)
 
 
 def intact(library: Path, digest: Path) -> bool:

@@ -5,18 +5,18 @@ from __future__ import annotations
 import ctypes
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 from bywire.simulation.compiler import PLAIN, Compiler, compile_library
-from bywire.simulation.emission import Layout, layout_of
-from bywire.simulation.emit_single import emit_single
-from bywire.simulation.program import Program
+from bywire.simulation.layout import Layout
 from bywire.simulation.schedule import Schedule
-from bywire.simulation.stages import build_stages
+
+if TYPE_CHECKING:
+    from bywire.simulation.program import Program
 
 
 @dataclass(frozen=True)
@@ -67,13 +67,22 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 class SingleKernel:
     """Compiled kernel for one run."""
 
-    def __init__(self, program: Program, compiler: Compiler) -> None:
-        stages = build_stages(program)
-        self.layout: Layout = layout_of(stages)
+    def __init__(self, layout: Layout, library: Path, compiler: Compiler) -> None:
+        self.layout, self.library, self.compiler = layout, library, compiler
         self.label = f"compiled C, {compiler.label}"
-        self.library: Path = compile_library(emit_single(stages), PLAIN, compiler)
-        self._run = ctypes.CDLL(str(self.library)).bw_run
+        self._run = ctypes.CDLL(str(library)).bw_run
         self._run.restype = None
+
+    @classmethod
+    def of(cls, program: Program, compiler: Compiler) -> SingleKernel:
+        """Emit the kernel of a program, and compile it unless the cache has it."""
+        from bywire.simulation.emission import layout_of
+        from bywire.simulation.emit_single import emit_single
+        from bywire.simulation.stages import build_stages
+
+        stages = build_stages(program)
+        library = compile_library(emit_single(stages), PLAIN, compiler)
+        return cls(layout_of(stages), library, compiler)
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
         """Run frames begin..end: renews ``state`` and fills ``rows`` in place.
@@ -81,7 +90,7 @@ class SingleKernel:
         Parameters
         ----------
         state
-            State vector, see ``emission.Layout``.
+            State vector, see ``layout.Layout``.
         rows
             Shape (recorded rows of these frames, selected outputs).
         """

@@ -16,9 +16,9 @@ from bywire.core.errors import StepError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import find_compiler
-from bywire.simulation.emission import Layout
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import lane_kernel
+from bywire.simulation.layout import Layout
 from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.window import Stimuli, advance_window, given_rows, one_by_one

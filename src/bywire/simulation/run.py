@@ -14,8 +14,8 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import Progress, advance_all
-from bywire.simulation.emission import Layout
 from bywire.simulation.engine import prepare
+from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule, plan
 from bywire.simulation.stiff_contacts import unresolved
@@ -101,7 +101,7 @@ def initial_vector(layout: Layout, state: Sequence[float], memory: Sequence[floa
 
 def request_for(run: Run, signals: Sequence[str] | None = None) -> Request:
     """Return what a kernel needs to compute a run; all outputs by default."""
-    names = tuple(prepare(run.model, run.par).program.outputs)
+    names = tuple(prepare(run.model, run.par).outputs)
     schedule = run.schedule()
     return Request(
         schedule=schedule,
@@ -141,7 +141,7 @@ def simulate(
     """
     prepared = prepare(run.model, run.par)
     chosen = prepared.engine(engine)
-    wanted = tuple(prepared.program.outputs) if signals is None else tuple(signals)
+    wanted = tuple(prepared.outputs) if signals is None else tuple(signals)
     request = request_for(run, wanted)
     schedule = request.schedule
     vector = initial_vector(chosen.layout, run.state, run.memory)
@@ -167,9 +167,9 @@ def simulate(
 
 def _doubt(run: Run) -> str:
     """Return why the step may be too long for the contacts, judged at the start."""
-    jacobians = prepare(run.model, run.par).program.contact_jacobians
     if not run.model.compliance(run.par):
         return ""
+    jacobians = prepare(run.model, run.par).contact_jacobians
     p = np.array(list(run.par.leaves().values()))
     opened, *closed = map(np.array, jacobians(np.array(run.state), np.array(run.memory), p))
     return unresolved(opened, closed, run.step)

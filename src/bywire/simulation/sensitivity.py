@@ -15,10 +15,11 @@ from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
-from bywire.simulation.emission import Layout, layout_of
+from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import prepare
 from bywire.simulation.expressions import needed
+from bywire.simulation.layout import Layout
 from bywire.simulation.native import plan_array, pointer
 from bywire.simulation.program import Program
 from bywire.simulation.run import (

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import threading
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.simulation.emission import CAP, Layout
+from bywire.simulation.layout import CAP, Layout
 from bywire.simulation.native import Request
-from bywire.simulation.program import Program
+
+if TYPE_CHECKING:
+    from bywire.simulation.program import Program
 
 
 class VirtualMachine:

@@ -1,0 +1,158 @@
+"""What a command keeps of a prepared model, so that the next one need not evaluate it on symbols.
+
+To know which compiled kernel is a model's, its whole graph had to be built, simplified and emitted
+again. Kept is what a single run needs beside the library: its name and digest, the layout of the
+state vector, and the Jacobians that judge the contacts. All else is built when it is asked for.
+
+A stale entry would be a wrong number in silence. So kept are only our own models, whose files are
+all in `source_state`: what another's model is made of, tables read from elsewhere for instance,
+cannot be known. A model that fails a check is never kept.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import platform
+import sys
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import casadi as ca
+import numpy as np
+
+from bywire.core.model import Model
+from bywire.core.sources import source_state
+from bywire.simulation.kernel_cache import intact, keep_text, sha256, usable_folder
+from bywire.simulation.layout import Layout
+
+if TYPE_CHECKING:
+    from bywire.simulation.native import SingleKernel
+
+
+class Identity(int):
+    """The address of an object: it tells structures apart in this process, and in no other."""
+
+
+@dataclass(frozen=True)
+class KeptKernel:
+    """A kernel that an earlier command built.
+
+    Parameters
+    ----------
+    compiler
+        Label of the compiler that made it.
+    jacobians
+        ``Program.contact_jacobians``, as CasADi writes a function down.
+    """
+
+    layout: Layout
+    library: Path
+    compiler: str
+    jacobians: str
+
+    @cached_property
+    def contact_jacobians(self) -> Any:
+        """As in ``Program``."""
+        return ca.Function.deserialize(self.jacobians)
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where the kernel of a structure is kept, and for which state of the files.
+
+    Parameters
+    ----------
+    file
+        In the folder of compiled kernels; one for every structure, so that they do not pile up.
+    state
+        Digest of the sources.
+    """
+
+    file: Path
+    state: str
+
+    def kept(self) -> KeptKernel | None:
+        """Return what is kept there; None where there is nothing, or it is stale or damaged."""
+        try:
+            digest, _, text = self.file.read_text(encoding="utf-8").partition("\n")
+            if digest != _digest(text):
+                return None
+            entry = json.loads(text)
+            library = self.file.with_name(entry["library"])
+            is_same = entry["state"] == self.state and sha256(library) == entry["digest"]
+            if not (is_same and intact(library, library.with_suffix(".sha256"))):
+                return None
+            layout = Layout(entry["start"], entry["length"])
+            return KeptKernel(layout, library, entry["compiler"], entry["jacobians"])
+        except (OSError, ValueError, KeyError, TypeError):
+            return None
+
+    def keep(self, kernel: SingleKernel, contact_jacobians: Any) -> None:
+        """Keep a kernel, unless a file has changed since its model was loaded."""
+        if _running_state() != self.state:
+            return
+        entry = {
+            "state": self.state,
+            "start": kernel.layout.start,
+            "length": kernel.layout.length,
+            "library": kernel.library.name,
+            "digest": sha256(kernel.library),
+            "compiler": kernel.compiler.label,
+            "jacobians": contact_jacobians.serialize(),
+        }
+        text = json.dumps(entry)
+        keep_text(self.file, f"{_digest(text)}\n{text}")
+
+
+def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
+    """Return where the kernel of a structure is kept; None where it must not be.
+
+    Parameters
+    ----------
+    structure
+        As ``engine.structure_of`` returns it, with the types of the model and of its parameters.
+    """
+    types = [value for value in structure if isinstance(value, type)]
+    if type(model) not in types or not all(map(_is_ours, types)) or _identities(structure):
+        return None
+    state = _running_state()
+    if not state:
+        return None
+    names = [f"{kind.__module__}.{kind.__qualname__}" for kind in types]
+    rest = [value for value in structure if not isinstance(value, type)]
+    built_by = (ca.CasadiMeta.version(), np.__version__, sys.version, platform.machine())
+    home = str(Path(sys.modules[__name__].__file__ or ""))
+    name = _digest(repr((names, rest, built_by, home)))[:32]
+    return Place(usable_folder() / f"kernel-{name}.json", state)
+
+
+def _running_state() -> str:
+    """Return the digest of the sources if this process is sure to run them; else nothing."""
+    state = source_state()
+    return state.digest if state.is_running else ""
+
+
+def _is_ours(kind: type) -> bool:
+    """Return whether a class and all that it inherits from bywire stand where they say."""
+    for base in kind.__mro__:
+        if base.__module__.partition(".")[0] in ("builtins", "typing", "pydantic"):
+            continue
+        module = sys.modules.get(base.__module__)
+        is_there = getattr(module, base.__name__, None) is base
+        if not (base.__module__.startswith("bywire.") and is_there):
+            return False
+    return True
+
+
+def _identities(value: object) -> bool:
+    """Return whether a structure holds the address of an object."""
+    if isinstance(value, tuple):
+        return any(_identities(each) for each in value)
+    return isinstance(value, Identity)
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

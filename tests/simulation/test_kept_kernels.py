@@ -1,0 +1,304 @@
+"""Kernels that a command keeps for the next one: never stale, never damaged, the same bits."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.core import sources
+from bywire.core.errors import ModelError
+from bywire.simulation import engine, kept_kernel, program
+from bywire.simulation.compiler import Compiler, find_compiler
+from bywire.simulation.run import Run, Trajectory, simulate
+from systems.nonlinear_drive import PARAMETERS, Memory, NonlinearDrive, State
+from systems.two_mass import rig
+
+PACKAGE = Path(bywire.__file__).parent
+
+
+class Kept:
+    """Runs as of one new process after the other, and how many programs they built."""
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.folder, self.builds, self._monkeypatch = folder, 0, monkeypatch
+        self.state = "first"
+        build = program.build_program
+
+        def counted(*arguments: object) -> object:
+            self.builds += 1
+            return build(*arguments)  # type: ignore[arg-type]
+
+        monkeypatch.setenv("BYWIRE_CACHE", str(folder))
+        monkeypatch.setattr(program, "build_program", counted)
+        monkeypatch.setattr(kept_kernel, "_is_ours", lambda kind: True)
+        monkeypatch.setattr(kept_kernel, "_running_state", lambda: self.state)
+
+    def run(self, run: Run, kind: str = "auto") -> Trajectory:
+        """Run in what counts as a new process."""
+        self._monkeypatch.setattr(engine, "_PREPARED", {})
+        return simulate(run, engine=kind)
+
+    def entries(self) -> list[Path]:
+        """Return the files of kept kernels."""
+        return sorted(self.folder.glob("kernel-*.json"))
+
+
+@pytest.fixture
+def kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Kept:
+    return Kept(tmp_path / "kernels", monkeypatch)
+
+
+def require_equal(a: Trajectory, b: Trajectory) -> None:
+    np.testing.assert_array_equal(a.values, b.values)
+    np.testing.assert_array_equal(a.vector, b.vector)
+    assert (a.names, a.status, a.engine, a.doubt) == (b.names, b.status, b.engine, b.doubt)
+
+
+# The contact is too stiff for the step: the doubt of it must be told by kept Jacobians too.
+CONTACT = rig(0.02, k_wall=5e9, tau_wall=1e-8)
+
+
+def test_a_kept_kernel_needs_no_program_and_gives_the_same_bits(kept: Kept) -> None:
+    plain = simulate(CONTACT)
+    assert "rebounds may be wrong" in plain.doubt
+    require_equal(kept.run(CONTACT), plain)
+    assert (kept.builds, len(kept.entries())) == (1, 1)
+    require_equal(kept.run(CONTACT), plain)
+    require_equal(kept.run(replace(CONTACT, par=CONTACT.par.replace({"m_1": 1.1}))),
+                  simulate(replace(CONTACT, par=CONTACT.par.replace({"m_1": 1.1}))))  # fmt: skip
+    assert kept.builds == 1
+
+
+def test_what_else_is_asked_of_it_is_built_then(kept: Kept) -> None:
+    kept.run(CONTACT)
+    machine = kept.run(CONTACT, "virtual-machine")
+    assert kept.builds == 2
+    require_equal(machine, simulate(CONTACT, engine="virtual-machine"))
+    assert len(engine.prepare(CONTACT.model, CONTACT.par).program.ticks) == 1
+    assert kept.builds == 2
+
+
+def halved(path: Path) -> None:
+    content = path.read_bytes()
+    path.unlink()  # the old one may be mapped
+    path.write_bytes(content[: len(content) // 2])
+
+
+def flipped(path: Path) -> None:
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.unlink()
+    path.write_bytes(bytes(content))
+
+
+def emptied(path: Path) -> None:
+    path.unlink()
+    path.write_bytes(b"")
+
+
+@pytest.mark.parametrize("damage", [halved, flipped, emptied, Path.unlink])
+@pytest.mark.parametrize("ending", ["json", "so", "sha256"])
+def test_what_is_damaged_is_built_anew(
+    kept: Kept, damage: Callable[[Path], None], ending: str
+) -> None:
+    first = kept.run(CONTACT)
+    damage(next(kept.folder.glob(f"*.{ending}")))
+    require_equal(kept.run(CONTACT), first)
+    assert kept.builds == 2
+    require_equal(kept.run(CONTACT), first)
+    assert kept.builds == 2
+
+
+def test_an_entry_of_another_shape_is_built_anew(kept: Kept) -> None:
+    """Its digest holds, its contents do not."""
+    first = kept.run(CONTACT)
+    for text in ("{}", "[]", '{"library": 3}'):
+        kept.entries()[0].write_text(f"{kept_kernel._digest(text)}\n{text}")
+        require_equal(kept.run(CONTACT), first)
+    assert kept.builds == 4
+
+
+def test_other_sources_or_another_compiler_build_anew(
+    kept: Kept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first = kept.run(CONTACT)
+    kept.state = "second"
+    require_equal(kept.run(CONTACT), first)
+    assert kept.builds == 2
+    found = find_compiler()
+    assert found is not None
+    monkeypatch.setattr(engine, "find_compiler", lambda: Compiler(found.command, "another 1.0"))
+    other = kept.run(CONTACT)
+    assert (other.engine, kept.builds) == ("compiled C, another 1.0", 3)
+    kept.run(CONTACT)
+    assert (kept.builds, len(kept.entries())) == (3, 1)
+
+
+def test_nothing_is_kept_when_a_file_changed_meanwhile(
+    kept: Kept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    states = iter(["before", "after"])
+    monkeypatch.setattr(kept_kernel, "_running_state", lambda: next(states))
+    kept.run(CONTACT)
+    assert kept.entries() == []
+
+
+class Geared(NonlinearDrive):
+    """A drive with a value and an object of its own."""
+
+    def __init__(self, factor: float, other: object = None) -> None:
+        self.factor, self.other = factor, other
+
+    def balance(self, x, xe, m, par, contact):
+        plain = super().balance(x, xe, m, par, contact)
+        return plain._replace(omega=plain.omega - self.factor * x.omega)
+
+
+class Broken(NonlinearDrive):
+    """A drive with a balance that is one short."""
+
+    def balance(self, x, xe, m, par, contact):
+        return super().balance(x, xe, m, par, contact)[:-1]
+
+
+def drive(model: NonlinearDrive) -> Run:
+    return Run(
+        model, PARAMETERS, State(0.0, 0.0, 0.0), Memory(6.0),
+        lambda t: np.full((t.size, 1), 6.0), 0.02,
+    )  # fmt: skip
+
+
+def test_models_are_kept_apart(kept: Kept) -> None:
+    runs = [drive(NonlinearDrive()), drive(Geared(0.0)), drive(Geared(0.1)), CONTACT,
+            rig(0.02, rare=True)]  # fmt: skip
+    plain = [simulate(run) for run in runs]
+    for _ in range(2):
+        for run, expected in zip(runs, plain, strict=True):
+            require_equal(kept.run(run), expected)
+    assert (kept.builds, len(kept.entries())) == (5, 5)
+
+
+def test_a_model_that_holds_an_object_is_not_kept(kept: Kept) -> None:
+    for _ in range(2):
+        kept.run(drive(Geared(0.1, other=object())))
+    assert (kept.builds, kept.entries()) == (2, [])
+
+
+def test_a_model_that_fails_fails_again(kept: Kept) -> None:
+    for _ in range(2):
+        with pytest.raises(ModelError, match="one right-hand side per state"):
+            kept.run(drive(Broken()))
+    assert kept.entries() == []
+
+
+def test_a_folder_that_takes_nothing(kept: Kept, monkeypatch: pytest.MonkeyPatch) -> None:
+    first = kept.run(CONTACT)
+    file = kept.folder / "file"
+    file.write_text("")
+    monkeypatch.setenv("BYWIRE_CACHE", str(file / "kernels"))
+    require_equal(kept.run(CONTACT), first)
+    assert kept.builds == 2
+    monkeypatch.setattr(kept_kernel, "keep_text", lambda path, text: None)
+    monkeypatch.setenv("BYWIRE_CACHE", str(kept.folder / "below"))
+    require_equal(kept.run(CONTACT), first)
+    assert kept.builds == 3
+
+
+def test_only_our_own_models_are_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of another's model nobody knows what it is made of."""
+    monkeypatch.setenv("BYWIRE_CACHE", str(tmp_path))
+    monkeypatch.setattr(kept_kernel, "_running_state", lambda: "state")
+    case = bywire.Bench("hard-braking", "dardanelli2010").cases()[0]
+    ours = engine.structure_of(case.model, case.par)
+    other_choice = engine.structure_of(case.model, case.par.replace({"gear.law": "directional"}))
+    assert kept_kernel.place_of(case.model, ours) is not None
+    assert kept_kernel.place_of(case.model, ours) != kept_kernel.place_of(case.model, other_choice)
+    theirs = engine.structure_of(CONTACT.model, CONTACT.par)
+    assert kept_kernel.place_of(CONTACT.model, theirs) is None
+
+    class Changed(type(case.model)):  # type: ignore[misc]
+        """One of ours with somebody's changes."""
+
+    changed = Changed()
+    assert kept_kernel.place_of(changed, engine.structure_of(changed, case.par)) is None
+    monkeypatch.setattr(kept_kernel, "_running_state", lambda: "")
+    assert kept_kernel.place_of(case.model, ours) is None
+
+
+def test_a_program_that_uses_bywire_is_no_command() -> None:
+    """It may have put functions of its own in the place of ours."""
+    assert not sources.source_state().is_running
+    with sources.command():
+        assert not sources.source_state().is_running
+
+
+RUN = """
+import sys
+sys.argv = ["bywire", "run", "hard-braking", "--json"]
+from bywire.cli.main import main
+try:
+    main()
+finally:
+    print("built" if "bywire.simulation.program" in sys.modules else "kept", file=sys.stderr)
+"""
+
+
+def start(home: Path, cache: Path) -> subprocess.Popen[str]:
+    """Start a command of the package in a folder."""
+    paths = os.pathsep.join([str(home), *sys.path])
+    changes = {"PYTHONPATH": paths, "BYWIRE_CACHE": str(cache)}
+    return subprocess.Popen(
+        [sys.executable, "-c", RUN], env=os.environ | changes, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def answer(process: subprocess.Popen[str]) -> tuple[dict[str, object], str]:
+    """Return a command's key figures, and whether it built a program or took a kept kernel."""
+    out, told = process.communicate(timeout=100)
+    assert process.returncode == 0, told
+    return json.loads(out)["kpis"], told.split()[-1]
+
+
+def test_commands_at_once_and_then_one_that_builds_nothing(tmp_path: Path) -> None:
+    cache = tmp_path / "kernels"
+    both = [answer(process) for process in [start(PACKAGE.parent, cache) for _ in range(2)]]
+    later = answer(start(PACKAGE.parent, cache))
+    assert later == (both[0][0], "kept")
+    assert both[0][0] == both[1][0]
+    assert sorted(p.suffix for p in cache.iterdir()) == [".json", ".sha256", ".so"]
+
+
+def test_a_changed_equation_counts_at_once(tmp_path: Path) -> None:
+    """Even one of the same length in a file that says it is as old as before."""
+    home, cache = tmp_path / "home", tmp_path / "kernels"
+    shutil.copytree(PACKAGE, home / "bywire")
+    time.sleep(1.1e-9 * sources.TICK)
+    first = answer(start(home, cache))[0]
+    assert answer(start(home, cache)) == (first, "kept")
+
+    element = home / "bywire" / "plant" / "dc_motor.py"
+    before, text = element.stat(), element.read_text()
+    changed = text.replace("u.v - par.R_m * x.i", "u.v - par.R_m*2*x.i", 1)
+    assert len(changed) == len(text)
+    assert changed != text
+    element.write_text(changed)
+    os.utime(element, ns=(before.st_atime_ns, before.st_mtime_ns))
+    shutil.rmtree(element.parent / "__pycache__", ignore_errors=True)  # else Python is deceived
+    young = answer(start(home, cache))
+    assert young[1] == "built"  # it may change again within the clock's tick: nothing is kept
+    assert young[0] != first
+    time.sleep(1.1e-9 * sources.TICK)
+    assert answer(start(home, cache)) == young
+    assert answer(start(home, cache)) == (young[0], "kept")
