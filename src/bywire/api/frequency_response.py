@@ -5,8 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
@@ -38,10 +36,10 @@ from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
+from bywire.core.typing import silent
 from bywire.core.units import shown
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
-    Attachment,
     Block,
     Document,
     FigureBlock,
@@ -49,6 +47,7 @@ from bywire.report.document import (
     Listing,
     Section,
     TableBlock,
+    recording_file,
 )
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
@@ -125,7 +124,7 @@ class FrequencyResponse(Answer):
             brief=self._brief(table),
             data=self._data(),
             attachments=[
-                Attachment(f"{loop.name}-frequency-response.nc", partial(_recorded, found))
+                recording_file(f"{loop.name}-frequency-response.nc", found)
             ],
             heed=[self.note] if self.note else [],
         )
@@ -258,16 +257,12 @@ def frequency_response(
         case.loop.inputs, case.loop.output, wanted, sizes, flags=flags,
         whole=case.loop.whole(point.par), saturations=case.loop.saturations,
     )  # fmt: skip
-    found = _measured(variants, sweep, excitation, progress or _silent)
+    found = _measured(variants, sweep, excitation, progress or silent)
     found = with_widths(found, widths(variants, found))
     linear = variants[0].linear(found["frequency"].values)
     return FrequencyResponse(
         case, found, linear, tuple(variants), varied, unit, note, sweep.tolerance
     )
-
-
-def _silent(label: str, share: float) -> None:
-    """Show no progress."""
 
 
 def _sustained(case: LoopCase, changes: Mapping[str, Any]) -> tuple[Variant, str]:
@@ -411,9 +406,3 @@ def _cell(gain: float, phase: float) -> str:
         return "sticks"
     decibel = round(20.0 * math.log10(gain), 2) + 0.0  # no negative zero
     return f"{decibel:.2f} dB {phase:.1f}°"
-
-
-def _recorded(found: xr.Dataset, path: Path) -> Path:
-    from bywire.data.netcdf import write_recording
-
-    return write_recording(found, path)

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
-
-import xarray as xr
 
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
@@ -19,7 +16,6 @@ from bywire.bench.running import Progress
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
-    Attachment,
     Banner,
     Block,
     Details,
@@ -28,6 +24,7 @@ from bywire.report.document import (
     Paragraph,
     Section,
     TableBlock,
+    recording_file,
 )
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
@@ -95,7 +92,7 @@ class BenchResult(Result, Answer):
             data=self._data(),
             banner=self._banner(),
             attachments=[
-                Attachment(f"{label}.nc", partial(_recorded, recording))
+                recording_file(f"{label}.nc", recording)
                 for label, recording in self.recordings.items()
             ],
             record="result.json",
@@ -221,9 +218,3 @@ def energy_table(books: Ledger) -> Table:
     rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
     rows.append(row("", "closing error", books.closing_error))
     return text_table(["", "place", "energy", "share of what was given"], rows)
-
-
-def _recorded(recording: xr.Dataset, path: Path) -> Path:
-    from bywire.data.netcdf import write_recording
-
-    return write_recording(recording, path)

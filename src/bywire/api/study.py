@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -17,9 +16,9 @@ from bywire.bench.running import Progress
 from bywire.bench.values import parsed
 from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
+from bywire.core.typing import silent
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
-    Attachment,
     Details,
     Document,
     FigureBlock,
@@ -27,6 +26,7 @@ from bywire.report.document import (
     Listing,
     Section,
     TableBlock,
+    recording_file,
 )
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.subject import Subject
@@ -103,7 +103,7 @@ class StudyResult(Answer):
                 *brief_limits, *brief_tables, Listing(found.assumptions, "assumptions"),
             ],
             data=self._data(),
-            attachments=[Attachment(f"{study.name}.nc", partial(_recorded, found.data))],
+            attachments=[recording_file(f"{study.name}.nc", found.data)],
         )  # fmt: skip
 
     def _rows(self) -> list[KpiRow]:
@@ -174,12 +174,8 @@ def study(
     definition = STUDIES.find(name)
     cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)
     par, options = _changed(definition, cited.parameters(), overrides)
-    found = definition.compute(par, options, progress or _silent)
+    found = definition.compute(par, options, progress or silent)
     return StudyResult(definition, cited.name, par, options, found)
-
-
-def _silent(label: str, share: float) -> None:
-    """Show no progress."""
 
 
 def _changed(
@@ -218,9 +214,3 @@ def _drawn(data: xr.Dataset, shown: Map) -> Figure:
     from bywire.report.contour import contour
 
     return contour(data, shown)
-
-
-def _recorded(data: xr.Dataset, path: Path) -> Path:
-    from bywire.data.netcdf import write_recording
-
-    return write_recording(data, path)

@@ -12,3 +12,7 @@ Complex = NDArray[np.complex128]
 
 Progress = Callable[[str, float], None]
 """called with a label and the finished share, 0 to 1"""
+
+
+def silent(label: str, share: float) -> None:
+    """Show no progress."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from bywire.report.tables import Table
 
 if TYPE_CHECKING:
+    import xarray as xr
     from matplotlib.figure import Figure
 
 
@@ -120,6 +121,17 @@ class Attachment:
     name: str
     write: Callable[[Path], Path]
     after_record: bool = False
+
+
+def recording_file(name: str, data: xr.Dataset) -> Attachment:
+    """Return a NetCDF file with a recording, or another dataset with units."""
+
+    def write(path: Path) -> Path:
+        from bywire.data.netcdf import write_recording
+
+        return write_recording(data, path)
+
+    return Attachment(name, write)
 
 
 @dataclass(frozen=True)

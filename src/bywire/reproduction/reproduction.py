@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -15,7 +13,6 @@ from bywire.bench.running import Progress
 from bywire.core.registry import Kind, instances
 from bywire.report.answer import Answer
 from bywire.report.document import (
-    Attachment,
     Banner,
     Block,
     Details,
@@ -25,6 +22,7 @@ from bywire.report.document import (
     Paragraph,
     Section,
     TableBlock,
+    recording_file,
 )
 from bywire.report.tables import Table
 from bywire.reproduction.item import Item
@@ -144,7 +142,7 @@ class Reproduction(Answer):
             data=self._data(),
             banner=Banner(f"All statements together: {tally(self.items)}"),
             attachments=[
-                Attachment(f"{_stem(name)}.nc", partial(_recorded, recording))
+                recording_file(f"{_stem(name)}.nc", recording)
                 for name, recording in self.recordings.items()
             ],
             record="results.json",
@@ -216,9 +214,3 @@ SOURCES = Kind("source", ("paper",), instances(Source))
 def _stem(name: str) -> str:
     """Return the name of a file, without what file systems dislike."""
     return re.sub(r"[^A-Za-z0-9.-]+", "-", name)
-
-
-def _recorded(recording: xr.Dataset, path: Path) -> Path:
-    from bywire.data.netcdf import write_recording
-
-    return write_recording(recording, path)
