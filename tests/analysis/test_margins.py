@@ -7,6 +7,10 @@ import pytest
 from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth, margin
+from bywire.analysis.loop import LOOPS
+from bywire.analysis.margins import SENSES, LoopMargins, margins, worst
+from bywire.core.catalog import parameters
+from bywire.core.errors import ParameterError
 
 Array = NDArray[np.float64]
 
@@ -46,3 +50,35 @@ def test_bandwidth_of_a_lag() -> None:
 
     assert bandwidth(lag, (1e-4, 1e3)) == pytest.approx(12.5, rel=1e-6)
     assert math.isnan(bandwidth(lag, (1e-4, 10.0)))
+
+
+def margins_by(**changes: float) -> LoopMargins:
+    """Return margins of a stable loop, all 5 but some."""
+    every = dict.fromkeys((*SENSES, "crossover"), 5.0)
+    return LoopMargins(**{**every, **changes}, stable=True)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("field", SENSES)
+def test_worst_is_the_least_margin_and_the_largest_peak(field: str) -> None:
+    cases = [margins_by(), margins_by(**{field: 4.0}), margins_by(**{field: 6.0})]
+    bad = 6.0 if field in ("sensitivity", "complementary") else 4.0
+    at = {4.0: 20.0, 6.0: 30.0}[bad]
+    found = worst(cases, [10.0, 20.0, 30.0])
+    assert found[field] == (bad, at)
+    assert all(pair == (5.0, 10.0) for name, pair in found.items() if name != field)
+
+
+def test_what_nothing_has_is_worst_nowhere() -> None:
+    """A delay margin that no case has; one that only some have."""
+    none, some = margins_by(delay=math.nan), margins_by(delay=7.0)
+    assert math.isnan(worst([none, none], [1.0, 2.0])["delay"][0])
+    assert worst([none, some], [1.0, 2.0])["delay"] == (7.0, 2.0)
+    with pytest.raises(ParameterError, match="give at least one value"):
+        worst([], [])
+
+
+def test_margins_of_a_loop_are_solved_and_not_read_between_points() -> None:
+    loop, par = LOOPS.find("pressure"), parameters("dardanelli2010")
+    found = margins(loop, par, 20e5)
+    L = loop.gain(par, 20e5).response(np.array([found.crossover]))
+    assert abs(complex(np.ravel(L)[0])) == pytest.approx(1.0, abs=1e-9)
