@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import wraps
 from types import ModuleType
 
 import numpy as np
@@ -94,6 +95,6 @@ def test_a_wrong_sign_shows(
 ) -> None:
     """Each loss with its sign turned, and a stored energy off by one per cent."""
     right = getattr(element, name)
-    monkeypatch.setattr(element, name, lambda *args: factor * right(*args))
+    monkeypatch.setattr(element, name, wraps(right)(lambda *args: factor * right(*args)))
     wrong = type("WronglyBooked", (MotorcycleBrake,), {})  # a type of its own is built anew
     assert worst(recorded(BRAKING, 20e-6, wrong)) > 1e-5
