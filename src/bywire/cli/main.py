@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 import traceback
 import warnings
@@ -32,6 +33,8 @@ from bywire.cli.sizing_commands import design_command, study_command
 from bywire.core.errors import BywireError, ModelError, ParameterError
 
 FAILED = 3
+GARBAGE = 50_000
+"""objects between two searches for garbage; Python's 700 make a short run a tenth longer"""
 
 app = typer.Typer(
     name="bywire",
@@ -91,6 +94,7 @@ def main() -> None:
     """Run the command line; errors meant for the user become one message and an exit status."""
     from bywire.core.sources import command
 
+    gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
     with command():
         status = _status()
