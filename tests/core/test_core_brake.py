@@ -123,6 +123,27 @@ def test_what_is_not_there_is_said() -> None:
         load_system("nowhere.py")
 
 
+def test_a_file_beside_a_script_or_notebook_loads(
+    write: Write, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write("beside.py", declared("beside"))
+    monkeypatch.syspath_prepend(str(path.parent))  # as Python puts the folder of what it runs
+    assert load_system(path).name == "beside"
+    other = write("below/beside_two.py", declared("beside-two"))
+    write("beside_two.py", declared("beside-two"))
+    with pytest.raises(ModelError, match=r"a module 'beside_two' already \(.*beside_two\.py\)"):
+        load_system(other)
+
+
+def test_the_folder_of_a_project_is_its_package(write: Write) -> None:
+    package = write("project/src/packed_in_src/__init__.py", declared("packed-in-src")).parent
+    project = package.parents[1]
+    assert load_system(project) is load_system(package)
+    write("project/src/another/__init__.py", declared("another"))
+    with pytest.raises(FileError, match="is no brake: give a Python file"):
+        load_system(project)
+
+
 def test_a_file_that_was_mended_loads(write: Write) -> None:
     path = write("mended.py", "1 / 0\n")
     with pytest.raises(ModelError, match="ZeroDivisionError"):

@@ -127,7 +127,8 @@ def load_system(path: str | Path) -> Brake:
     Parameters
     ----------
     path
-        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; also that file.
+        Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; also that file,
+        or the folder of a project that keeps one such package in its ``src``.
 
     Raises
     ------
@@ -137,12 +138,12 @@ def load_system(path: str | Path) -> Brake:
         When it fails on import, declares no brake, or one whose name is taken.
     """
     place = Path(path).expanduser().resolve()
-    place = place.parent if place.name == "__init__.py" else place
+    place = place.parent if place.name == "__init__.py" else _package_of(place)
     source = place / "__init__.py" if place.is_dir() else place
     if not source.is_file() or source.suffix != ".py":
         raise FileError(
-            f"{path} is no brake: give a Python file, or a folder with an __init__.py, that "
-            "declares BRAKE = bywire.Brake(...)"
+            f"{path} is no brake: give a Python file, a folder with an __init__.py, or a project "
+            "with one such folder in src, that declares BRAKE = bywire.Brake(...)"
         )
     known = next((b for b in _loaded.values() if Path(b.file).resolve() == source), None)
     if known is not None:
@@ -153,14 +154,22 @@ def load_system(path: str | Path) -> Brake:
     return brake
 
 
+def _package_of(place: Path) -> Path:
+    """Return the one package that a project keeps in its folder src; any other place as it is."""
+    packages = [] if (place / "__init__.py").exists() else [*place.glob("src/*/__init__.py")]
+    return packages[0].parent if len(packages) == 1 else place
+
+
 def _imported(place: Path, source: Path) -> ModuleType:
     name = place.name if place.is_dir() else place.stem
     if not name.isidentifier():
         raise ModelError(f"{place}: its name must be one that Python can import, like servo_axis")
     there = sys.modules.get(name)
     elsewhere = importlib.util.find_spec(name) if there is None else None
-    if elsewhere is not None and elsewhere.origin is not None:  # not a mere folder of that name
+    origin = elsewhere.origin if elsewhere is not None else None  # None: a mere folder of that name
+    if origin is not None and Path(origin).resolve() != source:  # the same where its folder is cwd
         there = ModuleType(name)
+        there.__file__ = origin
     if there is not None and Path(getattr(there, "__file__", None) or "").resolve() != source:
         raise ModelError(
             f"{place}: there is a module {name!r} already ({_origin(there)}): give it another name"
@@ -218,6 +227,8 @@ def _place(error: BaseException, *inside: str) -> str:
         return f"{error.filename}, line {error.lineno}: {type(error).__name__}: {error.msg}"
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
     text = str(error) if isinstance(error, BywireError) else text
+    if "truth value of a CasADi" in text:
+        text = "an if, and, or, min or max on a number of the model: use bywire.core.ops.where"
     lines = [
         (frame.filename, frame.lineno)
         for frame in traceback.extract_tb(error.__traceback__)
