@@ -43,10 +43,10 @@ class Parameters(ParameterSet):
     shaft: shaft.Parameters
     T_forward: Torque
     T_backward: Torque
-    count: Annotated[float, Unit("rad", 1e-3), Field(gt=0)]
-    k_angle: Annotated[float, Unit("1/s", 30.0), Field(gt=0)]
-    k_p: Annotated[float, Unit("V*s/rad"), Field(gt=0)]
-    k_i: Annotated[float, Unit("V/rad"), Field(ge=0)]
+    count: Annotated[float, Unit("rad", 1e-3), Field(gt=0, allow_inf_nan=False)]
+    k_angle: Annotated[float, Unit("1/s", 30.0), Field(gt=0, allow_inf_nan=False)]
+    k_p: Annotated[float, Unit("V*s/rad"), Field(gt=0, allow_inf_nan=False)]
+    k_i: Annotated[float, Unit("V/rad"), Field(ge=0, allow_inf_nan=False)]
     v_max: Voltage
     T_s: Duration
 

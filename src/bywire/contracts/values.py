@@ -99,6 +99,8 @@ def refuses_outside(
         message = refusal(par, name, wrong)
         if message is None:
             text = f"{name} = {value!r} was taken; admissible is {leaf.range_text}"
+            if not math.isfinite(value):
+                text += ": write allow_inf_nan=False in its Field"
             yield Evidence(False, text, place=place)
             continue
         lacking = [part for part in wanted(leaf, value) if part not in message]

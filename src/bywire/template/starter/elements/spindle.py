@@ -13,6 +13,7 @@ from bywire.authoring import (
     Inertia,
     ParameterSet,
     Power,
+    Role,
     RotaryDamping,
     Signal,
     Speed,
@@ -20,6 +21,8 @@ from bywire.authoring import (
     Unit,
     signals,
 )
+
+Loss = Annotated[float, Signal("W", "viscous loss", role=Role("sink", "viscous friction"))]
 
 
 class Parameters(ParameterSet):
@@ -105,6 +108,6 @@ def power_in(x: State, u: Input, par: Parameters) -> Power:
     return (u.torque - par.r * u.force) * x.omega
 
 
-def power_loss(x: State, par: Parameters) -> Power:
+def power_loss(x: State, par: Parameters) -> Loss:
     """Return what viscous friction takes, >= 0."""
     return par.d * x.omega * x.omega
