@@ -61,6 +61,8 @@ class Check(Answer):
         counts += [f"{len(self.broken)} do not"] if self.broken else []
         counts += [f"{len(self.not_checked)} could not be checked"] if self.not_checked else []
         summary = f"{self.subject}: {', '.join(counts)}"
+        if not self.findings:
+            summary = f"{self.subject} declares nothing to check: docs/modeling.md says what it may"
         shown = [f for f in self.findings if f.figure is not None and "(" in f.subject]
         brief: list[str | Flat] = [TableBlock(_figures(shown)), ""] if shown else []
         if self.not_checked:

@@ -94,7 +94,7 @@ def _bound(name: str, text: Any, unit: str) -> tuple[str, float]:
         raise ParameterError(
             f"requirement {name} = {quoted(text)} cannot be read: write for instance {example!r}"
         )
-    limit = written.removeprefix(compare)
+    limit = written.removeprefix(compare).strip()
     if unit != "%":
         return compare, number(limit, unit, f"requirement {name}")
     if not limit.endswith("%"):  # 15 would be a share of 1500 %, which nobody means

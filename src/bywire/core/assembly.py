@@ -21,7 +21,7 @@ from bywire.core.gathering import AnyPart, contacts, gather, stores
 from bywire.core.model import Bounds, Matrix, Model
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
-from bywire.core.wired import Instant, Wired, instant_of
+from bywire.core.wired import Instant, Wired, instant_of, line
 from bywire.core.wires import Integral, Shown, Wire
 
 ParT = TypeVar("ParT")
@@ -354,7 +354,9 @@ def _at_an_instant(cls: type[Any]) -> type[Any]:
     known = frozenset(name for name, value in every.items() if isinstance(value, kinds))
 
     def refuse(self: Any, name: str) -> Any:
-        raise ModelError(f"{cls.__name__}: {unknown_name('part or wire', name, known)}")
+        there = known | {n for n, v in vars(Assembly).items() if isinstance(v, property)}
+        error = unknown_name("part or wire", name, there)
+        raise ModelError(f"{cls.__name__}: {line()} names an {error}")
 
     def assign(self: Any, name: str, value: Any) -> None:
         if name not in known:

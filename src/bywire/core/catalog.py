@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.core.brake import brakes
-from bywire.core.errors import ModelError
+from bywire.core.errors import ModelError, ParameterError
 from bywire.core.parameters import ParameterSet, require_units
 from bywire.core.provenance import Cited, chosen
 from bywire.core.registry import Kind, instances
@@ -49,7 +49,10 @@ class CitedSet:
 
     def parameters(self) -> ParameterSet:
         """Return the validated parameter set."""
-        return self.parameter_class.create({k: c.value for k, c in self.values.items()})
+        try:
+            return self.parameter_class.create({k: c.value for k, c in self.values.items()})
+        except ParameterError as error:
+            raise ParameterError(f"parameter set {self.name!r}: {error}") from None
 
 
 PARAMETER_SETS = Kind("parameter set", ("sets",), instances(CitedSet), declared="a CitedSet")

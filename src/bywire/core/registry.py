@@ -22,6 +22,7 @@ from bywire.core.brake import (
     BrakeWarning,
     brakes,
     is_foreign,
+    loaded_files,
     modules_below,
     modules_of,
 )
@@ -101,7 +102,9 @@ class Kind(Generic[T]):
             for brake in brakes().values()
             if self.declared and not any(kind.of(brake.module) for kind in kinds)
         ]
-        return UnknownNameError("; ".join([str(error), *hints]))
+        if self.declared and not loaded_files() and "did you mean" not in str(error):
+            hints.append("that of a brake of your own takes --system PATH, or bywire.load_system")
+        return UnknownNameError("; ".join([str(error), *hints]).replace("?; ", "? "))
 
     def guess(self, name: str) -> T | None:
         """Return the thing of a name if the file of that name, or of its kind, declares it.

@@ -41,8 +41,8 @@ def nyquist(family: Family) -> Figure:
               label="-1", linestyle="none")  # fmt: skip
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    axes.set_xlim(_LEFT, _RIGHT)
-    axes.set_ylim(-_HALF, _HALF)
+    axes.set_xlim(_LEFT, _RIGHT, auto=True)  # fixed ones matplotlib would complain about
+    axes.set_ylim(-_HALF, _HALF, auto=True)
     axes.set_aspect("equal", adjustable="datalim")  # more is shown where there is room
     axes.set_xlabel("real part of L [-]")
     axes.set_ylabel("imaginary part of L [-]")

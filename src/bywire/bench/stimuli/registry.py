@@ -134,6 +134,6 @@ def wanted(stimulus: Stimulus | None, experiment: str) -> Stimulus:
     if stimulus is None:
         raise ParameterError(
             f"{experiment} needs a [stimulus] section: kind = step, ramp, sine, chirp, multisine "
-            "or table, with its parameters"
+            "or table, with its parameters; without a file --set stimulus.kind=step and so on"
         )
     return stimulus
