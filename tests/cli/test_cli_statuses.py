@@ -97,7 +97,8 @@ def test_list_is_complete(bywire):
     assert (status, err) == (0, "")
     found = json.loads(out)
     titles = {
-        "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops", "plants",
+        "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
+        "plants",
         "studies", "methods", "stimuli", "kpis",
     }  # fmt: skip
     assert set(found) == titles | {"kpis_of_experiments"}

@@ -50,8 +50,8 @@ class NewBrake(Answer):
             f"bywire check --system {self.package}",
             f"bywire run {self.name}-clamp --system {self.package}",
             f"bywire margins {self.name}-force --system {self.package}",
-            f"pytest {self.folder / 'tests'}",
             f"pip install -e {self.folder}    # then every command finds it without --system",
+            f"pytest {self.folder / 'tests'}    # with pytest installed",
         ]
         written = Paragraph(f"{self.name} stands in {self.folder}; its README says what is where")
         following = Listing(steps, "Next:")

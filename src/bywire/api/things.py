@@ -10,6 +10,7 @@ from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
+from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.identification.fitting.asked import BENCH_METHODS
 from bywire.identification.method import METHODS, Method
@@ -24,6 +25,7 @@ def all_things() -> dict[str, Any]:
         m.name: f"{m.summary} (any, with --bench)" for m in BENCH_METHODS.all().values()
     }  # fmt: skip
     return {
+        "brakes": {brake.name: brake.summary for brake in brakes().values()},
         "assemblies": sorted({cited.assembly for cited in sets}),
         "parameter_sets": {cited.name: cited.summary for cited in sets},
         "experiments": _of_assemblies(experiments),
