@@ -87,4 +87,5 @@ def test_damaged_cache_is_compiled_anew(process, bench, tmp_path, suffix):
     second = process("run", path, "--json", BYWIRE_CACHE=str(cache))
     assert (second.status, second.err) == (0, "")
     assert second.object == first.object
-    assert sorted(p.suffix for p in cache.iterdir()) == [".sha256", ".so"]
+    kept = {p.suffix for p in cache.iterdir()} - {".json"}  # what a later command may take
+    assert kept == {".sha256", ".so"}

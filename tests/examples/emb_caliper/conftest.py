@@ -22,7 +22,7 @@ CALIPER = Path(__file__).parents[3] / "examples" / "emb_caliper"
 SET = "emb42v"
 
 
-@pytest.fixture(scope="package", autouse=True)
+@pytest.fixture(scope="module", autouse=True)
 def caliper() -> Iterator[Path]:
     with loaded(CALIPER):
         yield CALIPER
