@@ -20,8 +20,8 @@ from systems.loading import loaded
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 OPS = (
-    "from bywire.core.model import Bounds",
-    "from bywire.core import ops\nfrom bywire.core.model import Bounds",
+    "from bywire.plant import dc_motor",
+    "from bywire.core import ops\nfrom bywire.plant import dc_motor",
 )
 STAIRS = (
     "w.F = caliper_spring.output(w.caliper.u, w.caliper.par)",
