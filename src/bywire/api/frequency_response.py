@@ -18,7 +18,6 @@ from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import require_stable
 from bywire.analysis.response.large_signal import (
     Variant,
-    leaving,
     variants_over,
     widths,
     with_widths,
@@ -32,6 +31,7 @@ from bywire.api.bandwidth_tables import (
     worst_line,
 )
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
+from bywire.api.response_warnings import purity, response_warnings
 from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
@@ -319,70 +319,6 @@ def _measured(
         return found.assign_attrs(excitation=excitation)
     kind = Broadband(cast(Any, excitation))
     return broadband_response(points[0], sweep, kind, progress, points=points)
-
-
-def response_warnings(
-    found: xr.Dataset, variants: Sequence[Variant], unit: str, tolerance: float
-) -> list[str]:
-    """Return what left the brake's range, what stuck, and what never repeated.
-
-    Parameters
-    ----------
-    found
-        Response.
-    variants
-        Its cases.
-    unit
-        SI unit of the amplitudes.
-    tolerance
-        Share within which a window had to repeat the one before.
-    """
-    texts = []
-    for k, size in enumerate(found["amplitude"].values):
-        row = found.isel(amplitude=k)
-        label = f"amplitude {amount(float(size), unit, 3)}"
-        reasons = (leaving(case.loop, case.par, case.value, float(size)) for case in variants)
-        if reason := next(filter(None, reasons), ""):
-            texts.append(f"{label}: it asks for set points out of the brake's range: {reason}")
-        still, restless = np.isnan(row["gain"].values), row["settled"].values == 0
-        if still.any():
-            texts.append(f"{label}: the output sticks at {_cases(found, still)}: no gain")
-        shaken = restless & ~still
-        if shaken.any():
-            scatter = float(np.nanmax(row["scatter"].values[shaken]))
-            texts.append(
-                f"{label}: no window repeats the one before within {100 * tolerance:g} % at "
-                f"{_cases(found, shaken)} (a limit cycle, a drift, or the encoder's resolution): "
-                f"shown are means of the last windows; their root mean square distance from the "
-                f"mean is up to {amount(100 * scatter, 'percent', 2)}"
-            )
-    if found["unsettled_substeps"].values.any():
-        texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
-    return texts
-
-
-def purity(found: xr.Dataset) -> str:
-    """Return the least coherence by amplitude, as what the excitation makes of it.
-
-    Parameters
-    ----------
-    found
-        Response to sines or, then averaged over windows, to all frequencies at once.
-    """
-    lowest = found["coherence"].min(dim="frequency").values[0]
-    shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
-    if found.attrs["excitation"] == "sine":
-        return (
-            f"least share of the output's power at the sine: {shares} (harmonics, dither and "
-            "ripple are the rest)"
-        )
-    return f"lowest coherence of set point and output: {shares}"
-
-
-def _cases(found: xr.Dataset, which: NDArray[np.bool_]) -> str:
-    count = int(which.sum())
-    many = "frequency" if count == 1 else "frequencies"
-    return f"{count} {many}" + (" of all cases" if found.sizes["variant"] > 1 else "")
 
 
 def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
