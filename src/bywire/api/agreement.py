@@ -8,15 +8,12 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from bywire.analysis import agreement as measuring
 from bywire.analysis.agreement import EVERYTHING, GAIN, LIMITS, NOTHING, PHASE, Agreement
 from bywire.analysis.response.frequency_response import require_stable
 from bywire.api.loop_case import LoopCase, loop_case, spread
 from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError
-from bywire.core.signals import signals_of
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Banner, Document, FigureBlock, Paragraph, Section, TableBlock
 from bywire.report.tables import Table, text_table
@@ -159,14 +156,9 @@ def agreement(
         For names that are unknown, values out of range, sets of another brake, unstable loops.
     """
     case = loop_case(loop, parameters, at, overrides)
-    point = case.loop.point(case.par, case.value)
-    unit = signals_of(point.model.Stimulus)[case.loop.inputs[0]].unit
+    unit = case.input_unit
     small, large = _amplitudes(case, amplitudes, unit)
-    wanted = (
-        spread(frequencies, "Hz", "frequencies", logarithmic=True)
-        if frequencies
-        else [float(f) for f in np.geomspace(*case.loop.band, _POINTS)]
-    )
+    wanted = case.frequencies(frequencies, _POINTS)
     require_stable(case.loop.closed(case.par, case.value))
     found = measuring.agreement(
         case.loop, case.par, case.value, wanted, (small, large), progress=progress

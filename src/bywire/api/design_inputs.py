@@ -9,7 +9,6 @@ from typing import Any
 from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError
-from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
 from bywire.synthesis.requirement import Requirement, read
 from bywire.synthesis.trial import Trial
@@ -51,9 +50,7 @@ def tunables_of(case: LoopCase) -> Spans:
 def trial_of(case: LoopCase, changes: Mapping[str, Any], amplitudes: str) -> Trial:
     """Return what the design is tried on; ``amplitudes`` are those of the sines, with units."""
     loop = case.loop
-    model = loop.point(case.par, case.value).model
-    unit = signals_of(model.Stimulus)[loop.inputs[0]].unit
-    sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
+    sizes = spread(amplitudes, case.input_unit, "amplitudes") if amplitudes else loop.amplitudes[1:]
     bench = Bench(loop.proof, case.name, changes) if loop.proof else None
     return Trial(loop, case.par, case.value, tuple(sizes), bench)
 

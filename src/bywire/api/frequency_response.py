@@ -35,7 +35,6 @@ from bywire.api.response_warnings import purity, response_warnings
 from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
-from bywire.core.signals import signals_of
 from bywire.core.typing import silent
 from bywire.core.units import shown
 from bywire.report.answer import Answer, use_case
@@ -241,13 +240,8 @@ def frequency_response(
     if excitation not in _EXCITATIONS:
         raise unknown_name("excitation", excitation, _EXCITATIONS)
     case = loop_case(loop, parameters, at, overrides)
-    point = case.loop.point(case.par, case.value)
-    unit = signals_of(point.model.Stimulus)[case.loop.inputs[0]].unit
-    wanted = (
-        spread(frequencies, "Hz", "frequencies", logarithmic=True)
-        if frequencies
-        else [float(f) for f in np.geomspace(*case.loop.band, _POINTS)]
-    )
+    unit = case.input_unit
+    wanted = case.frequencies(frequencies, _POINTS)
     sizes = spread(amplitudes, unit, "amplitudes") if amplitudes else list(case.loop.amplitudes)
     base, note = _sustained(case, overrides)
     variants, varied = _variants(base, case, over)

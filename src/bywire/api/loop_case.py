@@ -14,6 +14,7 @@ from bywire.api.parameter_choice import parameters_for
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.signals import signals_of
 
 if TYPE_CHECKING:
     from bywire.report.subject import Subject
@@ -46,6 +47,24 @@ class LoopCase:
         from bywire.report.wording import amount
 
         return f"{self.loop.at.name} = {amount(self.value, self.loop.at.unit)}"
+
+    @property
+    def input_unit(self) -> str:
+        """SI unit of the input that is shaken."""
+        model = self.loop.point(self.par, self.value).model
+        return signals_of(model.Stimulus)[self.loop.inputs[0]].unit
+
+    def frequencies(self, text: str, points: int) -> list[float]:
+        """Return the frequencies [Hz] that a text names; so many over the loop's band by default.
+
+        Raises
+        ------
+        InputError
+            As `spread`.
+        """
+        if text:
+            return spread(text, "Hz", "frequencies", logarithmic=True)
+        return [float(f) for f in np.geomspace(*self.loop.band, points)]
 
     @property
     def subject(self) -> Subject:

@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.api.loop_case import LoopCase
-from bywire.core.signals import signals_of
 from bywire.report.tables import Table, text_table
 from bywire.report.wording import amount
 from bywire.synthesis.bench_figures import BenchFigures
@@ -82,7 +81,7 @@ def _figure_rows(
 
     sizes = next(([s.amplitude for s in one.small] for one in found if one and one.small), [])
     rows = [
-        [f"{name}, sine of {amount(size, _input_unit(case), 3)}{where}",
+        [f"{name}, sine of {amount(size, case.input_unit, 3)}{where}",
          *(cell(one, k, name) for one in found)]
         for k, size in enumerate(sizes) for name in ("bandwidth", "phase_margin", "crossover")
     ]  # fmt: skip
@@ -135,8 +134,3 @@ def _figures(one: BenchFigures) -> dict[str, Any]:
         ],
         "step": dict(one.step),
     }  # fmt: skip
-
-
-def _input_unit(case: LoopCase) -> str:
-    model = case.loop.point(case.par, case.value).model
-    return signals_of(model.Stimulus)[case.loop.inputs[0]].unit
