@@ -4,20 +4,23 @@ from __future__ import annotations
 
 import ctypes
 import os
+import shutil
 import stat
 import subprocess
 import sys
+import tempfile
 import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from bywire.core import scratch
 from bywire.core.errors import CompilerError
 from bywire.simulation import compiler as compiler_module
 from bywire.simulation import engine as engine_module
 from bywire.simulation import kernel_cache
-from bywire.simulation.compiler import PLAIN, Compiler, compile_library, find_compiler
+from bywire.simulation.compiler import PLAIN, Compiler, compile_library, find_compiler, load_library
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
@@ -184,6 +187,16 @@ def test_a_compiler_that_writes_nothing(cache: Path, tmp_path: Path) -> None:
         compile_library(SOURCE, PLAIN, Compiler((str(idle),), "idle 1.0"))
 
 
+def test_a_compiler_that_hangs(
+    cache: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(compiler_module, "TIMEOUT", 0.2)
+    slow = Compiler((str(script(tmp_path / "slowcc", "exec sleep 20")),), "slow 1.0")
+    with pytest.raises(CompilerError, match=r"slow 1\.0 took longer than 0\.2 s.*BYWIRE_CC"):
+        compile_library(SOURCE, PLAIN, slow)
+    assert list(cache.iterdir()) == []
+
+
 def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     find_compiler.cache_clear()
     try:
@@ -204,7 +217,8 @@ def test_a_cache_that_cannot_be_written(tmp_path: Path, monkeypatch: pytest.Monk
     blocked = tmp_path / "file"
     blocked.write_text("not a folder")
     monkeypatch.setenv("BYWIRE_CACHE", str(blocked / "kernels"))
-    monkeypatch.setattr(compiler_module.tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(tempfile, "gettempdir", lambda: str(tmp_path))
+    monkeypatch.setattr(scratch, "_folder_of", scratch._folder_of.__wrapped__)  # forgets the other
     library = compile_library(SOURCE, PLAIN, system_compiler())
     assert twice(library) == 42.0
     assert library.parent.parent == tmp_path
@@ -216,7 +230,117 @@ def test_folders_that_others_may_write_to_are_not_trusted(tmp_path, monkeypatch)
     shared.mkdir()
     shared.chmod(0o777)
     monkeypatch.setenv("BYWIRE_CACHE", str(shared))
-    with pytest.raises(CompilerError, match="can be written by others"):
+    with pytest.raises(CompilerError, match="not yours alone"):
         kernel_cache.usable_folder()
     shared.chmod(0o700)
     assert kernel_cache.usable_folder() == shared
+
+
+PLANTED = "double twice(double x) { return 666.0; }\n"
+
+
+def planted(library: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Put foreign code in a library's place, with a digest that is right."""
+    with monkeypatch.context() as patch:
+        patch.setenv("BYWIRE_CACHE", str(tmp_path / "elsewhere"))
+        foreign = compile_library(PLANTED, PLAIN, system_compiler())
+    library.unlink()
+    shutil.copy(foreign, library)
+    shutil.copy(kernel_cache.digest_of(foreign), kernel_cache.digest_of(library))
+
+
+def test_a_planted_library_does_not_run(cache, tmp_path, monkeypatch):
+    """Its digest is right, and the folder is private again; but others could write to the file."""
+    compiler = system_compiler()
+    library = compile_library(SOURCE, PLAIN, compiler)
+    planted(library, tmp_path, monkeypatch)
+    library.chmod(0o666)
+    with pytest.raises(CompilerError, match="not yours alone"):
+        kernel_cache.load(library, "twice")
+    assert twice(compile_library(SOURCE, PLAIN, compiler)) == 42.0
+
+
+@pytest.mark.skipif(os.name == "nt" or os.getuid() != 0, reason="gives files to others")
+@pytest.mark.parametrize("what", ["library", "digest", "folder", "above"])
+def test_a_library_of_somebody_else_does_not_run(cache, tmp_path, monkeypatch, what):
+    compiler = system_compiler()
+    library = compile_library(SOURCE, PLAIN, compiler)
+    planted(library, tmp_path, monkeypatch)
+    digest = kernel_cache.digest_of(library)
+    os.chown({"library": library, "digest": digest, "folder": cache, "above": tmp_path}[what], 1, 1)
+    assert not kernel_cache.is_intact(library, "twice")
+    if what in ("library", "digest"):
+        assert twice(compile_library(SOURCE, PLAIN, compiler)) == 42.0
+        assert library.stat().st_uid == 0
+    else:
+        with pytest.raises(CompilerError, match="not yours alone"):
+            compile_library(SOURCE, PLAIN, compiler)
+        with pytest.raises(CompilerError, match="not yours alone"):
+            kernel_cache.load(library, "twice")
+
+
+def test_folders_above_count_unless_others_cannot_replace_what_is_not_theirs(tmp_path, monkeypatch):
+    above = tmp_path / "above"
+    inner = above / "inner"
+    inner.mkdir(parents=True)
+    monkeypatch.setenv("BYWIRE_CACHE", str(inner))
+    above.chmod(0o777)
+    with pytest.raises(CompilerError, match=rf"{above} is not yours alone"):
+        kernel_cache.usable_folder()
+    above.chmod(0o1777)
+    assert kernel_cache.usable_folder() == inner
+    link = tmp_path / "link"
+    link.symlink_to(inner)
+    above.chmod(0o777)
+    monkeypatch.setenv("BYWIRE_CACHE", str(link))
+    with pytest.raises(CompilerError, match="not yours alone"):
+        kernel_cache.usable_folder()
+
+
+def test_the_usual_folder_is_left_alone_with_a_word(tmp_path, monkeypatch):
+    open_folder = tmp_path / "cache"
+    open_folder.mkdir()
+    open_folder.chmod(0o777)
+    monkeypatch.delenv("BYWIRE_CACHE", raising=False)
+    monkeypatch.setenv("XDG_CACHE_HOME", str(open_folder))
+    monkeypatch.setattr(kernel_cache, "user_cache_path", lambda *_: open_folder / "bywire")
+    with pytest.warns(UserWarning, match="compiled kernels are not kept"):
+        folder = kernel_cache.usable_folder()
+    assert folder != open_folder / "bywire" / "kernels"
+
+
+@pytest.mark.parametrize("content", [b"garbage", b"\x7fELF", "halved", "without the function"])
+def test_a_library_that_is_none_is_rebuilt_and_not_loaded(cache, monkeypatch, content):
+    """Though its digest fits: the system would crash on half a library."""
+    compiler = system_compiler()
+    library = compile_library(SOURCE, PLAIN, compiler, "twice")
+    whole = library.read_bytes()
+    made = {"halved": whole[: len(whole) // 2]}.get(content, content)
+    if content == "without the function":
+        made = compile_library("int other;", PLAIN, compiler).read_bytes()
+    library.unlink()
+    library.write_bytes(made)
+    kernel_cache.digest_of(library).write_text(kernel_cache.sha256(library))
+    loaded, again = load_library(SOURCE, PLAIN, compiler, "twice")
+    assert again == library
+    assert loaded.twice
+    assert twice(library) == 42.0
+
+
+def test_a_private_group_may_write(tmp_path, monkeypatch):
+    """Many systems give each user a group, and files that it may write to."""
+    folder = tmp_path / "group"
+    folder.mkdir()
+    folder.chmod(0o770)
+    assert kernel_cache.open_to_others(folder) == ""
+    monkeypatch.setattr(kernel_cache, "_is_private", lambda group: False)
+    assert kernel_cache.open_to_others(folder) == str(folder)
+
+
+def test_a_full_disk_is_said_with_a_way_out(cache, monkeypatch):
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(compiler_module, "_compile", full)
+    with pytest.raises(CompilerError, match=rf"{cache}.*No space left.*set BYWIRE_CACHE"):
+        compile_library(SOURCE, PLAIN, system_compiler())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
 import importlib.util
 import os
@@ -10,13 +11,13 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 from bywire.core.errors import CompilerError
-from bywire.simulation.kernel_cache import intact, sha256, usable_folder
+from bywire.core.scratch import scratch_folder
+from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, usable_folder
 
 # Kernels compare and select all the time: without these, maxima become branches.
 _MATH = ("-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only")
@@ -28,6 +29,9 @@ _WIDE = ("-march=native", "-ffp-contract=fast", *(("-mprefer-vector-width=512",)
 _VECTOR = ("-O2", "-fopenmp-simd", *_WIDE)
 _GCC = ("-fschedule-insns", "-fsched-pressure")  # a tenth quicker there; clang has no such option
 TIMEOUT = 300.0
+_OTHERWISE = (
+    "set BYWIRE_CC to another C compiler, or to none, with which runs are about 200 times slower"
+)
 
 
 @dataclass(frozen=True)
@@ -84,18 +88,52 @@ def _labeled(command: tuple[str, ...]) -> Compiler:
             [*command, "--version"], capture_output=True, text=True, timeout=60, check=False
         )
     except (OSError, subprocess.TimeoutExpired) as error:
-        raise CompilerError(f"the C compiler {command[0]} does not start: {error}") from None
+        reason = getattr(error, "strerror", None) or "it took longer than 60 s"
+        what = f"the C compiler {command[0]} does not start ({reason})"
+        raise CompilerError(f"{what}: {_OTHERWISE}") from None
     if done.returncode != 0:
-        raise CompilerError(f"the C compiler {command[0]} does not tell its version")
+        what = f"the C compiler {command[0]} does not tell its version"
+        raise CompilerError(f"{what}: {_OTHERWISE}")
     first = (done.stdout.splitlines() or [Path(command[0]).name])[0]
     return Compiler(command, first.strip())
 
 
-def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> Path:
-    """Return the shared library of a C source, compiled unless the cache has it.
+def load_library(
+    source: str, flags: tuple[str, ...], compiler: Compiler, entry: str
+) -> tuple[ctypes.CDLL, Path]:
+    """Return the loaded library of a C source, and its file, which is compiled where it must be.
+
+    Parameters
+    ----------
+    entry
+        Name of a function that it must have.
+
+    Raises
+    ------
+    CompilerError
+        With the first lines of the compiler's message.
+    """
+    library = compile_library(source, flags, compiler, entry)
+    try:
+        return load(library, entry), library
+    except CompilerError:  # of another system, or garbled before its digest was made
+        digest_of(library).unlink(missing_ok=True)
+    library = compile_library(source, flags, compiler, entry)
+    return load(library, entry), library
+
+
+def compile_library(
+    source: str, flags: tuple[str, ...], compiler: Compiler, entry: str = ""
+) -> Path:
+    """Return the file of the shared library of a C source, compiled unless the cache has it.
 
     The library is written to a temporary name and renamed, so that processes which compile the
     same kernel at once do not disturb each other. A digest beside it guards against damage.
+
+    Parameters
+    ----------
+    entry
+        Name of a function that it must have.
 
     Raises
     ------
@@ -106,17 +144,22 @@ def compile_library(source: str, flags: tuple[str, ...], compiler: Compiler) -> 
     parts = "\0".join((source, *_COMMON, *flags, compiler.label, built_for))
     key = hashlib.sha256(parts.encode()).hexdigest()[:32]
     folder = usable_folder()
-    library, digest = folder / f"{key}.so", folder / f"{key}.sha256"
-    if intact(library, digest):
+    library = folder / f"{key}.so"
+    if is_intact(library, entry):
         return library
-    with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        text, built = Path(scratch) / "kernel.c", Path(scratch) / "kernel.so"
-        text.write_text(source)
-        _compile(compiler, flags, text, built)
-        fresh = Path(scratch) / "digest"
-        fresh.write_text(sha256(built))
-        os.replace(built, library)
-        os.replace(fresh, digest)
+    try:
+        with scratch_folder(folder) as scratch:
+            text, built, fresh = scratch / "kernel.c", scratch / "kernel.so", scratch / "digest"
+            text.write_text(source)
+            _compile(compiler, flags, text, built)
+            fresh.write_text(sha256(built))
+            os.replace(built, library)
+            os.replace(fresh, digest_of(library))
+    except OSError as error:
+        raise CompilerError(
+            f"a compiled kernel cannot be written to {folder} ({error.strerror}): make room there, "
+            "or set BYWIRE_CACHE to another folder"
+        ) from None
     return library
 
 
@@ -134,8 +177,15 @@ def _compile(compiler: Compiler, flags: tuple[str, ...], source: Path, target: P
     command = [*compiler.command, *_COMMON, *flags, str(source), "-o", str(target), "-lm"]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=TIMEOUT, check=False)
-    except (OSError, subprocess.TimeoutExpired) as error:
-        raise CompilerError(f"{compiler.label} did not run: {error}") from None
+    except subprocess.TimeoutExpired:
+        raise CompilerError(
+            f"{compiler.label} took longer than {TIMEOUT:g} s for a kernel: {_OTHERWISE}"
+        ) from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise CompilerError(f"{compiler.label} did not run ({reason}): {_OTHERWISE}") from None
     if done.returncode != 0 or not target.exists():
         message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
-        raise CompilerError(f"{compiler.label} refused a generated kernel:\n{message}")
+        raise CompilerError(
+            f"{compiler.label} refused a generated kernel:\n{message}\n{_OTHERWISE}"
+        )

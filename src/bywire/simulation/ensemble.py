@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
+from bywire.simulation.compiler import Compiler, find_compiler, load_library, vector_flags
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.engine import prepare
@@ -73,9 +73,8 @@ class LaneKernel:
         stages = build_stages(program, outputs=selection)
         self._signals = len(selection)
         self.layout: Layout = layout_of(stages)
-        library = ctypes.CDLL(
-            str(compile_library(emit_lanes(stages), vector_flags(compiler), compiler))
-        )
+        source = emit_lanes(stages)
+        library, _ = load_library(source, vector_flags(compiler), compiler, "bw_run_lanes")
         self.lanes = int(library.bw_lanes())
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
         self._run = library.bw_run_lanes

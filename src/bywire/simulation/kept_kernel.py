@@ -23,9 +23,10 @@ from typing import TYPE_CHECKING, Any
 import casadi as ca
 import numpy as np
 
+from bywire.core.errors import CompilerError
 from bywire.core.model import Model
 from bywire.core.sources import source_state
-from bywire.simulation.kernel_cache import intact, keep_text, sha256, usable_folder
+from bywire.simulation.kernel_cache import is_intact, keep_text, load, sha256, usable_folder
 from bywire.simulation.layout import Layout
 
 if TYPE_CHECKING:
@@ -82,12 +83,14 @@ class Place:
                 return None
             entry = json.loads(text)
             library = self.file.with_name(entry["library"])
+            entry_point = entry["entry"]
             is_same = entry["state"] == self.state and sha256(library) == entry["digest"]
-            if not (is_same and intact(library, library.with_suffix(".sha256"))):
+            if not (is_same and is_intact(library, entry_point)):
                 return None
+            load(library, entry_point)
             layout = Layout(entry["start"], entry["length"])
             return KeptKernel(layout, library, entry["compiler"], entry["jacobians"])
-        except (OSError, ValueError, KeyError, TypeError):
+        except (OSError, ValueError, KeyError, TypeError, CompilerError):
             return None
 
     def keep(self, kernel: SingleKernel, contact_jacobians: Any) -> None:
@@ -99,6 +102,7 @@ class Place:
             "start": kernel.layout.start,
             "length": kernel.layout.length,
             "library": kernel.library.name,
+            "entry": kernel.ENTRY,
             "digest": sha256(kernel.library),
             "compiler": kernel.compiler.label,
             "jacobians": contact_jacobians.serialize(),

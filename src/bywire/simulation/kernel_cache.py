@@ -1,18 +1,32 @@
-"""Folder of compiled kernels: loaded code, so only folders that nobody else can write to."""
+"""Folder of compiled kernels: code that is run, so only what nobody else could have put there.
+
+A file is run only if it, its folder and every folder above belong to the user or to root, and
+nobody else may write to them; of the folders above, one like ``/tmp`` will do, where others cannot
+replace what is not theirs. Digests tell damage, not intent: who can write a library can write its
+digest. On Windows rights are not modes, and the user's folders are taken as they are.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import hashlib
 import os
 import stat
-import tempfile
+import struct
+import sys
+import warnings
 from functools import cache
 from pathlib import Path
 
 from platformdirs import user_cache_path
 
 from bywire.core.errors import CompilerError
+from bywire.core.scratch import process_folder, replacing, scratch_folder
+
+if sys.platform != "win32":
+    import grp
+    import pwd
 
 
 def cache_folder() -> Path:
@@ -33,54 +47,138 @@ def usable_folder() -> Path:
     """
     folder = cache_folder()
     try:
-        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        for each in reversed((folder, *folder.parents)):  # each, or those above get other rights
+            each.mkdir(mode=0o700, exist_ok=True)
+        with scratch_folder(folder):
             pass
     except OSError:
-        return _own_scratch()
-    if not _private(folder):
-        if "BYWIRE_CACHE" in os.environ:
-            raise CompilerError(
-                f"BYWIRE_CACHE = {folder} can be written by others, who could put code there: "
-                "name a folder of your own (chmod go-w)"
-            )
-        return _own_scratch()
-    return folder
+        return process_folder()
+    place = open_to_others(folder)
+    if not place:
+        return folder
+    advice = f"{place} is not yours alone, and others could put code there"
+    if "BYWIRE_CACHE" in os.environ:
+        raise CompilerError(
+            f"BYWIRE_CACHE = {folder}: {advice}: name a new folder in one that only you can write "
+            "to, or unset it"
+        )
+    _warn_once(f"compiled kernels are not kept: {advice}: set BYWIRE_CACHE to a folder of yours")
+    return process_folder()
 
 
 @cache
-def _own_scratch() -> Path:
-    return Path(tempfile.mkdtemp(prefix="bywire-"))
+def _warn_once(text: str) -> None:
+    warnings.warn(text, stacklevel=3)
 
 
-def _private(folder: Path) -> bool:
-    """Return whether a folder belongs to the user and nobody else may write to it."""
-    if os.name == "nt":
-        return True  # rights are not modes there
-    found = folder.stat()
-    own = found.st_uid == os.getuid()
-    return own and not found.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+def open_to_others(path: Path) -> str:
+    """Return what others may write to of a file or folder and the folders above; else nothing.
+
+    Raises
+    ------
+    OSError
+        When it is not there.
+    """
+    if sys.platform == "win32":
+        return ""
+    resolved = path.resolve(strict=True)
+    is_folder = resolved.is_dir()
+    for steps, each in enumerate((resolved, *resolved.parents)):
+        found = each.stat(follow_symlinks=False)
+        is_above = steps > (0 if is_folder else 1)
+        if found.st_uid not in (os.getuid(), 0) or not _is_closed(found, is_above):
+            return str(each)
+    return ""
+
+
+def _is_closed(found: os.stat_result, is_above: bool) -> bool:
+    """Return whether nobody but its owner may write to something."""
+    by_others = found.st_mode & stat.S_IWOTH
+    by_group = found.st_mode & stat.S_IWGRP and not _is_private(found.st_gid)
+    return not (by_others or by_group) or bool(is_above and found.st_mode & stat.S_ISVTX)
+
+
+def _is_private(group: int) -> bool:
+    """Return whether a group is a user's own, as many systems make one for each."""
+    if sys.platform == "win32":
+        return True
+    try:
+        found, user = grp.getgrgid(group), pwd.getpwuid(os.getuid())
+    except KeyError:
+        return False
+    is_own = user.pw_gid == group and found.gr_name == user.pw_name
+    return is_own and set(found.gr_mem) <= {user.pw_name}
 
 
 def keep_text(path: Path, text: str) -> None:
     """Write a file of the folder whole or not at all; where that fails, nothing is kept."""
-    with contextlib.suppress(OSError):
-        number, name = tempfile.mkstemp(dir=path.parent)
-        partial = Path(name)
-        try:
-            with open(number, "w", encoding="utf-8") as stream:
-                stream.write(text)
-            os.replace(partial, path)
-        finally:
-            partial.unlink(missing_ok=True)
+    with contextlib.suppress(OSError), replacing(path) as fresh:
+        fresh.write_text(text, encoding="utf-8")
 
 
-def intact(library: Path, digest: Path) -> bool:
-    """Return whether a library is the one that its digest was made of."""
+def is_intact(library: Path, entry: str) -> bool:
+    """Return whether a library is the user's, has a function, and is what its digest was made of.
+
+    Parameters
+    ----------
+    entry
+        Name of the function; any library will do without.
+    """
     try:
-        return sha256(library) == digest.read_text()
-    except (OSError, ValueError):  # missing, or no text at all
+        content = _content(library)
+        digest = _content(digest_of(library)).decode()
+    except (OSError, ValueError):  # missing, of somebody else, or no text at all
         return False
+    is_same = hashlib.sha256(content).hexdigest() == digest
+    return is_same and _is_whole(content) and f"{entry}\0".encode() in content
+
+
+def digest_of(library: Path) -> Path:
+    """Return the file with the digest of a library."""
+    return library.with_suffix(".sha256")
+
+
+def _content(path: Path) -> bytes:
+    """Return the bytes of a file that nobody else could have written."""
+    place = open_to_others(path)
+    if place:
+        raise PermissionError(place)
+    return path.read_bytes()
+
+
+def _is_whole(content: bytes) -> bool:
+    """Return whether a library is as long as its header says: the system would crash on others."""
+    if content[:4] != b"\x7fELF":
+        return len(content) > 4  # of another system
+    if len(content) < 64 or content[4] != 2:
+        return False
+    (table,) = struct.unpack_from("=Q", content, 40)
+    size, count = struct.unpack_from("=HH", content, 58)
+    return bool(table) and len(content) >= table + size * count
+
+
+def load(library: Path, entry: str) -> ctypes.CDLL:
+    """Load a library; whose it is, is looked at once more.
+
+    Nobody but the user and root can then put another in its place in between.
+
+    Raises
+    ------
+    CompilerError
+        When it is not the user's alone, or cannot be loaded.
+    """
+    try:
+        place = open_to_others(library)
+        if place:
+            raise CompilerError(
+                f"{library} is not loaded: {place} is not yours alone, and others could put code "
+                "there: set BYWIRE_CACHE to a new folder in one that only you can write to"
+            )
+        loaded = ctypes.CDLL(str(library.resolve(strict=True)))
+        getattr(loaded, entry)
+    except (OSError, AttributeError) as error:
+        raise CompilerError(f"{library} cannot be loaded ({error}): delete it") from None
+    return loaded
 
 
 def sha256(path: Path) -> str:

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
-from bywire.simulation.compiler import PLAIN, Compiler, compile_library
+from bywire.simulation.compiler import PLAIN, Compiler, load_library
+from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
 from bywire.simulation.schedule import Schedule
 
@@ -67,10 +68,13 @@ def pointer(array: NDArray[Any]) -> ctypes.c_void_p:
 class SingleKernel:
     """Compiled kernel for one run."""
 
+    ENTRY = "bw_run"
+    """its function in the library"""
+
     def __init__(self, layout: Layout, library: Path, compiler: Compiler) -> None:
         self.layout, self.library, self.compiler = layout, library, compiler
         self.label = f"compiled C, {compiler.label}"
-        self._run = ctypes.CDLL(str(library)).bw_run
+        self._run = load(library, self.ENTRY)[self.ENTRY]
         self._run.restype = None
 
     @classmethod
@@ -81,7 +85,7 @@ class SingleKernel:
         from bywire.simulation.stages import build_stages
 
         stages = build_stages(program)
-        library = compile_library(emit_single(stages), PLAIN, compiler)
+        _, library = load_library(emit_single(stages), PLAIN, compiler, cls.ENTRY)
         return cls(layout_of(stages), library, compiler)
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
+from bywire.simulation.compiler import Compiler, find_compiler, load_library, vector_flags
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import prepare
@@ -76,8 +76,9 @@ class TangentKernel:
         self.label = f"compiled C with tangents, {compiler.label}"
         velocities = [program.model.State._fields.index(n) for n in program.model.frictions]
         source = emit_tangents(stages, DIRECTIONS, velocities)
-        library = compile_library(source, vector_flags(compiler), compiler)
-        self._run = ctypes.CDLL(str(library)).bw_run_tangents
+        entry = "bw_run_tangents"
+        library, _ = load_library(source, vector_flags(compiler), compiler, entry)
+        self._run = library[entry]
         self._run.restype = None
         self.rounds = rounds(stages)
 

@@ -15,7 +15,7 @@ from bywire.benchmark.peers.hand_source import Subject
 from bywire.core.errors import CompilerError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
-from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
+from bywire.simulation.compiler import PLAIN, find_compiler, load_library
 from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
 
@@ -86,11 +86,9 @@ class HandCode:
         Without a C compiler, or without its OpenMP when ``THREADS`` asks for it.
     """
 
-    def __init__(
-        self, subject: Subject, par: ParameterSet, flags: tuple[str, ...] = PLAIN
-    ) -> None:
+    def __init__(self, subject: Subject, par: ParameterSet, flags: tuple[str, ...] = PLAIN) -> None:
         self._subject = subject
-        self.label, library = load(subject.text(par), flags)
+        self.label, library = load(subject.text(par), flags, "hand_run")
         self._run, self._ensemble = library.hand_run, library.hand_ensemble
         self._run.restype = self._ensemble.restype = None
 
@@ -101,9 +99,7 @@ class HandCode:
         arguments = (*plan_arguments(run, shared), pointer(state), pointer(values))
         return Call(outputs, values, state, _substeps(run), shared, lambda: self._run(*arguments))
 
-    def ensemble(
-        self, run: Run, cases: Sequence[ParameterSet], signals: Sequence[str]
-    ) -> Call:
+    def ensemble(self, run: Run, cases: Sequence[ParameterSet], signals: Sequence[str]) -> Call:
         """Prepare one run per parameter set, with the initial values and the stimulus of ``run``.
 
         Parameters
@@ -130,8 +126,8 @@ class HandCode:
         return Call(tuple(signals), values, state, count, kept, lambda: self._ensemble(*arguments))
 
 
-def load(text: str, flags: tuple[str, ...]) -> tuple[str, ctypes.CDLL]:
-    """Compile C and return what a table calls it, and the library.
+def load(text: str, flags: tuple[str, ...], entry: str) -> tuple[str, ctypes.CDLL]:
+    """Compile C with a function and return what a table calls it, and the library.
 
     Raises
     ------
@@ -141,7 +137,7 @@ def load(text: str, flags: tuple[str, ...]) -> tuple[str, ctypes.CDLL]:
     compiler = find_compiler()
     if compiler is None:
         raise CompilerError("the hand-written C needs a C compiler: install one")
-    library = ctypes.CDLL(str(compile_library(text, flags, compiler)))
+    library, _ = load_library(text, flags, compiler, entry)
     return f"hand-written C, {compiler.label}, {' '.join(flags)}", library
 
 

@@ -40,7 +40,7 @@ def solve(run: Run, width: float, width_v: float, step: float) -> Solution:
         friction; somewhat longer steps chatter within the width and cost little.
     """
     own = replace(run, step=step)
-    _, library = load(SUBJECT.text(own.par, "tanh_rk4_wedge.c"), PLAIN)
+    _, library = load(SUBJECT.text(own.par, "tanh_rk4_wedge.c"), PLAIN, "tanh_run")
     library.tanh_run.restype = None
     shared, state, values = arrays(own, [own.par], SIGNALS)
     arguments = (

@@ -1,0 +1,142 @@
+"""Files that appear whole or not at all, and temporary folders that no killed process leaves.
+
+A folder of temporary files is locked by the process that made it. The next one that works at the
+same place removes those without a lock: their process was killed. Where a file system has no
+locks (Windows, some network drives), they go when they are a day old.
+"""
+
+from __future__ import annotations
+
+import atexit
+import contextlib
+import os
+import shutil
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+
+if sys.platform != "win32":
+    import fcntl
+
+PREFIX = ".bywire-"
+"""what the names of temporary folders begin with"""
+
+_OLD = 86400.0  # seconds; without locks, younger ones may be in use
+
+
+@contextmanager
+def replacing(target: Path) -> Iterator[Path]:
+    """Yield where to write a file, which takes the place of another when the block has ended.
+
+    Where the block fails, or the process is killed, the other file stays as it was. The name is
+    the same, in a hidden folder beside it.
+
+    Raises
+    ------
+    OSError
+        When the folder cannot be written to.
+    """
+    with scratch_folder(target.parent) as folder:
+        fresh = folder / target.name
+        yield fresh
+        os.replace(fresh, target)
+
+
+@contextmanager
+def scratch_folder(parent: Path) -> Iterator[Path]:
+    """Yield a fresh folder in another, and remove it with all that is in it.
+
+    Raises
+    ------
+    OSError
+        When the folder cannot be written to.
+    """
+    sweep(parent)
+    folder, lock = _locked(parent)
+    try:
+        yield folder
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        _unlock(lock)
+
+
+def process_folder() -> Path:
+    """Return the temporary folder of this process, which nobody else can read."""
+    return _folder_of(os.getpid())
+
+
+@cache
+def _folder_of(process: int) -> Path:
+    parent = Path(tempfile.gettempdir())
+    sweep(parent)
+    folder, _ = _locked(parent)  # until the process ends
+
+    def remove() -> None:
+        if os.getpid() == process:  # not in what was forked from it
+            shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(remove)
+    return folder
+
+
+def sweep(parent: Path) -> None:
+    """Remove what killed processes left in a folder, as far as that is possible."""
+    with contextlib.suppress(OSError), os.scandir(parent) as entries:
+        for each in entries:
+            if each.name.startswith(PREFIX) and each.is_dir(follow_symlinks=False):
+                _remove_left(Path(each.path))
+
+
+def _remove_left(folder: Path) -> None:
+    try:
+        found = folder.stat(follow_symlinks=False)
+        if sys.platform == "win32":
+            lock = None
+        elif found.st_uid != os.getuid():
+            return
+        else:
+            lock = _lock(folder)
+    except BlockingIOError:
+        return  # in use
+    except OSError:
+        lock = None
+    if lock is not None or time.time() - found.st_mtime > _OLD:
+        shutil.rmtree(folder, ignore_errors=True)
+    _unlock(lock)
+
+
+def _locked(parent: Path) -> tuple[Path, int | None]:
+    """Return a fresh folder and what holds its lock; None where there are no locks."""
+    while True:
+        folder = Path(tempfile.mkdtemp(prefix=PREFIX, dir=parent))
+        try:
+            lock = _lock(folder)
+        except BlockingIOError:
+            continue  # another process is about to remove it
+        except OSError:
+            return folder, None
+        if folder.exists():
+            return folder, lock
+        _unlock(lock)
+
+
+def _lock(folder: Path) -> int | None:
+    """Take the lock of a folder, which a process keeps until it ends, however that is."""
+    if sys.platform == "win32":
+        return None
+    number = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(number)
+        raise
+    return number
+
+
+def _unlock(lock: int | None) -> None:
+    if lock is not None:
+        os.close(lock)
