@@ -117,8 +117,8 @@ def bracketed(unit: str) -> str:
 
 def modules(package: Any) -> Iterator[Any]:
     """Yield the modules of a package."""
-    for found in pkgutil.iter_modules(package.__path__):
-        yield importlib.import_module(f"{package.__name__}.{found.name}")
+    for module in pkgutil.iter_modules(package.__path__):
+        yield importlib.import_module(f"{package.__name__}.{module.name}")
 
 
 def models() -> Iterator[Any]:
@@ -131,8 +131,8 @@ def element_tuples() -> Iterator[tuple[str, type]]:
     for package in (plant, control, elements, laws):
         for module in modules(package):
             for value in vars(module).values():
-                own = isinstance(value, type) and value.__module__ == module.__name__
-                if own and issubclass(value, tuple) and value.__name__ not in DERIVED:
+                is_local = isinstance(value, type) and value.__module__ == module.__name__
+                if is_local and issubclass(value, tuple) and value.__name__ not in DERIVED:
                     yield module.__name__.rpartition(".")[2], value
 
 
@@ -198,16 +198,17 @@ def bench_reference() -> str:
         lines += table(("", "option", "unit", "", "range or choices", "meaning"), rows)
     lines += ["## Loops", "", "What `linearize`, `frequency-response` and `margins` know.", ""]
     rows = (
-        (f"`{one.name}`", one.summary, one.assembly, f"{one.at.name} [{unit_text(one.at.unit)}]",
-         ", ".join(f"`{name}`" for name in one.inputs), f"`{one.output}`", f"`{one.cut}`")
-        for one in LOOPS.all().values()
+        (f"`{loop.name}`", loop.summary, loop.assembly,
+         f"{loop.at.name} [{unit_text(loop.at.unit)}]",
+         ", ".join(f"`{name}`" for name in loop.inputs), f"`{loop.output}`", f"`{loop.cut}`")
+        for loop in LOOPS.all().values()
     )  # fmt: skip
     lines += table(("loop", "meaning", "of", "at", "from", "to", "cut at"), rows)
     lines += ["## Plants", "", "What `linearize` knows besides loops.", ""]
     rows = (
-        (f"`{one.name}`", one.summary, one.assembly,
-         ", ".join(f"{q.name} [{unit_text(q.unit)}]" for q in one.at), f"{one.band:g} Hz")
-        for one in PLANTS.all().values()
+        (f"`{plant.name}`", plant.summary, plant.assembly,
+         ", ".join(f"{q.name} [{unit_text(q.unit)}]" for q in plant.at), f"{plant.band:g} Hz")
+        for plant in PLANTS.all().values()
     )  # fmt: skip
     lines += table(("plant", "meaning", "of", "at one of", "judged up to"), rows)
     lines += ["## Stimuli", "", "`level`: the unit of what the experiment drives.", ""]

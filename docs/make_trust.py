@@ -31,8 +31,11 @@ def condensed(study: dict[str, Any], label: str) -> dict[str, Any]:
     """Return a study with one row of numbers per experiment."""
     names = list(study["recovered"])
     rows = [
-        [one["seed"], *(f"{one['values'].get(name, float('nan')):.7g}" for name in names)]
-        for one in study["experiments"]
+        [
+            experiment["seed"],
+            *(f"{experiment['values'].get(name, float('nan')):.7g}" for name in names),
+        ]
+        for experiment in study["experiments"]
     ]
     kept = {key: study[key] for key in ("method", "parameter_set", "options", "holds", "recovered")}
     return {"label": label, **kept, "columns": ["seed", *names], "experiments": rows}

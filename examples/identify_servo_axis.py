@@ -121,9 +121,11 @@ def measured(seed=1, noise=NOISE):
     f = np.array([[0.5], [0.9], [1.7]])
     target = lambda t: (np.array([2.0, 1.0, 0.5]) @ np.sin(2 * np.pi * f * t))[:, None]  # noqa: E731
     run = bywire.Run(ClosedLoop(), TRUTH, zeros(State), zeros(Voltage), target, 10.0)
-    made = bywire.simulate(run)
-    theta = made["theta"] + np.random.default_rng(seed).normal(0.0, noise, made.time.size)
-    return xr.Dataset({"theta": ("time", theta), "v": ("time", made["v"])}, {"time": made.time})
+    computed = bywire.simulate(run)
+    theta = computed["theta"] + np.random.default_rng(seed).normal(0.0, noise, computed.time.size)
+    return xr.Dataset(
+        {"theta": ("time", theta), "v": ("time", computed["v"])}, {"time": computed.time}
+    )
 
 
 def filtered(data):
@@ -154,24 +156,26 @@ def identified(data):
     second = estimate(output_error([bench], unknowns))
 
     fitted = dict(zip(second.names, second.values, strict=True))
-    made = bywire.simulate(moved_run(bench.run, fitted))
-    clean = filtered(data.assign(theta=("time", made["theta"])))
+    computed = bywire.simulate(moved_run(bench.run, fitted))
+    clean = filtered(data.assign(theta=("time", computed["theta"])))
     third = inverse_dynamics(*problem, bandwidth=30.0, instruments=clean)
     return first, second, third
 
 
-def apart(one, other):
+def apart(first, other):
     """Return the unknowns of which two estimates differ by 3.5 standard deviations and 0.1 %."""
-    told = [n for n in NAMES if n in one.names and n in other.names]
-    reach = [np.hypot(*(e.deviations[e.names.index(n)] for e in (one, other))) for n in told]
-    return [n for n, r in zip(told, reach, strict=True)
-            if abs(one[n] - other[n]) > max(3.5 * r, 1e-3 * abs(other[n]))]  # fmt: skip
+    names = [n for n in NAMES if n in first.names and n in other.names]
+    reach = [np.hypot(*(e.deviations[e.names.index(n)] for e in (first, other))) for n in names]
+    return [n for n, r in zip(names, reach, strict=True)
+            if abs(first[n] - other[n]) > max(3.5 * r, 1e-3 * abs(other[n]))]  # fmt: skip
 
 
 if __name__ == "__main__":
-    own = sys.argv[1:]  # a file with time [s], theta [rad] and v [V]
+    files = sys.argv[1:]  # a file with time [s], theta [rad] and v [V]
     try:
-        first, second, third = identified(bywire.read_measurement(own[0]) if own else measured())
+        first, second, third = identified(
+            bywire.read_measurement(files[0]) if files else measured()
+        )
     except bywire.BywireError as error:
         sys.exit(f"identify_servo_axis: {error}")
     print(f"angle left over: {NOISE * second.rms:.2g} rad; the encoder's noise, if all is well")
@@ -180,6 +184,6 @@ if __name__ == "__main__":
         print(f"{name}: noise biases inverse dynamics without instruments: {first[name]:.4g}")
     for name in apart(third, second):
         print(f"{name}: the equation of motion does not explain this record, do not use it")
-    if not own:
+    if not files:
         for name, (low, high) in zip(NAMES, second.intervals(0.999), strict=False):
             assert low < getattr(TRUTH, name) < high, name

@@ -57,7 +57,7 @@ closed = control.feedback(brake * regulator, back, sign=1)[0, 0]
 states = control.ss(A_i, B_i, K, np.zeros((1, 1)), T)
 omega = 2.0 * math.pi * np.geomspace(0.1, 490.0, 2000)
 (_, margin, _, _, crossover, _), (_, margin_states, *_) = (
-    control.stability_margins(control.frd(one, omega)) for one in (gain, states)
+    control.stability_margins(control.frd(L, omega)) for L in (gain, states)
 )
 
 pid = loop.closed(par, AT)

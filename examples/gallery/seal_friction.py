@@ -29,8 +29,8 @@ if arguments.data:
 else:
     data = method.synthetic(None, options, 1)
 result = method.identify(data, None, options, Effort())
-found = result.estimates["seal friction"]
-print(found)
+friction = result.estimates["seal friction"]
+print(friction)
 loop_0, loop_f, between = (
     result.figures[name][0]
     for name in ("loop_half_width_at_0", "loop_half_width_over_pressure",
@@ -54,5 +54,5 @@ if arguments.out:
 
 # What the loop shows too much is half of the difference in pressure, times the area.
 level = np.array([3e5, 6e5])
-excess = loop_0 + loop_f * level - found["F_0"] - found["f"] * level
-assert np.all(np.abs(excess - 0.5 * between * found["A"]) < 0.25 * np.abs(excess))
+excess = loop_0 + loop_f * level - friction["F_0"] - friction["f"] * level
+assert np.all(np.abs(excess - 0.5 * between * friction["A"]) < 0.25 * np.abs(excess))

@@ -36,10 +36,10 @@ names = [
     if name.split(".")[0] in ("supply", "motor", "gear", "seal", "master_cylinder", "caliper")
 ] + ["fluid.beta", "fluid.nu", "fluid.rho", "fluid.p_atm", "pipeline.L_pl", "pipeline.k_lf"]
 
-found = bywire.simulate_with_sensitivities(run, names, ["p_mc"])
-time = found.trajectory.time - case.settle
+slopes = bywire.simulate_with_sensitivities(run, names, ["p_mc"])
+time = slopes.trajectory.time - case.settle
 rise, end = (time > 0.0) & (time < 0.2), time > 1.1
-moves = {name: found.of("p_mc", name) * values[name] * PERCENT / BAR for name in names}
+moves = {name: slopes.of("p_mc", name) * values[name] * PERCENT / BAR for name in names}
 peak = {name: np.max(np.abs(moves[name][rise])) for name in names}
 left = {name: np.mean(moves[name][end]) for name in names}
 ranked = sorted(names, key=peak.__getitem__, reverse=True)

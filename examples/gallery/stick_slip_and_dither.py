@@ -42,8 +42,8 @@ breakaway = par.seal.k_brk_p * (par.seal.T_pr + par.seal.f_cfr_p * before)
 load = par.gear.k_g * par.master_cylinder.A_mc * before
 predicted = (load + breakaway) / (par.gear.eta_g * par.motor.K_e)
 print("breaks away at    predicted   pressure before       and after")
-for found, expected, low, high in zip(current[begins], predicted, before, after, strict=True):
-    print(f"{found:12.3f} A {expected:10.3f} A {low / BAR:13.2f} bar {high / BAR:11.2f} bar")
+for slipped, expected, low, high in zip(current[begins], predicted, before, after, strict=True):
+    print(f"{slipped:12.3f} A {expected:10.3f} A {low / BAR:13.2f} bar {high / BAR:11.2f} bar")
 print(f"stuck for {100 * kpis['share_stuck_undithered']:.0f} % of the time")
 print(f"area of the loop with dither over that without: {kpis['loop_area_ratio']:.2f}")
 

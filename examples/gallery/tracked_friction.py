@@ -33,8 +33,8 @@ record = record.assign_coords(time=1e-3 * np.arange(record.sizes["time"]))
 for name, sensor in {"y_M": 2.0, "F_N": 10.0}.items():  # standard deviations, N m and N
     record[name] = record[name] + sensor * random.standard_normal(record.sizes["time"])
 
-found = track("mu_B", record, bench.par)
-mu = found.data.sel(parameter="wedge.mu_B")
+tracked = track("mu_B", record, bench.par)
+mu = tracked.data.sel(parameter="wedge.mu_B")
 truth = np.repeat(FADING, runs[0].sizes["time"])
 length = runs[0].sizes["time"] * 1e-3
 within = np.abs(mu["time"].values % length - 0.5 * length) < 0.35 * length

@@ -28,14 +28,14 @@ def point(par: ParameterSet, F: float, drive: DriveMode, step: float = 20e-6) ->
     ParameterError
         When the pads do not touch.
     """
-    own = cast(CaliperBrakeParameters, par.replace({"drive": drive}))
-    if own.ecu.F_on > F:
+    driven = cast(CaliperBrakeParameters, par.replace({"drive": drive}))
+    if driven.ecu.F_on > F:
         raise ParameterError(
-            f"clamp force = {F:g} N is no operating point: below ecu.F_on = {own.ecu.F_on:g} N the "
-            "piston is parked; take for instance '5 kN'"
+            f"clamp force = {F:g} N is no operating point: below ecu.F_on = {driven.ecu.F_on:g} N "
+            "the piston is parked; take for instance '5 kN'"
         )
-    state = state_at(F, own)
+    state = state_at(F, driven)
     held = {"force": {"F_set": F}, "speed": {}, "current": {"i_set": state.i},
-            "voltage": {"v_set": own.motor.R_m * state.i}}[drive]  # fmt: skip
+            "voltage": {"v_set": driven.motor.R_m * state.i}}[drive]  # fmt: skip
     stimulus = zeros(Stimulus)._replace(**held)
-    return Point(EmbCaliper(), own, state, memory_at(F, own), stimulus, step)
+    return Point(EmbCaliper(), driven, state, memory_at(F, driven), stimulus, step)

@@ -136,11 +136,11 @@ def _windows(moved: xr.Dataset, options: Options) -> Iterator[slice]:
 
 
 def _require_spread(mean: dict[str, Array]) -> None:
-    for name, told, unit in (("F_cl", "friction.G", "N"), ("omega", "rotor.D", "rad/s")):
+    for name, parameter, unit in (("F_cl", "friction.G", "N"), ("omega", "rotor.D", "rad/s")):
         low, high = np.quantile(np.abs(mean[name]), (0.02, 0.98))
         if high < _SPREAD * low or high == 0.0:
             raise ParameterError(
-                f"the data does not tell {told} from friction.C: {name} stays near {high:.3g} "
+                f"the data does not tell {parameter} from friction.C: {name} stays near {high:.3g} "
                 f"{unit}; {_ADVICE}"
             )
 
@@ -171,13 +171,13 @@ def synthetic(par: CaliperBrakeParameters, options: Options, seed: int) -> xr.Da
     experiment = slow_strokes.EXPERIMENT
     (case,) = experiment.cases(par, experiment.defaults, None)
     noise = {"i": options.sigma_i, "theta": options.sigma_theta, "F_cl": options.sigma_F}
-    made = simulate(as_run(case, _STEP), tuple(noise))
+    computed = simulate(as_run(case, _STEP), tuple(noise))
     random = np.random.default_rng(seed)
     units = {"i": "A", "theta": "rad", "F_cl": "N"}
     return xr.Dataset(
-        {n: ("time", made[n] + random.normal(0.0, s, made.time.size), {"units": units[n]})
+        {n: ("time", computed[n] + random.normal(0.0, s, computed.time.size), {"units": units[n]})
          for n, s in noise.items()},
-        {"time": ("time", made.time, {"units": "s", "long_name": "time"})},
+        {"time": ("time", computed.time, {"units": "s", "long_name": "time"})},
     )  # fmt: skip
 
 

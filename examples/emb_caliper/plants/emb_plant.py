@@ -14,10 +14,10 @@ CURRENT = Quantity("current", "A", 7.5)
 
 def model(par: ParameterSet, at: PlantPoint) -> LinearModel:
     """Return the exact plant at a clamp force, or where a current holds it without friction."""
-    own = cast(CaliperBrakeParameters, par)
+    caliper = cast(CaliperBrakeParameters, par)
     F = at.value
     if at.quantity is CURRENT:
-        F = at.value * own.motor.K_e / travel_per_angle(own)
+        F = at.value * caliper.motor.K_e / travel_per_angle(caliper)
     p = point(par, F, "voltage")
     return linearize(
         p.model, p.par, p.state._replace(omega=at.speed), p.memory,

@@ -129,14 +129,16 @@ def compute(par: CaliperBrakeParameters, options: Options, progress: Progress) -
 def _applied(par: CaliperBrakeParameters, options: ParameterSet) -> tuple[float, float]:
     """Return the time to 90 % of the clamp force [s] and the energy up to there [J]."""
     (case,) = clamp_step.cases(par, options)  # type: ignore[arg-type]
-    made = simulate(as_run(case, 20e-6), ("F_cl", "E_source"))
+    computed = simulate(as_run(case, 20e-6), ("F_cl", "E_source"))
     wanted: step_response.Setting = clamp_step.step(options)  # type: ignore[arg-type]
-    reached = np.flatnonzero(made["F_cl"] >= 0.9 * (wanted.end or 0.0))
+    reached = np.flatnonzero(computed["F_cl"] >= 0.9 * (wanted.end or 0.0))
     if not reached.size:
         return float("nan"), float("nan")
     k = int(reached[0])
-    start = int(np.searchsorted(made.time, case.settle - 1e-9))
-    return float(made.time[k] - case.settle), float(made["E_source"][k] - made["E_source"][start])
+    start = int(np.searchsorted(computed.time, case.settle - 1e-9))
+    return float(computed.time[k] - case.settle), float(
+        computed["E_source"][k] - computed["E_source"][start]
+    )
 
 
 STUDY = Study(

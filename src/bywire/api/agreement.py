@@ -68,9 +68,9 @@ class LoopAgreement(Answer):
 
     def document(self) -> Document:
         """Return table, verdict and figure."""
-        case, found = self.case, self.differences
-        table = TableBlock(agreement_table(found), width=_WIDTH)
-        legend, text = Paragraph(LEGEND), verdict(found)
+        case, compared = self.case, self.differences
+        table = TableBlock(agreement_table(compared), width=_WIDTH)
+        legend, text = Paragraph(LEGEND), verdict(compared)
         small, large = amount(self.small, self.unit, 3), amount(self.large, self.unit, 3)
         sizes = f"small amplitude {small}, large amplitude {large}"
         figure = FigureBlock(
@@ -85,44 +85,46 @@ class LoopAgreement(Answer):
             case.subject.line,
             sections=[
                 Section("Differences", [figure, table, legend]),
-                case.subject.made(f"{sizes[0].upper()}{sizes[1:]}."),
+                case.subject.provenance(f"{sizes[0].upper()}{sizes[1:]}."),
             ],
             brief=[f"{head}: nonlinear less linear", sizes, table, legend, text],
             data=self._data(),
-            banner=Banner(text[0].upper() + text[1:], "good" if found.holds else "bad"),
+            banner=Banner(text[0].upper() + text[1:], "good" if compared.holds else "bad"),
         )
 
     def _draw(self) -> Figure:
         from bywire.report.differences import differences
 
-        found = self.differences
+        compared = self.differences
         sizes = {
             LABELS.get(cause, cause): (
-                (found.gain[cause], found.phase[cause])
+                (compared.gain[cause], compared.phase[cause])
                 if cause in LABELS
-                else found.beyond_limits(cause)
+                else compared.beyond_limits(cause)
             )
-            for cause in found.gain
+            for cause in compared.gain
         }
-        return differences(found.frequencies, sizes, (GAIN, PHASE))
+        return differences(compared.frequencies, sizes, (GAIN, PHASE))
 
     def _data(self) -> dict[str, Any]:
-        found = self.differences
+        compared = self.differences
         names = {NOTHING: "nothing", EVERYTHING: "everything"}
         return {
             **self.case.heading,
             "amplitudes": {"small": self.small, "large": self.large},
-            "frequency": found.frequencies.tolist(),
+            "frequency": compared.frequencies.tolist(),
             "differences": {
                 names.get(cause, cause): {
-                    "gain_dB": found.gain[cause].tolist(), "phase_deg": found.phase[cause].tolist(),
+                    "gain_dB": compared.gain[cause].tolist(),
+                    "phase_deg": compared.phase[cause].tolist(),
                 }
-                for cause in found.gain
+                for cause in compared.gain
             },
-            "step": {"gain_dB": found.step_gain.tolist(), "phase_deg": found.step_phase.tolist()},
-            "largest": [cause or None for cause in found.largest],
+            "step": {"gain_dB": compared.step_gain.tolist(),
+                     "phase_deg": compared.step_phase.tolist()},
+            "largest": [cause or None for cause in compared.largest],
             "tolerance": {"gain_dB": GAIN, "phase_deg": PHASE},
-            "holds": found.holds,
+            "holds": compared.holds,
         }  # fmt: skip
 
 
@@ -160,10 +162,10 @@ def agreement(
     small, large = _amplitudes(case, amplitudes, unit)
     wanted = case.frequencies(frequencies, _POINTS)
     require_stable(case.loop.closed(case.par, case.value))
-    found = measuring.agreement(
+    compared = measuring.agreement(
         case.loop, case.par, case.value, wanted, (small, large), progress=progress
     )
-    return LoopAgreement(case, found, small, large, unit)
+    return LoopAgreement(case, compared, small, large, unit)
 
 
 def _amplitudes(case: LoopCase, text: str, unit: str) -> tuple[float, float]:
@@ -179,26 +181,26 @@ def _amplitudes(case: LoopCase, text: str, unit: str) -> tuple[float, float]:
     return sizes[0], sizes[1]
 
 
-def verdict(found: Agreement) -> str:
+def verdict(compared: Agreement) -> str:
     """Return whether the responses agree with everything off, as a text with the limits."""
-    state = "agree" if found.holds else "DO NOT agree"
-    gain = max(map(abs, found.gain[NOTHING].tolist()))
-    phase = max(map(abs, found.phase[NOTHING].tolist()))
+    state = "agree" if compared.holds else "DO NOT agree"
+    gain = max(map(abs, compared.gain[NOTHING].tolist()))
+    phase = max(map(abs, compared.phase[NOTHING].tolist()))
     return (
         f"with everything off both responses {state}: largest differences {gain:.2g} dB and "
         f"{phase:.2g}° (at most {GAIN:g} dB and {PHASE:g}°)"
     )
 
 
-def agreement_table(found: Agreement) -> Table:
+def agreement_table(compared: Agreement) -> Table:
     """Return the differences, a row for what is left on, and the largest cause by frequency."""
-    heading = ["left on", *(amount(float(f), "Hz", 3) for f in found.frequencies)]
+    heading = ["left on", *(amount(float(f), "Hz", 3) for f in compared.frequencies)]
     rows = [
-        [LABELS.get(cause, cause), *map(_cell, found.gain[cause], found.phase[cause])]
-        for cause in found.gain
+        [LABELS.get(cause, cause), *map(_cell, compared.gain[cause], compared.phase[cause])]
+        for cause in compared.gain
     ]
-    rows.append([STEP, *map(_cell, found.step_gain, found.step_phase)])
-    return text_table(heading, [*rows, ["largest", *(one or "-" for one in found.largest)]])
+    rows.append([STEP, *map(_cell, compared.step_gain, compared.step_phase)])
+    return text_table(heading, [*rows, ["largest", *(cause or "-" for cause in compared.largest)]])
 
 
 def _cell(gain: float, phase: float) -> str:

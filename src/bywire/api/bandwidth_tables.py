@@ -20,9 +20,9 @@ NOTE = (
 )
 
 
-def shares(found: xr.Dataset) -> dict[str, str]:
+def shares(response: xr.Dataset) -> dict[str, str]:
     """Return the shares of the time that a response tells, with the titles of their columns."""
-    names = [str(name) for name in found if str(name).startswith("share_")]
+    names = [str(name) for name in response if str(name).startswith("share_")]
     return {name: _title(name.removeprefix("share_")) for name in names}
 
 
@@ -33,13 +33,13 @@ def _title(flag: str) -> str:
     return flag.replace("_", " ")
 
 
-def figures_table(found: xr.Dataset, unit: str) -> Table:
+def figures_table(response: xr.Dataset, unit: str) -> Table:
     """Return bandwidth, crossover and limits of the first variant by amplitude."""
-    known = shares(found)
+    known = shares(response)
     heading = ["amplitude", "bandwidth", "crossover", "phase margin", *known.values()]
     rows = []
-    for j, size in enumerate(found["amplitude"].values):
-        case = found.isel(variant=0, amplitude=j)
+    for j, size in enumerate(response["amplitude"].values):
+        case = response.isel(variant=0, amplitude=j)
         most = [f"{100.0 * float(case[name].max()):.3g} %" for name in known]
         margin = amount(float(case["phase_margin"]), "deg", 3)
         rows.append([amount(float(size), unit, 3), _frequency(case, "bandwidth"),
@@ -48,26 +48,26 @@ def figures_table(found: xr.Dataset, unit: str) -> Table:
 
 
 def worst_line(
-    found: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
+    response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> str:
     """Return the worst case of every amplitude over a range as a line; see `over_table`."""
     texts = []
-    for j, size in enumerate(found["amplitude"].values):
-        k = narrowest(found, j)
-        width = _frequency(found.isel(variant=k, amplitude=j), "bandwidth")
+    for j, size in enumerate(response["amplitude"].values):
+        k = narrowest(response, j)
+        width = _frequency(response.isel(variant=k, amplitude=j), "bandwidth")
         at = f"{range_[0]} = {amount(variants[k].label, range_[1])}"
         texts.append(f"{width} for {amount(float(size), unit, 3)} at {at}")
     return f"worst: {'; '.join(texts)}"
 
 
 def over_table(
-    found: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
+    response: xr.Dataset, variants: Sequence[Variant], range_: tuple[str, str], unit: str
 ) -> Table:
     """Return the bandwidths over a range by amplitude.
 
     Parameters
     ----------
-    found
+    response
         Response with its widths.
     variants
         Cases of the range.
@@ -76,39 +76,40 @@ def over_table(
     unit
         Of the amplitudes.
     """
-    sizes = [amount(float(size), unit, 3) for size in found["amplitude"].values]
+    sizes = [amount(float(size), unit, 3) for size in response["amplitude"].values]
     rows = [
         [amount(variant.label, range_[1]),
-         *(_frequency(found.isel(variant=k, amplitude=j), "bandwidth") for j in range(len(sizes)))]
+         *(_frequency(response.isel(variant=k, amplitude=j), "bandwidth")
+           for j in range(len(sizes)))]
         for k, variant in enumerate(variants)
     ]  # fmt: skip
     return text_table([range_[0], *sizes], rows)
 
 
-def figures_object(found: xr.Dataset, variant: int) -> list[dict[str, Any]]:
+def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
     """Return the figures of a variant by amplitude; null beyond the measured frequencies."""
     rows = []
-    for j, size in enumerate(found["amplitude"].values):
-        case = found.isel(variant=variant, amplitude=j)
+    for j, size in enumerate(response["amplitude"].values):
+        case = response.isel(variant=variant, amplitude=j)
         row: dict[str, Any] = {"amplitude": float(size)}
         row |= _bounded(case, "bandwidth") | _bounded(case, "crossover")
         row["phase_margin"] = _or_none(float(case["phase_margin"]))
-        row |= {f"largest_{name}": float(case[name].max()) for name in shares(found)}
+        row |= {f"largest_{name}": float(case[name].max()) for name in shares(response)}
         rows.append(row)
     return rows
 
 
-def over_object(found: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
+def over_object(response: xr.Dataset, variants: Sequence[Variant], name: str) -> dict[str, Any]:
     """Return the figures of all cases of a range, and the worst of every amplitude."""
     cases = [
-        {name: variant.label, "figures": figures_object(found, k),
-         "gain": _listed(found["gain"].values[k]), "phase": _listed(found["phase"].values[k])}
+        {name: variant.label, "figures": figures_object(response, k),
+         "gain": _listed(response["gain"].values[k]), "phase": _listed(response["phase"].values[k])}
         for k, variant in enumerate(variants)
     ]  # fmt: skip
     worst = []
-    for j, size in enumerate(found["amplitude"].values):
-        k = narrowest(found, j)
-        row = _bounded(found.isel(variant=k, amplitude=j), "bandwidth")
+    for j, size in enumerate(response["amplitude"].values):
+        k = narrowest(response, j)
+        row = _bounded(response.isel(variant=k, amplitude=j), "bandwidth")
         worst.append({"amplitude": float(size), **row, name: variants[k].label})
     return {"over": name, "cases": cases, "worst": worst}
 

@@ -175,7 +175,7 @@ def _table(findings: tuple[Finding, ...] | list[Finding]) -> Table:
     rows = []
     for f in findings:
         limit = "" if f.limit is None else f" (limit {f.limit:g})"
-        found = f"{f.text}{limit}" if f.outcome != "broken" else f"{f.text}{limit}; {f.place}"
+        statement = f"{f.text}{limit}" if f.outcome != "broken" else f"{f.text}{limit}; {f.place}"
         outcome = Cell(f.outcome, _VERDICTS[f.outcome])
-        rows.append((Cell(clean(f.subject)), Cell(f.contract), outcome, Cell(clean(found))))
+        rows.append((Cell(clean(f.subject)), Cell(f.contract), outcome, Cell(clean(statement))))
     return Table(tuple(Column(heading) for heading in _HEADINGS), tuple(rows))

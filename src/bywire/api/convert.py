@@ -62,8 +62,8 @@ class Conversion(Answer):
 
     def _signal_table(self) -> Table:
         rows = [
-            (name, told["unit"], str(told["samples"]), told["time"], told["column"])
-            for name, told in self._signals().items()
+            (name, row["unit"], str(row["samples"]), row["time"], row["column"])
+            for name, row in self._signals().items()
         ]
         return text_table(("signal", "unit", "samples", "instants", "column"), rows)
 

@@ -68,18 +68,18 @@ def described(name: str) -> list[Object]:
         "loop": (LOOPS.all(), described_loop),
         "plant": (PLANTS.all(), described_plant),
         "stimulus": (STIMULI.all(), _stimulus),
-        "KPI": (definitions(), lambda one: described_kpi(one.name, one.definition)),
+        "KPI": (definitions(), lambda kpi: described_kpi(kpi.name, kpi.definition)),
         "parameter": ({n: n for n in parameters()}, described_parameter),
         "parameter group": ({n: n for n in groups()}, described_group),
         "signal": (signals(), lambda rows: {"summary": rows[0]["meaning"], "found in": rows}),
     }
-    found: list[Object] = [
+    objects: list[Object] = [
         {"kind": kind, "name": name, **describe(known[name])}
         for kind, (known, describe) in kinds.items() if name in known
     ]  # fmt: skip
-    if not found:
+    if not objects:
         raise unknown_name("name", name, {n for known, _ in kinds.values() for n in known})
-    return found
+    return objects
 
 
 @dataclass(frozen=True)
@@ -87,22 +87,22 @@ class Description(Answer):
     """Everything of a name, as plain data: an object for each kind of thing that has it."""
 
     name: str
-    found: tuple[Object, ...]
+    objects: tuple[Object, ...]
 
     def document(self) -> Document:
         """Return lines and tables of each."""
-        blocks = [_blocks(thing) for thing in self.found]
-        titles = [f"{thing['kind']} {thing['name']}" for thing in self.found]
+        blocks = [_blocks(thing) for thing in self.objects]
+        titles = [f"{thing['kind']} {thing['name']}" for thing in self.objects]
         spaced = [part for k, each in enumerate(blocks) for part in ([""] * (k > 0) + each)]
         return Document(
             self.name,
-            "; ".join(str(thing["summary"]) for thing in self.found),
+            "; ".join(str(thing["summary"]) for thing in self.objects),
             sections=[
                 Section(title, [Paragraph(b) if isinstance(b, str) else b for b in each])
                 for title, each in zip(titles, blocks, strict=True)
             ],
             brief=spaced,
-            data={"name": self.name, "found": list(self.found)},
+            data={"name": self.name, "found": list(self.objects)},
             has_files=False,
         )
 
@@ -148,27 +148,27 @@ def _blocks(thing: Object) -> list[str | Flat]:
     return blocks
 
 
-def _method(one: Method) -> Object:
-    needed = [{"signal": n, "unit": u or "any", "needed": "yes"} for n, u in one.signals.items()]
-    more = [{"signal": n, "unit": u or "any", "needed": "no"} for n, u in one.optional.items()]
+def _method(method: Method) -> Object:
+    needed = [{"signal": n, "unit": u or "any", "needed": "yes"} for n, u in method.signals.items()]
+    more = [{"signal": n, "unit": u or "any", "needed": "no"} for n, u in method.optional.items()]
     return {
-        "summary": one.summary,
-        "assembly": one.assembly or "any",
-        "experiment": one.experiment,
-        "records": "one or several" if one.several else "one",
+        "summary": method.summary,
+        "assembly": method.assembly or "any",
+        "experiment": method.experiment,
+        "records": "one or several" if method.several else "one",
         "signals": [*needed, *more],
-        "estimates": _estimates(one),
-        "options": option_rows(one.options, one.defaults, one.simulated),
+        "estimates": _estimates(method),
+        "options": option_rows(method.options, method.defaults, method.simulated),
         "changed_with": "--option NAME=VALUE",
     }
 
 
-def _bench_method(one: BenchMethod) -> Object:
+def _bench_method(method: BenchMethod) -> Object:
     return {
-        "summary": one.summary,
+        "summary": method.summary,
         "assembly": "any, that of --bench",
         "records": "one or several",
-        "options": option_rows(one.options, one.defaults, one.simulated),
+        "options": option_rows(method.options, method.defaults, method.simulated),
         "changed_with": "--option NAME=VALUE",
         "see": "'bywire list' with the name of the bench's assembly shows what --input (stimulus), "
         "--output (recording) and --estimate-start (state) take, with a parameter's what --unknown "
@@ -176,71 +176,71 @@ def _bench_method(one: BenchMethod) -> Object:
     }
 
 
-def _estimates(one: Method) -> list[Object]:
+def _estimates(method: Method) -> list[Object]:
     """Return the names that a method finds, parameters of the assembly first."""
     rows = []
-    if one.assembly and one.unknowns:
-        cls = PARAMETER_SETS.find(main_set(one.assembly)).parameter_class
+    if method.assembly and method.unknowns:
+        cls = PARAMETER_SETS.find(main_set(method.assembly)).parameter_class
         leaves, notes = leaf_fields(cls), field_notes(cls)
         rows += [{"name": n, "unit": display_unit(leaves[n].unit.symbol), "meaning": notes[n]}
-                 for n in one.unknowns if n in leaves]  # fmt: skip
+                 for n in method.unknowns if n in leaves]  # fmt: skip
     return rows + [{"name": n, "unit": display_unit(unit) or "any", "meaning": text}
-                   for n, (unit, text) in one.further.items()]  # fmt: skip
+                   for n, (unit, text) in method.further.items()]  # fmt: skip
 
 
-def _experiment(one: Experiment) -> Object:
+def _experiment(experiment: Experiment) -> Object:
     return {
-        "summary": one.summary,
-        "assembly": one.assembly,
-        **described_drive(one),
-        "kpis": [{"name": n, "unit": display_unit(u)} for n, u in one.kpis.items()],
-        "options": option_rows(one.options, one.defaults),
+        "summary": experiment.summary,
+        "assembly": experiment.assembly,
+        **described_drive(experiment),
+        "kpis": [{"name": n, "unit": display_unit(u)} for n, u in experiment.kpis.items()],
+        "options": option_rows(experiment.options, experiment.defaults),
         "changed_with": "--set options.NAME=VALUE",
     }  # fmt: skip
 
 
-def _generic(one: GenericExperiment) -> Object:
-    rows = option_rows(one.options, None)
+def _generic(experiment: GenericExperiment) -> Object:
+    rows = option_rows(experiment.options, None)
     for row in rows:
-        value = one.defaults.get(row["name"])
-        row["value"] = None if value is None else _default(value, row["unit"], one)
+        value = experiment.defaults.get(row["name"])
+        row["value"] = None if value is None else _default(value, row["unit"], experiment)
     return {
-        "summary": one.summary,
+        "summary": experiment.summary,
         "assembly": "any",
         "options": rows,
         "changed_with": "--set options.NAME=VALUE",
         "see": "'bywire list' with the name of an assembly shows its stimuli and what it records; "
-        f"levels are multiples of what is nominal for the signal of option {_named(one)}",
+        f"levels are multiples of what is nominal for the signal of option {_named(experiment)}",
     }
 
 
-def _default(value: Any, unit: str, one: GenericExperiment) -> str:
+def _default(value: Any, unit: str, experiment: GenericExperiment) -> str:
     from bywire.report.tables import value_text
 
-    if any(option in unit for option in one.signals):  # the unit is that of a signal
+    if any(option in unit for option in experiment.signals):  # the unit is that of a signal
         values = value if isinstance(value, tuple) else (value,)
         return ", ".join(f"{v:g} x nominal" if v else "0" for v in values)
     return value_text(value, unit)
 
 
-def _named(one: GenericExperiment) -> str:
-    return " or ".join(one.signals)
+def _named(experiment: GenericExperiment) -> str:
+    return " or ".join(experiment.signals)
 
 
-def _study(one: Study) -> Object:
-    return {**_in_short(one), "options": option_rows(one.options, one.defaults),
+def _study(study: Study) -> Object:
+    return {**_in_short(study), "options": option_rows(study.options, study.defaults),
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
 
 
-def _set(one: Set) -> Object:
-    return {**_in_short(one), "source": one.source,
-            "parameters": option_rows(one.parameter_class, one.parameters()),
+def _set(cited: Set) -> Object:
+    return {**_in_short(cited), "source": cited.source,
+            "parameters": option_rows(cited.parameter_class, cited.parameters()),
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
 
 
-def _stimulus(one: StimulusKind) -> Object:
-    return {"summary": one.summary, "parameters": option_rows(one.parameter_class, None)}
+def _stimulus(stimulus: StimulusKind) -> Object:
+    return {"summary": stimulus.summary, "parameters": option_rows(stimulus.parameter_class, None)}
 
 
-def _in_short(one: Any) -> Object:
-    return {"summary": one.summary, "assembly": one.assembly}
+def _in_short(entry: Any) -> Object:
+    return {"summary": entry.summary, "assembly": entry.assembly}

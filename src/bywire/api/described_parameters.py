@@ -16,35 +16,35 @@ Object = dict[str, Any]
 
 def parameters() -> Mapping[str, tuple[str, ...]]:
     """Return the assemblies of every parameter by dotted name."""
-    found: dict[str, tuple[str, ...]] = {}
+    holders: dict[str, tuple[str, ...]] = {}
     for assembly in sorted({e.assembly for e in PARAMETER_SETS.all().values()}):
         for name in field_notes(PARAMETER_SETS.find(main_set(assembly)).parameter_class):
-            found[name] = (*found.get(name, ()), assembly)
-    return found
+            holders[name] = (*holders.get(name, ()), assembly)
+    return holders
 
 
 def groups() -> Mapping[str, tuple[str, ...]]:
     """Return the assemblies of every group of parameters, such as ``motor``, by name."""
-    found: dict[str, tuple[str, ...]] = {}
+    holders: dict[str, tuple[str, ...]] = {}
     for name, assemblies in parameters().items():
         group = name.rpartition(".")[0]
         if group:
-            found[group] = tuple(dict.fromkeys((*found.get(group, ()), *assemblies)))
-    return found
+            holders[group] = tuple(dict.fromkeys((*holders.get(group, ()), *assemblies)))
+    return holders
 
 
 def described_parameter(name: str) -> Object:
     """Return unit, range and meaning of a parameter, and its value in every set."""
     assemblies, values = parameters()[name], []
-    told: dict[str, list[str]] = {"meaning": [], "unit": [], "range": []}
-    for one in PARAMETER_SETS.all().values():
-        if one.assembly in assemblies:
-            rows = option_rows(one.parameter_class, one.parameters())
+    descriptions: dict[str, list[str]] = {"meaning": [], "unit": [], "range": []}
+    for cited in PARAMETER_SETS.all().values():
+        if cited.assembly in assemblies:
+            rows = option_rows(cited.parameter_class, cited.parameters())
             (row,) = (row for row in rows if row["name"] == name)
-            values.append({"parameter set": one.name, "value": row["value"]})
-            for key, texts in told.items():
+            values.append({"parameter set": cited.name, "value": row["value"]})
+            for key, texts in descriptions.items():
                 texts += [] if row[key] in texts else [row[key]]
-    said = {key: " or ".join(filter(None, texts)) for key, texts in told.items()}
+    said = {key: " or ".join(filter(None, texts)) for key, texts in descriptions.items()}
     return {
         "summary": said["meaning"], "assembly": ", ".join(assemblies), "unit": said["unit"],
         "range": said["range"], "values": values, "see": f"changed with --set {name}=VALUE",
@@ -56,9 +56,9 @@ def described_group(name: str) -> Object:
     assemblies = groups()[name]
     rows, sets = [], []
     for assembly in assemblies:
-        one = PARAMETER_SETS.find(main_set(assembly))
-        sets.append(one.name)
-        new = [row for row in option_rows(one.parameter_class, one.parameters())
+        cited = PARAMETER_SETS.find(main_set(assembly))
+        sets.append(cited.name)
+        new = [row for row in option_rows(cited.parameter_class, cited.parameters())
                if row["name"].rpartition(".")[0] == name]  # fmt: skip
         if len(assemblies) > 1:
             new = [{**row, "meaning": f"{row['meaning']} ({assembly})".strip()} for row in new]

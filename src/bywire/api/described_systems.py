@@ -24,14 +24,14 @@ Object = dict[str, Any]
 
 def signals() -> Mapping[str, Sequence[Object]]:
     """Return every signal of a system by name: in which systems, with unit, meaning and place."""
-    found: dict[str, list[Object]] = {}
+    places: dict[str, list[Object]] = {}
     for system, model in ASSEMBLIES.all().items():
         for name, signal, where in merged_signals(places_of(model).items()):
-            found.setdefault(name, []).append({
+            places.setdefault(name, []).append({
                 "system": system, "unit": display_unit(signal.unit), "meaning": signal.label,
                 "where": ", ".join(where),
             })  # fmt: skip
-    return found
+    return places
 
 
 def described_system(model: type[Any]) -> Object:
@@ -47,7 +47,7 @@ def described_system(model: type[Any]) -> Object:
         for name, signal, where in merged_signals(places_of(model).items())
     ]  # fmt: skip
     there = {
-        kind: ", ".join(n for n, one in known.items() if one.assembly == model.name)
+        kind: ", ".join(n for n, entry in known.items() if entry.assembly == model.name)
         for kind, known in kinds.items()
     }
     # The class says what it is for; what it is stands at the head of its file.
@@ -58,15 +58,17 @@ def described_system(model: type[Any]) -> Object:
             "see": shown if there["parameter sets"] else ""}  # fmt: skip
 
 
-def described_drive(one: Experiment) -> Object:
+def described_drive(experiment: Experiment) -> Object:
     """Return which signals an experiment drives, of which systems."""
-    if one.driven_unit is not None:
-        row = {"signal": "[stimulus]", "unit": display_unit(one.driven_unit(one.defaults)),
-               "meaning": "what this section of the bench file gives", "system": one.assembly}
-        return {"drives": [row], "see": _recorded([one.assembly])}  # fmt: skip
-    par = PARAMETER_SETS.find(main_set(one.assembly)).parameters()
+    if experiment.driven_unit is not None:
+        unit = display_unit(experiment.driven_unit(experiment.defaults))
+        row = {"signal": "[stimulus]", "unit": unit,
+               "meaning": "what this section of the bench file gives",
+               "system": experiment.assembly}
+        return {"drives": [row], "see": _recorded([experiment.assembly])}  # fmt: skip
+    par = PARAMETER_SETS.find(main_set(experiment.assembly)).parameters()
     rows: dict[tuple[str, str], Object] = {}
-    for case in (one.preview or one.cases)(par, one.defaults, None):
+    for case in (experiment.preview or experiment.cases)(par, experiment.defaults, None):
         for name, unit, label in _driven(case):
             key = name, case.model.name
             rows[key] = {"signal": name, "unit": unit, "meaning": label, "system": key[1]}
@@ -108,8 +110,8 @@ def described_loop(loop: Loop) -> Object:
 def described_plant(plant: Plant) -> Object:
     """Return a plant with its inputs, outputs and states."""
     model = plant.model(PARAMETER_SETS.find(main_set(plant.assembly)).parameters(), plant.usual)
-    own = places_of(ASSEMBLIES.all()[plant.assembly]).items()
-    meaning = {name: signal.label for name, signal, _ in merged_signals(own)}
+    places = places_of(ASSEMBLIES.all()[plant.assembly]).items()
+    meaning = {name: signal.label for name, signal, _ in merged_signals(places)}
     parts = (
         ("input", model.inputs, model.input_units), ("output", model.outputs, model.output_units),
         ("state", model.states, model.state_units),

@@ -128,7 +128,7 @@ class DesignAnswer(Answer):
                 Section("Requirements", [required]),
                 Section("Result", _blocks(parts)),
                 Section("Figures", self._figures()),
-                self.case.subject.made("Parameters as they were before the design."),
+                self.case.subject.provenance("Parameters as they were before the design."),
             ],
             brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
             data=self.data(),
@@ -194,14 +194,14 @@ class DesignAnswer(Answer):
 
 @dataclass(frozen=True)
 class LoopDesign(DesignAnswer):
-    """Gains of a loop from requirements; ``found`` is the linear design."""
+    """Gains of a loop from requirements; ``designed`` is the linear design."""
 
-    found: Design
+    designed: Design
 
     @property
     def linear(self) -> Design:
         """The design on the linear model."""
-        return self.found
+        return self.designed
 
     @property
     def points(self) -> str:
@@ -210,39 +210,39 @@ class LoopDesign(DesignAnswer):
 
     def parts(self) -> Sequence[Part]:
         """Return tables and sentences of the result."""
-        return design_parts.as_parts(self.case, self.requirements, self.found, self.tried)
+        return design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data."""
-        return design_parts.as_object(self.case, self.requirements, self.found, self.tried)
+        return design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
 
 
 @dataclass(frozen=True)
 class LoopScheduleDesign(DesignAnswer):
     """Gains of a loop by region; ``retuned`` is the loop across the regions with the bench's."""
 
-    found: ScheduleDesign
+    designed: ScheduleDesign
     retuned: tuple[Across, ...]
 
     @property
     def linear(self) -> ScheduleDesign:
         """The design on the linear model."""
-        return self.found
+        return self.designed
 
     @property
     def points(self) -> str:
         """The operating points in words."""
         unit = self.case.loop.at.unit
-        return ", ".join(shown(v, unit) for values in self.found.points.values() for v in values)
+        return ", ".join(shown(v, unit) for values in self.designed.points.values() for v in values)
 
     def parts(self) -> Sequence[Part]:
         """Return tables and sentences of the result."""
-        return schedule_parts.as_parts(self.case, self.found, self.tried, self.retuned)
+        return schedule_parts.as_parts(self.case, self.designed, self.tried, self.retuned)
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data."""
         return schedule_parts.as_object(
-            self.case, self.requirements, self.found, self.tried, self.retuned
+            self.case, self.requirements, self.designed, self.tried, self.retuned
         )
 
 
@@ -304,10 +304,10 @@ def design(
     trial = None if linear_only else trial_of(case, overrides, amplitudes)
     start = {name: case.par.leaves()[name] for name in tunables}
     tried = None
-    found = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
-    if trial is not None and found.status == "met":
-        tried = verify(found.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
-    return LoopDesign(case, overrides, wanted, tried, found)
+    designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
+    if trial is not None and designed.status == "met":
+        tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
+    return LoopDesign(case, overrides, wanted, tried, designed)
 
 
 def _scheduled(
@@ -335,16 +335,16 @@ def _scheduled(
     ranges = dict(over_range(text, case)[::2] for text in over)
     trial = None if amplitudes is None else trial_of(case, overrides, amplitudes)
     tried = None
-    found = design_schedule(
+    designed = design_schedule(
         loop, case.par, wanted, points, tunables, over=ranges, seed=seed, progress=progress
     )
-    if trial is not None and found.status == "met":
-        tried = verify_schedule(found, wanted, tunables, trial, seed=seed, progress=progress)
+    if trial is not None and designed.status == "met":
+        tried = verify_schedule(designed, wanted, tunables, trial, seed=seed, progress=progress)
     retuned: tuple[Across, ...] = ()
     if tried is not None and tried.tuning is not None:
         every = [value for values in points.values() for value in values]
         retuned = frozen(loop, case.par, every, tried.final.gains, wanted)
-    return LoopScheduleDesign(case, overrides, wanted, tried, found, retuned)
+    return LoopScheduleDesign(case, overrides, wanted, tried, designed, retuned)
 
 
 def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:

@@ -22,7 +22,7 @@ def requirements_of(file: str | Path | None, texts: Sequence[str]) -> tuple[Requ
 
 
 def left_to_choose(
-    loop: str, own: Spans, changes: Mapping[str, Any]
+    loop: str, spans: Spans, changes: Mapping[str, Any]
 ) -> dict[str, tuple[float, float]]:
     """Return what may be chosen: what the user has set stays.
 
@@ -31,11 +31,13 @@ def left_to_choose(
     ParameterError
         When nothing is left.
     """
-    if not own:
+    if not spans:
         raise ParameterError(f"loop {loop!r} has no gains to design")
-    left = {name: span for name, span in own.items() if name not in changes}
+    left = {name: span for name, span in spans.items() if name not in changes}
     if not left:
-        raise ParameterError(f"--set fixes all of {', '.join(own)}: leave out what is to be chosen")
+        raise ParameterError(
+            f"--set fixes all of {', '.join(spans)}: leave out what is to be chosen"
+        )
     return left
 
 
@@ -64,12 +66,12 @@ def _from_file(path: Path | None) -> list[str]:
         raise ParameterError(
             f'{path}: a section [requirements] is wanted, with lines such as bandwidth = ">= 10 Hz"'
         )
-    found = []
+    wanted = []
     for figure, limits in section.items():
         for limit in limits if isinstance(limits, list) else [limits]:
             if not isinstance(limit, str):
                 raise ParameterError(
                     f'{path}: {figure} = {limit}: write a text such as ">= 10 Hz"'
                 )
-            found.append(f"{figure} {limit}")
-    return found
+            wanted.append(f"{figure} {limit}")
+    return wanted

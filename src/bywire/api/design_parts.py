@@ -23,35 +23,35 @@ from bywire.synthesis.verification import Verification
 def as_object(
     case: LoopCase,
     requirements: Sequence[Requirement],
-    found: Design,
+    design: Design,
     tried: Verification | None,
 ) -> dict[str, Any]:
     """Return everything as plain data."""
-    final = found.gains if tried is None else tried.final.gains
+    final = design.gains if tried is None else tried.final.gains
     return {
         "loop": case.loop.name,
         "parameters": case.name,
         "operating_point": {case.loop.at.name: case.value, "unit": case.loop.at.unit},
-        "requirements": [one.text for one in requirements],
-        "status": found.status,
+        "requirements": [requirement.text for requirement in requirements],
+        "status": design.status,
         "gains": dict(final),
         "gain_units": {name: unit_of(case, name) for name in final},
         "linear": {
-            "gains": dict(found.gains),
+            "gains": dict(design.gains),
             "units": {name: kind.unit for name, kind in FIGURES.items()},
-            "nominal": dict(found.nominal),
-            "worst": {k: {"value": v, "at": at} for k, (v, at) in found.worst.items()},
-            "slack": found.slack,
-            "kept": [one.text for one in found.kept],
+            "nominal": dict(design.nominal),
+            "worst": {k: {"value": v, "at": at} for k, (v, at) in design.worst.items()},
+            "slack": design.slack,
+            "kept": [requirement.text for requirement in design.kept],
             "binding": [
-                {"requirement": one.requirement.text, "at": one.case,
-                 "value": one.value, "slack": one.slack}
-                for one in found.binding
+                {"requirement": binding.requirement.text, "at": binding.case,
+                 "value": binding.value, "slack": binding.slack}
+                for binding in design.binding
             ],
             "conflicts": [
-                {"requirement": one.wanted.text, "best": one.best, "with": one.kept.text,
-                 "excluded": one.excludes}
-                for one in found.conflicts
+                {"requirement": conflict.wanted.text, "best": conflict.best,
+                 "with": conflict.kept.text, "excluded": conflict.excludes}
+                for conflict in design.conflicts
             ],
         },
         "bench": None if tried is None else verification_object(case, tried),
@@ -61,54 +61,55 @@ def as_object(
 def as_parts(
     case: LoopCase,
     requirements: Sequence[Requirement],
-    found: Design,
+    design: Design,
     tried: Verification | None,
 ) -> list[Part]:
     """Return what a person wants to know, in tables and sentences."""
     at = case.loop.at
     point = f"{at.name} = {amount(case.value, at.unit)}"
     parts: list[Part] = [
-        f"loop {case.loop.name} of {case.name} at {point}: linear design {found.status}"
+        f"loop {case.loop.name} of {case.name} at {point}: linear design {design.status}"
     ]
-    final = found.gains if tried is None else tried.final.gains
+    final = design.gains if tried is None else tried.final.gains
     heading = ["gain", "linear design"]
-    rows = [[name, gain_text(case, name, value)] for name, value in found.gains.items()]
+    rows = [[name, gain_text(case, name, value)] for name, value in design.gains.items()]
     if tried is not None and tried.tuning is not None:
         heading.append("retuned on the bench")
         rows = [[*row, gain_text(case, row[0], final[row[0]])] for row in rows]
     parts.append(text_table(heading, rows))
-    wanted = {one.figure: one.text for one in (*requirements, *found.kept)}
+    wanted = {requirement.figure: requirement.text for requirement in (*requirements, *design.kept)}
     figures = [
         [
             name,
-            figure_text(name, found.nominal[name]),
-            figure_text(name, found.worst[name][0]),
-            found.worst[name][1],
+            figure_text(name, design.nominal[name]),
+            figure_text(name, design.worst[name][0]),
+            design.worst[name][1],
             wanted.get(name, "").removeprefix(name).strip(),
         ]
         for name in FIGURES
     ]
     parts.append(text_table(["linear", "nominal", "worst", "at", "wanted"], figures))
-    parts += kept_lines(found)
+    parts += kept_lines(design)
     parts += [
-        f"{'binds' if found.binds else 'tightest'}: {one.requirement.text}, "
-        f"{figure_text(one.requirement.figure, one.value)} at {one.case}"
-        for one in found.binding
+        f"{'binds' if design.binds else 'tightest'}: {binding.requirement.text}, "
+        f"{figure_text(binding.requirement.figure, binding.value)} at {binding.case}"
+        for binding in design.binding
     ]
     parts += [
-        f"{one.wanted.text}: at best {amount(one.best, one.wanted.unit, 3)} with {one.kept.text}"
-        for one in found.conflicts
+        f"{conflict.wanted.text}: at best {amount(conflict.best, conflict.wanted.unit, 3)} "
+        f"with {conflict.kept.text}"
+        for conflict in design.conflicts
     ]
     if tried is not None:
-        parts += verification_parts(case, found.nominal, tried)
+        parts += verification_parts(case, design.nominal, tried)
     return parts
 
 
-def kept_lines(found: Design) -> list[str]:
+def kept_lines(design: Design) -> list[str]:
     """Return what is kept besides the requirements, a sentence or none."""
-    if not found.kept:
+    if not design.kept:
         return []
-    texts = ", ".join(one.text for one in found.kept)
+    texts = ", ".join(requirement.text for requirement in design.kept)
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 

@@ -68,8 +68,8 @@ def remove(out: Path, keep: Sequence[Path]) -> None:
     kept = {path.resolve() for path in keep}
     # Names alone, within the folder: it may have moved since. The list itself goes last.
     names = [Path(str(text)).name for text in earlier.get("files", [])]
-    own = [out / name for name in names if Path(name).suffix in _OURS]
-    for path in (*own, out / ESTIMATE):
+    written = [out / name for name in names if Path(name).suffix in _OURS]
+    for path in (*written, out / ESTIMATE):
         if path.resolve() not in kept:
             _unlink(path)
 
@@ -90,11 +90,11 @@ def _read(path: Path) -> dict[str, Any] | None:
     if not path.exists():
         return None
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
-        if not (isinstance(found, dict) and isinstance(found.get("files", []), list)):
+        earlier = json.loads(path.read_text(encoding="utf-8"))
+        if not (isinstance(earlier, dict) and isinstance(earlier.get("files", []), list)):
             raise ValueError("it is no result of bywire identify")
     except (OSError, ValueError) as error:
         raise FileError(
             f"{path} cannot be read ({error}): name another folder with --out, or remove it"
         ) from None
-    return found
+    return earlier

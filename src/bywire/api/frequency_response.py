@@ -99,9 +99,9 @@ class FrequencyResponse(Answer):
 
     def document(self) -> Document:
         """Return gain and phase, bandwidths by amplitude, and the Bode plot."""
-        loop, found = self.case.loop, self.data
+        loop, response = self.case.loop, self.data
         table = TableBlock(
-            _table(found, self.linear, self.unit), "Gain and phase by frequency and amplitude."
+            _table(response, self.linear, self.unit), "Gain and phase by frequency and amplitude."
         )
         heed = [self.note, *self.warnings] if self.note else self.warnings
         listing: list[Block] = [Listing(heed)] if heed else []
@@ -110,7 +110,7 @@ class FrequencyResponse(Answer):
             "Closed loop: the exact linear response without friction, and the nonlinear ones.",
             f"{loop.name}-frequency-response",
         )
-        method = f"Excitation: {found.attrs['excitation']}. {purity(found)}."
+        method = f"Excitation: {response.attrs['excitation']}. {purity(response)}."
         return Document(
             f"Frequency response of loop {loop.name}",
             self.case.subject.line,
@@ -118,28 +118,28 @@ class FrequencyResponse(Answer):
                 Section("Response", [*listing, bode]),
                 Section("Bandwidth by amplitude", self._bandwidths()),
                 Section("Numbers", [table]),
-                self.case.subject.made(method),
+                self.case.subject.provenance(method),
             ],
             brief=self._brief(table),
             data=self._data(),
             attachments=[
-                recording_file(f"{loop.name}-frequency-response.nc", found)
+                recording_file(f"{loop.name}-frequency-response.nc", response)
             ],
             heed=[self.note] if self.note else [],
         )
 
     def _brief(self, table: TableBlock) -> list[str | Flat]:
-        case, found = self.case, self.data
+        case, response = self.case, self.data
         head = f"closed loop {case.loop.name} of {case.name} at {case.point}"
         if self.range[0]:
-            over = TableBlock(over_table(found, self.variants, self.range, self.unit))
-            worst = worst_line(found, self.variants, self.range, self.unit)
+            over = TableBlock(over_table(response, self.variants, self.range, self.unit))
+            worst = worst_line(response, self.variants, self.range, self.unit)
             return [f"{head}: bandwidth (-3 dB) by amplitude", over, worst]
-        excitation = found.attrs["excitation"]
+        excitation = response.attrs["excitation"]
         peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
         return [
             f"{head}: gain and phase by amplitude", *(peaks if excitation != "sine" else []),
-            table, purity(found), "", TableBlock(figures_table(found, self.unit)), NOTE,
+            table, purity(response), "", TableBlock(figures_table(response, self.unit)), NOTE,
         ]  # fmt: skip
 
     def _bandwidths(self) -> list[Block]:
@@ -165,11 +165,11 @@ class FrequencyResponse(Answer):
     def _bode(self) -> Figure:
         from bywire.report.bode import Response, bode
 
-        found = self.data
-        f = found["frequency"].values
+        response = self.data
+        f = response["frequency"].values
         lines = [Response(f"linear, without friction{self._first(', ')}", f, self.linear)]
-        for k, size in enumerate(found["amplitude"].values):
-            at = found.isel(variant=0, amplitude=k)
+        for k, size in enumerate(response["amplitude"].values):
+            at = response.isel(variant=0, amplitude=k)
             value = at["gain"].values * np.exp(1j * np.radians(at["phase"].values))
             label = f"amplitude {amount(float(size), self.unit, 3)}"
             lines.append(Response(label, f, value, measured=True))
@@ -181,24 +181,24 @@ class FrequencyResponse(Answer):
         return bandwidth_range(self.data, [v.label for v in self.variants], *self.range)
 
     def _data(self) -> dict[str, Any]:
-        found, loop = self.data, self.case.loop
-        names = [str(name) for name in found if found[name].ndim == 3]
+        response, loop = self.data, self.case.loop
+        names = [str(name) for name in response if response[name].ndim == 3]
         shown = {
             **self.case.heading,
-            "excitation": found.attrs["excitation"],
+            "excitation": response.attrs["excitation"],
             "inputs": list(loop.inputs),
             "output": loop.output,
-            "frequency": found["frequency"].values.tolist(),
-            "amplitude": found["amplitude"].values.tolist(),
-            **{name: found[name].values[0].tolist() for name in names},
+            "frequency": response["frequency"].values.tolist(),
+            "amplitude": response["amplitude"].values.tolist(),
+            **{name: response[name].values[0].tolist() for name in names},
             "linear": {
                 "gain": np.abs(self.linear).tolist(),
                 "phase": np.degrees(np.unwrap(np.angle(self.linear))).tolist(),
             },
-            "figures": figures_object(found, 0),
+            "figures": figures_object(response, 0),
         }
         if self.range[0]:
-            shown |= over_object(found, self.variants, self.range[0])
+            shown |= over_object(response, self.variants, self.range[0])
         return shown
 
 
@@ -251,11 +251,11 @@ def frequency_response(
         case.loop.inputs, case.loop.output, wanted, sizes, flags=flags,
         whole=case.loop.whole(point.par), saturations=case.loop.saturations,
     )  # fmt: skip
-    found = _measured(variants, sweep, excitation, progress or silent)
-    found = with_widths(found, widths(variants, found))
-    linear = variants[0].linear(found["frequency"].values)
+    response = _measured(variants, sweep, excitation, progress or silent)
+    response = with_widths(response, widths(variants, response))
+    linear = variants[0].linear(response["frequency"].values)
     return FrequencyResponse(
-        case, found, linear, tuple(variants), varied, unit, note, sweep.tolerance
+        case, response, linear, tuple(variants), varied, unit, note, sweep.tolerance
     )
 
 
@@ -309,23 +309,23 @@ def _measured(
     """Return the response of all cases, each around its own operating point."""
     points = [variant.point.run() for variant in variants]
     if excitation == "sine":
-        found = by_sines.frequency_response(points[0], sweep, progress, points=points)
-        return found.assign_attrs(excitation=excitation)
+        response = by_sines.frequency_response(points[0], sweep, progress, points=points)
+        return response.assign_attrs(excitation=excitation)
     kind = Broadband(cast(Any, excitation))
     return broadband_response(points[0], sweep, kind, progress, points=points)
 
 
-def _table(found: xr.Dataset, linear: Any, unit: str) -> Table:
+def _table(response: xr.Dataset, linear: Any, unit: str) -> Table:
 
-    sizes = found["amplitude"].values
+    sizes = response["amplitude"].values
     heading = ["frequency", "linear"]
     heading += [amount(float(size), unit, 3) for size in sizes]
     rows = []
     phases = np.degrees(np.unwrap(np.angle(linear)))
-    for k, f in enumerate(found["frequency"].values):
+    for k, f in enumerate(response["frequency"].values):
         row = [amount(float(f), "Hz", 4), _cell(float(np.abs(linear[k])), float(phases[k]))]
         for j in range(len(sizes)):
-            at = found.isel(variant=0, amplitude=j, frequency=k)
+            at = response.isel(variant=0, amplitude=j, frequency=k)
             row.append(_cell(float(at["gain"]), float(at["phase"])))
         rows.append(row)
     return text_table(heading, rows)

@@ -215,7 +215,7 @@ class Identification(Answer):
         chosen = Details("Options of the method", [TableBlock(parameter_table(rows))])
         if subject is None:
             return Section("How it was made", [Paragraph(method.summary), chosen])
-        section = subject.made(f"Method {method.name}: {method.summary}.")
+        section = subject.provenance(f"Method {method.name}: {method.summary}.")
         return Section(section.title, [*section.blocks, chosen])
 
     def _banner(self) -> Banner:

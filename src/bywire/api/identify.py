@@ -162,10 +162,10 @@ def identify(
     )  # fmt: skip
 
 
-def far_off(found: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
+def far_off(estimates: Mapping[str, float], before: Mapping[str, float]) -> list[str]:
     """Return a note for every parameter that is far from what it was, as by a wrong unit."""
     notes = []
-    for name, value in found.items():
+    for name, value in estimates.items():
         known = before.get(name, 0.0)
         ratio = abs(value / known) if known else 1.0
         if ratio > _FAR or ratio * _FAR < 1.0:

@@ -62,15 +62,15 @@ def state_space(model: LinearModel) -> dict[str, Any]:
 
 def transfers(model: LinearModel) -> list[dict[str, Any]]:
     """Return zeros, poles and factor of every path of a model."""
-    found = []
+    rows = []
     for output in model.outputs:
         for input in model.inputs:
             path = model.transfer(input, output)
-            found.append({
+            rows.append({
                 "input": input, "output": output, "unit": path.unit, "factor": path.factor,
                 "zeros": pairs(path.zeros), "poles": pairs(path.poles),
             })  # fmt: skip
-    return found
+    return rows
 
 
 def pairs(values: Any) -> list[list[float]]:
@@ -117,22 +117,22 @@ def _is_number(text: str) -> bool:
     return True
 
 
-def reduced_object(found: Reduced) -> dict[str, Any]:
+def reduced_object(reduced: Reduced) -> dict[str, Any]:
     """Return the JSON object of a reduced model."""
     return {
-        **matrices(found.model),
-        "order": len(found.model.states),
-        "kept": found.kept,
-        "hankel": found.hankel.tolist(),
-        "bound": found.bound.tolist(),
-        "error": error_object(found.error),
+        **matrices(reduced.model),
+        "order": len(reduced.model.states),
+        "kept": reduced.kept,
+        "hankel": reduced.hankel.tolist(),
+        "bound": reduced.bound.tolist(),
+        "error": error_object(reduced.error),
     }
 
 
-def reduced_line(found: Reduced) -> str:
+def reduced_line(reduced: Reduced) -> str:
     """Return order and error of a reduced model as a line."""
-    kept = f", {found.kept} of them kept as they are not stable" if found.kept else ""
-    return f"reduced to {len(found.model.states)} states{kept}; {error_line(found.error)}"
+    kept = f", {reduced.kept} of them kept as they are not stable" if reduced.kept else ""
+    return f"reduced to {len(reduced.model.states)} states{kept}; {error_line(reduced.error)}"
 
 
 def error_object(error: ReductionError) -> dict[str, Any]:
@@ -163,30 +163,30 @@ def _percent(share: float) -> str:
     return amount(100.0 * share, "percent", 2)
 
 
-def locus_object(found: Locus) -> dict[str, Any]:
+def locus_object(locus: Locus) -> dict[str, Any]:
     """Return values, poles by value [real, imaginary], and where stability changes."""
     return {
-        "over": found.name,
-        "unit": found.unit,
-        "values": found.values.tolist(),
-        "period": found.period,
-        "poles": [pairs(row) for row in found.poles],
-        "stable": [bool(stable) for stable in found.stable],
+        "over": locus.name,
+        "unit": locus.unit,
+        "values": locus.values.tolist(),
+        "period": locus.period,
+        "poles": [pairs(row) for row in locus.poles],
+        "stable": [bool(stable) for stable in locus.stable],
         "borders": [
             {"value": b.value, "rate": [b.rate.real, b.rate.imag], "stable_above": b.above}
-            for b in found.borders
+            for b in locus.borders
         ],
     }
 
 
-def locus_lines(found: Locus) -> list[str]:
+def locus_lines(locus: Locus) -> list[str]:
     """Return where over its range a loop is stable, a text each."""
     from bywire.report.root_locus import border_text
 
-    if not found.borders:
-        state = "stable" if found.stable.all() else "unstable"
-        return [f"{state} at all {len(found.values)} values"]
-    return [border_text(border, found.name, found.unit) for border in found.borders]
+    if not locus.borders:
+        state = "stable" if locus.stable.all() else "unstable"
+        return [f"{state} at all {len(locus.values)} values"]
+    return [border_text(border, locus.name, locus.unit) for border in locus.borders]
 
 
 def dithered_object(model: PeriodicModel) -> dict[str, Any]:

@@ -87,7 +87,7 @@ class LinearizedLoop(Answer):
             sections=lambda: [
                 Section("Poles", [*poles, *self._dithered_blocks(), *over]),
                 Section("Figures", self._figures()),
-                self.case.subject.made(
+                self.case.subject.provenance(
                     f"Exact linear model, sampled with {model.period * 1e3:g} ms: plant, filters "
                     "and controllers, dry friction left out."
                 ),
@@ -98,8 +98,8 @@ class LinearizedLoop(Answer):
             attachments=self._attachments(),
         )
 
-    def _locus_listing(self, found: Locus) -> Listing:
-        return Listing(texts.locus_lines(found), f"over {found.name}:")
+    def _locus_listing(self, locus: Locus) -> Listing:
+        return Listing(texts.locus_lines(locus), f"over {locus.name}:")
 
     def _brief_reduced(self) -> list[str | Flat]:
         if self.reduced is None:
@@ -142,15 +142,15 @@ class LinearizedLoop(Answer):
             blocks.append(FigureBlock(draw, caption, f"{name}-locus"))
         return blocks
 
-    def _draw_locus(self, found: Locus) -> Figure:
+    def _draw_locus(self, locus: Locus) -> Figure:
         from bywire.report.root_locus import root_locus
 
         case = self.case
-        ends = (float(found.values[0]), float(found.values[-1]))
-        cases = case.loop.varied(case.par, case.value, found.name, ends)
+        ends = (float(locus.values[0]), float(locus.values[-1]))
+        cases = case.loop.varied(case.par, case.value, locus.name, ends)
         models = [self.model, *(case.loop.closed(*each) for each in cases)]
         widths = [closed_bandwidth(model) for model in models if model.is_stable]
-        return root_locus(found, max(widths, default=math.nan))
+        return root_locus(locus, max(widths, default=math.nan))
 
     def _attachments(self) -> list[Attachment]:
         name = self.case.loop.name

@@ -146,7 +146,7 @@ class LinearizedPlant(Answer):
         return [
             Section("Poles", poles),
             Section("Figures", figures or [Paragraph("No output answers the first input.")]),
-            case.subject.made(_MADE),
+            case.subject.provenance(_MADE),
         ]
 
     def _data(self) -> dict[str, Any]:
@@ -194,7 +194,7 @@ class PlantLocus(Answer):
             sections=lambda: [
                 Section(f"Stability over {self.locus.name}", [listing]),
                 Section("Figures", [figure]),
-                case.subject.made(_MADE),
+                case.subject.provenance(_MADE),
             ],
             brief=[head, listing],
             data=data,
@@ -306,7 +306,7 @@ def _friction(friction: str, speed: str) -> tuple[Friction, float]:
     return kind, omega
 
 
-def _draw_locus(found: Locus) -> Figure:
+def _draw_locus(locus: Locus) -> Figure:
     from bywire.report.root_locus import root_locus
 
-    return root_locus(found, math.nan)
+    return root_locus(locus, math.nan)

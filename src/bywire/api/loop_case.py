@@ -105,9 +105,9 @@ def loop_case(
         For names that are unknown, values out of range, and sets of another brake.
     """
     loop = LOOPS.find(name)
-    own, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
+    name, par = parameters_for(f"loop {loop.name!r}", loop.assembly, parameters, changes)
     value = number(at, loop.at.unit, loop.at.name) if at else loop.at.default
-    return LoopCase(loop, own, par, value)
+    return LoopCase(loop, name, par, value)
 
 
 def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> list[float]:

@@ -100,14 +100,16 @@ class Margins(Answer):
         ]  # fmt: skip
         head = f"loop {loop.name} of {self.case.name} at {self.case.point}, cut at {loop.cut}"
         worst_line = ["worst: " + "; ".join(texts)] if self.name else []
-        made = self.case.subject.made(f"Exact linear model of the sampled loop, cut at {loop.cut}.")
+        provenance = self.case.subject.provenance(
+            f"Exact linear model of the sampled loop, cut at {loop.cut}."
+        )
         return Document(
             f"Margins of loop {loop.name}",
             self.case.subject.line,
             sections=[
                 Section("Margins", [*worst_of, table, Paragraph(LEGEND)]),
                 Section("Figures", figures),
-                made,
+                provenance,
             ],
             brief=[head, table, *worst_line, Paragraph(LEGEND)],
             data=self._data(),
@@ -179,13 +181,13 @@ def margins(
 
 
 def margins_table(
-    found: Sequence[LoopMargins], name: str = "", unit: str = "1", values: Sequence[float] = ()
+    margins_at: Sequence[LoopMargins], name: str = "", unit: str = "1", values: Sequence[float] = ()
 ) -> Table:
     """Return the table, with the values of the parameter that is varied in the first column.
 
     Parameters
     ----------
-    found
+    margins_at
         Margins, one row each.
     name, unit, values
         Parameter, its SI unit and its values; empty where nothing is varied.
@@ -194,7 +196,7 @@ def margins_table(
     rows = [
         (*(_cell(getattr(margins, k), unit, 3) for k, unit in UNITS.items()),
          Cell("yes", value=True) if margins.stable else Cell("NO", "bad", value=False))
-        for margins in found
+        for margins in margins_at
     ]  # fmt: skip
     if name:
         heading = [clean(name), *heading]
@@ -207,16 +209,16 @@ def _cell(value: float, unit: str, digits: int = 4) -> Cell:
 
 
 def worst_texts(
-    found: Sequence[LoopMargins], name: str, unit: str, values: Sequence[float]
+    margins_at: Sequence[LoopMargins], name: str, unit: str, values: Sequence[float]
 ) -> list[str]:
     """Return where the loop is unstable, and the worst of each margin where it is stable."""
-    pairs = list(zip(values, found, strict=True))
+    pairs = list(zip(values, margins_at, strict=True))
     lost = [amount(value, unit) for value, margins in pairs if not margins.stable]
     kept = [(margins, value) for value, margins in pairs if margins.stable]
     texts = []
     if lost:
         where = lost[0] if len(lost) == 1 else f"{lost[0]} to {lost[-1]}"
-        texts.append(f"unstable at {len(lost)} of {len(found)} values of {name} ({where})")
+        texts.append(f"unstable at {len(lost)} of {len(margins_at)} values of {name} ({where})")
     if kept:
         least = worst([margins for margins, _ in kept], [value for _, value in kept])
         texts += [

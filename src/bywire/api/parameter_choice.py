@@ -24,13 +24,13 @@ def set_for(subject: str, assembly: str, name: str) -> CitedSet:
     InputError
         For names that are unknown, and sets of another brake.
     """
-    found = PARAMETER_SETS.find(name or main_set(assembly))
-    if found.assembly != assembly:
+    cited = PARAMETER_SETS.find(name or main_set(assembly))
+    if cited.assembly != assembly:
         raise ParameterError(
-            f"{subject} is for a {assembly}, but parameter set {found.name!r} is for a "
-            f"{found.assembly}"
+            f"{subject} is for a {assembly}, but parameter set {cited.name!r} is for a "
+            f"{cited.assembly}"
         )
-    return found
+    return cited
 
 
 def parameters_for(
@@ -54,6 +54,6 @@ def parameters_for(
     InputError
         For names that are unknown, values out of range, and sets of another brake.
     """
-    found = set_for(subject, assembly, name)
-    base = found.parameters()
-    return found.name, base.replace(parsed(type(base), changes, "parameter"))
+    cited = set_for(subject, assembly, name)
+    base = cited.parameters()
+    return cited.name, base.replace(parsed(type(base), changes, "parameter"))

@@ -111,7 +111,7 @@ class Replay(Answer):
                 Section("How well it fits", [table, Listing(definitions)]),
                 Section("Measured and simulated", self._figures()),
                 *([Section("Tracked parameters", self._track_figures())] if self.tracks else []),
-                subject.made(f"Measurement: {self.source}.",
+                subject.provenance(f"Measurement: {self.source}.",
                              *(f"{note[:1].upper()}{note[1:]}." for note in self.notes)),
             ],
             brief=spaced([head, table, *self._tracked_texts()]),
@@ -152,12 +152,12 @@ class Replay(Answer):
     def _tracked_texts(self) -> Iterator[str]:
         for each in self.tracks:
             data, unit = each.data.isel(parameter=0), each.relation.units[0]
-            told = data.isel(time=data["used"].values > 0)
-            if told.sizes["time"]:
+            updated = data.isel(time=data["used"].values > 0)
+            if updated.sizes["time"]:
                 first, last = (
-                    f"{amount(float(told['value'][k]), unit)} "
-                    f"({amount(float(told['low'][k]), unit)} "
-                    f"to {amount(float(told['high'][k]), unit)})"
+                    f"{amount(float(updated['value'][k]), unit)} "
+                    f"({amount(float(updated['low'][k]), unit)} "
+                    f"to {amount(float(updated['high'][k]), unit)})"
                     for k in (0, -1)
                 )
                 yield f"{each.relation.parameter} tracked: at first {first}, at last {last}"

@@ -13,13 +13,13 @@ from bywire.report.wording import amount
 
 
 def response_warnings(
-    found: xr.Dataset, variants: Sequence[Variant], unit: str, tolerance: float
+    response: xr.Dataset, variants: Sequence[Variant], unit: str, tolerance: float
 ) -> list[str]:
     """Return what left the brake's range, what stuck, and what never repeated.
 
     Parameters
     ----------
-    found
+    response
         Response.
     variants
         Its cases.
@@ -29,40 +29,41 @@ def response_warnings(
         Share within which a window had to repeat the one before.
     """
     texts = []
-    for k, size in enumerate(found["amplitude"].values):
-        row = found.isel(amplitude=k)
+    for k, size in enumerate(response["amplitude"].values):
+        row = response.isel(amplitude=k)
         label = f"amplitude {amount(float(size), unit, 3)}"
         reasons = (leaving(case.loop, case.par, case.value, float(size)) for case in variants)
         if reason := next(filter(None, reasons), ""):
             texts.append(f"{label}: it asks for set points out of the brake's range: {reason}")
         still, restless = np.isnan(row["gain"].values), row["settled"].values == 0
         if still.any():
-            texts.append(f"{label}: the output sticks at {_cases(found, still)}: no gain")
+            texts.append(f"{label}: the output sticks at {_cases(response, still)}: no gain")
         shaken = restless & ~still
         if shaken.any():
             scatter = float(np.nanmax(row["scatter"].values[shaken]))
+            cases = _cases(response, shaken)
             texts.append(
                 f"{label}: no window repeats the one before within {100 * tolerance:g} % at "
-                f"{_cases(found, shaken)} (a limit cycle, a drift, or the encoder's resolution): "
-                f"shown are means of the last windows; their root mean square distance from the "
+                f"{cases} (a limit cycle, a drift, or the encoder's resolution): "
+                "shown are means of the last windows; their root mean square distance from the "
                 f"mean is up to {amount(100 * scatter, 'percent', 2)}"
             )
-    if found["unsettled_substeps"].values.any():
+    if response["unsettled_substeps"].values.any():
         texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
     return texts
 
 
-def purity(found: xr.Dataset) -> str:
+def purity(response: xr.Dataset) -> str:
     """Return the least coherence by amplitude, as what the excitation makes of it.
 
     Parameters
     ----------
-    found
+    response
         Response to sines or, then averaged over windows, to all frequencies at once.
     """
-    lowest = found["coherence"].min(dim="frequency").values[0]
+    lowest = response["coherence"].min(dim="frequency").values[0]
     shares = ", ".join("-" if np.isnan(share) else f"{share:.3f}" for share in lowest)
-    if found.attrs["excitation"] == "sine":
+    if response.attrs["excitation"] == "sine":
         return (
             f"least share of the output's power at the sine: {shares} (harmonics, dither and "
             "ripple are the rest)"
@@ -70,7 +71,7 @@ def purity(found: xr.Dataset) -> str:
     return f"lowest coherence of set point and output: {shares}"
 
 
-def _cases(found: xr.Dataset, which: NDArray[np.bool_]) -> str:
+def _cases(response: xr.Dataset, which: NDArray[np.bool_]) -> str:
     count = int(which.sum())
     many = "frequency" if count == 1 else "frequencies"
-    return f"{count} {many}" + (" of all cases" if found.sizes["variant"] > 1 else "")
+    return f"{count} {many}" + (" of all cases" if response.sizes["variant"] > 1 else "")

@@ -62,17 +62,17 @@ class BenchResult(Result, Answer):
 
     def ledgers(self) -> dict[str, Ledger]:
         """Return the books of every run from time zero on, further ones apart, by label."""
-        found = {}
+        ledgers = {}
         for label, recording in self.recordings.items():
             if "E_stored" not in recording or recording["E_stored"].dims != ("time",):
                 continue
             after = recording.sel(time=slice(-1e-9, None))
             if after.sizes["time"] < 2:
                 continue
-            found[label] = actuator_ledger(after)
+            ledgers[label] = actuator_ledger(after)
             further = further_ledgers(after)
-            found |= {f"{label}, {book}": books for book, books in further.items()}
-        return found
+            ledgers |= {f"{label}, {book}": books for book, books in further.items()}
+        return ledgers
 
     def document(self) -> Document:
         """Return key figures, verdicts, figures, energy, and how it was made."""

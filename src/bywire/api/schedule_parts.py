@@ -27,50 +27,50 @@ _SEEN = ("bandwidth", "crossover", "phase_margin", "gain_margin", "disk_margin",
 def as_object(
     case: LoopCase,
     requirements: Sequence[Requirement],
-    found: ScheduleDesign,
+    design: ScheduleDesign,
     tried: Verification | None,
     retuned: Sequence[Across],
 ) -> dict[str, Any]:
     """Return everything as plain data."""
-    final = found.gains if tried is None else tried.final.gains
+    final = design.gains if tried is None else tried.final.gains
     at = case.loop.at
     return {
         "loop": case.loop.name,
         "parameters": case.name,
-        "operating_points": {"unit": at.unit, **{k: list(v) for k, v in found.points.items()}},
+        "operating_points": {"unit": at.unit, **{k: list(v) for k, v in design.points.items()}},
         "borders": {name: case.par.leaves()[name] for name in scheduled(case.loop).borders},
-        "requirements": [one.text for one in requirements],
-        "status": found.status,
+        "requirements": [requirement.text for requirement in requirements],
+        "status": design.status,
         "gains": dict(final),
         "gain_units": {name: unit_of(case, name) for name in final},
         "regions": {
             region: {
-                "status": one.status, "gains": dict(one.gains), "slack": one.slack,
+                "status": regional.status, "gains": dict(regional.gains), "slack": regional.slack,
                 "binding": [
                     {"requirement": b.requirement.text, "at": b.case, "value": b.value,
                      "slack": b.slack}
-                    for b in one.binding
+                    for b in regional.binding
                 ],
             }
-            for region, one in found.regions.items()
+            for region, regional in design.regions.items()
         },
         "across": {
             "units": {name: kind.unit for name, kind in FIGURES.items()},
-            "cases": [_case(one, at.name) for one in found.across],
-            "worst": _case(found.worst, at.name),
-            "retuned": [_case(one, at.name) for one in retuned],
+            "cases": [_case(across, at.name) for across in design.across],
+            "worst": _case(design.worst, at.name),
+            "retuned": [_case(across, at.name) for across in retuned],
         },
         "bench": None if tried is None else verification_object(case, tried),
     }  # fmt: skip
 
 
-def _case(one: Across, name: str) -> dict[str, Any]:
-    return {name: one.at, "region": one.region, "slack": one.slack, **dict(one.figures)}
+def _case(across: Across, name: str) -> dict[str, Any]:
+    return {name: across.at, "region": across.region, "slack": across.slack, **dict(across.figures)}
 
 
 def as_parts(
     case: LoopCase,
-    found: ScheduleDesign,
+    design: ScheduleDesign,
     tried: Verification | None,
     retuned: Sequence[Across],
 ) -> list[Part]:
@@ -80,33 +80,35 @@ def as_parts(
     the linear design's.
     """
     at, leaves = case.loop.at, case.par.leaves()
-    borders = " and ".join(shown(leaves[one], at.unit) for one in scheduled(case.loop).borders)
+    borders = " and ".join(
+        shown(leaves[border], at.unit) for border in scheduled(case.loop).borders
+    )
     parts: list[Part] = [
         f"gain schedule of loop {case.loop.name} of {case.name}, borders at {at.name} = "
-        f"{borders}: linear design {found.status}",
-        _gains(case, found, found.gains, "linear design"),
+        f"{borders}: linear design {design.status}",
+        _gains(case, design, design.gains, "linear design"),
     ]
     if tried is not None and tried.tuning is not None:
-        parts.append(_gains(case, found, tried.final.gains, "retuned on the bench"))
-    for region, one in found.regions.items():
-        where = ", ".join(shown(point, at.unit) for point in found.points[region])
+        parts.append(_gains(case, design, tried.final.gains, "retuned on the bench"))
+    for region, regional in design.regions.items():
+        where = ", ".join(shown(point, at.unit) for point in design.points[region])
         bound = ", ".join(
             f"{b.requirement.text} ({figure_text(b.requirement.figure, b.value)})"
-            for b in one.binding
+            for b in regional.binding
         )
-        word = "binds" if one.binds else "tightest"
-        parts.append(f"{region}, designed at {where}: {one.status}; {word}: {bound}")
-        parts += [f"  {line}" for line in kept_lines(one)]
+        word = "binds" if regional.binds else "tightest"
+        parts.append(f"{region}, designed at {where}: {regional.status}; {word}: {bound}")
+        parts += [f"  {line}" for line in kept_lines(regional)]
         parts += [
             f"  {c.wanted.text}: at best {amount(c.best, c.wanted.unit, 3)} with {c.kept.text}"
-            for c in one.conflicts
+            for c in regional.conflicts
         ]
-    for title, across in (("linear design", found.across), ("retuned gains", retuned)):
+    for title, across in (("linear design", design.across), ("retuned gains", retuned)):
         if across:
             parts.append(f"{title}, gains frozen, linear model, room as a share of the limit:")
             parts += _frozen(case, across)
     if tried is not None:
-        parts += verification_parts(case, found.nominal, tried)
+        parts += verification_parts(case, design.nominal, tried)
     return parts
 
 
@@ -115,13 +117,13 @@ def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
     at = case.loop.at
     rows = [
         [
-            f"{shown(one.at, at.unit)}", one.region,
-            *(figure_text(name, one.figures[name]) for name in _SEEN),
-            f"{100.0 * one.slack:+.1f} %",
+            f"{shown(row.at, at.unit)}", row.region,
+            *(figure_text(name, row.figures[name]) for name in _SEEN),
+            f"{100.0 * row.slack:+.1f} %",
         ]
-        for one in across
+        for row in across
     ]  # fmt: skip
-    worst = min(across, key=lambda one: one.slack)
+    worst = min(across, key=lambda row: row.slack)
     where = f"{at.name} = {shown(worst.at, at.unit)}"
     return [
         text_table([at.name, "region", *_SEEN, "least room"], rows),
@@ -130,7 +132,7 @@ def _frozen(case: LoopCase, across: Sequence[Across]) -> list[Part]:
 
 
 def _gains(
-    case: LoopCase, found: ScheduleDesign, gains: Mapping[str, float], title: str
+    case: LoopCase, design: ScheduleDesign, gains: Mapping[str, float], title: str
 ) -> Table:
     """Return a table of gains, a column for each region."""
     regions = scheduled(case.loop).regions

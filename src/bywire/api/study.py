@@ -52,7 +52,7 @@ class StudyResult(Answer):
         Name of the parameter set, and the values in use.
     options
         Options in use.
-    found
+    findings
         All designs as an xarray dataset, key figures, maps and tables.
     """
 
@@ -60,29 +60,31 @@ class StudyResult(Answer):
     name: str
     par: ParameterSet
     options: ParameterSet
-    found: Findings
+    findings: Findings
 
     @property
     def warnings(self) -> list[str]:
         """What the user should know of the designs."""
-        return list(self.found.warnings)
+        return list(self.findings.warnings)
 
     def document(self) -> Document:
         """Return key figures, limits, maps, tables and assumptions."""
-        study, found = self.definition, self.found
+        study, findings = self.definition, self.findings
         subject = Subject(study.name, study.summary, self.name, self.par)
         kpis = TableBlock(kpi_table(self._rows()))
-        tables = [TableBlock(cut_table(cut), f"{cut.title}.", _WIDTH) for cut in found.cuts]
+        tables = [TableBlock(cut_table(cut), f"{cut.title}.", _WIDTH) for cut in findings.cuts]
         maps = [
-            FigureBlock(partial(_drawn, found.data, shown), shown.caption, f"{study.name}-{kind}")
-            for kind, shown in found.maps.items()
+            FigureBlock(
+                partial(_drawn, findings.data, shown), shown.caption, f"{study.name}-{kind}"
+            )
+            for kind, shown in findings.maps.items()
         ]
-        warned = [Listing([f"Warning: {text}." for text in found.warnings])]
-        limits = Listing(found.limits)
+        warned = [Listing([f"Warning: {text}." for text in findings.warnings])]
+        limits = Listing(findings.limits)
         options = TableBlock(parameter_table(parameter_rows(self.options)))
         chosen = Details("Options of the study", [options])
         brief_limits: list[str | Flat] = (
-            ["what limits the best design", limits, ""] if found.limits else []
+            ["what limits the best design", limits, ""] if findings.limits else []
         )
         brief_tables: list[str | Flat] = [
             each for table in tables for each in (table.caption.rstrip("."), table, "")
@@ -91,19 +93,19 @@ class StudyResult(Answer):
             f"Study {study.name}",
             subject.line,
             sections=lambda: [
-                Section("Key figures", [*(warned if found.warnings else []), kpis]),
-                *([Section("What limits the best design", [limits])] if found.limits else []),
+                Section("Key figures", [*(warned if findings.warnings else []), kpis]),
+                *([Section("What limits the best design", [limits])] if findings.limits else []),
                 *([Section("Maps", maps)] if maps else []),
                 *([Section("Tables", tables)] if tables else []),
-                Section("Assumptions", [Listing(found.assumptions), chosen]),
-                subject.made(),
+                Section("Assumptions", [Listing(findings.assumptions), chosen]),
+                subject.provenance(),
             ],
             brief=[
                 f"study {study.name} of {self.name}: {study.summary}", "", kpis, "",
-                *brief_limits, *brief_tables, Listing(found.assumptions, "assumptions"),
+                *brief_limits, *brief_tables, Listing(findings.assumptions, "assumptions"),
             ],
             data=self._data(),
-            attachments=[recording_file(f"{study.name}.nc", found.data)],
+            attachments=[recording_file(f"{study.name}.nc", findings.data)],
         )  # fmt: skip
 
     def _rows(self) -> list[KpiRow]:
@@ -113,23 +115,23 @@ class StudyResult(Answer):
                 kpi.name, kpi.value, kpi.unit,
                 f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
             )
-            for kpi in self.found.kpis
+            for kpi in self.findings.kpis
         ]  # fmt: skip
 
     def _data(self) -> dict[str, Any]:
-        found = self.found
+        findings = self.findings
         return {
             "study": self.definition.name,
             "parameters": self.name,
             "options": self.options.model_dump(mode="json"),
-            "assumptions": list(found.assumptions),
-            "limits": list(found.limits),
+            "assumptions": list(findings.assumptions),
+            "limits": list(findings.limits),
             "kpis": {
                 kpi.name: {
                     "value": kpi.value, "unit": kpi.unit, "definition": kpi.definition,
                     "note": kpi.note,
                 }
-                for kpi in found.kpis
+                for kpi in findings.kpis
             },
             "designs": {
                 str(name): {
@@ -137,10 +139,10 @@ class StudyResult(Answer):
                     "unit": values.attrs["units"],
                     "values": np.asarray(values.values, dtype=float).tolist(),
                 }
-                for name, values in found.data.variables.items()
+                for name, values in findings.data.variables.items()
             },
-            "figures": {name: shown.caption for name, shown in found.maps.items()},
-            "warnings": list(found.warnings),
+            "figures": {name: shown.caption for name, shown in findings.maps.items()},
+            "warnings": list(findings.warnings),
         }  # fmt: skip
 
 
@@ -174,8 +176,8 @@ def study(
     definition = STUDIES.find(name)
     cited = set_for(f"study {definition.name!r}", definition.assembly, parameters)
     par, options = _changed(definition, cited.parameters(), overrides)
-    found = definition.compute(par, options, progress or silent)
-    return StudyResult(definition, cited.name, par, options, found)
+    findings = definition.compute(par, options, progress or silent)
+    return StudyResult(definition, cited.name, par, options, findings)
 
 
 def _changed(

@@ -163,7 +163,7 @@ def trust(
         earlier_result.remove_study(Path(folder))
         store = Path(folder) / STORE
     try:
-        found = trusted.trust(
+        recovered = trusted.trust(
             chosen.method, chosen.par, chosen.options, range(seed, seed + count),
             Effort(starts=starts), processes=processes, store=store, progress=shown,
         )  # fmt: skip
@@ -173,4 +173,4 @@ def trust(
         raise KeyboardInterrupt(
             f"finished experiments are in {store}: the same command goes on"
         ) from None
-    return TrustStudy(chosen, found)
+    return TrustStudy(chosen, recovered)

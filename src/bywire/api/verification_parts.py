@@ -29,17 +29,19 @@ def verification_parts(
     columns = [("linear design", tried.linear)]
     if tried.tuning is not None:
         columns.append(("retuned", tried.tuning.best))
-    shown = [one for _, one in columns]
-    rows = _figure_rows(case, "", [one.figures for one in shown])
+    shown = [candidate for _, candidate in columns]
+    rows = _figure_rows(case, "", [candidate.figures for candidate in shown])
     for label in tried.final.corners:
-        rows += _figure_rows(case, f" at {label}", [one.corners.get(label) for one in shown])
+        rows += _figure_rows(
+            case, f" at {label}", [candidate.corners.get(label) for candidate in shown]
+        )
     for name in ("phase_margin", "gain_margin", "disk_margin"):
         both = [nominal, tried.nominal][: len(columns)]
-        cells = [figure_text(name, one[name]) for one in both]
+        cells = [figure_text(name, figures[name]) for figures in both]
         rows.append([f"{name}, linear model", *cells])
     parts: list[Part] = [text_table(["nonlinear bench", *(c for c, _ in columns)], rows)]
     if not tried.linear.figures.step and tried.kpis:
-        kpis = [[one.name, amount(one.value, one.unit)] for one in tried.kpis]
+        kpis = [[kpi.name, amount(kpi.value, kpi.unit)] for kpi in tried.kpis]
         parts.append(text_table([case.loop.proof, "final gains"], kpis))
     labels = tried.final.corners
     if labels:
@@ -47,7 +49,7 @@ def verification_parts(
         parts.append(
             f"tried on the bench: at the nominal point, and at {'; '.join(labels)}{worst}"
         )
-    kept = {one.text for one in tried.kept}
+    kept = {requirement.text for requirement in tried.kept}
     for text, slack in tried.final.slacks.items():
         where = "kept besides" if text in kept else "on the bench"
         verdict = "met" if slack >= 0.0 else "NOT met"
@@ -55,10 +57,10 @@ def verification_parts(
         parts.append(f"{where}: {text} {verdict} ({room:+.1f} % of the limit)")
     conflict = tried.conflict()
     if conflict is not None:
-        one, other, edge = conflict
+        first, other, edge = conflict
         middle = sorted(sorted(edge, key=min)[-_PAIRS:])  # where both are nearly met
         pairs = "; ".join(f"{100 * a:+.1f} % and {100 * b:+.1f} %" for a, b in middle)
-        parts.append(f"edge between {one} and {other}, as distance from the limits: {pairs}")
+        parts.append(f"edge between {first} and {other}, as distance from the limits: {pairs}")
     return parts
 
 
@@ -71,24 +73,28 @@ def figure_text(name: str, value: float) -> str:
 
 
 def _figure_rows(
-    case: LoopCase, where: str, found: list[BenchFigures | None]
+    case: LoopCase, where: str, columns: list[BenchFigures | None]
 ) -> list[list[str]]:
     """Return rows of one trial: what the sines and the step show, a column for each design."""
-    def cell(one: BenchFigures | None, k: int, name: str) -> str:
-        if one is None or not one.small:
+    def cell(figures: BenchFigures | None, k: int, name: str) -> str:
+        if figures is None or not figures.small:
             return "-"
-        return amount(getattr(one.small[k], name), FIGURES[name].unit, 3)
+        return amount(getattr(figures.small[k], name), FIGURES[name].unit, 3)
 
-    sizes = next(([s.amplitude for s in one.small] for one in found if one and one.small), [])
+    sizes = next(
+        ([s.amplitude for s in figures.small] for figures in columns if figures and figures.small),
+        [],
+    )
     rows = [
         [f"{name}, sine of {amount(size, case.input_unit, 3)}{where}",
-         *(cell(one, k, name) for one in found)]
+         *(cell(figures, k, name) for figures in columns)]
         for k, size in enumerate(sizes) for name in ("bandwidth", "phase_margin", "crossover")
     ]  # fmt: skip
-    steps = next((tuple(one.step) for one in found if one and one.step), ())
+    steps = next((tuple(figures.step) for figures in columns if figures and figures.step), ())
     for name in steps:
         cells = [
-            amount(one.step.get(name) if one else None, FIGURES[name].unit, 3) for one in found
+            amount(figures.step.get(name) if figures else None, FIGURES[name].unit, 3)
+            for figures in columns
         ]
         rows.append([f"{name}, {case.loop.proof}{where}", *cells])
     return rows
@@ -105,9 +111,9 @@ def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
         "linear_design": _candidate(tried.linear),
         "final": _candidate(tried.final),
         "final_linear": dict(tried.nominal),
-        "kept": [one.text for one in tried.kept],
+        "kept": [requirement.text for requirement in tried.kept],
         "experiment": case.loop.proof,
-        "kpis": {one.name: {"value": one.value, "unit": one.unit} for one in tried.kpis},
+        "kpis": {kpi.name: {"value": kpi.value, "unit": kpi.unit} for kpi in tried.kpis},
         "conflict": None if conflict is None else {
             "requirements": list(conflict[:2]),
             "slacks": [list(pair) for pair in conflict[2]],
@@ -115,22 +121,22 @@ def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _candidate(one: Candidate) -> dict[str, Any]:
+def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
-        "gains": dict(one.gains),
-        **_figures(one.figures),
-        "corners": {label: _figures(found) for label, found in one.corners.items()},
-        "slacks": {text: one.room(text) for text in one.slacks},
+        "gains": dict(candidate.gains),
+        **_figures(candidate.figures),
+        "corners": {label: _figures(corner) for label, corner in candidate.corners.items()},
+        "slacks": {text: candidate.room(text) for text in candidate.slacks},
     }
 
 
-def _figures(one: BenchFigures) -> dict[str, Any]:
+def _figures(figures: BenchFigures) -> dict[str, Any]:
     return {
         "sines": [
             {"amplitude": s.amplitude, "bandwidth": s.bandwidth,
              "phase_margin": s.phase_margin, "crossover": s.crossover,
              "peak": s.peak, "settled": s.settled}
-            for s in one.small
+            for s in figures.small
         ],
-        "step": dict(one.step),
+        "step": dict(figures.step),
     }  # fmt: skip

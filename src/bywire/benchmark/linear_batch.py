@@ -108,7 +108,7 @@ def _mapped(function: Any, count: int, values: Sequence[Array]) -> list[Array]:
     """
     mapped = _map(function, count)
     buffer, evaluate = mapped.buffer()
-    found = []
+    results = []
     kept = [np.ascontiguousarray(np.moveaxis(v, 1, -1)).ravel() for v in values]  # by columns
     for k, flat in enumerate(kept):
         buffer.set_arg(k, memoryview(cast(Any, flat)))
@@ -116,9 +116,9 @@ def _mapped(function: Any, count: int, values: Sequence[Array]) -> list[Array]:
         rows, columns = function.size_out(k)
         result = np.zeros((count, columns, rows))
         buffer.set_res(k, memoryview(cast(Any, result.reshape(-1))))
-        found.append(result)
+        results.append(result)
     evaluate()
-    return [np.moveaxis(result, 1, 2) for result in found]
+    return [np.moveaxis(result, 1, 2) for result in results]
 
 
 def _stiffness(matrices: Sequence[Array], d: Array) -> Array:
@@ -126,7 +126,7 @@ def _stiffness(matrices: Sequence[Array], d: Array) -> Array:
     K, at = np.zeros((*d.shape, d.shape[1])), 0
     for C in matrices:
         n = len(C)
-        own = slice(at, at + n)
+        block = slice(at, at + n)
         stiffnesses, tests = [], []
         for closed in (list(s) for size in range(n + 1) for s in combinations(range(n), size)):
             part = np.zeros((n, n))
@@ -135,7 +135,7 @@ def _stiffness(matrices: Sequence[Array], d: Array) -> Array:
             test[closed] = (np.diag(C)[:, None] * part)[closed]
             stiffnesses.append(part)
             tests.append(test)
-        slack = np.einsum("sij,pj->psi", np.array(tests), d[:, own]).min(axis=2)
-        K[:, own, own] = np.array(stiffnesses)[slack.argmax(axis=1)]
+        slack = np.einsum("sij,pj->psi", np.array(tests), d[:, block]).min(axis=2)
+        K[:, block, block] = np.array(stiffnesses)[slack.argmax(axis=1)]
         at += n
     return K

@@ -54,15 +54,15 @@ def named(texts: list[str] | None, flag: str) -> dict[str, str]:
     ParameterError
         For what names nothing, and names that are given twice.
     """
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     for text in texts or ():
         name, equals, value = (part.strip() for part in text.partition("="))
         if not name or (equals and not value):
             raise ParameterError(f"{flag} {text}: write NAME, or NAME=TEXT")
-        if name in found:
+        if name in values:
             raise ParameterError(f"{flag} {text}: {name} is given twice: leave one of them out")
-        found[name] = value
-    return found
+        values[name] = value
+    return values
 
 
 def changes(texts: list[str] | None, flag: str = "--set") -> dict[str, str]:
@@ -73,12 +73,12 @@ def changes(texts: list[str] | None, flag: str = "--set") -> dict[str, str]:
     ParameterError
         For what is no KEY=VALUE, and keys that are set twice.
     """
-    found: dict[str, str] = {}
+    values: dict[str, str] = {}
     for text in texts or ():
         key, equals, value = (part.strip() for part in text.partition("="))
         if not equals or not key or not value:
             raise ParameterError(f"{flag} {text}: write KEY=VALUE, for instance motor.R_m=0.4ohm")
-        if key in found:
+        if key in values:
             raise ParameterError(f"{flag} {text}: {key} is set twice: leave one of them out")
-        found[key] = value
-    return found
+        values[key] = value
+    return values

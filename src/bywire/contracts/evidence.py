@@ -56,10 +56,10 @@ def measured(figure: float, limit: float, text: str, place: Place | None = None)
     return Evidence(bool(figure <= limit), text, float(figure), limit, place)
 
 
-def worst(found: Iterable[Evidence]) -> Evidence:
+def worst(evidence: Iterable[Evidence]) -> Evidence:
     """Return the first evidence that does not hold, else that which is nearest to its limit."""
     nearest: Evidence | None = None
-    for each in found:
+    for each in evidence:
         if not each.holds:
             return each
         if nearest is None or _share(each) > _share(nearest):
@@ -91,8 +91,8 @@ def examine(contract: Contract, subject: Any, place: Place | None = None) -> Evi
         When it cannot be put to the test.
     """
     try:
-        found = contract(subject)
-        return found if isinstance(found, Evidence) else worst(found)
+        evidence = contract(subject)
+        return evidence if isinstance(evidence, Evidence) else worst(evidence)
     except NotCheckedError:
         raise
     except Exception as error:  # whatever a user's equations raise
@@ -120,8 +120,8 @@ def field_place(cls: type[Any], name: str) -> Place:
     except (OSError, TypeError):
         return at
     wanted = re.compile(rf"\s+{re.escape(name)}\s*:")
-    found = (Place(at.file, first + k) for k, line in enumerate(lines) if wanted.match(line))
-    return next(found, at)
+    places = (Place(at.file, first + k) for k, line in enumerate(lines) if wanted.match(line))
+    return next(places, at)
 
 
 def _raised_at(error: Exception, file: str) -> Place | None:

@@ -57,13 +57,13 @@ class Demand:
         """Return what comes out."""
         place = self.place or place_of(self.on)
         try:
-            found = examine(self.contract, self.on, place)
+            evidence = examine(self.contract, self.on, place)
         except NotCheckedError as reason:
             return Finding(self.subject, self.name, "not checked", str(reason), place)
-        outcome: Outcome = "holds" if found.holds else "broken"
+        outcome: Outcome = "holds" if evidence.holds else "broken"
         return Finding(
-            self.subject, self.name, outcome, found.text, found.place or place,
-            found.figure, found.limit,
+            self.subject, self.name, outcome, evidence.text, evidence.place or place,
+            evidence.figure, evidence.limit,
         )  # fmt: skip
 
 

@@ -75,8 +75,8 @@ class Probe(Model):
     @property
     def Output(self) -> type[NamedTuple]:
         """All states and all of the memory."""
-        found: type[NamedTuple] = _recorded(type(self.inner), self.State, self.Memory)
-        return found
+        output: type[NamedTuple] = _recorded(type(self.inner), self.State, self.Memory)
+        return output
 
     @property
     def frictions(self) -> tuple[str, ...]:
@@ -184,11 +184,11 @@ def drive_of(start: Start, share: float) -> Drive:
         Probe(start.model, held=False), run.par, run.state, run.memory, run.stimulus,
         run.duration, run.step, run.record,
     )  # fmt: skip
-    found = simulate(probe)
-    memory = found.values[:, len(start.state) :]
+    trajectory = simulate(probe)
+    memory = trajectory.values[:, len(start.state) :]
     return Drive(start, np.asarray(memory - memory[0]))
 
 
-def states(found: Trajectory, names: Sequence[str]) -> Array:
+def states(trajectory: Trajectory, names: Sequence[str]) -> Array:
     """Return the recorded states of a probe, shape (rows, states)."""
-    return np.asarray(found.values[:, : len(names)])
+    return np.asarray(trajectory.values[:, : len(names)])

@@ -59,7 +59,7 @@ def rests_exactly(trial: Trial) -> Iterator[Evidence]:
 def _holds_at_start(trial: Trial) -> dict[str, float]:
     """Return for all that stands how much of its dry friction the start takes."""
     start, model = trial.start, trial.model
-    x, found = start.state, {}
+    x, shares = start.state, {}
     contact = _forces(trial, SX(ca.DM(list(x))))
     balance = model.balance(x, x, start.memory, start.par, contact)
     bounds = model.bounds(x, x, start.memory, start.par, contact)
@@ -68,8 +68,8 @@ def _holds_at_start(trial: Trial) -> dict[str, float]:
             low, high = (float(ca.evalf(SX(value))) for value in pair)
             needed = -float(ca.evalf(SX(getattr(balance, name))))
             bound = high if needed > 0.0 else low
-            found[name] = needed / bound if bound else math.inf
-    return found
+            shares[name] = needed / bound if bound else math.inf
+    return shares
 
 
 def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
@@ -120,14 +120,14 @@ def _same_at_rest(trial: Trial, name: str) -> Evidence:
 def _bounds_at(trial: Trial, speed: float) -> list[float]:
     """Return the width between the bounds of every friction, each at a speed in turn."""
     start, model = trial.start, trial.model
-    found = []
+    widths = []
     for k, name in enumerate(model.frictions):
         x = start.state._replace(**{name: speed})
         column = SX(ca.DM(list(x)))
         contact = _forces(trial, column)
         low, high = model.bounds(x, x, start.memory, start.par, contact)[k]
-        found.append(float(ca.evalf(SX(high) - SX(low))))
-    return found
+        widths.append(float(ca.evalf(SX(high) - SX(low))))
+    return widths
 
 
 def _change(trial: Trial, name: str, speed: float) -> float:

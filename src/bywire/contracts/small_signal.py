@@ -38,11 +38,11 @@ def is_its_linear_model(trial: Trial) -> Iterator[Evidence]:
     place = trial.place("balance", "wire")
     try:
         base = states(simulate(trial.drive.run(0.0, step, not removed)), names)
-        found = [states(simulate(trial.drive.run(s, step, not removed)), names) for s in SMALL]
+        runs = [states(simulate(trial.drive.run(s, step, not removed)), names) for s in SMALL]
     except SolverError as error:
         raise NotCheckedError(f"the small run from {start.known} fails: {error}") from error
     wanted = _response(linear, trial.drive.rows[: len(base)], period)
-    deviations = [(run - base) / share for run, share in zip(found, SMALL, strict=True)]
+    deviations = [(run - base) / share for run, share in zip(runs, SMALL, strict=True)]
     nominal = [abs(s.nominal) for s in signals_of(trial.model.State).values()]
     moving = 0
     for k, name in enumerate(names):

@@ -42,10 +42,10 @@ def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
     That is what it does without dry friction. Where a velocity with dry friction turns round, the
     instant falls somewhere within a substep: there at least the first order is wanted.
     """
-    told = list(_orders(trial, False, ORDER))
-    if not told:
+    orders = list(_orders(trial, False, ORDER))
+    if not orders:
         raise NotCheckedError(f"from {trial.start.known} no state moves enough to tell it")
-    yield from told
+    yield from orders
     if trial.model.frictions:
         yield from _orders(trial, True, 1.0)
 

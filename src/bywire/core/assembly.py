@@ -183,8 +183,8 @@ class Assembly(Model, Generic[ParT, MemoryT]):
             if part.has("matrix"):
                 groups.append(wired.call(part.element.matrix))
             else:
-                own = wired.call(part.function("compliance"))
-                groups += (((own,),),) * len(part.element.Forces._fields)
+                compliance = wired.call(part.function("compliance"))
+                groups += (((compliance,),),) * len(part.element.Forces._fields)
         return tuple(groups)
 
     def gap(self, x: Any, xe: Any, par: ParT) -> tuple[tuple[float, ...], ...]:
@@ -271,13 +271,13 @@ class Assembly(Model, Generic[ParT, MemoryT]):
             When there is no such part, or the state is another element's.
         """
         values: dict[str, float] = {}
-        for name, own in parts.items():
+        for name, given in parts.items():
             part = cls.parts.get(name)
             if part is None:
                 raise ModelError(f"{cls.__name__}: {unknown_name('part', name, cls.parts)}")
-            if not part.has("State") or not isinstance(own, part.element.State):
-                raise ModelError(f"{part.where}: {type(own).__name__} is no state of {part.kind}")
-            values |= {part.state_name(k): v for k, v in own._asdict().items()}
+            if not part.has("State") or not isinstance(given, part.element.State):
+                raise ModelError(f"{part.where}: {type(given).__name__} is no state of {part.kind}")
+            values |= {part.state_name(k): v for k, v in given._asdict().items()}
         return zeros(cls.State)._replace(**values)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
@@ -292,12 +292,12 @@ class Assembly(Model, Generic[ParT, MemoryT]):
             )
 
         watched = [part for part in self.parts.values() if part.has("watch")]
-        found: list[str] = []
+        warnings: list[str] = []
         with np.errstate(all="ignore"):
             w = self.at(rows(self.State), rows(self.Memory), par) if watched else None
             for part in watched:
-                found += _wired(w, part).call(part.element.watch, t=recording["time"].values)
-        return found
+                warnings += _wired(w, part).call(part.element.watch, t=recording["time"].values)
+        return warnings
 
     def _nothing(self) -> Any:
         """Return a memory that is not known: where it does not count, nobody must see it."""
@@ -312,8 +312,8 @@ def _part_values(w: Assembly[Any, Any], wanted: tuple[str, ...]) -> Iterator[tup
                 yield there, part.output_value(name, _wired(w, part))
         for name in part.kept:
             if name in wanted:
-                own = _wired(w, part).call(part.element.energy)
-                yield name, getattr(w.flow, part.work) - own
+                stored = _wired(w, part).call(part.element.energy)
+                yield name, getattr(w.flow, part.work) - stored
 
 
 def _wired(w: Any, part: AnyPart) -> Wired[Any, Any, Any, Any]:

@@ -67,7 +67,7 @@ def brakes() -> Mapping[str, Brake]:
 
 @cache
 def _installed() -> Mapping[str, Brake]:
-    found: dict[str, Brake] = {}
+    brakes: dict[str, Brake] = {}
 
     def order(point: EntryPoint) -> tuple[bool, str]:
         """Ours first, so that what takes one of our names is what is left out."""
@@ -76,7 +76,7 @@ def _installed() -> Mapping[str, Brake]:
     for point in sorted(entry_points(group=GROUP), key=order):
         try:
             brake = _declared(importlib.import_module(point.module), point.value)
-            _require_new(brake, found)
+            _require_new(brake, brakes)
         except Exception as error:
             reason = str(error) if isinstance(error, ModelError) else _place(error, "")
             warnings.warn(
@@ -84,8 +84,8 @@ def _installed() -> Mapping[str, Brake]:
                 BrakeWarning, stacklevel=2,
             )  # fmt: skip
         else:
-            found[brake.name] = brake
-    return found
+            brakes[brake.name] = brake
+    return brakes
 
 
 def is_foreign(brake: Brake) -> bool:
@@ -188,8 +188,8 @@ def _imported(place: Path, source: Path) -> ModuleType:
             del sys.modules[loaded]
         if not isinstance(error, (Exception, SystemExit)):
             raise
-        told = _place(error, str(source.parent) if place.is_dir() else str(source))
-        raise ModelError(f"{told}; mend it and load it again") from error
+        message = _place(error, str(source.parent) if place.is_dir() else str(source))
+        raise ModelError(f"{message}; mend it and load it again") from error
     return module
 
 
@@ -273,8 +273,8 @@ def modules_below(name: str) -> Iterator[ModuleType]:
 
     module = _attempted(name)
     yield module
-    for found in pkgutil.iter_modules(getattr(module, "__path__", ())):
-        yield _attempted(f"{name}.{found.name}")
+    for below in pkgutil.iter_modules(getattr(module, "__path__", ())):
+        yield _attempted(f"{name}.{below.name}")
 
 
 def _attempted(name: str) -> ModuleType:

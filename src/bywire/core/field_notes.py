@@ -27,18 +27,18 @@ def field_notes(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, str]:
     prefix
         Put before every name.
     """
-    own: dict[str, str] = {}
+    written: dict[str, str] = {}
     for base in reversed(cls.__mro__):
         if issubclass(base, ParameterSet) and base is not ParameterSet:
-            own |= _written_under_fields(base)
-    found: dict[str, str] = {}
+            written |= _written_under_fields(base)
+    notes: dict[str, str] = {}
     for name, info in cls.model_fields.items():
         inner = info.annotation
         if isinstance(inner, type) and issubclass(inner, ParameterSet):
-            found |= field_notes(inner, f"{prefix}{name}.")
+            notes |= field_notes(inner, f"{prefix}{name}.")
         else:
-            found[f"{prefix}{name}"] = own.get(name, "")
-    return MappingProxyType(found)
+            notes[f"{prefix}{name}"] = written.get(name, "")
+    return MappingProxyType(notes)
 
 
 def _written_under_fields(cls: type) -> dict[str, str]:
@@ -48,12 +48,12 @@ def _written_under_fields(cls: type) -> dict[str, str]:
         return {}
     (definition,) = ast.parse(source).body
     assert isinstance(definition, ast.ClassDef)
-    found: dict[str, str] = {}
+    notes: dict[str, str] = {}
     for field, below in zip(definition.body, definition.body[1:], strict=False):
         match field, below:
             case (
                 ast.AnnAssign(target=ast.Name(id=name)),
                 ast.Expr(value=ast.Constant(value=str(text))),
             ):
-                found[name] = inspect.cleandoc(text)
-    return found
+                notes[name] = inspect.cleandoc(text)
+    return notes

@@ -67,11 +67,11 @@ def _derives(kind: Any) -> bool:
 def _named_tuple(owner: type, kind: str, signals: Mapping[str, Signal]) -> Any:
     """Return a signal tuple that can be pickled as an attribute of its assembly."""
     make: Callable[..., Any] = NamedTuple
-    made = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
-    made.__module__, made.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"
-    made.__doc__ = f"{kind} of {owner.__name__}, gathered from its parts."
-    made.derived = True
-    return made
+    gathered = make(kind, [(name, Annotated[float, signal]) for name, signal in signals.items()])
+    gathered.__module__, gathered.__qualname__ = owner.__module__, f"{owner.__qualname__}.{kind}"
+    gathered.__doc__ = f"{kind} of {owner.__name__}, gathered from its parts."
+    gathered.derived = True
+    return gathered
 
 
 def stores(cls: type[Any]) -> Iterator[AnyPart]:

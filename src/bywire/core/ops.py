@@ -33,9 +33,9 @@ def _apply(name: str, *args: Any) -> Any:
     special = next((a for a in args if not isinstance(a, _PLAIN)), None)
     if special is None:
         return _FLOATS[name](*args)
-    own = getattr(special, "_bywire_op", None)
-    if own is not None:
-        return own(name, *args)
+    operation = getattr(special, "_bywire_op", None)
+    if operation is not None:
+        return operation(name, *args)
     if type(special).__module__.startswith("casadi"):
         import casadi
 

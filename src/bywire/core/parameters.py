@@ -102,31 +102,31 @@ class ParameterSet(BaseModel):
 @cache
 def leaf_fields(cls: type[ParameterSet], prefix: str = "") -> Mapping[str, Leaf]:
     """Return the description of every number of a parameter class, by dotted name."""
-    found: dict[str, Leaf] = {}
+    leaves: dict[str, Leaf] = {}
     for name, info in cls.model_fields.items():
         dotted = f"{prefix}{name}"
         inner = info.annotation
         if isinstance(inner, type) and issubclass(inner, ParameterSet):
-            found |= leaf_fields(inner, f"{dotted}.")
+            leaves |= leaf_fields(inner, f"{dotted}.")
             continue
         unit = next((m for m in info.metadata if isinstance(m, Unit)), None)
         if unit is not None:
-            found[dotted] = _leaf(dotted, unit, info)
-    return MappingProxyType(found)
+            leaves[dotted] = _leaf(dotted, unit, info)
+    return MappingProxyType(leaves)
 
 
 @cache
 def choice_fields(cls: type[ParameterSet], prefix: str = "") -> tuple[str, ...]:
     """Return the dotted names of all structural choices of a class."""
-    found: list[str] = []
+    choices: list[str] = []
     for name, info in cls.model_fields.items():
         dotted = f"{prefix}{name}"
         inner = info.annotation
         if isinstance(inner, type) and issubclass(inner, ParameterSet):
-            found += choice_fields(inner, f"{dotted}.")
+            choices += choice_fields(inner, f"{dotted}.")
         elif not any(isinstance(m, Unit) for m in info.metadata):
-            found.append(dotted)
-    return tuple(found)
+            choices.append(dotted)
+    return tuple(choices)
 
 
 def choices_of(cls: type[ParameterSet], name: str) -> tuple[Any, ...]:
@@ -225,5 +225,5 @@ def _validated(cls: type[T], tree: Mapping[str, Any], texts: Mapping[str, str]) 
     try:
         return cls.model_validate(tree)
     except ValidationError as error:
-        found = refusals(error, cls.__name__, leaf_fields(cls), texts)
-        raise ParameterError("\n".join(found)) from None
+        messages = refusals(error, cls.__name__, leaf_fields(cls), texts)
+        raise ParameterError("\n".join(messages)) from None

@@ -190,14 +190,14 @@ class Part(Generic[X, U, F, P]):
         """Return its states by their names in the assembly."""
         if not self.has("State"):
             return {}
-        own = signals_of(self.element.State)
+        signals = signals_of(self.element.State)
         for name in (*self.renamed, *self.labels, *self.fixed):
-            if name not in own:
-                raise ModelError(f"{self.where}: {unknown_name('state', name, own)}")
+            if name not in signals:
+                raise ModelError(f"{self.where}: {unknown_name('state', name, signals)}")
         number = self.suffix.replace("_", " ")
         return {
             self.state_name(name): replace(s, label=self.labels.get(name, s.label) + number)
-            for name, s in own.items()
+            for name, s in signals.items()
         }
 
     def state_name(self, name: str) -> str:
@@ -256,10 +256,10 @@ class Part(Generic[X, U, F, P]):
         """Return its state; ``fixed`` are those taken value-only, None for all."""
         if not self.has("State"):
             raise ModelError(f"{self.where}: {self.kind} has no state")
-        own: type[Any] = self.element.State
-        return own._make(
+        state_class: type[Any] = self.element.State
+        return state_class._make(
             getattr(instant.xe if fixed is None or k in fixed else instant.x, self.state_name(k))
-            for k in own._fields
+            for k in state_class._fields
         )
 
     def forces_at(self, instant: Instant, par: Any) -> Any:

@@ -34,11 +34,11 @@ def refusals(
     texts
         How numbers were written, by dotted name, where they came as texts.
     """
-    found: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
-    places = {detail["loc"][:-1] for detail in found}
+    details: list[dict[str, Any]] = [dict(detail) for detail in error.errors()]
+    places = {detail["loc"][:-1] for detail in details}
     # A table with a wrong node also counts as too short: the node alone is worth a line.
-    found = [d for d in found if not (_is_length(d) and d["loc"] in places)]
-    return [_explain(detail, owner, leaves, texts) for detail in found]
+    details = [d for d in details if not (_is_length(d) and d["loc"] in places)]
+    return [_explain(detail, owner, leaves, texts) for detail in details]
 
 
 def _explain(

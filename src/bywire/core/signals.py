@@ -90,7 +90,7 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
     Every field must be annotated ``Annotated[float, Signal(...)]``.
     """
     hints = typing.get_type_hints(tuple_type, include_extras=True)
-    found: dict[str, Signal] = {}
+    signals: dict[str, Signal] = {}
     for name in tuple_type._fields:
         signal = signal_in(hints[name])
         if signal is None:
@@ -98,8 +98,8 @@ def signals_of(tuple_type: type[NamedTuple]) -> dict[str, Signal]:
                 f"{place_of(tuple_type)}: {tuple_type.__qualname__}.{name} has no Signal annotation"
                 f": write {name}: Annotated[float, Signal(\"m\", \"what it is\")]"
             )
-        found[name] = signal
-    return found
+        signals[name] = signal
+    return signals
 
 
 def signal_in(annotation: Any) -> Signal | None:

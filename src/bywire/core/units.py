@@ -66,9 +66,9 @@ class Written(float):
 
     def __new__(cls, value: float, text: str = "") -> Self:
         """Return the number with its text."""
-        made = super().__new__(cls, value)
-        made.text = text
-        return made
+        written = super().__new__(cls, value)
+        written.text = text
+        return written
 
     def __getnewargs__(self) -> tuple[float, str]:  # type: ignore[override]
         """Return what a copy is made of."""

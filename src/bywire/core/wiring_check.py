@@ -89,14 +89,14 @@ class _Operands:
     def wired(self, method: str) -> AnyAssembly:
         """Return the assembly at an instant, with the lines in which its wires were set."""
         lines: dict[str, str] = {}
-        found: AnyAssembly = self.evaluated(
+        wired: AnyAssembly = self.evaluated(
             method,
             lambda: self.model.at(
                 self.state, self.memory, self.par, self.contact, rate=self.rate,
                 reaction=self.reaction, lines=lines,
             ),
         )  # fmt: skip
-        return found
+        return wired
 
     def evaluated(self, method: str, function: Callable[..., Any], *arguments: Any) -> Any:
         """Return what an equation gives, its errors with their lines."""
@@ -213,7 +213,7 @@ def _place(model: AnyAssembly, method: str = "wire") -> str:
 
 def _line_of(error: BaseException, model: AnyAssembly) -> str:
     """Return the innermost line outside of the numbers' own operations."""
-    own = {__file__, inspect.getsourcefile(Dimension), inspect.getsourcefile(fits)}
+    checkers = {__file__, inspect.getsourcefile(Dimension), inspect.getsourcefile(fits)}
     frames = [f for f in traceback.extract_tb(error.__traceback__)
-              if f.filename not in own and not f.filename.endswith("core/ops.py")]  # fmt: skip
+              if f.filename not in checkers and not f.filename.endswith("core/ops.py")]  # fmt: skip
     return f"{frames[-1].filename}, line {frames[-1].lineno}" if frames else _place(model)

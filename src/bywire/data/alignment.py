@@ -85,14 +85,14 @@ def resample(
     for name in names:
         if name not in measurement.data_vars:
             raise unknown_name("signal", name, map(str, measurement.data_vars))
-    found = {name: _quality(measurement, name, longest) for name in names}
-    axis = _axis(found, step, method)
+    qualities = {name: _quality(measurement, name, longest) for name in names}
+    axis = _axis(qualities, step, method)
     variables, channels = {}, []
-    for name, one in found.items():
-        values, excluded = _on_axis(measurement, name, one, axis, step, method, left_out)
+    for name, channel in qualities.items():
+        values, excluded = _on_axis(measurement, name, channel, axis, step, method, left_out)
         variables[name] = ("time", values, dict(measurement[name].attrs))
         delay = float(measurement[name].attrs.get("delay", 0.0))
-        channels.append(AlignedChannel(name, one, delay, excluded))
+        channels.append(AlignedChannel(name, channel, delay, excluded))
     time = ("time", pd.Index(axis, copy=False, name="time"), {"units": "s", "long_name": "time"})
     dataset = xr.Dataset(variables, coords={"time": time}, attrs=dict(measurement.attrs))
     report = AlignmentReport(
@@ -138,22 +138,22 @@ def _quality(measurement: xr.Dataset, name: str, longest: float | None) -> Chann
         raise ParameterError(f"{name} has {error}: two at least are needed") from None
 
 
-def _axis(found: dict[str, ChannelQuality], step: float, method: str) -> NDArray[np.float64]:
+def _axis(qualities: dict[str, ChannelQuality], step: float, method: str) -> NDArray[np.float64]:
     """Return the multiples of the step that lie in all channels."""
     margin = step / 2.0 if method == "average" else 0.0
-    if not found:
+    if not qualities:
         raise ParameterError("no signal was chosen: name one at least")
-    last_start = max(found, key=lambda name: found[name].start)
-    first_stop = min(found, key=lambda name: found[name].stop)
-    start, stop = found[last_start].start + margin, found[first_stop].stop - margin
+    last_start = max(qualities, key=lambda name: qualities[name].start)
+    first_stop = min(qualities, key=lambda name: qualities[name].stop)
+    start, stop = qualities[last_start].start + margin, qualities[first_stop].stop - margin
     first, last = math.ceil(start / step - _SLACK), math.floor(stop / step + _SLACK)
     if last - first < 1:
         raise ParameterError(
             f"nothing of {step:g} s fits between the start of {last_start} at "
-            f"{found[last_start].start:g} s and the end of {first_stop} at "
-            f"{found[first_stop].stop:g} s: choose a smaller interval, or signals that overlap"
+            f"{qualities[last_start].start:g} s and the end of {first_stop} at "
+            f"{qualities[first_stop].stop:g} s: choose a smaller interval, or signals that overlap"
         )
-    size = 8 * (last - first + 1) * (len(found) + 1)
+    size = 8 * (last - first + 1) * (len(qualities) + 1)
     if size > room():
         raise ParameterError(
             f"interval = {step:g} s would make {last - first + 1:.3g} samples of each signal, "
@@ -168,7 +168,7 @@ def _axis(found: dict[str, ChannelQuality], step: float, method: str) -> NDArray
 def _on_axis(
     measurement: xr.Dataset,
     name: str,
-    found: ChannelQuality,
+    channel: ChannelQuality,
     axis: NDArray[np.float64],
     step: float,
     method: str,
@@ -183,7 +183,7 @@ def _on_axis(
     reach = step / 2.0 if method == "average" else 0.0
     flawed = np.zeros(axis.size, dtype=bool)
     for flaw in left_out:
-        for stretch in getattr(found, flaw):
+        for stretch in getattr(channel, flaw):
             flawed[_inside(stretch, axis, step, reach, ends=flaw == "clipped")] = True
     if flawed.all():
         raise ParameterError(

@@ -65,4 +65,4 @@ class AlignmentReport:
         if self.method == "average":
             return ()
         limit = (1.0 + _FASTER) / self.interval
-        return tuple(one.name for one in self.channels if one.quality.rate > limit)
+        return tuple(channel.name for channel in self.channels if channel.quality.rate > limit)

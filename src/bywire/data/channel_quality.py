@@ -119,12 +119,12 @@ def quality(
 
 def _missing(time: NDArray[np.float64], there: NDArray[np.bool_]) -> list[Stretch]:
     """Return the stretches of NaN between measured values."""
-    found = []
+    stretches = []
     for first, last in _runs(~there):
         if first > 0 and last < time.size - 1:
             begin, end = float(time[first - 1]), float(time[last + 1])
-            found.append(Stretch(begin, end - begin, last - first + 1))
-    return found
+            stretches.append(Stretch(begin, end - begin, last - first + 1))
+    return stretches
 
 
 def _clipped(

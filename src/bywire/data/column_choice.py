@@ -68,16 +68,16 @@ class Chosen:
 
     def attributes(self) -> dict[str, Any]:
         """Return what a dataset says of the signal."""
-        found: dict[str, Any] = {
+        attributes: dict[str, Any] = {
             "units": self.symbol, "long_name": self.label, "column": self.column,
         }  # fmt: skip
         if self.meanings:
-            found["flag_meanings"] = self.meanings
+            attributes["flag_meanings"] = self.meanings
         if self.mapping.delay:
-            found["delay"] = self.mapping.delay
+            attributes["delay"] = self.mapping.delay
         if self.mapping.limits is not None:
-            found["valid_min"], found["valid_max"] = self.mapping.limits
-        return found
+            attributes["valid_min"], attributes["valid_max"] = self.mapping.limits
+        return attributes
 
 
 def choose(
@@ -102,7 +102,7 @@ def choose(
         wanted = {name: wanted[name] for name in signals}
     if not wanted:
         raise FileError(f"{file} holds no signal: {_listing(source.columns)}")
-    return [_chosen(file, source, meaning, one) for one in wanted.values()]
+    return [_chosen(file, source, meaning, signal) for signal in wanted.values()]
 
 
 def every_signal(
@@ -119,26 +119,26 @@ def every_signal(
 
 
 def _chosen(
-    file: Path, source: Source, meaning: MeasurementMapping, one: SignalMapping
+    file: Path, source: Source, meaning: MeasurementMapping, signal: SignalMapping
 ) -> Chosen:
-    column = _column(file, source, one.column, f"signals.{one.name}.column")
-    clock = _clock(file, source, column, one.clock or meaning.clock)
-    unit = one.unit or column.unit
+    column = _column(file, source, signal.column, f"signals.{signal.name}.column")
+    clock = _clock(file, source, column, signal.clock or meaning.clock)
+    unit = signal.unit or column.unit
     where = f"{file}, column {quoted(column.name)}"
     if not unit:
         raise UnitError(
-            f"{where}: it has no unit: write it behind the title, as '{one.name} [mm]', or in a "
-            f"mapping, as [signals.{one.name}] unit = 'bar', or '1' for none"
+            f"{where}: it has no unit: write it behind the title, as '{signal.name} [mm]', or in a "
+            f"mapping, as [signals.{signal.name}] unit = 'bar', or '1' for none"
         )
-    found = _known_unit(unit, where)
-    if one.unit and column.unit and one.scale is None:
-        _require_same(one, column, where)
+    known_unit = _known_unit(unit, where)
+    if signal.unit and column.unit and signal.scale is None:
+        _require_same(signal, column, where)
     # A unit that is SI already keeps its name, for instance Pa*s.
-    plain = float(converted(np.array([1.0]), found, si_symbol(found))[0]) == 1.0
-    keeps = plain and si_symbol(found) != "1" and unit.isascii() and unit[0].isalpha()
-    symbol = _plain(unit) if keeps else si_symbol(found)
-    label = one.label or column.label or one.name
-    return Chosen(one, column.name, clock, unit, symbol, label, column.meanings)
+    plain = float(converted(np.array([1.0]), known_unit, si_symbol(known_unit))[0]) == 1.0
+    keeps = plain and si_symbol(known_unit) != "1" and unit.isascii() and unit[0].isalpha()
+    symbol = _plain(unit) if keeps else si_symbol(known_unit)
+    label = signal.label or column.label or signal.name
+    return Chosen(signal, column.name, clock, unit, symbol, label, column.meanings)
 
 
 def _plain(unit: str) -> str:
@@ -156,19 +156,19 @@ def _known_unit(unit: str, where: str) -> Any:
         ) from None
 
 
-def _require_same(one: SignalMapping, column: Column, where: str) -> None:
+def _require_same(signal: SignalMapping, column: Column, where: str) -> None:
     """Refuse a mapping whose unit is another one than the file's."""
-    own = _known_unit(column.unit, where)
-    said = unit_of(one.unit)
+    unit = _known_unit(column.unit, where)
+    said = unit_of(signal.unit)
     two = np.array([1.0, 2.0])
-    if measures(own, si_symbol(said)) and np.array_equal(
-        converted(two, own, si_symbol(said)), converted(two, said, si_symbol(said))
+    if measures(unit, si_symbol(said)) and np.array_equal(
+        converted(two, unit, si_symbol(said)), converted(two, said, si_symbol(said))
     ):
         return
     raise UnitError(
-        f"{where}: the file says {column.unit!r} and the mapping {one.unit!r}: leave "
-        f"signals.{one.name}.unit out, or give signals.{one.name}.scale, which tells how many "
-        f"{one.unit} the number 1 is"
+        f"{where}: the file says {column.unit!r} and the mapping {signal.unit!r}: leave "
+        f"signals.{signal.name}.unit out, or give signals.{signal.name}.scale, which tells how "
+        f"many {signal.unit} the number 1 is"
     )
 
 
@@ -176,7 +176,7 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
     if given is not None and given.rate:
         return given
     if given is not None:
-        found = _column(file, source, given.column, "time.column")
+        clock = _column(file, source, given.column, "time.column")
     else:
         name = column.clock or _usual_clock(source)
         if name is None:
@@ -190,19 +190,19 @@ def _clock(file: Path, source: Source, column: Column, given: Clock | None) -> C
                 + _listing(source.columns)
                 + (before if len(source.columns) == 1 else "")
             )
-        found = source.columns[name]
-    unit = (given.unit if given is not None else "") or found.unit
-    where = f"{file}, column {quoted(found.name)}"
+        clock = source.columns[name]
+    unit = (given.unit if given is not None else "") or clock.unit
+    where = f"{file}, column {quoted(clock.name)}"
     if not unit:
         raise UnitError(
             f"{where}: the time has no unit: write in a mapping "
-            f'time = {{ column = "{found.name}", unit = "ms" }}'
+            f'time = {{ column = "{clock.name}", unit = "ms" }}'
         )
     if not measures(_known_unit(unit, where), "s"):
         raise UnitError(f"{where}: {unit!r} is no unit of time: choose another column")
-    if given is not None and given.unit and found.unit:
-        _require_same(SignalMapping("time", found.name, given.unit), found, where)
-    return Clock(found.name, unit)
+    if given is not None and given.unit and clock.unit:
+        _require_same(SignalMapping("time", clock.name, given.unit), clock, where)
+    return Clock(clock.name, unit)
 
 
 def _usual_clock(source: Source) -> str | None:
@@ -223,9 +223,9 @@ def _is_time(unit: str) -> bool:
 
 def _column(file: Path, source: Source, name: str, key: str) -> Column:
     """Return a column by its name, or by its title with the unit behind it."""
-    found = source.columns.get(name) or source.columns.get(split_title(name)[0])
-    if found is not None:
-        return found
+    column = source.columns.get(name) or source.columns.get(split_title(name)[0])
+    if column is not None:
+        return column
     many = [other for other in source.columns if other.rpartition("@")[0] == name]
     near = many or get_close_matches(name, source.columns, n=3, cutoff=0.5)
     hint = f"is it {' or '.join(map(repr, near))}? " if near else ""

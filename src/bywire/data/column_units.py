@@ -84,8 +84,8 @@ def converted(values: NDArray[np.float64], unit: Any, symbol: str) -> NDArray[np
 
 def convert_in_place(values: NDArray[np.float64], unit: Any, symbol: str) -> None:
     """Turn values into an SI unit where they lie, for arrays of which there is no room for two."""
-    zero, one = converted(np.array([0.0, 1.0]), unit, symbol)
-    slope = float(f"{one - zero:.15g}")  # 0.001 for mm, and not its neighbor
+    zero, unity = converted(np.array([0.0, 1.0]), unit, symbol)
+    slope = float(f"{unity - zero:.15g}")  # 0.001 for mm, and not its neighbor
     if slope != 1.0:
         values *= slope
     if zero:

@@ -73,7 +73,7 @@ def kept(path: Path) -> Iterator[FailingStream]:
         At the end, the first one that writing met.
     """
     with FileIO(path, "w+") as stream:
-        found = FailingStream(stream)
-        yield found
-    if found.error is not None:
-        raise found.error
+        failing = FailingStream(stream)
+        yield failing
+    if failing.error is not None:
+        raise failing.error

@@ -36,19 +36,19 @@ def format_to_read(path: Path, name: str = "") -> FileFormat:
     head = head_of(path)
     if not head:
         raise FileError(f"{path} is empty (0 bytes): was the recording stopped or the copy cut?")
-    holds = [one for one in FORMATS.all().values() if one.recognizes(head)]
-    for one in wanted or holds:
-        if one in holds:
-            return one
+    holds = [kind for kind in FORMATS.all().values() if kind.recognizes(head)]
+    for kind in wanted or holds:
+        if kind in holds:
+            return kind
     if not wanted:
         raise FileError(f"{path} holds no known format: known are {_names()}")
     said = f"format = {name!r}" if name else f"its ending {path.suffix!r}"
     if holds:
-        found, hint = holds[0].title, f"rename it, or say format = {holds[0].name!r}"
+        content, hint = holds[0].title, f"rename it, or say format = {holds[0].name!r}"
     else:
-        found = f"something else (it begins with {quoted(head[:8])})"
+        content = f"something else (it begins with {quoted(head[:8])})"
         hint = "export it again from the program that measured"
-    raise FileError(f"{path} holds {found}, not {wanted[0].title} as {said} says: {hint}")
+    raise FileError(f"{path} holds {content}, not {wanted[0].title} as {said} says: {hint}")
 
 
 def format_to_write(path: Path, name: str = "") -> FileFormat:
@@ -63,14 +63,14 @@ def format_to_write(path: Path, name: str = "") -> FileFormat:
     """
     if name:
         return FORMATS.find(name)
-    for one in _of_ending(path):
-        return one
-    endings = ", ".join(dict.fromkeys(e for one in FORMATS.all().values() for e in one.endings))
+    for kind in _of_ending(path):
+        return kind
+    endings = ", ".join(dict.fromkeys(e for kind in FORMATS.all().values() for e in kind.endings))
     raise FileError(f"{path}: the ending {path.suffix!r} belongs to no format: use {endings}")
 
 
 def _of_ending(path: Path) -> list[FileFormat]:
-    return [one for one in FORMATS.all().values() if path.suffix.lower() in one.endings]
+    return [kind for kind in FORMATS.all().values() if path.suffix.lower() in kind.endings]
 
 
 def _names() -> str:

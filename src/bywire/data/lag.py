@@ -148,10 +148,10 @@ def _refined(
     def loss(s: float) -> float:
         return -sign * _correlation(a[index], spline(index + s))
 
-    found = minimize_scalar(
+    peak = minimize_scalar(
         loss, bounds=(shift - 1.0, shift + 1.0), method="bounded", options={"xatol": 1e-6}
     )
-    return float(found.x), -sign * float(found.fun)
+    return float(peak.x), -sign * float(peak.fun)
 
 
 def _correlation(a: NDArray[np.float64], b: NDArray[np.float64]) -> float:

@@ -148,8 +148,8 @@ class LimitedSource:
             "path": str(path), "folder": os.getcwd(), "memory": memory, "seconds": seconds,
             "request": self._request,
         })  # fmt: skip
-        found = [Column(*fields) for fields in answer["columns"]]
-        self.columns: Mapping[str, Column] = {column.name: column for column in found}
+        columns = [Column(*fields) for fields in answer["columns"]]
+        self.columns: Mapping[str, Column] = {column.name: column for column in columns}
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns, piece by piece as the child sends them."""

@@ -70,12 +70,12 @@ def columns_of(parts: Mapping[str, Part], texts: Mapping[str, str]) -> dict[str,
     texts
         Texts in structs by dotted name, for instance ``units.p_mc``.
     """
-    found = {}
+    columns = {}
     for name, part in parts.items():
         unit, label = (texts.get(f"{struct}.{name}", "") for struct in NOTES)
         clock = texts.get(f"{CLOCKS}.{name}", "")
-        found[name] = Column(name, unit, part.length, clock if clock in parts else None, label)
-    return found
+        columns[name] = Column(name, unit, part.length, clock if clock in parts else None, label)
+    return columns
 
 
 def described(dataset: xr.Dataset, path: Path) -> dict[str, dict[str, str]]:
@@ -94,9 +94,9 @@ def described(dataset: xr.Dataset, path: Path) -> dict[str, dict[str, str]]:
                 f"cannot write {path}: {quoted(name)} is no name of a variable in MATLAB: letters, "
                 "digits and _ after a letter; choose another name in a mapping"
             )
-    found = {
+    structs = {
         struct: {n: str(dataset[n].attrs.get(key, "")) for n in (*signals, *axes)}
         for struct, key in NOTES.items()
     }
-    found[CLOCKS] = {name: str(dataset[name].dims[0]) for name in signals}
-    return found
+    structs[CLOCKS] = {name: str(dataset[name].dims[0]) for name in signals}
+    return structs

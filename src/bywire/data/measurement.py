@@ -160,10 +160,10 @@ def _dataset(
         column = _taken(values, uses, key.clock.column) if key.clock.column else None
         axes[key] = instants(file, source, key, column)
     variables = {}
-    for one, key in zip(chosen, keys, strict=True):
-        numbers = _timed(file, one, _taken(values, uses, one.column), axes[key].size)
-        one.to_si(numbers)
-        variables[one.mapping.name] = (dims[key], numbers, one.attributes())
+    for signal, key in zip(chosen, keys, strict=True):
+        numbers = _timed(file, signal, _taken(values, uses, signal.column), axes[key].size)
+        signal.to_si(numbers)
+        variables[signal.mapping.name] = (dims[key], numbers, signal.attributes())
     # Indexes of pandas that share the array: from the array, xarray would copy it.
     coords: dict[str, Any] = {
         dims[key]: (dims[key], pd.Index(axis, copy=False, name=dims[key]),
@@ -182,13 +182,13 @@ def _taken(
 
 
 def _timed(
-    file: Path, one: Chosen, numbers: NDArray[np.float64], count: int
+    file: Path, signal: Chosen, numbers: NDArray[np.float64], count: int
 ) -> NDArray[np.float64]:
     """Return the numbers that have instants; those behind a shorter clock must be blank."""
     if not np.isnan(numbers[count:]).all():
         raise FileError(
-            f"{file}, column {one.column!r}: it has numbers after the last instant of "
-            f"{one.clock.column!r}: give the signal its own time in a mapping"
+            f"{file}, column {signal.column!r}: it has numbers after the last instant of "
+            f"{signal.clock.column!r}: give the signal its own time in a mapping"
         )
     return numbers[:count]
 
@@ -196,13 +196,13 @@ def _timed(
 def _dimensions(chosen: Sequence[Chosen], keys: Sequence[AxisKey]) -> dict[AxisKey, str]:
     """Return the dimension of every time axis; that of most signals is ``time``."""
     main = Counter(keys).most_common(1)[0][0]
-    found: dict[AxisKey, str] = {main: "time"}
-    for one, key in zip(chosen, keys, strict=True):
-        found.setdefault(key, f"time_{one.mapping.name}")
-    for one in chosen:
-        if one.mapping.name in found.values():
+    dimensions: dict[AxisKey, str] = {main: "time"}
+    for signal, key in zip(chosen, keys, strict=True):
+        dimensions.setdefault(key, f"time_{signal.mapping.name}")
+    for signal in chosen:
+        if signal.mapping.name in dimensions.values():
             raise ParameterError(
-                f"signal {quoted(one.mapping.name)} has the name of the instants of signals: give "
-                "it another one in a mapping"
+                f"signal {quoted(signal.mapping.name)} has the name of the instants of signals: "
+                "give it another one in a mapping"
             )
-    return found
+    return dimensions

@@ -145,12 +145,12 @@ def _is_text(line: bytes) -> bool:
 
 def _cells(path: Path, line: str, separator: str, number: int) -> list[str]:
     try:
-        found = list(csv.reader(
+        rows = list(csv.reader(
             io.StringIO(line), delimiter=separator, strict=True, skipinitialspace=True
         ))
     except csv.Error as error:
         raise FileError(f"{path}, line {number}: {error}: check its quotation marks") from None
-    return [cell.strip() for cell in found[0]] if found else []
+    return [cell.strip() for cell in rows[0]] if rows else []
 
 
 def _are_numbers(cells: list[str]) -> bool:

@@ -63,15 +63,15 @@ class Answer(ABC):
         """Return the tables of the page as pandas frames, by caption or section."""
         import pandas as pd
 
-        found: dict[str, pd.DataFrame] = {}
+        frames: dict[str, pd.DataFrame] = {}
         for section in self.document().page:
             for block in section.blocks:
                 if isinstance(block, TableBlock):
                     name = block.caption.rstrip(".") or section.title
                     headings = [column.heading for column in block.table.columns]
                     rows = [[cell.content for cell in row] for row in block.table.rows]
-                    found.setdefault(name, pd.DataFrame(rows, columns=headings))
-        return found
+                    frames.setdefault(name, pd.DataFrame(rows, columns=headings))
+        return frames
 
     def write(self, folder: str | Path) -> list[Path]:
         """Write recordings, figures and one self-contained page; each file whole or not at all.

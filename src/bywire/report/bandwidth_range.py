@@ -16,13 +16,13 @@ _COLORS = (style.BLUE, style.VERMILLION, style.GREEN, style.PURPLE, style.ORANGE
 
 
 def bandwidth_range(
-    found: xr.Dataset, labels: Sequence[float], name: str, symbol: str
+    response: xr.Dataset, labels: Sequence[float], name: str, symbol: str
 ) -> Figure:
     """Draw the bandwidth of every amplitude; a ring marks the worst case.
 
     Parameters
     ----------
-    found
+    response
         Dataset with ``bandwidth`` [Hz] over ``variant`` and ``amplitude``; where it lies beyond
         the measured frequencies, an arrow stands at the last one.
     labels
@@ -32,10 +32,10 @@ def bandwidth_range(
     """
     figure, (axes,) = style.new_figure(2.9)
     factor, _ = in_display_unit(1.0, symbol)
-    x, lowest, highest = factor * np.asarray(labels), *found["frequency"].values[[0, -1]]
-    size_unit = str(found["amplitude"].attrs["units"])
-    for (j, size), color in zip(enumerate(found["amplitude"].values), cycle(_COLORS)):
-        y = found["bandwidth"].values[:, j]
+    x, lowest, highest = factor * np.asarray(labels), *response["frequency"].values[[0, -1]]
+    size_unit = str(response["amplitude"].attrs["units"])
+    for (j, size), color in zip(enumerate(response["amplitude"].values), cycle(_COLORS)):
+        y = response["bandwidth"].values[:, j]
         inside = np.clip(y, lowest, highest)
         label = f"amplitude {amount(float(size), size_unit, 3)}"
         axes.plot(x, inside, marker="o", markersize=4, color=color, label=style.plain(label))

@@ -89,8 +89,8 @@ def levels_between(low: float, high: float) -> list[float]:
     if low > 0 and high > 3.0 * low:
         decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
         every = [step * 10.0**n for n in decades for step in _STEPS]
-        found = [float(f"{level:g}") for level in every if low < level < high]
-        return found[:: math.ceil(len(found) / _MOST)]
+        levels = [float(f"{level:g}") for level in every if low < level < high]
+        return levels[:: math.ceil(len(levels) / _MOST)]
     span = (high - low) or abs(high) or 1.0
     step = 10.0 ** math.floor(math.log10(span / 5.0))
     step *= next(f for f in (1.0, 2.0, 5.0, 10.0) if span / (f * step) <= 10.0)

@@ -45,24 +45,24 @@ class DesignCurve:
     span: float
 
 
-def loop_gains(found: Sequence[DesignCurve], phase_margin: float | None) -> Figure:
+def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Figure:
     """Draw magnitude and phase of the loop gains; the phase margin read as a vertical span.
 
     Parameters
     ----------
-    found
+    curves
         At most three sets of gains, in their order.
     phase_margin
         The required one [degree], drawn as a limit of the phase at the crossovers.
     """
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
-    for one, color, line in zip(found, _COLORS, _LINES, strict=False):
-        f = one.curve.frequency
-        margins = one.curve.margins
-        label = f"{one.label}: {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
-        upper.plot(f, 20.0 * np.log10(np.abs(one.curve.L)), line, color=color, linewidth=1.6,
-                   label=label if margins.stable else f"{one.label}: unstable")  # fmt: skip
-        lower.plot(f, one.curve.phase, line, color=color, linewidth=1.6)
+    for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
+        f = design.curve.frequency
+        margins = design.curve.margins
+        label = f"{design.label}: {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
+        upper.plot(f, 20.0 * np.log10(np.abs(design.curve.L)), line, color=color, linewidth=1.6,
+                   label=label if margins.stable else f"{design.label}: unstable")  # fmt: skip
+        lower.plot(f, design.curve.phase, line, color=color, linewidth=1.6)
         if math.isfinite(margins.phase_at):
             lower.plot([margins.phase_at] * 2, [-180.0, margins.phase - 180.0], color=color,
                        linewidth=3.0, alpha=0.6, zorder=4)  # fmt: skip
@@ -74,22 +74,22 @@ def loop_gains(found: Sequence[DesignCurve], phase_margin: float | None) -> Figu
                       linewidth=look.linewidth)  # fmt: skip
         upper.plot([], [], color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
                    label=f"required phase margin {phase_margin:.3g}°")  # fmt: skip
-    span = max(float(np.ptp(one.curve.phase)) for one in found)
+    span = max(float(np.ptp(design.curve.phase)) for design in curves)
     lower.yaxis.set_major_locator(MultipleLocator(45.0 if span < 300.0 else 90.0))
     upper.set_ylabel("magnitude of L [dB]")
     lower.set_ylabel("phase of L [°]")
-    _frequency_axis(found, upper, lower)
+    _frequency_axis(curves, upper, lower)
     style.legend_above(upper)
     figure.align_ylabels([upper, lower])
     return figure
 
 
-def sensitivities(found: Sequence[DesignCurve]) -> Figure:
+def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
     """Draw |S| and |T| of the stable loops with the limits that are usually asked for.
 
     Parameters
     ----------
-    found
+    curves
         See `loop_gains`.
     """
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
@@ -99,41 +99,41 @@ def sensitivities(found: Sequence[DesignCurve]) -> Figure:
                      linewidth=look.linewidth, label=f"usual limit {limit:g}")  # fmt: skip
         axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
         highest, lowest = 20.0 * math.log10(limit), 0.0
-        for one, color, line in zip(found, _COLORS, _LINES, strict=False):
-            if not one.curve.margins.stable:
+        for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
+            if not design.curve.margins.stable:
                 continue
-            size = 20.0 * np.log10(np.abs(getattr(one.curve, quantity)))
+            size = 20.0 * np.log10(np.abs(getattr(design.curve, quantity)))
             highest, lowest = max(highest, float(size.max())), min(lowest, float(size.min()))
             peak = 10.0 ** (float(size.max()) / 20.0)
-            axes.plot(one.curve.frequency, size, line, color=color, linewidth=1.6,
-                      label=f"{one.label}: max |{quantity}| {peak:.3g}")  # fmt: skip
+            axes.plot(design.curve.frequency, size, line, color=color, linewidth=1.6,
+                      label=f"{design.label}: max |{quantity}| {peak:.3g}")  # fmt: skip
         axes.set_ylim(max(lowest, _LOWEST) - 2.0, highest + 3.0)
         axes.set_ylabel(f"|{quantity}| [dB]")
         style.legend_above(axes)
-    _frequency_axis(found, *panels)
+    _frequency_axis(curves, *panels)
     figure.align_ylabels(panels)
     return figure
 
 
-def steps(found: Sequence[DesignCurve], overshoot: float | None) -> Figure:
+def steps(curves: Sequence[DesignCurve], overshoot: float | None) -> Figure:
     """Draw the linear responses to a unit step; the band of settling and the required overshoot.
 
     Parameters
     ----------
-    found
+    curves
         See `loop_gains`; unstable loops are left out.
     overshoot
         The required one [%].
     """
     figure, (axes,) = style.new_figure(3.2)
     axes.axhspan(0.98, 1.02, color=style.SHADE, zorder=0.5, label="settled: within 2 %")
-    stable = [one for one in found if one.curve.margins.stable]
-    end = max((one.span for one in stable), default=1.0)
-    for one, color, line in zip(found, _COLORS, _LINES, strict=False):
-        if one.curve.margins.stable:
-            time = np.append(one.time, max(end, one.time[-1]))
-            axes.plot(time, np.append(one.step, one.step[-1]), line, color=color, linewidth=1.6,
-                      label=one.label)  # fmt: skip
+    stable = [design for design in curves if design.curve.margins.stable]
+    end = max((design.span for design in stable), default=1.0)
+    for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
+        if design.curve.margins.stable:
+            time = np.append(design.time, max(end, design.time[-1]))
+            axes.plot(time, np.append(design.step, design.step[-1]), line, color=color,
+                      linewidth=1.6, label=design.label)  # fmt: skip
     if overshoot is not None:
         look = style.STROKES[Role.LIMIT]
         axes.axhline(1.0 + 0.01 * overshoot, color=look.color, linestyle=look.linestyle,
@@ -146,9 +146,9 @@ def steps(found: Sequence[DesignCurve], overshoot: float | None) -> Figure:
     return figure
 
 
-def _frequency_axis(found: Sequence[DesignCurve], upper: Axes, lower: Axes) -> None:
+def _frequency_axis(curves: Sequence[DesignCurve], upper: Axes, lower: Axes) -> None:
     upper.set_xscale("log")
-    upper.set_xlim(found[0].curve.frequency[0], found[0].curve.frequency[-1])
+    upper.set_xlim(curves[0].curve.frequency[0], curves[0].curve.frequency[-1])
     lower.xaxis.set_major_formatter(lambda hertz, _: f"{hertz:g}")
     lower.xaxis.set_minor_formatter(NullFormatter())
     lower.set_xlabel(style.axis_label("frequency", "Hz"))

@@ -20,7 +20,7 @@ _LEAST = 0.01  # of the tolerance: smaller differences are drawn at the lower ed
 
 def differences(
     frequency: Array,
-    found: Mapping[str, tuple[Array, Array]],
+    sizes: Mapping[str, tuple[Array, Array]],
     tolerance: tuple[float, float],
 ) -> Figure:
     """Draw the size of differences of gain and phase over frequency, logarithmically.
@@ -29,7 +29,7 @@ def differences(
     ----------
     frequency
         Frequencies [Hz], shape (n,).
-    found
+    sizes
         Label -> differences of gain [dB] and phase [degree], shape (n,) each; NaN is left out.
     tolerance
         What counts as agreement, in dB and degree: drawn as limits.
@@ -39,13 +39,13 @@ def differences(
     ParameterError
         When there is nothing to draw.
     """
-    if not found:
+    if not sizes:
         raise ParameterError("differences: nothing given: give at least one cause")
     figure, panels = style.new_figure(5.2, (1.0, 1.0))
     look = style.STROKES[Role.LIMIT]
     for n, (axes, label) in enumerate(zip(panels, ("gain [dB]", "phase [°]"), strict=True)):
         floor = _LEAST * tolerance[n]
-        for k, (name, values) in enumerate(found.items()):
+        for k, (name, values) in enumerate(sizes.items()):
             size = np.abs(values[n])
             axes.plot(
                 frequency, np.where(np.isfinite(size), np.maximum(size, floor), np.nan),

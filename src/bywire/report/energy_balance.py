@@ -127,17 +127,17 @@ def _sides(books: Ledger) -> tuple[list[Entry], list[Entry]]:
     """Return the givers and the receivers of energy."""
     given: list[Entry] = []
     taken: list[Entry] = []
-    for one, color in zip(books.sources, cycle(SOURCE_COLORS)):
-        back = "back to the source" if len(books.sources) == 1 else f"{one.label} (takes)"
-        gives = one.energy > 0
+    for entry, color in zip(books.sources, cycle(SOURCE_COLORS)):
+        back = "back to the source" if len(books.sources) == 1 else f"{entry.label} (takes)"
+        gives = entry.energy > 0
         side = given if gives else taken
-        side.append(Entry(one.label if gives else back, abs(one.energy), color))
-    colors = _colors([one.name for one in books.sinks])
-    for one in books.sinks:
-        takes = one.energy > 0
+        side.append(Entry(entry.label if gives else back, abs(entry.energy), color))
+    colors = _colors([entry.name for entry in books.sinks])
+    for entry in books.sinks:
+        takes = entry.energy > 0
         suffix = "" if takes else " (gives)"
         side = taken if takes else given
-        side.append(Entry(one.label + suffix, abs(one.energy), colors[one.name]))
+        side.append(Entry(entry.label + suffix, abs(entry.energy), colors[entry.name]))
     return given, taken
 
 
@@ -154,11 +154,11 @@ def _colors(sinks: Sequence[str]) -> dict[str, str]:
     """Return a color for every variable, no two alike while there are any left over."""
     known = {COLORS[name] for name in sinks if name in COLORS}
     left = cycle([c for c in dict.fromkeys(COLORS.values()) if c not in known] or [style.BLACK])
-    found: dict[str, str] = {}
+    colors: dict[str, str] = {}
     for name in sinks:
         usual = COLORS.get(name)
-        found[name] = next(left) if usual is None or usual in found.values() else usual
-    return found
+        colors[name] = next(left) if usual is None or usual in colors.values() else usual
+    return colors
 
 
 def _stack(axes: Axes, row: float, entries: list[Entry], total: float) -> None:

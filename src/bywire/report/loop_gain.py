@@ -46,16 +46,16 @@ def loop_gain(family: Family) -> Figure:
 
 def _spans(upper: Axes, lower: Axes, worst: LoopCurve) -> None:
     """Draw phase margin and gain margin as the spans that they are, with their frequencies."""
-    found = worst.margins
-    if math.isfinite(found.phase_at):
-        text = f"phase margin {found.phase:.3g}° at {found.phase_at:.3g} Hz"
-        lower.plot([found.phase_at] * 2, [-180.0, found.phase - 180.0], color=style.GREEN,
+    margins = worst.margins
+    if math.isfinite(margins.phase_at):
+        text = f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz"
+        lower.plot([margins.phase_at] * 2, [-180.0, margins.phase - 180.0], color=style.GREEN,
                    linewidth=2.2, zorder=4)  # fmt: skip
-        _line(upper, lower, found.phase_at, style.GREEN, text)
-    if math.isfinite(found.gain):
+        _line(upper, lower, margins.phase_at, style.GREEN, text)
+    if math.isfinite(margins.gain):
         at = worst.phase_crossover
-        text = f"gain margin {found.gain:.3g} at {at:.3g} Hz"
-        upper.plot([at] * 2, [-20.0 * math.log10(found.gain), 0.0], color=style.PURPLE,
+        text = f"gain margin {margins.gain:.3g} at {at:.3g} Hz"
+        upper.plot([at] * 2, [-20.0 * math.log10(margins.gain), 0.0], color=style.PURPLE,
                    linewidth=2.2, zorder=4)  # fmt: skip
         _line(upper, lower, at, style.PURPLE, text)
 

@@ -63,8 +63,8 @@ def nichols(family: Family) -> Figure:
     axes.set_xlabel("phase of L [°]")
     axes.set_ylabel("magnitude of L [dB]")
     value_bar(figure, [axes], family)
-    own = [h for h in axes.get_legend_handles_labels()[0] if isinstance(h, Line2D)]
-    style.legend_above(axes, [*own, *handles])
+    gain_lines = [h for h in axes.get_legend_handles_labels()[0] if isinstance(h, Line2D)]
+    style.legend_above(axes, [*gain_lines, *handles])
     return figure
 
 
@@ -87,14 +87,14 @@ def _points(curve: LoopCurve) -> tuple[Array, Array]:
 
 def _crossings(axes: Axes, worst: LoopCurve) -> None:
     """Mark -1 and where phase and gain margin are read."""
-    found = worst.margins
+    margins = worst.margins
     axes.plot(-180.0, 0.0, "+", color=style.BLACK, markersize=10, markeredgewidth=1.6, zorder=5,
               linestyle="none", label="-1")  # fmt: skip
-    if math.isfinite(found.crossover):
-        axes.plot(found.phase - 180.0, 0.0, "o", color=style.BLACK, markersize=5, zorder=5,
-                  linestyle="none", label=f"phase margin {found.phase:.3g}°")  # fmt: skip
-    if math.isfinite(found.gain):
+    if math.isfinite(margins.crossover):
+        axes.plot(margins.phase - 180.0, 0.0, "o", color=style.BLACK, markersize=5, zorder=5,
+                  linestyle="none", label=f"phase margin {margins.phase:.3g}°")  # fmt: skip
+    if math.isfinite(margins.gain):
         phase = float(np.interp(worst.phase_crossover, worst.frequency, worst.phase))
         at = 360.0 * round((phase - 180.0) / 360.0) + 180.0  # the odd half turn next to it
-        axes.plot(at, -20.0 * math.log10(found.gain), "s", color=style.BLACK, markersize=5,
-                  zorder=5, linestyle="none", label=f"gain margin {found.gain:.3g}")  # fmt: skip
+        axes.plot(at, -20.0 * math.log10(margins.gain), "s", color=style.BLACK, markersize=5,
+                  zorder=5, linestyle="none", label=f"gain margin {margins.gain:.3g}")  # fmt: skip

@@ -72,14 +72,15 @@ def _disk(axes: Axes, worst: LoopCurve) -> None:
 
 def _crossings(axes: Axes, worst: LoopCurve) -> None:
     """Mark where phase and gain margin are read."""
-    found = worst.margins
-    if math.isfinite(found.phase_at):
-        angle = math.radians(found.phase - 180.0)
+    margins = worst.margins
+    if math.isfinite(margins.phase_at):
+        angle = math.radians(margins.phase - 180.0)
         axes.plot(math.cos(angle), math.sin(angle), "o", color=style.BLACK, markersize=5, zorder=5,
                   linestyle="none",
-                  label=f"phase margin {found.phase:.3g}° at {found.phase_at:.3g} Hz")  # fmt: skip
-    if math.isfinite(found.gain):
-        axes.plot(-1.0 / found.gain, 0.0, "s", color=style.BLACK, markersize=5, zorder=5,
+                  label=f"phase margin {margins.phase:.3g}° at {margins.phase_at:.3g} Hz",
+                  )  # fmt: skip
+    if math.isfinite(margins.gain):
+        axes.plot(-1.0 / margins.gain, 0.0, "s", color=style.BLACK, markersize=5, zorder=5,
                   linestyle="none",
-                  label=f"gain margin {found.gain:.3g} at {worst.phase_crossover:.3g} Hz",
+                  label=f"gain margin {margins.gain:.3g} at {worst.phase_crossover:.3g} Hz",
                   )  # fmt: skip

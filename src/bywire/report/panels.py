@@ -101,15 +101,15 @@ def panels_by_unit(recording: xr.Dataset) -> tuple[Panel, ...]:
     groups: dict[str, list[str]] = {}
     for name in lines:
         groups.setdefault(str(recording[name].attrs.get("units", "1")), []).append(name)
-    found = []
+    panels = []
     for group in groups.values():
         for first in range(0, len(group), _LINES):
             shown = group[first : first + _LINES]
             roles = zip(shown, (Role.MAIN, Role.SECOND), strict=False)
             traces = [Trace(name, role) for name, role in roles]
             traces += [Trace(n, Role.SET_POINT) for n in names if targets[n] in shown]
-            found.append(Panel(_quantity(recording, shown), tuple(traces)))
-    return tuple(found)
+            panels.append(Panel(_quantity(recording, shown), tuple(traces)))
+    return tuple(panels)
 
 
 def _is_drawn(recording: xr.Dataset, name: str) -> bool:

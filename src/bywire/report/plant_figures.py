@@ -33,16 +33,16 @@ def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[
     values = {label: model.response(f) for label, model in models.items()}
     taken, drawn = first.input_units[0], []
     for row, (signal, given) in enumerate(zip(first.outputs, first.output_units, strict=True)):
-        if not any(np.any(one[:, row, 0]) for one in values.values()):
+        if not any(np.any(response[:, row, 0]) for response in values.values()):
             continue
         shown = display_unit(given)
         scale = convert(1.0, given, shown) / convert(1.0, taken, display_unit(taken))
         unit = f"{unit_text(shown) or '1'}/{unit_text(display_unit(taken)) or '1'}"
         lines = []
-        for k, (label, one) in enumerate(values.items()):
+        for k, (label, response) in enumerate(values.items()):
             # Points on top of a line: models that agree would hide each other.
             some = slice(None) if k == 0 else slice(k * _APART // 2, None, _APART)
             path = f"{label}, {signal} by {first.inputs[0]}"
-            lines.append(Response(path, f[some], scale * one[some, row, 0], measured=k > 0))
+            lines.append(Response(path, f[some], scale * response[some, row, 0], measured=k > 0))
         drawn.append((signal, bode(lines, gain_unit=unit)))
     return drawn

@@ -27,7 +27,9 @@ def rate_table(model: LinearModel) -> Table:
         size = abs(s)
         if s.imag < -1e-9 or size < STILL:  # the other of a pair; what does not move
             continue
-        figures = [f"{one:.4g}" for one in (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)]
+        figures = [
+            f"{figure:.4g}" for figure in (s.real, s.imag, size / 2.0 / np.pi, -s.real / size)
+        ]
         if model.period and abs(s.imag * model.period / np.pi - 1.0) < _SAME:
             figures[2:] = [f"{model.nyquist:.4g} (f_s/2)", "-"]
         rows.append(figures)
@@ -43,8 +45,8 @@ def left_out(model: LinearModel) -> list[str]:
     model
         The same one.
     """
-    found = rates(model)
-    still, dead = int(np.sum(np.abs(found) < STILL)), len(model.states) - len(found)
+    speeds = rates(model)
+    still, dead = int(np.sum(np.abs(speeds) < STILL)), len(model.states) - len(speeds)
     parts = []
     if still:
         parts.append(f"{still} at 0 (not driven, or not brought back)")

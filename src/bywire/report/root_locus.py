@@ -21,48 +21,48 @@ _COLORS = "viridis"
 _ROOM = 1.3  # around what must be seen
 
 
-def root_locus(found: Locus, bandwidth: float) -> Figure:
+def root_locus(locus: Locus, bandwidth: float) -> Figure:
     """Draw the poles' ways in two planes: all that the sampling can tell, and the slow ones.
 
     Parameters
     ----------
-    found
+    locus
         The poles.
     bandwidth
         Largest bandwidth of the loop over the range [Hz]; NaN where there is none: the poles that
         turn unstable then choose the second plane.
     """
-    rates = found.rates
+    rates = locus.rates
     sizes = [float(s) for s in np.abs(rates[np.isfinite(rates)]) if s > STILL]
-    whole = shown_radius(sizes, found.period)
-    slow = min(max([slow_radius(sizes, bandwidth, whole), *_borders(found)]), whole)
-    crossing = _crossing(found)
+    whole = shown_radius(sizes, locus.period)
+    slow = min(max([slow_radius(sizes, bandwidth, whole), *_borders(locus)]), whole)
+    crossing = _crossing(locus)
     if not math.isfinite(bandwidth) and crossing > 0.0:
         slow = min(crossing, whole)
     figure, panels = planes(("poles", "the slow ones"), 4.6)
-    factor, _ = in_display_unit(1.0, found.unit)
-    norm = Normalize(factor * found.values[0], factor * found.values[-1])
+    factor, _ = in_display_unit(1.0, locus.unit)
+    norm = Normalize(factor * locus.values[0], factor * locus.values[-1])
     for axes, radius in zip(panels, (whole, slow), strict=True):
         inside = rates[np.isfinite(rates) & (np.abs(rates) <= radius)]
-        draw_plane(axes, radius, found.period, float(np.max(inside.real, initial=0.0)))
-        _ways(axes, found, norm, factor)
+        draw_plane(axes, radius, locus.period, float(np.max(inside.real, initial=0.0)))
+        _ways(axes, locus, norm, factor)
     bar = figure.colorbar(ScalarMappable(norm, _COLORS), ax=panels, aspect=40, pad=0.02,
                           format="%g")  # fmt: skip
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
-    bar.set_label(style.axis_label(found.name, found.unit), fontsize=style.TEXT_SIZE)
+    bar.set_label(style.axis_label(locus.name, locus.unit), fontsize=style.TEXT_SIZE)
     handles, _ = panels[0].get_legend_handles_labels()
     figure.legend(handles=handles, loc="outside upper left", frameon=False,
                   fontsize=style.TEXT_SIZE)  # fmt: skip
     return figure
 
 
-def _borders(found: Locus) -> list[float]:
-    return [_ROOM * abs(border.rate) for border in found.borders]
+def _borders(locus: Locus) -> list[float]:
+    return [_ROOM * abs(border.rate) for border in locus.borders]
 
 
-def _crossing(found: Locus) -> float:
+def _crossing(locus: Locus) -> float:
     """Return the radius that shows the whole ways of the poles that turn unstable; 0 for none."""
-    rates = np.where(np.isfinite(found.rates), found.rates, 0.0)
+    rates = np.where(np.isfinite(locus.rates), locus.rates, 0.0)
     turning = (rates.real > STILL).any(axis=0) & (rates.real < -STILL).any(axis=0)
     return _ROOM * float(np.max(np.abs(rates[:, turning]), initial=0.0))
 
@@ -75,8 +75,8 @@ def border_text(border: Border, name: str, unit: str) -> str:
     return f"unstable {side} {name} = {amount(border.value, unit)}: it {how}"
 
 
-def _ways(axes: Axes, found: Locus, norm: Normalize, factor: float) -> None:
-    rates = found.rates
+def _ways(axes: Axes, locus: Locus, norm: Normalize, factor: float) -> None:
+    rates = locus.rates
     for column in rates.T:
         moves = np.isfinite(column) & (np.abs(column) > STILL)
         upper = moves & (column.imag >= -STILL)
@@ -85,7 +85,7 @@ def _ways(axes: Axes, found: Locus, norm: Normalize, factor: float) -> None:
         line = np.where(upper, column, np.nan)
         axes.plot(line.real, line.imag, color=style.GRAY, linewidth=0.6, zorder=2.0)
         axes.scatter(
-            line.real, line.imag, c=factor * found.values, cmap=_COLORS, norm=norm, s=7, zorder=3,
+            line.real, line.imag, c=factor * locus.values, cmap=_COLORS, norm=norm, s=7, zorder=3,
             linewidths=0.0,
         )  # fmt: skip
     for k, marker, text in ((0, "x", "first"), (-1, "o", "last")):
@@ -94,11 +94,11 @@ def _ways(axes: Axes, found: Locus, norm: Normalize, factor: float) -> None:
         axes.plot(
             shown.real, shown.imag, marker, color=style.BLACK, markersize=5, zorder=4,
             markerfacecolor="none", linestyle="none",
-            label=style.plain(f"{text}: {found.name} = {amount(found.values[k], found.unit)}"),
+            label=style.plain(f"{text}: {locus.name} = {amount(locus.values[k], locus.unit)}"),
         )  # fmt: skip
-    for border in found.borders:
+    for border in locus.borders:
         axes.plot(
             border.rate.real, border.rate.imag, "*", color=style.VERMILLION, markersize=11,
             markeredgecolor="white", zorder=5, linestyle="none",
-            label=style.plain(border_text(border, found.name, found.unit)),
+            label=style.plain(border_text(border, locus.name, locus.unit)),
         )  # fmt: skip

@@ -37,7 +37,7 @@ class Subject:
         at = f" at {self.point}" if self.point else ""
         return f"{self.summary}{at}; parameter set {self.parameters}"
 
-    def made(self, *notes: str) -> Section:
+    def provenance(self, *notes: str) -> Section:
         """Return the section on how a report was made: notes, source and all parameters.
 
         Raises

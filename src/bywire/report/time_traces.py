@@ -114,10 +114,10 @@ def _drawable(
 
 def _present(panel: Panel, recording: xr.Dataset) -> list[Trace]:
     """Return the traces worth drawing; a set point that is always 0 was never used."""
-    found = [trace for trace in panel.traces if trace.variable in recording.data_vars]
+    traces = [trace for trace in panel.traces if trace.variable in recording.data_vars]
     return [
         trace
-        for trace in found
+        for trace in traces
         if trace.role is not Role.SET_POINT or bool(np.any(recording[trace.variable].values))
     ]
 
@@ -187,10 +187,10 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
 
 def _parameter(recording: xr.Dataset, path: str) -> float | None:
     """Return a parameter with which a recording was made; None where it says none."""
-    found = json.loads(str(recording.attrs.get("parameters", "{}")))
+    value = json.loads(str(recording.attrs.get("parameters", "{}")))
     for name in path.split("."):
-        found = found.get(name) if isinstance(found, dict) else None
-    return float(found) if isinstance(found, (int, float)) else None
+        value = value.get(name) if isinstance(value, dict) else None
+    return float(value) if isinstance(value, (int, float)) else None
 
 
 def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:

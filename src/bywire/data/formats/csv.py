@@ -45,22 +45,22 @@ class TextSource:
         indices = [self._index[name] for name in names]
         dialect = with_mark(self._path, self._dialect, indices)
         size = self._path.stat().st_size
-        found = GrowingColumns(len(names), 0)
+        growing = GrowingColumns(len(names), 0)
         line, done, tail = self._dialect.first_line, self._dialect.start, b""
         for block in _blocks(self._path, self._dialect.start):
             columns = _fast(block, dialect, indices)
             if columns is None:
                 columns = strict_columns(self._path, block, line, dialect, indices)
             done += len(block)
-            if not found.rows:  # as many rows as bytes promise, and a hundredth more
+            if not growing.rows:  # as many rows as bytes promise, and a hundredth more
                 expected = 1.01 * len(columns[0]) * (size - self._dialect.start) / len(block)
-                found = GrowingColumns(len(names), int(expected) + 1)
-            found.append(columns)
+                growing = GrowingColumns(len(names), int(expected) + 1)
+            growing.append(columns)
             line += block.count(b"\n")
             tail = tail[-LOOKED_AT:] + block[-LOOKED_AT:]
             require_whole_end(self._path, tail, line, dialect)
             progress(f"reading {self._path.name}", done / max(size, 1))
-        return dict(zip(names, found.finished(), strict=True))
+        return dict(zip(names, growing.finished(), strict=True))
 
     def place(self, name: str, row: int) -> str:
         """Return the line of a row."""
@@ -77,11 +77,11 @@ class TextSource:
 def _names(dialect: Dialect) -> dict[str, int]:
     """Return the index of every column by its name; a title that stands twice tells its number."""
     titles = dialect.titles or ("",) * dialect.width
-    found = {}
+    indices = {}
     for k, title in enumerate(titles):
         plain = title or str(k + 1)
-        found[f"{plain}@{k + 1}" if titles.count(title) > 1 and title else plain] = k
-    return found
+        indices[f"{plain}@{k + 1}" if titles.count(title) > 1 and title else plain] = k
+    return indices
 
 
 def _blocks(path: Path, start: int) -> Iterator[bytes]:
@@ -122,9 +122,9 @@ def _fast(
         )  # fmt: skip
     except (ValueError, OverflowError):  # the strict reader finds the cell, and says it better
         return None
-    found = [frame[k].to_numpy(dtype=np.float64) for k in indices]
-    is_whole = all(len(one) == lines and not np.isinf(one).any() for one in found)
-    return found if is_whole else None
+    columns = [frame[k].to_numpy(dtype=np.float64) for k in indices]
+    is_whole = all(len(column) == lines and not np.isinf(column).any() for column in columns)
+    return columns if is_whole else None
 
 
 @contextmanager

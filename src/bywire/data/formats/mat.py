@@ -33,14 +33,16 @@ class MatSource:
         from scipy.io import whosmat
 
         self._path = path
-        found = whosmat(path, appendmat=False)
-        name, count = Counter(name for name, _, _ in found).most_common(1)[0] if found else ("", 0)
+        variables = whosmat(path, appendmat=False)
+        name, count = (
+            Counter(name for name, _, _ in variables).most_common(1)[0] if variables else ("", 0)
+        )
         if count > 1:
             raise FileError(f"{path} holds {quoted(name)} twice: save each variable once")
         self._inner: dict[str, NDArray[Any]] = {}
         self._parts: dict[str, Part] = {}
         texts: dict[str, str] = {}
-        for name, shape, kind in found:
+        for name, shape, kind in variables:
             if kind in _NUMBERS:
                 self._parts |= parts_of(name, shape)
             elif kind == "struct":
@@ -68,10 +70,10 @@ class MatSource:
         """Return a variable as MATLAB has it."""
         from scipy.io import loadmat
 
-        found = loadmat(self._path, variable_names=[name], appendmat=False)[name]
-        if not isinstance(found, np.ndarray):
-            raise FileError(f"{self._path} is damaged: {quoted(name)} cannot be read ({found})")
-        return found
+        variable = loadmat(self._path, variable_names=[name], appendmat=False)[name]
+        if not isinstance(variable, np.ndarray):
+            raise FileError(f"{self._path} is damaged: {quoted(name)} cannot be read ({variable})")
+        return variable
 
     def _walk(self, name: str, struct: NDArray[Any], texts: dict[str, str], depth: int) -> None:
         """Find arrays and texts in a struct that is no table of structs."""

@@ -61,15 +61,15 @@ class Mat73Source:
         for name in group:
             if name.startswith("#") or not isinstance(group.get(name, getlink=True), h5py.HardLink):
                 continue
-            one = group[name]
-            if isinstance(one, h5py.Group):
+            item = group[name]
+            if isinstance(item, h5py.Group):
                 if depth < _DEEPEST:
-                    self._walk(one, f"{prefix}{name}.", depth + 1)
-            elif isinstance(one, h5py.Dataset) and one.dtype.kind in "iufb" and one.shape:
-                if _attribute(one, "MATLAB_class") == "char":
-                    self._texts[f"{prefix}{name}"] = self._text(one)
+                    self._walk(item, f"{prefix}{name}.", depth + 1)
+            elif isinstance(item, h5py.Dataset) and item.dtype.kind in "iufb" and item.shape:
+                if _attribute(item, "MATLAB_class") == "char":
+                    self._texts[f"{prefix}{name}"] = self._text(item)
                 else:
-                    self._arrays[f"{prefix}{name}"] = one
+                    self._arrays[f"{prefix}{name}"] = item
             if len(self._arrays) + len(self._texts) > _MOST:
                 raise FileError(f"{self._path} holds more than {_MOST} arrays: choose another file")
 
@@ -114,11 +114,11 @@ class Mat73Source:
             )
 
 
-def _attribute(one: Any, name: str) -> str:
+def _attribute(item: Any, name: str) -> str:
     """Return a short text that is an attribute; nothing where it is something else."""
-    if name not in one.attrs or math.prod(one.attrs.get_id(name).shape or ()) > 1:
+    if name not in item.attrs or math.prod(item.attrs.get_id(name).shape or ()) > 1:
         return ""
-    value = one.attrs[name]
+    value = item.attrs[name]
     text = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
     return str(text)[:_LONGEST] if isinstance(text, str) else ""
 
@@ -141,9 +141,9 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     with kept(path) as whole, h5py.File(whole, "w", userblock_size=_USER_BLOCK) as file:
         for k, (name, variable) in enumerate(dataset.variables.items()):
             numbers = np.asarray(variable.values, dtype=np.float64).reshape(1, -1)
-            made = file.create_dataset(str(name), data=numbers, compression="gzip", shuffle=True,
+            written = file.create_dataset(str(name), data=numbers, compression="gzip", shuffle=True,
                                        compression_opts=1)  # fmt: skip
-            made.attrs["MATLAB_class"] = np.bytes_("double")
+            written.attrs["MATLAB_class"] = np.bytes_("double")
             progress(f"writing {path.name}", (k + 1) / len(dataset.variables))
         for struct, fields in texts.items():
             group = file.create_group(struct)
@@ -158,12 +158,12 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 def _write_text(group: Any, name: str, text: str, codes: NDArray[np.uint16]) -> None:
     """Write a text as MATLAB does: one number for each character, in a column."""
     if not text:
-        made = group.create_dataset(name, data=np.array([0, 0], dtype=np.uint64))
-        made.attrs["MATLAB_empty"] = np.uint8(1)
+        written = group.create_dataset(name, data=np.array([0, 0], dtype=np.uint64))
+        written.attrs["MATLAB_empty"] = np.uint8(1)
     else:
-        made = group.create_dataset(name, data=codes)
-        made.attrs["MATLAB_int_decode"] = np.int32(2)
-    made.attrs["MATLAB_class"] = np.bytes_("char")
+        written = group.create_dataset(name, data=codes)
+        written.attrs["MATLAB_int_decode"] = np.int32(2)
+    written.attrs["MATLAB_class"] = np.bytes_("char")
 
 
 FORMAT = FileFormat(

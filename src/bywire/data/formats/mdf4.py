@@ -48,28 +48,30 @@ class Mdf4Source:
 
     def _columns(self) -> dict[str, Column]:
         groups = self._file.groups
-        uses = Counter(one.name for group in groups for one in group.channels)
-        found: dict[str, Column] = {}
+        uses = Counter(channel.name for group in groups for channel in group.channels)
+        columns: dict[str, Column] = {}
         for g, group in enumerate(groups):
             length = group.channel_group.cycles_nr
             master = self._file.masters_db.get(g)
             if master is None or not length or not _is_time(group.channels[master]):
                 continue
             names = {
-                c: one.name if uses[one.name] == 1 else f"{one.name}@{g}"
-                for c, one in enumerate(group.channels)
-                if _is_read(one, group.channel_dependencies[c])
+                c: channel.name if uses[channel.name] == 1 else f"{channel.name}@{g}"
+                for c, channel in enumerate(group.channels)
+                if _is_read(channel, group.channel_dependencies[c])
             }
             if master not in names:
                 continue
             for c, name in names.items():
-                one = group.channels[c]
-                unit = "s" if c == master else one.unit or getattr(one.conversion, "unit", "")
-                unit = "1" if not unit and _has_texts(one) else unit
+                channel = group.channels[c]
+                unit = (
+                    "s" if c == master else channel.unit or getattr(channel.conversion, "unit", "")
+                )
+                unit = "1" if not unit and _has_texts(channel) else unit
                 clock = None if c == master else names[master]
                 self._places[name] = (g, c)
-                found[name] = Column(name, (unit or "").strip(), length, clock, "")
-        return found
+                columns[name] = Column(name, (unit or "").strip(), length, clock, "")
+        return columns
 
     def _read(
         self, group: int, names: Sequence[str], begin: int, size: int
@@ -158,9 +160,9 @@ def _has_formula(conversion: Any) -> bool:
     return any(_has_formula(block) for block in inner.values())
 
 
-def _has_texts(one: Any) -> bool:
+def _has_texts(channel: Any) -> bool:
     """Return whether a channel's numbers stand for texts; the numbers are what is read."""
-    return getattr(one.conversion, "conversion_type", 0) in _TEXTS
+    return getattr(channel.conversion, "conversion_type", 0) in _TEXTS
 
 
 @contextmanager
@@ -195,11 +197,11 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
             time = np.asarray(dataset[dim].values, dtype=np.float64)
             signals = [
                 asammdf.Signal(
-                    samples=np.asarray(one.values), timestamps=time, name=str(name),
-                    unit=str(one.attrs.get("units", "1")),
+                    samples=np.asarray(signal.values), timestamps=time, name=str(name),
+                    unit=str(signal.attrs.get("units", "1")),
                 )
-                for name, one in dataset.data_vars.items()
-                if one.dims[0] == dim
+                for name, signal in dataset.data_vars.items()
+                if signal.dims[0] == dim
             ]  # fmt: skip
             file.append(signals, comment="bywire")
         progress(f"writing {path.name}", 0.5)

@@ -40,7 +40,7 @@ class NetcdfSource:
 
 
 def _columns(file: Any) -> Mapping[str, Column]:
-    found = {}
+    columns = {}
     for name, variable in file.variables.items():
         if len(variable.shape) != 1 or not np.issubdtype(variable.dtype, np.number):
             continue
@@ -49,8 +49,8 @@ def _columns(file: Any) -> Mapping[str, Column]:
         unit = str(getattr(variable, "units", "")).partition(" since ")[0]
         label = str(getattr(variable, "long_name", ""))
         meanings = str(getattr(variable, "flag_meanings", ""))
-        found[name] = Column(name, unit, variable.shape[0], clock, label, meanings)
-    return {n: c for n, c in found.items() if c.clock is None or c.clock in found}
+        columns[name] = Column(name, unit, variable.shape[0], clock, label, meanings)
+    return {n: c for n, c in columns.items() if c.clock is None or c.clock in columns}
 
 
 @contextmanager

@@ -28,7 +28,7 @@ class ParquetSource:
         self._path = path
         self._file = file
         self.columns = _columns(file)
-        kinds = {one.name: str(one.type) for one in file.schema_arrow}
+        kinds = {field.name: str(field.type) for field in file.schema_arrow}
         self._instants = {name for name, kind in kinds.items() if kind.startswith("timestamp")}
         self._origins: dict[str, int] = {}
 
@@ -60,19 +60,19 @@ class ParquetSource:
 def _columns(file: Any) -> Mapping[str, Column]:
     import pyarrow as pa
 
-    found = {}
+    columns = {}
     names = list(file.schema_arrow.names)
-    for one in file.schema_arrow:
-        kind = one.type
+    for field in file.schema_arrow:
+        kind = field.type
         is_clock = pa.types.is_timestamp(kind) or pa.types.is_duration(kind)
         is_number = pa.types.is_integer(kind) or pa.types.is_floating(kind)
-        if names.count(one.name) > 1 or not (is_number or is_clock or pa.types.is_boolean(kind)):
+        if names.count(field.name) > 1 or not (is_number or is_clock or pa.types.is_boolean(kind)):
             continue
-        notes = one.metadata or {}
+        notes = field.metadata or {}
         unit = kind.unit if is_clock else notes.get(_UNIT, b"").decode("utf-8", "replace")
         label = notes.get(_LABEL, b"").decode("utf-8", "replace")
-        found[one.name] = Column(one.name, unit, file.metadata.num_rows, None, label)
-    return found
+        columns[field.name] = Column(field.name, unit, file.metadata.num_rows, None, label)
+    return columns
 
 
 @contextmanager
