@@ -107,14 +107,14 @@ def test_file_that_cannot_be_written_leaves_the_old_one(recording, tmp_path):
 def test_file_that_is_no_recording(tmp_path, content):
     path = tmp_path / "run.nc"
     path.write_bytes(content)
-    with pytest.raises(FileError, match=r"cannot read recording .*run\.nc"):
+    with pytest.raises(FileError, match=r"cannot read recording .*run\.nc|run\.nc is damaged, as a recording"):
         bywire.read_recording(path)
 
 
 def test_recording_that_is_not_there(tmp_path):
     with pytest.raises(FileError, match="No such file"):
         bywire.read_recording(tmp_path / "none.nc")
-    with pytest.raises(FileError, match="cannot read recording"):
+    with pytest.raises(FileError, match="is not a file"):
         bywire.read_recording(tmp_path)
 
 

@@ -6,7 +6,6 @@ import keyword
 import os
 import re
 import sys
-import tempfile
 from collections.abc import Iterator
 from dataclasses import dataclass
 from importlib.util import find_spec
@@ -15,6 +14,7 @@ from typing import Any
 
 from bywire.core.brake import brakes
 from bywire.core.errors import FileError, ParameterError, quoted
+from bywire.core.scratch import scratch_folder
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Listing, Paragraph, Section
 
@@ -121,8 +121,8 @@ def write_package(name: str, folder: Path) -> Path:
     if not folder.is_dir():
         raise FileError(f"{folder} is no folder: make it first, or choose another one")
     try:
-        with tempfile.TemporaryDirectory(dir=folder, prefix=f".{name}-") as scratch:
-            draft = Path(scratch) / name
+        with scratch_folder(folder) as scratch:
+            draft = scratch / name
             for place, text in _files(package):
                 (draft / place).parent.mkdir(parents=True, exist_ok=True)
                 (draft / place).write_text(text, encoding="utf-8")

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import FileError
 from bywire.core.extras import how_to_install
 from bywire.core.machine_memory import machine_memory
+from bywire.core.scratch import process_folder
 from bywire.data.file_format import Column, FileFormat, Progress
 from bywire.data.reading_child import NUMBERS, fill, receive, send
 
@@ -57,7 +58,7 @@ class Child:
 
     def __init__(self, module: str) -> None:
         # asammdf writes a temporary file; with its folder it goes, whatever becomes of the child.
-        self._folder = mkdtemp(prefix="bywire-")
+        self._folder = mkdtemp(dir=process_folder())
         paths = os.pathsep.join(path for path in sys.path if path)
         self._process = subprocess.Popen(
             # -P: a module beside the measurement must not run in place of a library's.
@@ -150,6 +151,7 @@ class LimitedSource:
         })  # fmt: skip
         columns = [Column(*fields) for fields in answer["columns"]]
         self.columns: Mapping[str, Column] = {column.name: column for column in columns}
+        self.notes: Mapping[str, Any] = answer["notes"]
 
     def read(self, names: Sequence[str], progress: Progress) -> dict[str, NDArray[np.float64]]:
         """Return the numbers of some columns, piece by piece as the child sends them."""

@@ -26,7 +26,7 @@ from bywire.data.limited_source import limited
 from bywire.data.mapping import MeasurementMapping
 from bywire.data.mapping_file import read_mapping
 from bywire.data.mapping_tables import mapping_from
-from bywire.data.room import room
+from bywire.data.room import require_room, room
 from bywire.data.time_axis import AxisKey, instants
 
 
@@ -87,7 +87,8 @@ def dataset_of(
 ) -> xr.Dataset:  # fmt: skip
     """Read signals of an open measurement file, as `read_measurement` does."""
     chosen = choose(file, source, meaning, signals)
-    _require_room(file, source, chosen, largest)
+    names = {c.column for c in chosen} | {c.clock.column for c in chosen if c.clock.column}
+    require_room(file, source, names, largest)
     dataset = _dataset(file, source, chosen, progress)
     dataset.attrs = {"source": file.name, "format": format_to_read(file, meaning.format).name}
     return dataset
@@ -129,20 +130,6 @@ def mapping_of(
     if isinstance(mapping, Mapping):
         return mapping_from(mapping)
     return MeasurementMapping() if mapping is None else read_mapping(mapping)
-
-
-def _require_room(
-    file: Path, source: Source, chosen: Sequence[Chosen], largest: int
-) -> None:
-    """Refuse what would not fit, before anything is read."""
-    names = {c.column for c in chosen} | {c.clock.column for c in chosen if c.clock.column}
-    size = 8 * sum(source.columns[name].length or 0 for name in names)
-    if size > largest:
-        raise FileError(
-            f"{file} says that it holds {size / 2**30:.3g} GiB of numbers in {len(names)} columns, "
-            f"and {largest / 2**30:.3g} GiB are read at most: choose fewer signals, or check the "
-            "file where it is much smaller"
-        )
 
 
 def _dataset(

@@ -1,15 +1,32 @@
-"""Recordings as NetCDF files, written whole or not at all."""
+"""Recordings as NetCDF files: written whole or not at all, and read in a child process.
+
+The library that reads them believes what a file says of itself: a damaged one has it crash, or run
+without an end, where not even Ctrl-C is heard.
+"""
 
 from __future__ import annotations
 
-import contextlib
-import os
-import secrets
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
+from bywire.core.scratch import replacing
+from bywire.data.file_format import Column, FileFormat, ReadOptions, no_progress
+from bywire.data.format_registry import head_of
+from bywire.data.formats.netcdf import FORMAT as NETCDF
+from bywire.data.limited_source import limited
+from bywire.data.room import require_room
+
+if TYPE_CHECKING:
+    from bywire.data.limited_source import LimitedSource
+
+_VALUES = 1 << 22  # that are handed over at a time
 
 
 def write_recording(recording: xr.Dataset, path: Path) -> Path:
@@ -20,19 +37,16 @@ def write_recording(recording: xr.Dataset, path: Path) -> Path:
     FileError
         When the file cannot be written, for instance because the disk is full.
     """
-    scratch = path.with_name(f".{path.name}.{secrets.token_hex(4)}")
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
     try:
-        recording.to_netcdf(scratch, engine="netcdf4", encoding=encoding)
-        os.replace(scratch, path)
+        with replacing(path) as fresh:
+            recording.to_netcdf(fresh, engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write {path}: {reason}: choose a folder that you may write to"
+            f"cannot write {path}: {reason}: make room there, or choose a folder that you may "
+            "write to"
         ) from None
-    finally:
-        with contextlib.suppress(OSError):
-            scratch.unlink(missing_ok=True)
     return path
 
 
@@ -42,10 +56,93 @@ def read_recording(path: str | Path) -> xr.Dataset:
     Raises
     ------
     FileError
-        When the file cannot be read or is no NetCDF file.
+        When the file cannot be read, is damaged, or is no NetCDF file.
     """
-    try:
-        with xr.open_dataset(path, engine="netcdf4") as opened:
-            return opened.load()
-    except (OSError, RuntimeError, ValueError) as error:
-        raise FileError(f"cannot read recording {path}: {error}") from None
+    file = Path(path)
+    if not NETCDF.recognizes(head_of(file)):
+        raise FileError(
+            f"cannot read recording {file}: it is no NetCDF file: bywire convert, or "
+            "read_measurement, reads other formats"
+        )
+    with limited(file, FORMAT) as source:
+        require_room(file, source)
+        return _dataset(source)
+
+
+class RecordingSource:
+    """An open recording: numbers of any shape as columns, what else it holds as notes."""
+
+    def __init__(self, file: xr.Dataset) -> None:
+        self._file = file
+        numbers = {str(name): v for name, v in file.variables.items() if v.dtype.kind in "iufbmM"}
+        self.columns: Mapping[str, Column] = {
+            name: Column(name, length=variable.size) for name, variable in numbers.items()
+        }
+        self.notes = {
+            "attrs": _plain(file.attrs),
+            "coords": [str(name) for name in file.coords],
+            "variables": {
+                str(name): {
+                    "dims": list(variable.dims),
+                    "shape": list(variable.shape),
+                    "kind": variable.dtype.str,
+                    "attrs": _plain(variable.attrs),
+                    "texts": None if name in numbers else variable.values.astype(str).tolist(),
+                }
+                for name, variable in file.variables.items()
+            },
+        }
+
+    def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
+        """Yield numbers row by row; those of eight bytes as they lie in memory."""
+        for name in names:
+            flat = np.ascontiguousarray(self._file.variables[name].values).reshape(-1)
+            plain = flat.view(np.float64) if flat.itemsize == 8 else flat
+            for begin in range(0, flat.size, _VALUES):
+                yield name, begin, plain[begin : begin + _VALUES]
+
+
+def _plain(attributes: Mapping[Any, Any]) -> dict[str, Any]:
+    """Return attributes as JSON holds them: texts, and numbers with their type."""
+    return {
+        str(name): value if isinstance(value, str) else
+        {"kind": np.asarray(value).dtype.str, "values": np.asarray(value).tolist()}
+        for name, value in attributes.items()
+    }  # fmt: skip
+
+
+def _attributes(plain: Mapping[str, Any]) -> dict[str, Any]:
+    """Return attributes as xarray has them."""
+    return {
+        name: value if isinstance(value, str) else np.array(value["values"], value["kind"])[()]
+        for name, value in plain.items()
+    }
+
+
+def _dataset(source: LimitedSource) -> xr.Dataset:
+    columns = source.read(list(source.columns), no_progress)
+    variables = {}
+    for name, said in source.notes["variables"].items():
+        kind = np.dtype(said["kind"])
+        if name not in columns:
+            values = np.array(said["texts"], dtype=object if kind.kind == "O" else kind)
+        elif kind.itemsize == 8:
+            values = columns.pop(name).view(kind)
+        else:
+            values = columns.pop(name).astype(kind)
+        variables[name] = (said["dims"], values.reshape(said["shape"]), _attributes(said["attrs"]))
+    coords = {name: variables.pop(name) for name in source.notes["coords"]}
+    return xr.Dataset(variables, coords, _attributes(source.notes["attrs"]))
+
+
+@contextmanager
+def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
+    with xr.open_dataset(path, engine="netcdf4", cache=False) as file:
+        yield RecordingSource(file)
+
+
+FORMAT = FileFormat(
+    "recording", "a recording", NETCDF.endings, NETCDF.recognizes, _open, NETCDF.write,
+    has_many_axes=True, libraries=("netCDF4",), counts=("index", 0),
+)  # fmt: skip
+"""how the child reads a recording; measurement files have the format ``netcdf``"""

@@ -5,8 +5,9 @@ crash, run without an end, or ask for all memory. Here that ends a child, and no
 
 Both ways messages go as a length, a JSON object, and for a piece of a column its numbers as they
 lie in memory: nothing is unpickled. The reader asks ``{path, folder, memory, seconds}``; the answer
-is ``{columns}``. It asks for ``{names}`` as often as it likes, and ends with none; the answers are
-pieces ``{column, begin, count, kind}`` and ``{end}``. ``{error}`` and ``{memory}`` end it early.
+is ``{columns, notes}``. It asks for ``{names}`` as often as it likes, and ends with none; the
+answers are pieces ``{column, begin, count, kind}`` and ``{end}``. ``{error}`` and ``{memory}`` end
+it early.
 
 On Linux the process imports the library once and forks for each file, so that a file costs
 milliseconds, starts from a sound state and has its own limits. Elsewhere it reads one file.
@@ -109,7 +110,8 @@ def _serve(
         with kind.open(path, ReadOptions()) as opened:
             source = cast(PieceSource, opened)
             columns = source.columns
-            send(answers, {"columns": [astuple(column) for column in columns.values()]})
+            described = {"columns": [astuple(column) for column in columns.values()]}
+            send(answers, described | {"notes": getattr(source, "notes", {})})
             while names := (receive(requests) or {"names": []})["names"]:
                 for name, begin, part in source.pieces(names):
                     _allow(request["seconds"])

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import os
-import secrets
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 
 from bywire.core.errors import FileError, InputError
+from bywire.core.scratch import replacing
 from bywire.data.file_format import FileFormat, Progress, no_progress
 from bywire.data.format_registry import format_to_write
 
@@ -57,21 +56,17 @@ def write_measurement(
     require_free(target, overwrite=overwrite)
     _require_fit(dataset, target, kind)
     ready = _with_units(dataset)
-    # The ending stays: some libraries append their own to a file without it.
-    scratch = target.with_name(f".{target.stem}.{secrets.token_hex(4)}{target.suffix}")
     try:
-        kind.write(ready, scratch, progress)
-        os.replace(scratch, target)
+        with replacing(target) as fresh:
+            kind.write(ready, fresh, progress)
     except InputError:
         raise
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write {target}: {reason}: choose a folder that you may write to"
+            f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
+            "write to"
         ) from None
-    finally:
-        with contextlib.suppress(OSError, ValueError):
-            scratch.unlink(missing_ok=True)
     return target
 
 

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import io
 import os
-import secrets
 import warnings
 from pathlib import Path
 
@@ -13,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from bywire.core.errors import FileError
+from bywire.core.scratch import replacing
 
 PNG_DPI = 160
 """pixels per inch of a PNG"""
@@ -83,18 +82,14 @@ def write_bytes(path: str | os.PathLike[str], content: bytes) -> Path:
         When the folder cannot be made or written to; names the file and the reason.
     """
     target = Path(path)
-    partial = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
         target.parent.mkdir(parents=True, exist_ok=True)
-        with open(partial, "xb") as stream:
-            stream.write(content)
-        os.replace(partial, target)
+        with replacing(target) as fresh:
+            fresh.write_bytes(content)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise FileError(
-            f"cannot write {target}: {reason}; choose a folder that you may write to"
+            f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
+            "write to"
         ) from None
-    finally:
-        with contextlib.suppress(OSError, ValueError):
-            partial.unlink(missing_ok=True)
     return target
