@@ -93,10 +93,10 @@ def sweep(parent: Path) -> None:
 
 def _remove_left(folder: Path) -> None:
     try:
-        found = folder.stat(follow_symlinks=False)
+        status = folder.stat(follow_symlinks=False)
         if sys.platform == "win32":
             lock = None
-        elif found.st_uid != os.getuid():
+        elif status.st_uid != os.getuid():
             return
         else:
             lock = _lock(folder)
@@ -104,7 +104,7 @@ def _remove_left(folder: Path) -> None:
         return  # in use
     except OSError:
         lock = None
-    if lock is not None or time.time() - found.st_mtime > _OLD:
+    if lock is not None or time.time() - status.st_mtime > _OLD:
         shutil.rmtree(folder, ignore_errors=True)
     _unlock(lock)
 

@@ -84,18 +84,18 @@ def open_to_others(path: Path) -> str:
     resolved = path.resolve(strict=True)
     is_folder = resolved.is_dir()
     for steps, each in enumerate((resolved, *resolved.parents)):
-        found = each.stat(follow_symlinks=False)
+        status = each.stat(follow_symlinks=False)
         is_above = steps > (0 if is_folder else 1)
-        if found.st_uid not in (os.getuid(), 0) or not _is_closed(found, is_above):
+        if status.st_uid not in (os.getuid(), 0) or not _is_closed(status, is_above):
             return str(each)
     return ""
 
 
-def _is_closed(found: os.stat_result, is_above: bool) -> bool:
+def _is_closed(status: os.stat_result, is_above: bool) -> bool:
     """Return whether nobody but its owner may write to something."""
-    by_others = found.st_mode & stat.S_IWOTH
-    by_group = found.st_mode & stat.S_IWGRP and not _is_private(found.st_gid)
-    return not (by_others or by_group) or bool(is_above and found.st_mode & stat.S_ISVTX)
+    by_others = status.st_mode & stat.S_IWOTH
+    by_group = status.st_mode & stat.S_IWGRP and not _is_private(status.st_gid)
+    return not (by_others or by_group) or bool(is_above and status.st_mode & stat.S_ISVTX)
 
 
 def _is_private(group: int) -> bool:
@@ -103,11 +103,11 @@ def _is_private(group: int) -> bool:
     if sys.platform == "win32":
         return True
     try:
-        found, user = grp.getgrgid(group), pwd.getpwuid(os.getuid())
+        entry, user = grp.getgrgid(group), pwd.getpwuid(os.getuid())
     except KeyError:
         return False
-    is_own = user.pw_gid == group and found.gr_name == user.pw_name
-    return is_own and set(found.gr_mem) <= {user.pw_name}
+    is_personal = user.pw_gid == group and entry.gr_name == user.pw_name
+    return is_personal and set(entry.gr_mem) <= {user.pw_name}
 
 
 def keep_text(path: Path, text: str) -> None:
