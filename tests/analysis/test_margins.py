@@ -71,7 +71,9 @@ def test_worst_is_the_least_margin_and_the_largest_peak(field: str) -> None:
 def test_what_nothing_has_is_worst_nowhere() -> None:
     """A delay margin that no case has; one that only some have."""
     none, some = margins_by(delay=math.nan), margins_by(delay=7.0)
-    assert math.isnan(worst([none, none], [1.0, 2.0])["delay"][0])
+    value, at = worst([none, none], [1.0, 2.0])["delay"]
+    assert math.isnan(value)
+    assert at == 1.0  # nowhere worse than where it was looked first
     assert worst([none, some], [1.0, 2.0])["delay"] == (7.0, 2.0)
     with pytest.raises(ParameterError, match="give at least one value"):
         worst([], [])

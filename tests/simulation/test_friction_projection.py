@@ -110,6 +110,17 @@ def test_without_a_unique_solution(m: int) -> None:
         assert failed.mean() < (0.7 if project is project_fast else 1e-9)
 
 
+def test_forces_that_cancel_leave_rounding_and_no_failure() -> None:
+    """Of two forces of 2e8 N on the third body, 2 N are left: their rounding is no failure."""
+    S = np.array([[2.0, 0.0, 0.7], [0.0, 2.0, 0.3], [0.7, 0.3, 2.0]])
+    low, high = -np.ones(3), np.ones(3)
+    wanted = np.array([1e9 / 3.0, -7e9 / 9.0, 1.0])
+    c = S @ wanted - np.where(wanted > 0.0, low, high)
+    w, failed = evaluate(project_exact, S[None], c[None], low[None], high[None])
+    np.testing.assert_allclose(w[0], wanted, rtol=1e-6)
+    assert not failed.any()
+
+
 @pytest.mark.parametrize("project", [project_fast, project_exact])
 def test_without_frictions_there_is_nothing_to_find_and_nothing_fails(project: object) -> None:
     nothing = ca.SX(0, 1)
