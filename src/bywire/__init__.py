@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from bywire.data.measurement import read_measurement
     from bywire.data.netcdf import read_recording, write_recording
     from bywire.data.writing import write_measurement
+    from bywire.identification.fitting.question import Question
     from bywire.simulation.ensemble import Ensemble, simulate_ensemble
     from bywire.simulation.run import Run, Trajectory, simulate
     from bywire.simulation.sensitivity import Sensitivity, simulate_with_sensitivities
@@ -56,6 +57,7 @@ _HOMES = {
     "BenchResult": "api.run",
     "Check": "api.check",
     "check": "api.check",
+    "Question": "identification.fitting.question",
     "Identification": "api.identification",
     "Replay": "api.replay",
     "Run": "simulation.run",
@@ -102,6 +104,7 @@ __all__ = [
     "Ensemble",
     "Identification",
     "NewBrake",
+    "Question",
     "Replay",
     "Run",
     "Sensitivity",

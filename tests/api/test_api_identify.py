@@ -57,7 +57,7 @@ def test_signals_in_memory_are_a_measurement() -> None:
     with pytest.raises(bywire.BywireError, match="give only one of"):
         bywire.identify("seal-friction", made.data, synthetic=2)
     with pytest.raises(bywire.BywireError, match="--unknown is for methods of any bench"):
-        bywire.identify("seal-friction", made.data, unknowns="A")
+        bywire.identify("seal-friction", made.data, question=bywire.Question(unknowns="A"))
 
 
 def test_trust_goes_on_from_its_folder(tmp_path: Path) -> None:

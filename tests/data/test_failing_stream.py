@@ -7,8 +7,8 @@ import pytest
 from measurement_files import measurement
 
 from bywire.core.errors import FileError
-from bywire.data import failing_stream
-from bywire.data.failing_stream import FailingStream, kept
+from bywire.data.formats import mat73
+from bywire.data.formats.mat73 import FailingStream, kept
 from bywire.data.writing import write_measurement
 
 
@@ -46,7 +46,7 @@ def test_the_first_error_is_remembered(tmp_path):
 
 def test_hdf5_on_a_full_disk_is_one_error_and_no_file(tmp_path, monkeypatch):
     pytest.importorskip("h5py")
-    monkeypatch.setattr(failing_stream, "FileIO", FullDisk)
+    monkeypatch.setattr(mat73, "FileIO", FullDisk)
     with pytest.raises(FileError, match=r"cannot write .*No space left on device"):
         write_measurement(measurement(), tmp_path / "a.h5")
     assert not list(tmp_path.iterdir())

@@ -17,8 +17,7 @@ from bywire.report.document import Document, Section, TableBlock
 from bywire.report.tables import Table, text_table
 
 if TYPE_CHECKING:
-    from bywire.data.alignment_report import AlignedChannel, AlignmentReport
-    from bywire.data.channel_quality import Stretch
+    from bywire.data.channel_quality import AlignedChannel, AlignmentReport, Stretch
 
 _LISTED = 20
 """stretches of a kind that the JSON object lists for a channel; it counts all of them"""

@@ -13,6 +13,8 @@ from bywire.api.described_parameters import (
     described_kpi,
     described_parameter,
     groups,
+    option_rows,
+    option_table,
     parameters,
 )
 from bywire.api.described_systems import (
@@ -22,7 +24,6 @@ from bywire.api.described_systems import (
     described_system,
     signals,
 )
-from bywire.api.option_rows import option_rows, option_table
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.kpis.registry import definitions
@@ -34,7 +35,7 @@ from bywire.core.field_notes import field_notes
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
-from bywire.identification.fitting.asked import BENCH_METHODS, BenchMethod
+from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Flat, Paragraph, Section, TableBlock

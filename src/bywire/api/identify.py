@@ -11,17 +11,10 @@ import xarray as xr
 
 from bywire.api import earlier_result
 from bywire.api.identification import Identification
-from bywire.api.method_choice import (
-    BenchQuestion,
-    ChosenMethod,
-    Source,
-    Texts,
-    choose,
-    texts_of,
-)
+from bywire.api.method_choice import ChosenMethod, Source, choose
 from bywire.core.errors import ParameterError
 from bywire.data.file_format import Progress, no_progress
-from bywire.identification.fitting.asked import Asked
+from bywire.identification.fitting.question import Question
 from bywire.identification.measured import Measured, measured, name_of
 from bywire.identification.method import Effort, Identified
 from bywire.identification.simulated_experiments import displaced
@@ -29,13 +22,13 @@ from bywire.identification.trust import put_in
 from bywire.report.answer import use_case
 
 if TYPE_CHECKING:
-    from bywire.bench.bench import Bench
     from bywire.core.parameters import ParameterSet
 
 STARTS = "starts.jsonl"
 """file of the output folder that keeps finished starts"""
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
+_NOTHING = Question()
 _FAR = 30.0  # times: beyond, a unit is the first suspect
 
 
@@ -46,20 +39,12 @@ def identify(
     parameters: str = "",
     overrides: Mapping[str, Any] = _NONE,
     *,
+    question: Question = _NOTHING,
     mapping: str | Path | None = None,
     options: Mapping[str, Any] = _NONE,
     starts: int = 16,
     seed: int = 1,
     synthetic: int | None = None,
-    bench: Bench | str | Path | None = None,
-    inputs: Mapping[str, str] = _NONE,
-    outputs: Texts = (),
-    unknowns: Texts = (),
-    priors: Mapping[str, str] = _NONE,
-    states: Sequence[str] = (),
-    case: str = "",
-    holdout: Source | None = None,
-    loss: str = "",
     folder: str | Path | None = None,
     progress: Progress | None = None,
 ) -> Identification:
@@ -74,6 +59,8 @@ def identify(
     parameters, overrides
         Parameter set from which the search begins (of the method's brake, the main one by
         default), and what of it is changed: SI numbers, or texts with units.
+    question
+        For methods of any bench: which one, what is measured there, and what is unknown.
     mapping
         File that says what the columns of measurement files mean.
     options
@@ -82,25 +69,6 @@ def identify(
         Starts of the search, and the seed of all but the first.
     synthetic
         Seed of a simulated measurement, which is identified in place of a measured one.
-    bench
-        For methods of any bench: a `Bench`, the path of a bench file, or an experiment's name.
-    inputs
-        Stimulus of the model -> measured signal; by default all of the same name.
-    outputs
-        Output that is measured -> standard deviation of its noise, such as ``"0.02 bar"``; empty,
-        or the names alone, for the record's own.
-    unknowns
-        What is searched -> range such as ``"0.1..1 ohm"``; empty, or the names alone, for none.
-    priors
-        What is known of an unknown: ``"0.35 +- 0.02 ohm"``.
-    states
-        States whose initial values are unknown.
-    case
-        Run of the experiment; the first by default.
-    holdout
-        Measurement that is not fitted: validation.
-    loss
-        How large residuals count: ``linear``, ``soft_l1``, ``huber`` or ``cauchy``.
     folder
         Where the result will be written: a folder with the result of another method is refused, an
         earlier result is removed, and finished starts are kept there, so that an interrupted
@@ -125,10 +93,6 @@ def identify(
     ['A', 'F_0', 'f']
     """
     sources = [measurements] if isinstance(measurements, Source) else list(measurements)
-    asked = Asked(
-        dict(inputs), texts_of(outputs), texts_of(unknowns), dict(priors), tuple(states), case
-    )
-    question = BenchQuestion(bench, asked, holdout, loss)
     shown = no_progress if progress is None else progress
     chosen = choose(
         method, parameters, overrides, options, question, measurements=sources, mapping=mapping,
@@ -139,8 +103,9 @@ def identify(
     if place is not None:
         earlier_result.require_own(place, method)
     data, source = _data(chosen, sources, mapping, synthetic, shown)
-    held = [] if holdout is None else [holdout]
-    files = tuple(Path(each) for each in (*sources, *held) if not isinstance(each, xr.Dataset))
+    files = tuple(
+        Path(each) for each in (*sources, question.holdout) if isinstance(each, str | Path)
+    )
     if place is not None:
         earlier_result.remove(place, files)
     start = _start(chosen, synthetic)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import filecmp
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,11 +12,15 @@ import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import driven_bench
-from bywire.bench.bench import Bench
 from bywire.bench.values import parsed
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.data.file_format import Progress, no_progress
-from bywire.identification.fitting.asked import BENCH_METHODS, Asked, BenchMethod, find_method
+from bywire.identification.fitting.question import (
+    BENCH_METHODS,
+    BenchMethod,
+    Question,
+    find_method,
+)
 from bywire.identification.measured import measured
 
 if TYPE_CHECKING:
@@ -25,42 +29,6 @@ if TYPE_CHECKING:
 
 Source = str | Path | xr.Dataset
 """a measurement: a file, or what `bywire.read_measurement` gives"""
-
-Texts = Mapping[str, str] | Iterable[str]
-"""what is said of each name; or the names alone"""
-
-
-@dataclass(frozen=True)
-class BenchQuestion:
-    """What a method of any bench is asked.
-
-    Parameters
-    ----------
-    bench
-        A bench, the path of a bench file, or an experiment's name; None where none is given.
-    asked
-        What is measured there and what is unknown.
-    holdout
-        A measurement that is not fitted.
-    loss
-        How large residuals count; empty for the method's own choice.
-    """
-
-    bench: Bench | str | Path | None = None
-    asked: Asked = field(default_factory=Asked)
-    holdout: Source | None = None
-    loss: str = ""
-
-    @property
-    def given(self) -> tuple[str, ...]:
-        """What was given, as options of the command."""
-        asked = self.asked
-        options = {
-            "--bench": self.bench is not None, "--input": asked.inputs, "--output": asked.outputs,
-            "--unknown": asked.unknowns, "--prior": asked.priors, "--estimate-start": asked.states,
-            "--case": asked.case, "--holdout": self.holdout is not None, "--loss": self.loss,
-        }  # fmt: skip
-        return tuple(name for name, value in options.items() if value)
 
 
 @dataclass(frozen=True)
@@ -85,19 +53,12 @@ class ChosenMethod:
     changes: Mapping[str, Any] = field(default_factory=dict)
 
 
-def texts_of(names: Texts) -> dict[str, str]:
-    """Return what is said of each name, nothing where there are names alone."""
-    if isinstance(names, Mapping):
-        return dict(names)
-    return dict.fromkeys([names] if isinstance(names, str) else names, "")
-
-
 def choose(
     name: str,
     parameters: str,
     overrides: Mapping[str, Any],
     options: Mapping[str, Any],
-    question: BenchQuestion,
+    question: Question,
     *,
     measurements: Sequence[Source] = (),
     mapping: str | Path | None = None,
@@ -202,7 +163,7 @@ def _require_not_fitted(holdout: Source, measurements: Sequence[Source]) -> None
 
 def _on_bench(
     method: BenchMethod,
-    question: BenchQuestion,
+    question: Question,
     changes: Mapping[str, Any],
     mapping: str | Path | None,
     progress: Progress,
@@ -213,11 +174,11 @@ def _on_bench(
             f"{method.name} needs --bench: a bench file (TOML), or an experiment of 'bywire list'"
         )
     bench = driven_bench(question.bench, changes)
-    on_bench = method.on(bench, question.asked)
+    on_bench = method.on(bench, replace(question, holdout=None))
     if question.holdout is None:
         return on_bench
     held = measured(
         [question.holdout], mapping, on_bench.signals, optional=on_bench.optional, gaps=True,
         multiple=bench.step, progress=progress,
     )  # fmt: skip
-    return method.on(bench, replace(question.asked, holdout=held.data))
+    return method.on(bench, replace(question, holdout=held.data))

@@ -12,7 +12,7 @@ from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.identification.fitting.asked import BENCH_METHODS
+from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS, Method
 from bywire.synthesis.study import STUDIES
 

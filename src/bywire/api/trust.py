@@ -3,31 +3,29 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from bywire.api import earlier_result
-from bywire.api.method_choice import BenchQuestion, ChosenMethod, Texts, choose, texts_of
+from bywire.api.method_choice import ChosenMethod, choose
 from bywire.data.file_format import Progress, no_progress
 from bywire.identification import trust as trusted
-from bywire.identification.fitting.asked import Asked
+from bywire.identification.fitting.question import Question
 from bywire.identification.method import Effort
 from bywire.identification.trust import Trust
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Flat, Listing, Section, TableBlock
 from bywire.report.estimate_tables import trust_table
 
-if TYPE_CHECKING:
-    from bywire.bench.bench import Bench
-
 STORE = "experiments.jsonl"
 """file of the output folder that keeps finished experiments"""
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
+_NOTHING = Question()
 _MOST = 5  # experiments without a result that are named one by one
 
 
@@ -108,17 +106,10 @@ def trust(
     parameters: str = "",
     overrides: Mapping[str, Any] = _NONE,
     *,
+    question: Question = _NOTHING,
     options: Mapping[str, Any] = _NONE,
     starts: int = 1,
     seed: int = 1,
-    bench: Bench | str | Path | None = None,
-    inputs: Mapping[str, str] = _NONE,
-    outputs: Texts = (),
-    unknowns: Texts = (),
-    priors: Mapping[str, str] = _NONE,
-    states: Sequence[str] = (),
-    case: str = "",
-    loss: str = "",
     folder: str | Path | None = None,
     processes: int | None = None,
     progress: Progress | None = None,
@@ -127,10 +118,8 @@ def trust(
 
     Parameters
     ----------
-    method, parameters, overrides, options
+    method, parameters, overrides, question, options
         As of `bywire.identify`.
-    bench, inputs, outputs, unknowns, priors, states, case, loss
-        For methods of any bench, likewise.
     count
         Number of experiments.
     starts, seed
@@ -151,10 +140,6 @@ def trust(
     KeyboardInterrupt
         When interrupted.
     """
-    asked = Asked(
-        dict(inputs), texts_of(outputs), texts_of(unknowns), dict(priors), tuple(states), case
-    )
-    question = BenchQuestion(bench, asked, loss=loss)
     shown = no_progress if progress is None else progress
     chosen = choose(method, parameters, overrides, options, question, progress=shown)
     store = None

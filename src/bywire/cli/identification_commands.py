@@ -100,19 +100,21 @@ def identify(
     """Identify parameters with their confidence from measurements; status 1 if a check fails."""
     from bywire.api.identify import identify as identify_parameters
     from bywire.api.trust import trust
+    from bywire.identification.fitting.question import Question
 
+    question = Question(
+        bench, changes(input_, "--input"), named(output, "--output"), named(unknown, "--unknown"),
+        changes(prior, "--prior"), start or (), case, holdout, loss,
+    )  # fmt: skip
     shared: dict[str, Any] = {
-        "parameters": parameters, "overrides": changes(set_),
-        "options": changes(option, "--option"), "seed": seed, "bench": bench,
-        "inputs": changes(input_, "--input"), "outputs": named(output, "--output"),
-        "unknowns": named(unknown, "--unknown"), "priors": changes(prior, "--prior"),
-        "states": start or [], "case": case, "loss": loss, "folder": out,
+        "parameters": parameters, "overrides": changes(set_), "question": question,
+        "options": changes(option, "--option"), "seed": seed, "folder": out,
     }  # fmt: skip
     if study is None:
         show(
             lambda progress: identify_parameters(
                 method, measurements or [], mapping=map_, starts=starts or 16,
-                synthetic=synthetic, holdout=holdout, progress=progress, **shared,
+                synthetic=synthetic, progress=progress, **shared,
             ),
             out, json,
         )  # fmt: skip

@@ -13,8 +13,13 @@ from numpy.typing import NDArray
 
 from bywire.core import units
 from bywire.core.errors import ParameterError, unknown_name
-from bywire.data.alignment_report import AlignedChannel, AlignmentReport
-from bywire.data.channel_quality import ChannelQuality, Stretch, quality
+from bywire.data.channel_quality import (
+    AlignedChannel,
+    AlignmentReport,
+    ChannelQuality,
+    Stretch,
+    quality,
+)
 from bywire.data.resampling import METHODS, resampled
 from bywire.data.room import room
 

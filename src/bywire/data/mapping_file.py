@@ -1,13 +1,195 @@
-"""Mapping files: TOML in, mapping out; nothing in them is executed."""
+"""Mapping files: TOML in, mapping out; strict about keys and values, and nothing is executed."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Iterable, Mapping
 from pathlib import Path
+from typing import Any
 
-from bywire.core.errors import InputError
-from bywire.data.mapping import MeasurementMapping
-from bywire.data.mapping_tables import mapping_from
+from bywire.core import units
+from bywire.core.errors import InputError, ParameterError, UnitError, quoted, unknown_name
+from bywire.data.column_units import si_symbol, unit_of
+from bywire.data.mapping import Clock, MeasurementMapping, SignalMapping
 from bywire.data.toml_file import read_toml
+
+_KEYS = ("format", "time", "rate", "start", "signals", "decimal", "skip_lines")
+_TIME_KEYS = ("column", "unit", "rate", "start")
+_SIGNAL_KEYS = (
+    "column", "unit", "scale", "sign", "offset", "delay", "limits", "label", "time", "rate",
+)  # fmt: skip
+
+
+def mapping_from(content: Mapping[str, Any]) -> MeasurementMapping:
+    """Return the mapping that tables of keys and values describe, as a mapping file holds them.
+
+    Raises
+    ------
+    UnknownNameError
+        For an unknown key, with the nearest known one.
+    UnitError
+        For a unit that is not known or does not fit.
+    ParameterError
+        For a value that is not admissible.
+    """
+    _require_known(content, _KEYS, "key")
+    signals = _table(content.get("signals", {}), "signals")
+    decimal = _text(content, "decimal", "")
+    if decimal not in ("", ".", ","):
+        raise ParameterError(f"decimal = {decimal!r} is not admissible: it must be '.' or ','")
+    skip = content.get("skip_lines", 0)
+    if isinstance(skip, bool) or not isinstance(skip, int) or not 0 <= skip <= 10_000:
+        raise ParameterError(
+            f"skip_lines = {quoted(skip)} is not admissible: a whole number from 0 to 10000"
+        )
+    return MeasurementMapping(
+        {n: _signal(n, _table(v, f"signals.{n}")) for n, v in signals.items()},
+        _clock(content, ""),
+        _text(content, "format", ""),
+        decimal,
+        skip,
+    )
+
+
+def _signal(name: str, table: Mapping[str, Any]) -> SignalMapping:
+    where = f"signals.{name}."
+    _require_known(table, _SIGNAL_KEYS, f"key in [signals.{name}]")
+    unit = _unit(table, f"{where}unit")
+    symbol = si_symbol(unit_of(unit)) if unit else ""
+    needs_unit = [key for key in ("offset", "limits") if key in table and not symbol]
+    if needs_unit:
+        raise UnitError(f"{where}{needs_unit[0]} needs to know what is measured: give {where}unit")
+    sign = table.get("sign", 1)
+    if isinstance(sign, bool) or sign not in (1, -1):
+        raise ParameterError(f"{where}sign = {quoted(sign)} is not admissible: it must be 1 or -1")
+    return SignalMapping(
+        name=name,
+        column=_column(table, where) or name,
+        unit=unit,
+        scale=_scale(table, where),
+        sign=int(sign),
+        offset=_difference(table["offset"], symbol, f"{where}offset") if "offset" in table else 0.0,
+        delay=_quantity(table.get("delay", "0 s"), "s", f"{where}delay"),
+        limits=_limits(table, symbol, f"{where}limits"),
+        label=_text(table, "label", where),
+        clock=_clock(table, where),
+    )
+
+
+def _scale(table: Mapping[str, Any], where: str) -> float | None:
+    if "scale" not in table:
+        return None
+    scale = units.parse(table["scale"], "1", f"{where}scale")
+    if scale == 0.0:
+        raise ParameterError(f"{where}scale = 0 is not admissible: every value would be the same")
+    return scale
+
+
+def _limits(table: Mapping[str, Any], symbol: str, name: str) -> tuple[float, float] | None:
+    if "limits" not in table:
+        return None
+    pair = table["limits"]
+    if not isinstance(pair, list) or len(pair) != 2:
+        raise ParameterError(f'{name} = {quoted(pair)}: write two, as ["0 bar", "250 bar"]')
+    low, high = (_quantity(value, symbol, name) for value in pair)
+    if not low < high:
+        raise ParameterError(f"{name} = {quoted(pair)} is not admissible: the lower one first")
+    return low, high
+
+
+def _difference(value: object, symbol: str, name: str) -> float:
+    """Return an offset; one in degrees Celsius would count from another zero."""
+    number = _quantity(value, symbol, name)
+    unit = units.split(value)[1] if isinstance(value, str) else ""
+    if unit and units.has_own_zero(unit, symbol):
+        raise UnitError(f"{name} = {quoted(value)}: give the difference in {symbol}")
+    return number
+
+
+def _clock(table: Mapping[str, Any], where: str) -> Clock | None:
+    """Return the clock of a table's keys ``time``, or ``rate`` and ``start``."""
+    inner = table.get("time")
+    rest = {key: table[key] for key in ("rate", "start") if key in table}
+    if inner is None:
+        inner, name = rest, where
+    else:
+        name = f"{where}time."
+        inner = {"column": inner} if isinstance(inner, (str, int)) else inner
+        inner = {**_table(inner, f"{where}time"), **rest}
+    if not inner:
+        return None
+    _require_known(inner, _TIME_KEYS, f"key in {name.rstrip('.')}")
+    column = _column(inner, name)
+    if bool(column) == ("rate" in inner):
+        raise ParameterError(
+            f"{name}column or {name}rate: give one of them, as "
+            'time = { column = "t", unit = "ms" } or rate = "1 kHz"'
+        )
+    unit = _unit(inner, f"{name}unit")
+    if unit and si_symbol(unit_of(unit)) != "s":
+        raise UnitError(f"{name}unit = {quoted(unit)} is no unit of time: write for instance 'ms'")
+    if column and "start" in inner:
+        raise ParameterError(f"{name}start goes with a rate: a column has its own instants")
+    start = _quantity(inner.get("start", "0 s"), "s", f"{name}start")
+    rate = 0.0
+    if not column:
+        rate = _quantity(inner["rate"], "Hz", f"{name}rate")
+        if not rate > 0.0:
+            raise ParameterError(
+                f"{name}rate = {quoted(inner['rate'])} is not admissible: it must be > 0 Hz"
+            )
+    return Clock(column, unit, rate, start)
+
+
+def _quantity(value: Any, symbol: str, name: str) -> float:
+    """Return a quantity in SI; a plain number is refused where a unit is wanted, except 0."""
+    if symbol != "1" and isinstance(value, (int, float)) and value != 0 and math.isfinite(value):
+        raise UnitError(
+            f"{name} = {value} has no unit: write for instance {units.example(symbol)!r}"
+        )
+    return units.parse(value, symbol, name)
+
+
+def _unit(table: Mapping[str, Any], name: str) -> str:
+    text = _text(table, "unit", name.removesuffix("unit"))
+    try:
+        if "unit" in table:
+            unit_of(text)
+    except ValueError:
+        raise UnitError(
+            f"{name} = {quoted(text)} is no known unit: write for instance 'bar', or '1' for none"
+        ) from None
+    return text
+
+
+def _column(table: Mapping[str, Any], where: str) -> str:
+    """Return the name of a column; a number counts columns without names from 1."""
+    value = table.get("column", "")
+    if isinstance(value, int) and not isinstance(value, bool):
+        if not 1 <= value <= 100_000:
+            raise ParameterError(f"{where}column = {quoted(value)}: columns are counted from 1")
+        return str(value)
+    return _text(table, "column", where)
+
+
+def _text(table: Mapping[str, Any], key: str, where: str) -> str:
+    value = table.get(key, "")
+    if not isinstance(value, str):
+        raise ParameterError(f"{where}{key} = {quoted(value)}: write it in quotation marks")
+    return value.strip()
+
+
+def _table(value: Any, name: str) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{name} = {quoted(value)}: it must be a table of key = value")
+    return value
+
+
+def _require_known(table: Mapping[str, Any], known: Iterable[str], kind: str) -> None:
+    names = tuple(known)
+    for key in table:
+        if key not in names:
+            raise unknown_name(kind, key, names)
 
 
 def read_mapping(path: str | Path) -> MeasurementMapping:

@@ -24,8 +24,7 @@ from bywire.data.file_format import Progress, ReadOptions, Source, no_progress
 from bywire.data.format_registry import format_to_read
 from bywire.data.limited_source import limited
 from bywire.data.mapping import MeasurementMapping
-from bywire.data.mapping_file import read_mapping
-from bywire.data.mapping_tables import mapping_from
+from bywire.data.mapping_file import mapping_from, read_mapping
 from bywire.data.room import require_room, room
 from bywire.data.time_axis import AxisKey, instants
 

@@ -11,7 +11,7 @@ import xarray as xr
 
 from bywire.core.errors import ParameterError, UnitError, unknown_name
 from bywire.data.alignment import resample
-from bywire.data.alignment_report import AlignmentReport
+from bywire.data.channel_quality import AlignmentReport
 from bywire.data.column_units import measures, unit_of_symbol
 from bywire.data.file_format import Progress, no_progress
 from bywire.data.mapping_file import read_mapping

@@ -10,8 +10,8 @@ import xarray as xr
 
 import bywire
 from bywire.core.errors import InputError
-from bywire.identification.fitting.asked import Asked
 from bywire.identification.fitting.bench_fit import BenchFit
+from bywire.identification.fitting.question import Question
 from bywire.identification.fitting.unknown_texts import starts_of, unknowns_of
 from bywire.identification.fitting.worth import starts_check
 from bywire.identification.method import Effort, Identified
@@ -24,7 +24,7 @@ from bywire.identification.trust import trust
 SINE = {"kind": "sine", "mean": "0 V", "amplitude": "2 V", "f": "4 Hz", "phase": 0, "t_start": 0}
 KNOWN = {"source": "voltage", "add_holding": True, "duration": 0.25}
 OPTIONS = METHOD.defaults.replace({"between": "linear"})
-TWO = Asked(
+TWO = Question(
     outputs={"p_mc": "0.02 bar", "i": "10 mA"}, unknowns={"motor.R_m": "", "motor.K_e": ""}
 )
 
@@ -38,15 +38,15 @@ def bench(p_start: float | None = 10e5, f: str = "4 Hz", **overrides: float) -> 
     )  # fmt: skip
 
 
-def record(made_on: bywire.Bench, seed: int, asked: Asked = TWO) -> xr.Dataset:
-    return METHOD.on(made_on, asked).synthetic(made_on.par, OPTIONS, seed)
+def record(made_on: bywire.Bench, seed: int, question: Question = TWO) -> xr.Dataset:
+    return METHOD.on(made_on, question).synthetic(made_on.par, OPTIONS, seed)
 
 
 def identified(
-    on: bywire.Bench, data: xr.Dataset, asked: Asked = TWO, loss: str = "linear"
+    on: bywire.Bench, data: xr.Dataset, question: Question = TWO, loss: str = "linear"
 ) -> Identified:
     options = OPTIONS.replace({"loss": loss})
-    found: Identified = METHOD.on(on, asked).identify(data, on.par, options, Effort(starts=1))
+    found: Identified = METHOD.on(on, question).identify(data, on.par, options, Effort(starts=1))
     return found
 
 
@@ -59,15 +59,16 @@ def inside(found: Identified, truth: dict[str, float]) -> None:
 
 
 def require_derivatives(
-    made_on: bywire.Bench, on: bywire.Bench, asked: Asked, own: tuple[str, ...], speed: float | None
+    made_on: bywire.Bench, on: bywire.Bench, question: Question, own: tuple[str, ...],
+    speed: float | None,
 ) -> None:
     """Compare the Jacobian at the starts with central differences."""
-    data = record(made_on, 1, asked)
-    fit = BenchFit(on, asked)
+    data = record(made_on, 1, question)
+    fit = BenchFit(on, question)
     one = fit.record(on, data, OPTIONS)
     trial = fit.trial(one, "")
-    unknowns = [*unknowns_of(case_of(on, ""), on.par, asked), *fit.starts(one, trial)]
-    assert tuple(u.name for u in unknowns[len(asked.unknowns):]) == own
+    unknowns = [*unknowns_of(case_of(on, ""), on.par, question), *fit.starts(one, trial)]
+    assert tuple(u.name for u in unknowns[len(question.ranges):]) == own
     problem = output_error([trial], unknowns)
     values = np.array([u.start for u in unknowns])
     if speed is not None:
@@ -89,9 +90,9 @@ def test_derivatives_are_those_of_the_residuals() -> None:
     At rest an initial speed meets dry friction, whose derivative is one-sided: it begins moving.
     """
     names = ("motor.R_m", "motor.K_e", "caliper.K_pd", "stimulus.v_set", "offset.i")
-    asked = Asked(outputs=TWO.outputs, unknowns=dict.fromkeys(names, ""), states=("omega",))
+    question = Question(outputs=TWO.outputs, unknowns=dict.fromkeys(names, ""), states=("omega",))
     own = ("start.p_start", "initial.omega")
-    require_derivatives(bench(), bench(None), asked, own, 0.3)
+    require_derivatives(bench(), bench(None), question, own, 0.3)
 
 
 def test_derivatives_of_a_closed_loop_follow_the_controllers_start() -> None:
@@ -104,10 +105,10 @@ def test_derivatives_of_a_closed_loop_follow_the_controllers_start() -> None:
         })
         for start in ({"p_start": 10e5}, {})
     )  # fmt: skip
-    asked = Asked(outputs=TWO.outputs, unknowns={"motor.K_e": "", "caliper.K_pd": ""})
-    require_derivatives(made_on, on, asked, ("start.p_start",), None)
-    fit = BenchFit(on, asked)
-    begun = fit.trial(fit.record(on, record(made_on, 1, asked), OPTIONS), "").start
+    question = Question(outputs=TWO.outputs, unknowns={"motor.K_e": "", "caliper.K_pd": ""})
+    require_derivatives(made_on, on, question, ("start.p_start",), None)
+    fit = BenchFit(on, question)
+    begun = fit.trial(fit.record(on, record(made_on, 1, question), OPTIONS), "").start
     weak, strong = (begun({"motor.K_e": k})[1] for k in (0.03, 0.04))
     assert any(a != b for a, b in zip(weak, strong, strict=True))
 
@@ -148,8 +149,8 @@ def test_a_record_that_is_held_out_says_whether_the_result_carries_over() -> Non
     data, other = record(bench(), 5), record(bench(10e5, "7 Hz"), 6)
     wrong = other.assign(p_mc=other["p_mc"][::-1].variable)
     for held, holds in ((other, True), (wrong, False)):
-        asked = Asked(outputs=TWO.outputs, unknowns=TWO.unknowns, holdout=held)
-        found = {c.name: c for c in identified(bench(), data, asked).checks}
+        question = Question(outputs=TWO.outputs, unknowns=TWO.unknowns, holdout=held)
+        found = {c.name: c for c in identified(bench(), data, question).checks}
         assert found["validation.p_mc.vaf"].holds is holds
         assert found["validation.i.vaf"].value > 0.99
 
@@ -157,8 +158,8 @@ def test_a_record_that_is_held_out_says_whether_the_result_carries_over() -> Non
 def test_a_held_out_record_begins_where_it_did() -> None:
     """Not at the start of the one record that was fitted."""
     held = record(bench(14e5, "7 Hz"), 6)
-    asked = Asked(outputs=TWO.outputs, unknowns=TWO.unknowns, holdout=held)
-    found = {c.name: c for c in identified(bench(None), record(bench(), 5), asked).checks}
+    question = Question(outputs=TWO.outputs, unknowns=TWO.unknowns, holdout=held)
+    found = {c.name: c for c in identified(bench(None), record(bench(), 5), question).checks}
     assert found["validation.p_mc.vaf"].value > 0.99
     assert found["validation.p_mc.nrmse"].value < 0.05
 
@@ -193,7 +194,7 @@ def test_a_few_outliers_are_counted_by_a_robust_loss(loss: str) -> None:
 def test_noise_that_the_record_does_not_tell_is_no_proof_of_a_model() -> None:
     data = record(bench(), 2)
     data["p_mc"] = data["p_mc"] + 0.5e5 * (-1.0) ** np.arange(data.sizes["time"])
-    own = Asked(outputs={"p_mc": "", "i": ""}, unknowns=TWO.unknowns)
+    own = Question(outputs={"p_mc": "", "i": ""}, unknowns=TWO.unknowns)
     check = next(c for c in identified(bench(), data, own).checks if c.name == "noise_not_told")
     assert check.value == 1.0
     assert not check.holds
@@ -213,18 +214,18 @@ def test_a_minimum_that_one_start_of_several_found_is_not_believed() -> None:
 
 
 def test_ranges_priors_and_starts() -> None:
-    asked = Asked(
+    question = Question(
         outputs=TWO.outputs,
         unknowns={"motor.R_m": "100..1000 mohm", "gear.k_g": "0 .. 2 mm/rad", "offset.i": ""},
         priors={"motor.R_m": "0.4 +- 0.02 ohm"},
     )
     on = bench(motor__R_m=2.0)
-    R, k_g, zero = unknowns_of(case_of(on, ""), on.par, asked)
+    R, k_g, zero = unknowns_of(case_of(on, ""), on.par, question)
     assert (R.low, R.high, R.start, R.prior) == (0.1, 1.0, 0.55, (0.4, 0.02))
     assert 0.0 < k_g.low < 1e-8
     assert k_g.high == 2e-3
     assert (zero.start, zero.unit) == (0.0, "A")
-    starts = np.array(starts_of((R, k_g, zero), asked.unknowns, 200, 0.3, 1))
+    starts = np.array(starts_of((R, k_g, zero), question.ranges, 200, 0.3, 1))
     assert starts[0, 0] == 0.55
     assert starts[:, 0].min() < 0.12
     assert starts[:, 0].max() > 0.98
@@ -258,7 +259,7 @@ def test_ranges_priors_and_starts() -> None:
 )
 def test_what_does_not_fit_is_refused(changes: dict[str, Any], said: str) -> None:
     with pytest.raises(InputError) as refused:
-        METHOD.on(bench(), Asked(**{"outputs": TWO.outputs, "unknowns": TWO.unknowns} | changes))
+        METHOD.on(bench(), Question(**{"outputs": TWO.outputs, "unknowns": TWO.unknowns} | changes))
     assert said in str(refused.value)
 
 
@@ -267,19 +268,19 @@ def test_what_the_experiment_sets_itself_is_refused() -> None:
     case = wedge.cases()[0]
     own = next(n for n, v in case.par.leaves().items() if v != wedge.par.leaves()[n])
     with pytest.raises(InputError, match="the experiment itself sets it"):
-        METHOD.on(wedge, Asked(outputs={"i_1": ""}, unknowns={own: ""}))
+        METHOD.on(wedge, Question(outputs={"i_1": ""}, unknowns={own: ""}))
 
 
 def test_records_that_tell_nothing_are_refused() -> None:
     data = record(bench(), 8)
     still = data.assign(p_mc=0.0 * data["p_mc"] + 1e6)
-    quiet = Asked(outputs={"p_mc": ""}, unknowns=TWO.unknowns)
+    quiet = Question(outputs={"p_mc": ""}, unknowns=TWO.unknowns)
     with pytest.raises(InputError, match="p_mc does not move"):
         identified(bench(), still, quiet)
-    idle = Asked(outputs=TWO.outputs, unknowns={"pedal.x_max": ""})
+    idle = Question(outputs=TWO.outputs, unknowns={"pedal.x_max": ""})
     with pytest.raises(InputError, match=r"tells none of pedal\.x_max.*nothing measured depends"):
         identified(bench(), data, idle)
-    closed = Asked(outputs=TWO.outputs, unknowns={"fluid.V_air": ""})
+    closed = Question(outputs=TWO.outputs, unknowns={"fluid.V_air": ""})
     with pytest.raises(InputError, match=r"fluid\.air = none.*switch it on"):
         identified(bench(), data, closed)
     with pytest.raises(InputError, match="nothing measured drives the model"):

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
-from bywire.data.growing_columns import GrowingColumns
 from bywire.data.text_dialect import HEAD, Dialect, dialect_of, with_mark
 from bywire.data.text_rows import LOOKED_AT, require_whole_end, strict_columns
 
 if TYPE_CHECKING:
     import xarray as xr
+
 
 _BLOCK = 1 << 24  # bytes
 _ROWS = 1 << 16  # that are written at a time
@@ -160,3 +160,43 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
 
 
 FORMAT = FileFormat("csv", "a text table", (".csv", ".txt"), _recognizes, _open, _write)
+
+
+_GROWTH = 1.25
+
+
+class GrowingColumns:
+    """Columns of numbers that grow block by block.
+
+    Parameters
+    ----------
+    count
+        How many columns.
+    rows
+        How many rows are expected.
+    """
+
+    def __init__(self, count: int, rows: int) -> None:
+        self._arrays = [np.empty(max(rows, 1)) for _ in range(count)]
+        self._rows = 0
+
+    @property
+    def rows(self) -> int:
+        """How many rows there are."""
+        return self._rows
+
+    def append(self, blocks: Sequence[NDArray[np.float64]]) -> None:
+        """Add a block of rows, an array of shape ``(row,)`` for each column."""
+        end = self._rows + len(blocks[0])
+        for array, block in zip(self._arrays, blocks, strict=True):
+            if end > len(array):
+                # The system moves the pages: no second copy of the column is ever made.
+                array.resize(max(end, int(_GROWTH * len(array))), refcheck=False)
+            array[self._rows : end] = block
+        self._rows = end
+
+    def finished(self) -> list[NDArray[np.float64]]:
+        """Return the columns at their length."""
+        for array in self._arrays:
+            array.resize(self._rows, refcheck=False)
+        return self._arrays

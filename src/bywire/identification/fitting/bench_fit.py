@@ -16,11 +16,12 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet, choice_fields, choices_of, leaf_fields
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.fitting.asked import Asked, Options
 from bywire.identification.fitting.output_noise import output_noise, overestimated, resampled
+from bywire.identification.fitting.question import Options, Question
 from bywire.identification.fitting.unknown_texts import (
     is_parameter,
     starts_of,
@@ -58,12 +59,12 @@ class BenchFit:
     ----------
     bench
         What was measured, with the values that are known.
-    asked
+    question
         What is measured and what is unknown.
     """
 
     bench: Bench
-    asked: Asked
+    question: Question
 
     def identify(
         self, data: xr.Dataset, par: ParameterSet, options: Options, effort: Effort
@@ -88,7 +89,7 @@ class BenchFit:
             for label, signals in split(data, True).items()
         }
         trials = [self.trial(record, label) for label, record in records.items()]
-        unknowns = list(unknowns_of(case_of(bench, self.asked.case), bench.par, self.asked))
+        unknowns = list(unknowns_of(case_of(bench, self.question.case), bench.par, self.question))
         for record, trial in zip(records.values(), trials, strict=True):
             unknowns += self.starts(record, trial)
         problem = replace(
@@ -96,7 +97,7 @@ class BenchFit:
             silent=switched_off(bench.par, unknowns, exact_laws(type(bench.par))),
         )
         starts = starts_of(
-            unknowns, self.asked.unknowns, effort.starts, effort.spread, effort.seed
+            unknowns, self.question.ranges, effort.starts, effort.spread, effort.seed
         )
         led = search(
             problem, starts, options.loss, effort.progress, effort.store, effort.threads,
@@ -113,14 +114,14 @@ class BenchFit:
         uneven = any(resampled(record) for record in records.values())
         checks = checks_of(trials, fit, options, uneven)
         doubtful = overestimated(
-            list(records.values()), trials, fit.residuals, self.asked.outputs
+            list(records.values()), trials, fit.residuals, self.question.noise
         )
         return Identified(
             estimates={"output error": fit},
             parameters=believable(fit),
             figures=figures_of(shown, trials),
             checks=(
-                *checks, *noise_check(doubtful, self.asked.outputs),
+                *checks, *noise_check(doubtful, self.question.noise),
                 *starts_check(reached, effort.starts),
                 *(() if held is None else validation_of(held, options)),
             ),
@@ -138,15 +139,15 @@ class BenchFit:
         """Return the bench with other values of what is unknown."""
         leaves, known = par.leaves(), self.bench.par.leaves()
         return self.bench.with_overrides(
-            {n: leaves[n] for n in filter(is_parameter, self.asked.unknowns)
+            {n: leaves[n] for n in filter(is_parameter, self.question.ranges)
              if leaves.get(n) != known.get(n)}
         )  # fmt: skip
 
     def record(self, bench: Bench, data: xr.Dataset, options: Options) -> MeasuredRun:
         """Return a record with the run that stands beside it."""
         return measured_run(
-            bench, data, self.asked.inputs or None, list(self.asked.outputs), self.asked.case,
-            settle=not self.asked.states, between=options.between,
+            bench, data, self.question.inputs or None, list(self.question.noise),
+            self.question.case, settle=not self.question.states, between=options.between,
         )  # fmt: skip
 
     def trial(self, measured: MeasuredRun, label: str) -> Trial:
@@ -157,7 +158,7 @@ class BenchFit:
         return Trial(
             replace(measured.run, par=measured.run.par.replace(smooth)),
             {name: np.concatenate((before, row)) for name, row in values.items()},
-            {name: output_noise(measured, name, self.asked.outputs[name]) for name in values},
+            {name: output_noise(measured, name, self.question.noise[name]) for name in values},
             label,
             start=None if measured.bench.definition.preview
             else partial(_begun, measured.bench, measured.case),
@@ -173,12 +174,15 @@ class BenchFit:
                 unit = fields[name].unit.symbol
                 unknowns.append(Unknown(f"start.{name}", value, 0.0, scale=value, unit=unit,
                                      trial=trial.label))  # fmt: skip
-        return (*unknowns, *initial_states(trial, self.asked.states))
+        return (*unknowns, *initial_states(trial, self.question.states))
 
     def _held_out(self, bench: Bench, fit: Estimate, options: Options) -> Compared | None:
-        if self.asked.holdout is None:
+        data = self.question.holdout
+        if data is None:
             return None
-        held = self.record(bench, self.asked.holdout, options)
+        if not isinstance(data, xr.Dataset):
+            raise ParameterError(f"holdout = {data}: read it first, bywire.read_measurement does")
+        held = self.record(bench, data, options)
         # A label that no record has: only what all records share is known of it.
         return compared(held, self.trial(held, "held out"), fit)
 

@@ -16,7 +16,7 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.core.units import shown, split
-from bywire.identification.fitting.asked import Asked
+from bywire.identification.fitting.question import Question
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 
 _BETWEEN = re.compile(r"\s*(?:\+-|\+/-|±)\s*")
@@ -30,8 +30,8 @@ def is_parameter(name: str) -> bool:
     return not name.startswith((_STIMULUS, _OFFSET))
 
 
-def unknowns_of(case: Case, known: ParameterSet, asked: Asked) -> tuple[Unknown, ...]:
-    """Return what all records share; see `Asked` for how it is written.
+def unknowns_of(case: Case, known: ParameterSet, question: Question) -> tuple[Unknown, ...]:
+    """Return what all records share; see `Question` for how it is written.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ def unknowns_of(case: Case, known: ParameterSet, asked: Asked) -> tuple[Unknown,
         Run of the bench: its parameters are the starts.
     known
         Parameters of the bench; what the experiment sets itself differs from them.
-    asked
+    question
         What is asked for.
 
     Raises
@@ -49,21 +49,21 @@ def unknowns_of(case: Case, known: ParameterSet, asked: Asked) -> tuple[Unknown,
     ParameterError, UnitError
         When nothing is asked for; for ranges and priors that cannot be read or are empty.
     """
-    if not asked.unknowns:
+    if not question.ranges:
         raise ParameterError(
             "nothing is unknown: give --unknown PARAMETER, once for each, for instance --unknown "
             f"{next(iter(leaf_fields(type(case.par))))}"
         )
-    for name in asked.priors:
-        if name not in asked.unknowns:
-            raise unknown_name("unknown in --prior", name, asked.unknowns)
+    for name in question.priors:
+        if name not in question.ranges:
+            raise unknown_name("unknown in --prior", name, question.ranges)
     leaves = leaf_fields(type(known))
     return tuple(
         _with_texts(
-            _bare(name, case, known, asked.outputs), text, asked.priors.get(name, ""),
+            _bare(name, case, known, question.noise), text, question.priors.get(name, ""),
             leaves.get(name),
         )
-        for name, text in asked.unknowns.items()
+        for name, text in question.ranges.items()
     )  # fmt: skip
 
 

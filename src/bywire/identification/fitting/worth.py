@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
-from bywire.identification.fitting.asked import Options
+from bywire.identification.fitting.question import Options
 from bywire.identification.fitting.unknown_texts import is_parameter
 from bywire.identification.method import Check, Curve
 from bywire.identification.moved_run import moved_run

@@ -13,9 +13,9 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.signals import Signal, signals_of
-from bywire.identification.fitting.asked import Asked, BenchMethod, Options
 from bywire.identification.fitting.bench_fit import BenchFit
 from bywire.identification.fitting.output_noise import noise_given
+from bywire.identification.fitting.question import BenchMethod, Options, Question
 from bywire.identification.fitting.unknown_texts import is_parameter, unknowns_of
 from bywire.identification.method import Method
 from bywire.identification.replaying.measured_run import case_of
@@ -28,14 +28,14 @@ _DEFAULTS = Options(
 _SIMULATED = ("noise",)
 
 
-def simulated(bench: Bench, asked: Asked, options: Options, seed: int) -> xr.Dataset:
+def simulated(bench: Bench, question: Question, options: Options, seed: int) -> xr.Dataset:
     """Return what drives the experiment and what is measured of it.
 
     Parameters
     ----------
     bench
         With the true values.
-    asked
+    question
         Says which outputs, under which names the inputs, and how noisy the outputs are.
     options
         Their noise where it does not.
@@ -48,16 +48,16 @@ def simulated(bench: Bench, asked: Asked, options: Options, seed: int) -> xr.Dat
         Over ``time`` [s], as far before zero as the experiment records.
     """
     bench = replace(bench, seed=seed)
-    number = [begun.label for begun in bench.cases()].index(case_of(bench, asked.case).label)
+    number = [begun.label for begun in bench.cases()].index(case_of(bench, question.case).label)
     case = bench.cases()[number]
     run = as_run(case, bench.step, seed=(seed, number))
-    computed = simulate(run, tuple(asked.outputs))
+    computed = simulate(run, tuple(question.noise))
     kept = computed.time >= case.settle - case.keep - 1e-9
     t = np.round(computed.time[kept] - case.settle, 12)
     random = np.random.default_rng([seed, 1])
     known = signals_of(run.model.Output)
     rows = {}
-    for name, text in asked.outputs.items():
+    for name, text in question.noise.items():
         values = computed[name][kept]
         sigma = (
             noise_given(name, text, known[name].unit) if text
@@ -66,7 +66,7 @@ def simulated(bench: Bench, asked: Asked, options: Options, seed: int) -> xr.Dat
         noisy = values + random.normal(0.0, sigma, values.size)
         rows[name] = ("time", noisy, _attrs(known[name]))
     stimuli, given = signals_of(run.model.Stimulus), case.stimulus(t)
-    driven = asked.inputs or {n: n for n in given if not n.startswith("noise_")}
+    driven = question.inputs or {n: n for n in given if not n.startswith("noise_")}
     for name, signal in driven.items():
         values = np.asarray(given.get(name, np.zeros(t.size)), dtype=float)
         rows[signal] = ("time", np.broadcast_to(values, t.shape), _attrs(stimuli[name]))
@@ -78,14 +78,14 @@ def _attrs(signal: Signal) -> dict[str, str]:
     return {"units": signal.unit, "long_name": signal.label}
 
 
-def on(bench: Bench, asked: Asked) -> Method:
+def on(bench: Bench, question: Question) -> Method:
     """Return the method for what is asked of a bench.
 
     Parameters
     ----------
     bench
         Gives model, experiment, and all that is known.
-    asked
+    question
         What is measured and what is unknown.
 
     Raises
@@ -97,33 +97,33 @@ def on(bench: Bench, asked: Asked) -> Method:
     ----------
     L. Ljung, System Identification: Theory for the User, 2nd ed., 1999, section 7.2.
     """
-    case = case_of(bench, asked.case)
-    _require_known(case, asked)
-    unknowns_of(case, bench.par, asked)
+    case = case_of(bench, question.case)
+    _require_known(case, question)
+    unknowns_of(case, bench.par, question)
     stimuli, outputs = signals_of(case.model.Stimulus), signals_of(case.model.Output)
     driving = [name for name in stimuli if not name.startswith("noise_")]
-    measured = {name: outputs[name].unit for name in asked.outputs}
-    for name, text in asked.outputs.items():
+    measured = {name: outputs[name].unit for name in question.noise}
+    for name, text in question.noise.items():
         if text:
             noise_given(name, text, measured[name])
-    fit = BenchFit(bench, asked)
+    fit = BenchFit(bench, question)
     return Method(
         name=_NAME,
         assembly=bench.system,
         summary=f"parameters of {bench.experiment} by output error",
         experiment=bench.experiment,
-        signals={s: stimuli[name].unit for name, s in asked.inputs.items()} | measured,
-        optional={} if asked.inputs else {name: stimuli[name].unit for name in driving},
+        signals={s: stimuli[name].unit for name, s in question.inputs.items()} | measured,
+        optional={} if question.inputs else {name: stimuli[name].unit for name in driving},
         options=Options,
         defaults=_DEFAULTS,
         identify=fit.identify,
         synthetic=_Simulation(fit),
-        unknowns=tuple(filter(is_parameter, asked.unknowns)),
+        unknowns=tuple(filter(is_parameter, question.ranges)),
         several=True,
         gaps=True,
         simulated=_SIMULATED,
         bench=bench,
-        key=f"{bench} {asked.key}",
+        key=f"{bench} {question.key}",
     )
 
 
@@ -134,21 +134,21 @@ class _Simulation:
     fit: BenchFit
 
     def __call__(self, par: Any, options: Options, seed: int) -> xr.Dataset:
-        return simulated(self.fit.moved(par), self.fit.asked, options, seed)
+        return simulated(self.fit.moved(par), self.fit.question, options, seed)
 
 
-def _require_known(case: Case, asked: Asked) -> None:
+def _require_known(case: Case, question: Question) -> None:
     """Refuse names of signals and states that the model does not have."""
     outputs, stimuli = signals_of(case.model.Output), signals_of(case.model.Stimulus)
-    if not asked.outputs:
+    if not question.noise:
         raise ParameterError(
             "no output is measured: give --output SIGNAL, once for each of the model's outputs "
             f"that the record has, for instance {', '.join(list(outputs)[:6])}"
         )
     for kind, names, known in (
-        ("output", asked.outputs, outputs),
-        ("stimulus", asked.inputs, [n for n in stimuli if not n.startswith("noise_")]),
-        ("state in --estimate-start", asked.states, case.model.State._fields),
+        ("output", question.noise, outputs),
+        ("stimulus", question.inputs, [n for n in stimuli if not n.startswith("noise_")]),
+        ("state in --estimate-start", question.states, case.model.State._fields),
     ):
         for name in names:
             if name not in known:

@@ -11,7 +11,7 @@ import xarray as xr
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
-from bywire.identification.fitting.asked import find_method
+from bywire.identification.fitting.question import find_method
 from bywire.identification.method import Effort, Identified, Method
 from bywire.identification.records import joined, split
 from bywire.identification.trust import trust

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Annotated
 
 import xarray as xr
@@ -18,44 +19,84 @@ from bywire.identification.least_squares import Loss
 from bywire.identification.method import METHODS, Method
 from bywire.identification.replaying.measured_run import Between
 
+Texts = Mapping[str, str] | Iterable[str]
+"""what is said of each name; or the names alone"""
+
 Share = Annotated[float, Unit("1", 0.01), Field(ge=0, le=1, allow_inf_nan=False)]
 
 
 @dataclass(frozen=True)
-class Asked:
-    """What is measured and what is unknown; texts with units as on the command line.
+class Question:
+    """What a method of any bench is asked: what is measured there, and what is unknown.
+
+    Texts have units as on the command line.
 
     Parameters
     ----------
+    bench
+        A `Bench`, the path of a bench file, or an experiment's name.
     inputs
         Stimulus of the model -> measured signal; by default all of the same name.
     outputs
-        Output of the model, measured under the same name -> standard deviation of its noise, or
-        empty for the record's own.
+        Output of the model, measured under the same name -> standard deviation of its noise, such
+        as ``"0.02 bar"``; empty, or the names alone, for the record's own.
     unknowns
-        Parameter, ``stimulus.NAME`` or ``offset.SIGNAL`` -> range ``LOW..HIGH``, or empty.
+        Parameter, ``stimulus.NAME`` or ``offset.SIGNAL`` -> range such as ``"0.1..1 ohm"``; empty,
+        or the names alone, for none.
     priors
-        Of these unknowns -> ``MEAN +- DEVIATION``.
+        What is known of an unknown: ``"0.35 +- 0.02 ohm"``.
     states
         States whose initial values are unknown, in every record its own.
     case
-        Label of the experiment's run; the first one by default.
+        Run of the experiment; the first one by default.
     holdout
-        A record that is not fitted, to try the result on.
+        A measurement that is not fitted: validation.
+    loss
+        How large residuals count: ``linear``, ``soft_l1``, ``huber`` or ``cauchy``; the method's
+        own choice by default.
     """
 
+    bench: Bench | str | Path | None = None
     inputs: Mapping[str, str] = field(default_factory=dict)
-    outputs: Mapping[str, str] = field(default_factory=dict)
-    unknowns: Mapping[str, str] = field(default_factory=dict)
+    outputs: Texts = field(default_factory=dict)
+    unknowns: Texts = field(default_factory=dict)
     priors: Mapping[str, str] = field(default_factory=dict)
-    states: tuple[str, ...] = ()
+    states: Sequence[str] = ()
     case: str = ""
-    holdout: xr.Dataset | None = None
+    holdout: str | Path | xr.Dataset | None = None
+    loss: str = ""
+
+    @property
+    def noise(self) -> dict[str, str]:
+        """Noise of each measured output as it is written; empty for the record's own."""
+        return _texts_of(self.outputs)
+
+    @property
+    def ranges(self) -> dict[str, str]:
+        """Range of each unknown as it is written; empty for none."""
+        return _texts_of(self.unknowns)
 
     @property
     def key(self) -> str:
         """What tells experiments made for this from those made for anything else."""
-        return str(replace(self, holdout=None))  # what is held out shapes no experiment
+        return f"{self.inputs} {self.noise} {self.ranges} {self.priors} {self.states} {self.case}"
+
+    @property
+    def given(self) -> tuple[str, ...]:
+        """What was given, as options of the command."""
+        options = {
+            "--bench": self.bench is not None, "--input": self.inputs, "--output": self.outputs,
+            "--unknown": self.unknowns, "--prior": self.priors, "--estimate-start": self.states,
+            "--case": self.case, "--holdout": self.holdout is not None, "--loss": self.loss,
+        }  # fmt: skip
+        return tuple(name for name, value in options.items() if value)
+
+
+def _texts_of(names: Texts) -> dict[str, str]:
+    """Return what is said of each name, nothing where there are names alone."""
+    if isinstance(names, Mapping):
+        return dict(names)
+    return dict.fromkeys([names] if isinstance(names, str) else names, "")
 
 
 @dataclass(frozen=True)
@@ -71,7 +112,7 @@ class BenchMethod:
     options, defaults, simulated
         As of the methods that it makes.
     on
-        ``on(bench, asked) -> Method``: the method for what is asked of a bench.
+        ``on(bench, question) -> Method``: the method for what is asked of a bench.
     """
 
     name: str
@@ -79,7 +120,7 @@ class BenchMethod:
     options: type[ParameterSet]
     defaults: ParameterSet
     simulated: tuple[str, ...]
-    on: Callable[[Bench, Asked], Method]
+    on: Callable[[Bench, Question], Method]
 
 
 BENCH_METHODS = Kind(
