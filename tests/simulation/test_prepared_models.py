@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
+import pytest
 
+from bywire.simulation import ensemble, native, sensitivity
+from bywire.simulation.compiler import load_library
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, simulate
 from systems.nonlinear_drive import PARAMETERS, Memory, NonlinearDrive, State
@@ -41,6 +46,28 @@ def test_equal_models_are_built_once() -> None:
     run = drive(Tabulated(np.zeros(2000)))
     again = drive(Tabulated(np.zeros(2000)))
     assert prepare(run.model, run.par) is prepare(again.model, again.par)
+
+
+def test_threads_that_ask_at_once_compile_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """For single runs, lanes and derivatives alike."""
+    run, compiled = replace(drive(Tabulated(np.full(2000, 0.01))), duration=1e-3), []
+
+    def slow(source: str, *others: Any) -> Any:
+        compiled.append(source)
+        time.sleep(0.1)
+        return load_library(source, *others)
+
+    for module in (native, ensemble, sensitivity):
+        monkeypatch.setattr(module, "load_library", slow)
+    for wanted in (
+        lambda _: simulate(run, ["omega"]),
+        lambda _: ensemble.simulate_ensemble(run, {"R": [0.5, 0.6]}, ["omega"]),
+        lambda _: sensitivity.simulate_with_sensitivities(run, ["R"], ["omega"]),
+    ):
+        compiled.clear()
+        with ThreadPoolExecutor(4) as pool:
+            list(pool.map(wanted, range(4)))
+        assert len(compiled) == 1
 
 
 def test_threads_do_not_disturb_each_other() -> None:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import threading
 import warnings
-from collections.abc import Mapping
-from functools import cache
-from typing import TYPE_CHECKING, Any, Protocol
+from collections.abc import Callable, Mapping
+from functools import cache, wraps
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,21 @@ if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
 KINDS = ("auto", "compiled", "virtual-machine")
+_LOCK = threading.RLock()
+_P = ParamSpec("_P")
+_T = TypeVar("_T")
+
+
+def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
+    """Return a function that builds once per arguments; threads that ask meanwhile wait for it."""
+    cached = cache(build)
+
+    @wraps(build)
+    def waiting(*arguments: _P.args, **named: _P.kwargs) -> _T:
+        with _LOCK:
+            return cached(*arguments, **named)  # type: ignore[arg-type]
+
+    return waiting
 
 
 class Engine(Protocol):
@@ -106,9 +121,10 @@ class Prepared:
         """
         if kind not in KINDS:
             raise unknown_name("engine", kind, KINDS)
-        if kind not in self._engines:
-            self._engines[kind] = self._build(kind)
-        return self._engines[kind]
+        with _LOCK:
+            if kind not in self._engines:
+                self._engines[kind] = self._build(kind)
+            return self._engines[kind]
 
     def _build(self, kind: str) -> Engine:
         compiler = None if kind == "virtual-machine" else find_compiler()
@@ -134,7 +150,6 @@ class Prepared:
 
 
 _PREPARED: dict[tuple[object, ...], Prepared] = {}
-_LOCK = threading.RLock()
 
 
 def prepare(model: Model, par: ParameterSet) -> Prepared:

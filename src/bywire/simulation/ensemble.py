@@ -7,7 +7,6 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +17,7 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, find_compiler, load_library, vector_flags
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_lanes import emit_lanes
-from bywire.simulation.engine import prepare
+from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import plan_array, pointer
 from bywire.simulation.program import Program
@@ -190,7 +189,7 @@ def simulate_ensemble(
     )
 
 
-@cache
+@built_once
 def lane_kernel(program: Program, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
     """Return the kernel that records some outputs; built once."""
     return LaneKernel(program, compiler, selection)

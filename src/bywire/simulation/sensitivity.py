@@ -6,7 +6,6 @@ import ctypes
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +16,7 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, find_compiler, load_library, vector_flags
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
-from bywire.simulation.engine import prepare
+from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.expressions import needed
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import plan_array, pointer
@@ -225,7 +224,7 @@ def _directions(run: Run, wanted: Sequence[str], known: Sequence[str]) -> _Direc
     return _Directions(tuple(known.index(name) for name in own), seeds, initial)
 
 
-@cache
+@built_once
 def _tangent_kernel(
     program: Program, directions: tuple[int, ...], compiler: Compiler
 ) -> TangentKernel:

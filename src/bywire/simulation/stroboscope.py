@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -19,7 +19,7 @@ from bywire.core.errors import CompilerError, ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import Compiler, find_compiler
-from bywire.simulation.engine import prepare
+from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.native import plan_array
 from bywire.simulation.program import Program
 from bywire.simulation.repetition import window_schedule
@@ -234,7 +234,7 @@ def _by_substeps(schedule: Schedule) -> Schedule:
     )  # fmt: skip
 
 
-@cache
+@built_once
 def _kernel(program: Program, compiler: Compiler) -> TangentKernel:
     # Directions are set one by one; the kernel has at least one parameter among them.
     return TangentKernel(program, (0,), compiler)
