@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from fractions import Fraction
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 from bywire.core.errors import StepError
 
 _TOLERANCE = 1e-9
+_REST = 1e-6  # of a step, that an interval may differ from whole steps
+_MOST = 2**53  # substeps in an interval or a run: beyond, not even a float tells them apart
+_TRIALS = 10_000  # divisors that are tried for one that is short to write
 
 
 @dataclass(frozen=True)
@@ -90,7 +94,8 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
     Raises
     ------
     StepError
-        When the step does not divide a sample time or the recording interval.
+        When the step does not divide a sample time or the recording interval, or is much too
+        short for it.
     """
     if not (math.isfinite(step) and step > 0):
         raise StepError(f"step = {step:g} s is not admissible: it must be > 0 s, usually 20 us")
@@ -109,21 +114,41 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
     )
 
 
-def _whole(period: float, step: float, name: str) -> int:
-    count = round(period / step)
-    if count < 1 or abs(count * step - period) > _TOLERANCE * period:
+def _require_few(name: str, length: float, step: float) -> None:
+    if length / step > _MOST:
         raise StepError(
-            f"step = {step * 1e6:g} us does not divide the {name} interval of {period * 1e6:g} us: "
-            f"take for instance {_divisor(period, step):.12g} us"
+            f"step = {step * 1e6:g} us is too short for the {name} interval of {length:g} s, which "
+            f"would hold more than {_MOST:.2g} steps: take a shorter interval"
+        )
+
+
+def _whole(period: float, step: float, name: str) -> int:
+    _require_few(name, period, step)
+    count = round(period / step)
+    rest = abs(count * step - period)
+    rounding = _REST * step + 4.0 * math.ulp(period)
+    if count < 1 or rest > min(_TOLERANCE * period, rounding):
+        raise StepError(
+            f"step = {step * 1e6:g} us does not divide the {name} interval of "
+            f"{period * 1e6:.12g} us: take for instance {_divisor(period, step):.16g} us"
         )
     return count
 
 
 def _divisor(period: float, step: float) -> float:
-    """Return a step [us] that divides a period, at most the given one and short to write."""
+    """Return a step [us] that divides a period, at most the given one and short to write.
+
+    Whole nanoseconds if that is possible: then they divide a period of whole nanoseconds.
+    """
     least = max(math.ceil(period / step - _TOLERANCE), 1)
-    for count in range(least, 8 * least + 8):
-        candidate = period / count * 1e6
-        if abs(candidate - round(candidate, 3)) <= 1e-12 * candidate:
-            return round(candidate, 3)
+    whole, longest = (Fraction(f"{time:.15g}") * 10**9 for time in (period, step))
+    if whole.denominator == 1:
+        if longest <= _TRIALS:
+            shorter: Iterable[int] = range(math.floor(longest), 0, -1)
+        else:
+            counts = range(least, min(8 * least + 8, least + _TRIALS))
+            shorter = (int(whole / count) for count in counts if whole % count == 0)
+        for each in shorter:
+            if whole % each == 0:
+                return each * 1e-3
     return period / least * 1e6

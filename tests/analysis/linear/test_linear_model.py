@@ -6,6 +6,7 @@ import control
 import numpy as np
 import pytest
 
+from analysis.small_linear_models import model_of
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.errors import ParameterError, UnknownNameError
 
@@ -73,3 +74,9 @@ def test_state_space_has_names_and_the_same_response(period: float) -> None:
     got = control.frequency_response(system, 2.0 * math.pi * f).complex
     np.testing.assert_allclose(np.squeeze(got), model.response(f)[:, 0, 0], rtol=1e-10)
     np.testing.assert_allclose(np.sort(system.poles()), np.sort(model.poles()), rtol=1e-10)
+
+
+def test_a_sample_time_of_ages_is_one_error():
+    """Numbers of an unstable model overflow."""
+    with pytest.raises(ParameterError, match=r"sampled every 1\.3e\+19 s has no finite numbers"):
+        model_of(1.0, 1.0, 1.0).sampled(1.3e19)

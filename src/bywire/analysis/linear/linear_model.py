@@ -227,6 +227,11 @@ class LinearModel:
         ----------
         period
             Sample time T [s].
+
+        Raises
+        ------
+        ParameterError
+            When it is so long that the model's numbers overflow.
         """
         from scipy.linalg import expm
 
@@ -236,7 +241,13 @@ class LinearModel:
         whole = np.zeros((size, size))
         # Van Loan: the exponential of [[A, B], [0, 0]] holds both integrals, A singular or not.
         whole[:n, :n], whole[:n, n:] = self.A, self.B[:, acting]
-        step = expm(whole * period)
+        with np.errstate(all="ignore"):
+            step = expm(whole * period)
+        if not np.isfinite(step).all():
+            raise ParameterError(
+                f"a model that is sampled every {period:g} s has no finite numbers: take a shorter "
+                "sample time"
+            )
         B = np.zeros_like(self.B)
         B[:, acting] = step[:n, n:]
         return replace(self, A=step[:n, :n], B=B, period=period)
