@@ -21,6 +21,8 @@ import bywire
 from bywire.authoring import (
     Angle,
     Assembly,
+    Brake,
+    CitedSet,
     Duration,
     Integral,
     ParameterSet,
@@ -110,6 +112,8 @@ PAR = Parameters(
     shaft=shaft.Parameters(J=2e-4, d=1e-5), T_forward=0.03, T_backward=0.015, count=6e-4,
     k_angle=25.0, k_p=0.15, k_i=3.0, v_max=6.0, T_s=1e-3,
 )  # fmt: skip
+SERVO_1 = CitedSet("servo-1", "servo-axis", "", "a small axis", Parameters, PAR.flat())
+BRAKE = Brake("servo-axis", "a motor that turns an inertia against dry friction", __name__)
 TARGET = 3.0  # for one second; then back to zero for another one
 
 

@@ -14,8 +14,10 @@ from bywire.api.described_systems import (
     described_loop,
     described_plant,
 )
+from bywire.api.overview import overview
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import UnknownNameError
 from bywire.core.model import ASSEMBLIES
 from bywire.identification.method import METHODS
 from bywire.synthesis.study import STUDIES
@@ -61,8 +63,11 @@ def test_experiments_studies_and_sets_list_their_values(bywire: Bywire) -> None:
     cases = (
         ("experiment", "options", {n: e.defaults for n, e in EXPERIMENTS.all().items()}),
         ("study", "options", {n: s.defaults for n, s in STUDIES.all().items()}),
-        ("parameter set", "parameters",
-         {n: e.parameters() for n, e in PARAMETER_SETS.all().items()}),
+        (
+            "parameter set",
+            "parameters",
+            {n: e.parameters() for n, e in PARAMETER_SETS.all().items()},
+        ),
     )
     for kind, key, known in cases:
         for name, values in known.items():
@@ -118,9 +123,10 @@ def test_every_loop_and_plant_says_input_output_and_states(bywire: Bywire) -> No
     for plant in PLANTS.all().values():
         parts = {row["as"] for row in described_plant(plant)["signals"]}
         assert parts == {"input", "output", "state"}
-    assert "i_source  A      source current             input" in bywire(
-        "list", "motorcycle-plant"
-    ).out
+    assert (
+        "i_source  A      source current             input"
+        in bywire("list", "motorcycle-plant").out
+    )
 
 
 def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
@@ -140,3 +146,51 @@ def test_a_parameter_a_group_a_signal_and_a_key_figure(bywire: Bywire) -> None:
 def test_the_method_of_any_bench_says_where_its_signals_are(bywire: Bywire) -> None:
     text = bywire("list", "output-error").out
     assert "--input (stimulus), --output (recording) and --estimate-start (state)" in text
+
+
+def test_the_index_fits_a_screen_and_a_topic_opens(bywire: Bywire) -> None:
+    lines = bywire("list").out.rstrip("\n").split("\n")
+    assert len(lines) < 24
+    assert max(map(len, lines)) <= 80
+    (line,) = (line for line in lines if line.startswith("loops "))
+    assert int(line.split()[1]) == len(LOOPS.all())
+    every, topic = bywire("list", "--json").object, bywire("list", "Parameter-Sets", "--json")
+    assert topic.object == {"parameter_sets": every["parameter_sets"]}
+    assert every["loops"]["pressure"] in " ".join(bywire("list", "loops").out.split())
+
+
+def test_the_overview_gives_tables() -> None:
+    tables = overview().tables()
+    assert list(tables["loops"]["name"]) == list(LOOPS.all())
+    assert set(tables) >= {"experiments", "parameter sets", "kpis", "kpis of experiments"}
+    assert list(overview("loops").tables()) == ["loops"]
+    with pytest.raises(UnknownNameError, match="did you mean 'loops'"):
+        overview("lops")
+
+
+@pytest.mark.parametrize(
+    ("word", "kind", "name"),
+    [
+        ("battery", "parameter group", "supply"), ("friction", "parameter group", "seal"),
+        ("Winding resistance", "parameter", "motor.R_m"), ("caliper pressure", "signal", "p_pd"),
+        ("bar", "signal", "p_mc"), ("phase", "method", "cogging"),
+    ],
+)  # fmt: skip
+def test_a_word_finds_what_is_declared_to_mean_it(
+    bywire: Bywire, word: str, kind: str, name: str
+) -> None:
+    found = bywire("list", word, "--json").object["found"]
+    assert (kind, name) in {(one["kind"], one["name"]) for one in found}
+    text = bywire("list", word).out
+    assert text.startswith(f"nothing is called {word!r}; it is mentioned by")
+    assert len(text.splitlines()) <= 40
+
+
+def test_a_word_that_nothing_mentions_gets_the_nearest_that_is(bywire: Bywire) -> None:
+    refused(bywire("list", "battrey"), "unknown name 'battrey'", "'battery'")
+
+
+def test_a_stimulus_says_its_defaults(bywire: Bywire) -> None:
+    (sine,) = bywire("list", "sine", "--json").object["found"]
+    values = {row["name"]: row["value"] for row in sine["parameters"]}
+    assert (values["phase"], values["t_start"], values["f"]) == ("0 rad", "0 s", None)

@@ -58,6 +58,20 @@ def test_wrong_parameters_miss_the_tolerance(bywire: Bywire, stop: Path) -> None
     assert "missed: nrmse <= 2 %" in " ".join(outcome.out.split())
 
 
+def test_a_refusal_lists_what_resembles_the_input_first_and_not_all(
+    bywire: Bywire, tmp_path: Path
+) -> None:
+    names = [f"x_{k}" for k in range(30)] + ["pressure_set", "i_setpoint"]
+    rows = [",".join([f"{1e-3 * k:.3f}", *["1.0"] * len(names)]) for k in range(20)]
+    path = tmp_path / "many.csv"
+    head = ",".join(["time [s]", *(f"{name} [1]" for name in names)])
+    path.write_text("\n".join([head, *rows]) + "\n")
+    (line,) = bywire("replay", path, "--bench", "hard-braking").lines
+    listed = line.partition("v_set and one of ")[2]
+    assert set(listed.split(", ")[:2]) == {"pressure_set", "i_setpoint"}
+    assert listed.endswith(" and 20 more")
+
+
 def test_refusals(bywire: Bywire, stop: Path) -> None:
     base = ("replay", stop, "--bench")
     refused(bywire(*base, "moment-pulse"), "moment-pulses")
@@ -68,4 +82,5 @@ def test_refusals(bywire: Bywire, stop: Path) -> None:
     refused(bywire(*moment, "--tolerance", "nmrse <= 5 %"), "nrmse")
     refused(bywire(*moment, "--track", "alpha"), "wedge.mu_B")
     refused(bywire(*base, "open-loop"), "nothing measured drives the model")
+    refused(bywire(*base, "hard-braking"), "i_set, v_set and one of M_set, ")
     refused(bywire("replay", "none.csv", "--bench", "moment-pulses"), "none.csv")

@@ -102,10 +102,10 @@ def test_list_is_complete(bywire):
         "studies", "methods", "stimuli", "kpis",
     }  # fmt: skip
     assert set(found) == titles | {"kpis_of_experiments"}
-    text = bywire("list").out
-    for content in found.values():
+    for topic, content in found.items():
         assert content
-        assert all(f"  {name}" in text for name in content)
+        text = bywire("list", topic.replace("_", "-")).out
+        assert all(name in text for name in content)
     for name, kpis in found["kpis_of_experiments"].items():
         assert kpis == dict(EXPERIMENTS.find(name).kpis)
         assert all(kpi in text for kpi in kpis)

@@ -11,6 +11,7 @@ from command_line import Outcome, refused
 from systems.loading import SPRING_AXIS, forgotten
 
 Bywire = Callable[..., Outcome]
+ROOT = Path(__file__).parents[2]
 SYSTEM = ("--system", SPRING_AXIS)
 STEP = ("--set", "parameters=spring-axis-one", "--set", "options.input=F_set",
         "--set", "options.output=x")  # fmt: skip
@@ -86,7 +87,7 @@ def test_output_error_finds_its_parameters(bywire: Bywire, tmp_path: Path) -> No
         'experiment = "open-loop"\nparameters = "spring-axis-one"\n'
         '[options]\ninput = "F_set"\noutput = "x"\nrecord = "1 ms"\nduration = "0.5 s"\n'
         '[stimulus]\nkind = "multisine"\nmean = 0\namplitude = "60 N"\nf_base = "2 Hz"\nn = 12\n'
-        "t_start = 0\n[set]\nF_c = 0\nk_c = \"0.001 N/m\"\n"
+        't_start = 0\n[set]\nF_c = 0\nk_c = "0.001 N/m"\n'
     )
     out = tmp_path / "out"
     other = ("--set", "k=9000 N/m", "--set", "d=50 N*s/m")
@@ -151,3 +152,30 @@ def test_its_own_experiment_runs_by_its_name(bywire: Bywire, tmp_path: Path) -> 
     path = written(tmp_path, "own_experiment", text)
     assert bywire("run", "push", "--system", path, "--out", tmp_path / "out").status == 0
     assert (tmp_path / "out" / "time-traces.png").is_file()
+
+
+def test_its_own_names_come_first(bywire: Bywire) -> None:
+    assert next(iter(bywire("list", "--json", *SYSTEM).object["brakes"])) == "spring-axis"
+    caliper = ("--system", ROOT / "examples" / "emb_caliper")
+    refused(bywire("margins", "xyzzy", *caliper), "unknown loop 'xyzzy': known are clamp-force")
+
+
+def test_a_set_for_an_assembly_that_does_not_exist_is_said(bywire: Bywire, tmp_path: Path) -> None:
+    text = SPRING_AXIS.read_text()
+    wrong = text.replace('"spring-axis-one", "spring-axis"', '"spring-axis-one", "spring-axes"')
+    assert wrong != text
+    (tmp_path / "odd_axis.py").write_text(wrong)
+    system = ("--system", tmp_path / "odd_axis.py")
+    line = wrong[: wrong.index("CitedSet(\n")].count("\n") + 1
+    for _ in range(2):  # made anew, then kept
+        done = bywire("list", "--json", *system)
+        assert f"odd_axis.py, line {line}: parameter set 'spring-axis-one'" in done.err
+        assert "did you mean 'spring-axis'?" in done.err
+        assert "spring-axes" not in done.object["assemblies"]
+        assert "spring-axis" in done.object["assemblies"]
+
+
+def test_the_example_in_one_file_is_a_brake(bywire: Bywire) -> None:
+    servo = ("--system", ROOT / "examples" / "servo_axis.py")
+    assert "servo-1" in bywire("list", *servo, "--json").object["parameter_sets"]
+    assert bywire("run", "step", "--set", "parameters=servo-1", *servo).status == 0

@@ -156,13 +156,15 @@ def test_a_file_that_was_mended_loads(write: Write) -> None:
     ("stem", "line", "kind", "text"),
     [
         ("same_set", 'S = CitedSet("roberts2003", "a", "", "", ParameterSet, {})', PARAMETER_SETS,
-         r"same_set.py declares the parameter set 'roberts2003', and so does .*roberts2003.py"),
+         r"same_set.py, line 6: the parameter set 'roberts2003' is declared in .*roberts2003"),
         ("twice", 'S = CitedSet("s", "a", "", "", ParameterSet, {})\n'
          'T = CitedSet("s", "b", "", "", ParameterSet, {})', PARAMETER_SETS,
-         r"twice.py declares the parameter set 's' twice: give it another name"),
+         r"twice.py, line 7: the parameter set 's' is declared in .*twice.py, line 6 already: "
+         "give this one another name"),
         ("same_test", 'E = Experiment("hard-braking", "a", "", ParameterSet, ParameterSet(), '
          "None, None, {}, ())", EXPERIMENTS,
-         r"same_test.py declares the experiment 'hard-braking', and so does .*hard_braking.py"),
+         r"same_test.py, line 6: the experiment 'hard-braking' is declared in "
+         r".*hard_braking.py, line \d\d already"),
     ],
 )  # fmt: skip
 def test_a_name_that_is_taken_is_refused(
@@ -230,7 +232,9 @@ def test_a_broken_entry_point_is_reported_once_and_left_out(
     with pytest.warns(BrakeWarning, match=reason) as caught:
         first = set(brakes())
     assert first == set(brakes()) == OURS
-    assert len(caught) == 1
+    (warning,) = caught
+    assert Path(warning.filename).name == f"{name}.py"
+    assert warning.lineno == (2 if name == "broken_at_import" else 1)
 
 
 def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
@@ -246,3 +250,22 @@ def test_what_an_installed_brake_breaks_is_left_out_and_the_others_stay(
         known = PARAMETER_SETS.all()
     assert known["roberts2003"].assembly == "wedge-brake"
     assert set(brakes()) == OURS | {"clashing"}
+
+
+def test_a_name_taken_within_a_tuple_or_by_a_class_has_its_line(write: Write) -> None:
+    load_system(write("held.py", f"{declared('held')}from bywire.core.catalog import CitedSet\n"
+                "from bywire.core.parameters import ParameterSet\n"
+                'A = CitedSet("a", "x", "", "", ParameterSet, {})\n'
+                'SETS = (\n    CitedSet("b", "x", "", "", ParameterSet, {}),\n'
+                '    CitedSet("c", "x", "", "", ParameterSet, {}),\n)\n'))  # fmt: skip
+    lines = {name: PARAMETER_SETS.place(name)[1] for name in "abc"}
+    assert lines == {"a": 5, "b": 7, "c": 8}
+    file, line = ASSEMBLIES.place("motorcycle-brake")
+    assert Path(file).read_text().splitlines()[line - 1].startswith("class MotorcycleBrake")
+
+
+def test_a_brake_shows_itself_in_a_notebook(write: Write) -> None:
+    brake = load_system(write("shown.py", declared("shown").replace("of a test", "a < b")))
+    assert "<td>shown</td>" in brake._repr_html_()
+    assert "a &lt; b" in brake._repr_html_()
+    assert str(brake.file) in brake._repr_html_()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Annotated, Any, Literal
 
 import pydantic
@@ -14,6 +15,7 @@ from bywire.core.field_notes import field_notes
 from bywire.core.parameters import ParameterSet, choice_fields, leaf_fields
 from bywire.core.quantities import Fraction, Length, Resistance, Unit
 from bywire.core.units import Written
+from bywire.report.wording import range_text
 
 Nodes = tuple[Annotated[float, Field(ge=0, allow_inf_nan=False)], ...]
 
@@ -203,6 +205,9 @@ def test_fields_know_unit_range_and_description():
     assert leaves["inner.R"].range_text == "> 0 ohm"
     assert leaves["share"].range_text == "> 0 and <= 1"
     assert leaves["table"].range_text == ">= 0 Pa"
+    alone = replace(leaves["inner.R"], low=2.0, high=2.0)
+    assert alone.range_text == "exactly 2 ohm"
+    assert range_text(alone) == "exactly 2 Ω"
     assert choice_fields(Outer) == ("inner.law", "on", "note")
     notes = field_notes(Outer)
     assert [notes[name] for name in choice_fields(Outer)] == [

@@ -14,6 +14,8 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.margins import margins
 from bywire.analysis.response.dataset import Sweep, complex_values
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.api.loop_case import loop_case
+from bywire.api.verification_parts import verification_parts
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
@@ -26,7 +28,7 @@ from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.outcome import bench_text
 from bywire.synthesis.requirement import read
 from bywire.synthesis.trial import Trial
-from bywire.synthesis.verification import verify
+from bywire.synthesis.verification import Verification, verify
 
 PAPER = ("bandwidth >= 10 Hz", "phase margin >= 60 deg", "overshoot <= 15 %",
          "steady-state error <= 0 %")  # fmt: skip
@@ -148,3 +150,23 @@ def test_a_design_as_a_bench_file() -> None:
     for name, value in {**gains, "motor.R_m": 0.4}.items():
         assert bench.par.leaves()[name] == pytest.approx(value, rel=1e-8)
     assert bench.par.flat()["gear.law"] == "directional"
+
+
+@pytest.mark.parametrize(
+    ("peak", "crossover", "why"),
+    [
+        (0.0, math.nan, "phase_margin, crossover are not defined: the output does not move"),
+        (1.0, math.nan, "are not defined: the loop gain stays below 1"),
+        (1.0, math.inf, "sine of 1 bar: phase_margin is not defined: the loop gain stays above 1"),
+    ],
+)  # fmt: skip
+def test_what_is_not_defined_says_why(peak: float, crossover: float, why: str) -> None:
+    small = Small(1e5, 0.0, 0.0, math.nan, crossover, peak, True)
+    step = {"overshoot": math.nan}
+    figures = BenchFigures((small,), step, {"overshoot": "the response never moves"})
+    one = Candidate({}, figures, {"overshoot <= 1 %": 0.1})
+    nominal = dict.fromkeys(("phase_margin", "gain_margin", "disk_margin"), 1.0)
+    parts = verification_parts(loop_case("pressure"), nominal, Verification(one, None, (), nominal))
+    texts = [part for part in parts if isinstance(part, str)]
+    assert any(why in text for text in texts)
+    assert "overshoot, hard-braking, is not defined: the response never moves" in texts

@@ -54,7 +54,7 @@ def test_it_passes_the_check(project: Path) -> None:
 
 
 def test_commands_work_with_it(project: Path, tmp_path: Path) -> None:
-    assert "front-caliper-clamp" in command(project, "list")
+    assert "front-caliper-clamp" in command(project, "list", "experiments")
     assert "clamp force" in command(project, "list", "front-caliper-actuator")
     command(project, "run", "front-caliper-clamp", "--out", str(tmp_path / "out"))
     assert (tmp_path / "out" / "report.html").is_file()
@@ -91,8 +91,21 @@ def test_existing_folders_stay_as_they_are(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="exists already"):
         new(NAME, tmp_path)
     assert os.listdir(tmp_path / NAME) == []
+    (tmp_path / "file").touch()
     with pytest.raises(FileError, match="is no folder"):
-        new(NAME, tmp_path / "nowhere")
+        new(NAME, tmp_path / "file")
+
+
+def test_the_folder_that_it_goes_into_is_made(tmp_path: Path) -> None:
+    out = tmp_path / "brakes" / "front"
+    done = subprocess.run(
+        [sys.executable, "-m", "bywire", "new", NAME, "--out", str(out)],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert str(out / NAME) in done.stdout
+    assert os.listdir(tmp_path) == ["brakes"]
+    assert (out / NAME / "src" / "front_caliper" / "__init__.py").is_file()
 
 
 def test_a_failure_leaves_nothing_behind(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,13 +24,14 @@ from bywire.api.described_systems import (
     described_system,
     signals,
 )
+from bywire.api.mentions import Mentioned, mentions, nearest_words
 from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
-from bywire.core.errors import unknown_name
+from bywire.core.errors import UnknownNameError, unknown_name
 from bywire.core.field_notes import field_notes
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import leaf_fields
@@ -79,7 +80,8 @@ def described(name: str) -> list[Object]:
         for kind, (known, describe) in kinds.items() if name in known
     ]  # fmt: skip
     if not objects:
-        raise unknown_name("name", name, {n for known, _ in kinds.values() for n in known})
+        names = {n for known, _ in kinds.values() for n in known}
+        raise unknown_name("name", name, names.union(nearest_words(name)))
     return objects
 
 
@@ -108,21 +110,35 @@ class Description(Answer):
         )
 
 
-def describe(name: str) -> Description:
+def describe(name: str) -> Description | Mentioned:
     """Return all about something of the list, a parameter, a group of them, or a signal.
+
+    Of words that are no name, everything whose declared meaning mentions them.
 
     Parameters
     ----------
     name
         Name of an assembly, experiment, loop, plant, study, method, parameter set, stimulus, key
-        figure, parameter (``"motor.R_m"``), group of parameters, or signal.
+        figure, parameter (``"motor.R_m"``), group of parameters, or signal; or words, such as
+        ``"battery"``.
+
+    Returns
+    -------
+    Description or Mentioned
+        What there is of that name, or what mentions the words.
 
     Raises
     ------
     UnknownNameError
         With the nearest known names.
     """
-    return Description(name, tuple(described(name)))
+    try:
+        return Description(name, tuple(described(name)))
+    except UnknownNameError:
+        mentioned = mentions(name)
+        if not mentioned:
+            raise
+        return Mentioned(name, tuple(mentioned))
 
 
 def _blocks(thing: Object) -> list[str | Flat]:
@@ -143,6 +159,7 @@ def _blocks(thing: Object) -> list[str | Flat]:
     for key, heading in (("options", "default"), ("parameters", "value")):
         if thing.get(key):
             changed = f", changed with {thing['changed_with']}" if "changed_with" in thing else ""
+            heading = "default" if thing["kind"] == "stimulus" else heading
             blocks += ["", f"{key}{changed}", TableBlock(option_table(thing[key], heading))]
     if thing.get("see"):
         blocks += ["", thing["see"]]

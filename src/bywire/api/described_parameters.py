@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
@@ -60,18 +61,34 @@ def described_parameter(name: str) -> Object:
 def described_group(name: str) -> Object:
     """Return the parameters of a group, with the values of each assembly's main set."""
     assemblies = groups()[name]
-    rows, sets = [], []
+    rows, sets, meanings = [], [], []
     for assembly in assemblies:
         cited = PARAMETER_SETS.find(main_set(assembly))
         sets.append(cited.name)
+        meanings.append(group_meaning(_class_of(cited.parameter_class, name)))
         new = [row for row in option_rows(cited.parameter_class, cited.parameters())
                if row["name"].rpartition(".")[0] == name]  # fmt: skip
         if len(assemblies) > 1:
             new = [{**row, "meaning": f"{row['meaning']} ({assembly})".strip()} for row in new]
         rows += new
-    return {"summary": f"parameters, with the values of {' and '.join(sets)}",
+    about = " or ".join(dict.fromkeys(filter(None, meanings)))
+    return {"summary": f"{about}; parameters with the values of {' and '.join(sets)}",
             "assembly": ", ".join(assemblies), "parameters": rows,
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
+
+
+def group_meaning(cls: type[ParameterSet]) -> str:
+    """Return what a group of parameters is of: an element's module says it, else the class."""
+    about = inspect.getdoc(cls) or ""
+    if cls.__name__ == "Parameters":
+        about = getattr(inspect.getmodule(cls), "__doc__", None) or about
+    return " ".join(about.strip().partition("\n\n")[0].split()).rstrip(".")
+
+
+def _class_of(cls: type[Any], name: str) -> type[Any]:
+    for part in name.split("."):
+        cls = cls.model_fields[part].annotation
+    return cls
 
 
 def described_kpi(name: str, definition: str) -> Object:
@@ -91,14 +108,14 @@ def option_rows(
     cls
         The class.
     values
-        What is taken unless something else is given; None where everything has to be given.
+        What is taken unless something else is given; None where the class alone says so.
     simulated
         First parts of the names of those that only shape simulated experiments.
     """
     from bywire.report.tables import value_text
 
     leaves, notes = leaf_fields(cls), field_notes(cls)
-    known: Mapping[str, Any] = {} if values is None else values.flat()
+    known: Mapping[str, Any] = _given_by(cls) if values is None else values.flat()
     rows = []
     for name in notes:
         leaf = leaves.get(name)
@@ -114,6 +131,12 @@ def option_rows(
             "meaning": meaning,
         })  # fmt: skip
     return rows
+
+
+def _given_by(cls: type[ParameterSet]) -> Mapping[str, Any]:
+    """Return what a class takes where nothing is given, by name."""
+    fields = cls.model_fields.items()
+    return {name: info.default for name, info in fields if not info.is_required()}
 
 
 def option_table(rows: Sequence[Mapping[str, Any]], heading: str) -> Table:

@@ -50,12 +50,16 @@ def described_system(model: type[Any]) -> Object:
         kind: ", ".join(n for n, entry in known.items() if entry.assembly == model.name)
         for kind, known in kinds.items()
     }
+    shown = "'bywire list' with the name of a parameter set shows its parameters"
+    return {"summary": system_summary(model), **there, "signals": rows,
+            "see": shown if there["parameter sets"] else ""}  # fmt: skip
+
+
+def system_summary(model: type[Any]) -> str:
+    """Return what a model is in a line."""
     # The class says what it is for; what it is stands at the head of its file.
     about = inspect.getmodule(model).__doc__ or ""
-    summary = " ".join(about.strip().partition("\n\n")[0].split()).rstrip(".")
-    shown = "'bywire list' with the name of a parameter set shows its parameters"
-    return {"summary": summary, **there, "signals": rows,
-            "see": shown if there["parameter sets"] else ""}  # fmt: skip
+    return " ".join(about.strip().partition("\n\n")[0].split()).rstrip(".")
 
 
 def described_drive(experiment: Experiment) -> Object:
@@ -118,7 +122,8 @@ def described_plant(plant: Plant) -> Object:
     )  # fmt: skip
     rows = [
         {"signal": name, "unit": display_unit(unit), "meaning": meaning.get(name, ""), "as": part}
-        for part, names, units in parts for name, unit in zip(names, units, strict=True)
+        for part, names, units in parts
+        for name, unit in zip(names, units, strict=True)
     ]
     at = " or ".join(f"{q.name} [{unit_text(display_unit(q.unit))}]" for q in plant.at)
     return {"summary": plant.summary, "assembly": plant.assembly, "at": at, "signals": rows}

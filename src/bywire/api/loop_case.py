@@ -133,6 +133,10 @@ def spread(text: str, unit: str, name: str, *, logarithmic: bool = False) -> lis
         raise ParameterError(
             f"{name} = {text!r}: the range is logarithmic, and must start above 0 {unit}"
         )
+    if low == high:
+        raise ParameterError(
+            f"{name} = {text!r}: the range is a single value: write it alone, {name}={parts[0]}"
+        )
     if not low < high:
         raise ParameterError(f"{name} = {text!r}: the first value must be below the second")
     between = np.geomspace if logarithmic else np.linspace

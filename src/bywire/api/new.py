@@ -24,7 +24,6 @@ _ALLOWED = re.compile(r"[a-z][a-z0-9]*([_-][a-z0-9]+)*")
 _LONGEST = 40
 
 
-
 @dataclass(frozen=True)
 class NewBrake(Answer):
     """A package that was written.
@@ -78,7 +77,12 @@ def new(name: str, folder: str | Path = ".") -> NewBrake:
     name
         Of the brake: small letters, digits and single dashes, such as ``my-brake``.
     folder
-        Where its folder ``my-brake`` is made; the current one by default.
+        Where its folder ``my-brake`` is made; the current one by default, made where it is missing.
+
+    Returns
+    -------
+    NewBrake
+        Its name, the folder of its project, and its package.
 
     Raises
     ------
@@ -118,9 +122,10 @@ def write_package(name: str, folder: Path) -> Path:
     target = folder / name
     if target.exists() or target.is_symlink():
         raise FileError(f"{target} exists already: choose another name, or another folder")
-    if not folder.is_dir():
-        raise FileError(f"{folder} is no folder: make it first, or choose another one")
+    if folder.exists() and not folder.is_dir():
+        raise FileError(f"{folder} is no folder: choose another one")
     try:
+        folder.mkdir(parents=True, exist_ok=True)
         with scratch_folder(folder) as scratch:
             draft = scratch / name
             for place, text in _files(package):

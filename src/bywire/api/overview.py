@@ -6,19 +6,26 @@ import hashlib
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from textwrap import wrap
 from typing import Any
 
 from bywire.core.brake import brakes
+from bywire.core.errors import unknown_name
 from bywire.core.sources import source_state
-from bywire.report.answer import Answer
-from bywire.report.document import Document, Listing, Section
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Document, Section, TableBlock
+from bywire.report.tables import Table, text_table
 
-_WIDTH = 100  # characters of a line
-_NAME = 26  # columns of a name
+TOPICS = (
+    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
+    "plants", "studies", "methods", "stimuli", "kpis", "kpis_of_experiments",
+)  # fmt: skip
+"""kinds of things that have a name"""
+_WIDTH = 80  # characters of a line of the index
+_NAME = 21  # columns of a topic
 _HINT = (
-    "'bywire list NAME' shows the options, signals and units of one of them, of a parameter "
-    "(motor.R_m), a group of parameters (motor), or a signal (p_mc)"
+    "'bywire list TOPIC' opens one of these. 'bywire list NAME' shows all about a\n"
+    "name, a parameter (motor.R_m), a group (motor) or a signal (p_mc); of other\n"
+    "words, such as battery, what mentions them."
 )
 
 
@@ -31,31 +38,81 @@ class Overview(Answer):
     things
         Kind of thing -> name -> summary; a list of names where there is no summary, and the names
         of the key figures of every experiment.
+    topic
+        The kind that is shown; all where empty.
+    doubts
+        What is declared for something that does not exist.
     """
 
     things: Mapping[str, Any]
+    topic: str = ""
+    doubts: tuple[str, ...] = ()
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is declared for something that does not exist."""
+        return [*self.doubts]
 
     def document(self) -> Document:
-        """Return the names with their summaries, kind by kind."""
-        lines: list[str] = []
-        sections = []
-        for title, content in self.things.items():
-            pairs = content.items() if isinstance(content, dict) else ((n, "") for n in content)
-            entries = [line for name, about in pairs for line in _entry(name, about)]
-            lines += [title.replace("_", " "), *entries, ""]
-            sections.append(Section(title.replace("_", " "), [Listing(entries)]))
+        """Return an index of the kinds, and a table of the names and summaries of each."""
+        shown = {self.topic: self.things[self.topic]} if self.topic else self.things
+        tables = {key.replace("_", " "): _table(content) for key, content in shown.items()}
+        brief = next(iter(tables.items())) if self.topic else None
         return Document(
-            "What there is", _HINT, sections=sections, brief=["\n".join([*lines, _HINT])],
-            data=self.things, has_files=False,
+            "What there is", _HINT.replace("\n", " "),
+            sections=[Section(title, [TableBlock(table)]) for title, table in tables.items()],
+            brief=[brief[0], TableBlock(brief[1], width=0)] if brief else [self._index()],
+            data=shown, has_files=False,
         )  # fmt: skip
 
+    def _index(self) -> str:
+        """Return a line for each kind, and what to do next: a screen of 80 by 24."""
+        heads = {f"{key.replace('_', ' '):<{_NAME}}{len(content):>3}  ": content
+                 for key, content in self.things.items()}  # fmt: skip
+        lines = [f"{head}{_first(names, _WIDTH - len(head))}" for head, names in heads.items()]
+        return "\n".join([*lines, "", _HINT])
 
-def overview() -> Overview:
+
+@use_case
+def overview(topic: str = "") -> Overview:
     """Return everything that has a name, from an index that is made anew when a file changes.
 
     Making it loads every brake and all that it brings; the index is kept in the folder of compiled
     kernels, so that a listing need not.
+
+    Parameters
+    ----------
+    topic
+        The kind of things that is shown, for instance ``"experiments"``; all where empty.
+
+    Returns
+    -------
+    Overview
+        Names and summaries by kind, without units.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest topics.
     """
+    things, doubts = _things()
+    chosen = _plain(topic)
+    if topic and chosen not in things:
+        raise unknown_name("topic", topic, TOPICS)
+    return Overview(things, chosen, tuple(doubts))
+
+
+def is_topic(name: str) -> bool:
+    """Return whether a name is one of the kinds that `overview` opens."""
+    return _plain(name) in TOPICS
+
+
+def _plain(topic: str) -> str:
+    return topic.lower().replace("-", "_").replace(" ", "_")
+
+
+def _things() -> tuple[Mapping[str, Any], list[str]]:
+    """Return what there is, and what is doubtful of it."""
     from bywire.simulation.kernel_cache import keep_text, usable_folder
 
     names = hashlib.sha256(" ".join(brakes()).encode()).hexdigest()[:8]
@@ -64,20 +121,28 @@ def overview() -> Overview:
     try:
         kept = json.loads(index.read_text(encoding="utf-8"))
         if kept["state"] == state:
-            return Overview(kept["things"])
+            return kept["things"], kept["doubts"]
     except (OSError, ValueError, KeyError, TypeError):
         pass  # none yet, or not ours
-    from bywire.api.things import all_things
+    from bywire.api.things import all_things, doubts
 
-    things = all_things()
-    keep_text(index, json.dumps({"state": state, "things": things}))
-    return Overview(things)
+    made = {"state": state, "things": all_things(), "doubts": doubts()}
+    keep_text(index, json.dumps(made))
+    return made["things"], made["doubts"]
 
 
-def _entry(name: str, about: str | Iterable[str]) -> list[str]:
-    """Return the lines of an entry: its summary, or names broken over several lines."""
-    if isinstance(about, str):
-        return [f"  {name:<{_NAME}}  {about}".rstrip()]
-    return wrap(
-        f"  {name:<{_NAME}}  {', '.join(about)}", _WIDTH, subsequent_indent=" " * (_NAME + 4)
+def _first(names: Iterable[str], width: int) -> str:
+    """Return as many names as a line has room for."""
+    text = ", ".join(names)
+    return text if len(text) <= width else text[: width - 4].rpartition(", ")[0] + " ..."
+
+
+def _table(content: Any) -> Table:
+    """Return names with their summaries, or with the names that belong to them."""
+    if not isinstance(content, dict):
+        return text_table(["name"], [[name] for name in content])
+    pairs = content.items()
+    return text_table(
+        ["name", "meaning"],
+        [[n, about if isinstance(about, str) else ", ".join(about)] for n, about in pairs],
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bywire.api.loop_case import LoopCase
@@ -40,9 +40,13 @@ def verification_parts(
         cells = [figure_text(name, figures[name]) for figures in both]
         rows.append([f"{name}, linear model", *cells])
     parts: list[Part] = [text_table(["nonlinear bench", *(c for c, _ in columns)], rows)]
+    tries = [candidate.figures for candidate in shown]
+    tries += [figures for candidate in shown for figures in candidate.corners.values()]
+    parts += _reasons(case, tries)
     if not tried.linear.figures.step and tried.kpis:
         kpis = [[kpi.name, amount(kpi.value, kpi.unit)] for kpi in tried.kpis]
         parts.append(text_table([case.loop.proof, "final gains"], kpis))
+        parts += [f"{k.name} is not defined: {k.note}" for k in tried.kpis if math.isnan(k.value)]
     labels = tried.final.corners
     if labels:
         worst = f" (worst of {tried.corners} corners)" if len(labels) < tried.corners else ""
@@ -98,6 +102,26 @@ def _figure_rows(
         ]
         rows.append([f"{name}, {case.loop.proof}{where}", *cells])
     return rows
+
+
+def _reasons(case: LoopCase, tries: Sequence[BenchFigures]) -> list[Part]:
+    """Return why figures are not defined, each reason once."""
+    texts = [f"{n}, {case.loop.proof}, is not defined: {why}"
+             for figures in tries for n, why in figures.reasons.items()]  # fmt: skip
+    for size in [small for figures in tries for small in figures.small]:
+        if not math.isnan(size.phase_margin):
+            continue
+        if case.loop.laws is None:
+            why = "the loop declares no laws"
+        elif size.peak == 0.0:
+            why = "the output does not move"
+        else:
+            side = "above" if math.isinf(size.crossover) else "below"
+            why = f"the loop gain stays {side} 1 at all frequencies that were measured"
+        sine = amount(size.amplitude, case.input_unit, 3)
+        names = "phase_margin is" if math.isinf(size.crossover) else "phase_margin, crossover are"
+        texts.append(f"sine of {sine}: {names} not defined: {why}")
+    return [*dict.fromkeys(texts)]
 
 
 def verification_object(case: LoopCase, tried: Verification) -> dict[str, Any]:

@@ -236,7 +236,10 @@ def experiment_of(
     if name in known:
         models = ASSEMBLIES.of(brake)
         return known[name].bound(pick(models, system, "assembly")(), options or {})
-    return pick(EXPERIMENTS.all(), name, "experiment", also=known)
+    every = EXPERIMENTS.all()
+    if name not in every:
+        raise unknown_name("experiment", name, {*every, *known}, first=EXPERIMENTS.of(brake))
+    return every[name]
 
 
 def stimulus_sections(stimulus: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:

@@ -14,15 +14,18 @@ from bywire.cli.show import show
 def list_command(
     name: Annotated[
         str | None,
-        typer.Argument(help="Something of the list: its options, signals and units."),
+        typer.Argument(
+            metavar="[TOPIC|NAME|WORD]",
+            help="A kind of things; or a name: its options, signals, units; or what it is about.",
+        ),
     ] = None,
     json: JsonFlag = False,
 ) -> None:
-    """Show assemblies, parameter sets, experiments, methods, KPIs; or all about one of them."""
-    from bywire.api.overview import overview
+    """Show what there is: kinds of things, the names of one kind, or all about a name."""
+    from bywire.api.overview import is_topic, overview
 
-    if name is None:
-        show(lambda _: overview(), as_json=json)
+    if name is None or is_topic(name):
+        show(lambda _: overview(name or ""), as_json=json)
         return
     from bywire.api.describe import describe
 

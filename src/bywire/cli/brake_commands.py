@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from bywire.cli.options import JsonFlag, OutFolder
+from bywire.cli.output_folder import folder
 from bywire.cli.show import show
 
 
@@ -30,12 +31,18 @@ def check_command(
 
 def new_command(
     name: Annotated[str, typer.Argument(help="Name of the brake, e.g. my-brake.")],
-    folder: Annotated[
-        Path, typer.Option("--in", metavar="PATH", help="Folder in which its own is made.")
-    ] = Path(),
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out",
+            metavar="PATH",
+            parser=folder,
+            help="Folder in which its own is made; the current one by default.",
+        ),
+    ] = None,
     json: JsonFlag = False,
 ) -> None:
     """Write a package for a brake of your own, with tests, that passes bywire check."""
     from bywire.api.new import new
 
-    show(lambda progress: new(name, folder), None, json)
+    show(lambda progress: new(name, out or Path()), None, json)

@@ -14,15 +14,16 @@ import importlib
 import importlib.util
 import sys
 import traceback
-import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from html import escape
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from types import ModuleType
 
-from bywire.core.errors import BywireError, FileError, ModelError
+from bywire.core.author_lines import said_with_line, warn_at_line
+from bywire.core.errors import FileError, ModelError
 
 GROUP = "bywire.brakes"
 """entry points whose values name modules with a ``BRAKE``"""
@@ -56,6 +57,12 @@ class Brake:
         """Where it is declared."""
         return importlib.import_module(self.module).__file__ or self.module
 
+    def _repr_html_(self) -> str:
+        rows = {"brake": self.name, "what it is": self.summary, "declared in": self.file,
+                "what it brings": f"bywire.overview(), or bywire.check({self.name!r})"}  # fmt: skip
+        cells = "".join(f"<tr><th>{k}</th><td>{escape(v)}</td></tr>" for k, v in rows.items())
+        return f"<table>{cells}</table>"
+
 
 _loaded: dict[str, Brake] = {}
 
@@ -78,14 +85,24 @@ def _installed() -> Mapping[str, Brake]:
             brake = _declared(importlib.import_module(point.module), point.value)
             _require_new(brake, brakes)
         except Exception as error:
-            reason = str(error) if isinstance(error, ModelError) else _place(error, "")
-            warnings.warn(
-                f"the installed brake {point.name!r} ({point.value}) is left out: {reason}",
-                BrakeWarning, stacklevel=2,
-            )  # fmt: skip
+            place = _place_of(point.module)
+            reason = str(error) if isinstance(error, ModelError) else said_with_line(error, place)
+            text = f"the installed brake {point.name!r} ({point.value}) is left out: {reason}"
+            warn_at_line(text, BrakeWarning, error, place)
         else:
             brakes[brake.name] = brake
     return brakes
+
+
+def _place_of(module: str) -> str:
+    """Return the folder of a module's package, or its file; its name where it is nowhere."""
+    root = module.partition(".")[0]
+    try:
+        spec = importlib.util.find_spec(root)
+    except (ImportError, ValueError):
+        spec = None
+    folders = list(spec.submodule_search_locations or ()) if spec is not None else []
+    return folders[0] if folders else (spec.origin if spec is not None else None) or root
 
 
 def is_foreign(brake: Brake) -> bool:
@@ -106,7 +123,7 @@ def foreign_line(error: BaseException) -> str:
     frames = traceback.extract_tb(error.__traceback__)
     if not any(frame.filename.startswith(folder) for folder in folders for frame in frames):
         return ""
-    return _place(error, *folders)
+    return said_with_line(error, *folders)
 
 
 def is_package(brake: Brake) -> bool:
@@ -188,7 +205,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
             del sys.modules[loaded]
         if not isinstance(error, (Exception, SystemExit)):
             raise
-        message = _place(error, str(source.parent) if place.is_dir() else str(source))
+        message = said_with_line(error, str(source.parent) if place.is_dir() else str(source))
         raise ModelError(f"{message}; mend it and load it again") from error
     return module
 
@@ -219,22 +236,6 @@ def _require_new(brake: Brake, known: Mapping[str, Brake]) -> None:
 
 def _origin(module: ModuleType) -> str:
     return getattr(module, "__file__", None) or "of Python itself"
-
-
-def _place(error: BaseException, *inside: str) -> str:
-    """Return an error with the innermost line at which it happened in files of these folders."""
-    if isinstance(error, SyntaxError) and error.filename:
-        return f"{error.filename}, line {error.lineno}: {type(error).__name__}: {error.msg}"
-    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-    text = str(error) if isinstance(error, BywireError) else text
-    if "truth value of a CasADi" in text:
-        text = "an if, and, or, min or max on a number of the model: use bywire.core.ops.where"
-    lines = [
-        (frame.filename, frame.lineno)
-        for frame in traceback.extract_tb(error.__traceback__)
-        if frame.filename.startswith(inside) and not frame.filename.startswith("<")
-    ]
-    return f"{lines[-1][0]}, line {lines[-1][1]}: {text}" if lines else text
 
 
 def modules_of(brake: Brake, names: tuple[str, ...]) -> Iterator[ModuleType]:
@@ -285,4 +286,4 @@ def _attempted(name: str) -> ModuleType:
         if root == "bywire":
             raise
         folder = Path(getattr(sys.modules.get(root), "__file__", None) or "").parent
-        raise ModelError(_place(error, str(folder))) from error
+        raise ModelError(said_with_line(error, str(folder))) from error

@@ -18,7 +18,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from difflib import get_close_matches
+from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
 _SHOWN = 60  # characters of a value in a message
@@ -82,7 +82,9 @@ def place_of(thing: Any) -> str:
         return str(getattr(thing, "__qualname__", thing))
 
 
-def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownNameError:
+def unknown_name(
+    kind: str, name: str, known: Iterable[str], first: Iterable[str] = ()
+) -> UnknownNameError:
     """Build the error for an unknown name, with the nearest known ones.
 
     Parameters
@@ -93,11 +95,30 @@ def unknown_name(kind: str, name: str, known: Iterable[str]) -> UnknownNameError
         What the user wrote.
     known
         Every name that would have been accepted.
+    first
+        Those of them that a listing begins with.
     """
-    candidates = sorted(known)
+    every, leading = {*known}, sorted(first)
+    candidates = [*leading, *sorted(every.difference(leading))]
     close = get_close_matches(name, candidates, n=3, cutoff=0.5)
     hint = f"did you mean {', '.join(map(repr, close))}?" if close else _listing(candidates)
     return UnknownNameError(f"unknown {kind} {quoted(name)}: {hint}")
+
+
+def nearest_first(names: Iterable[str], wanted: Iterable[str]) -> str:
+    """Return names as an error lists them: those that resemble what is wanted first, not all.
+
+    Examples
+    --------
+    >>> nearest_first(["time", "p_caliper", "i_set"], ["p_set", "i_set"])
+    'i_set, p_caliper, time'
+    """
+    aims = list(wanted)
+
+    def distance(name: str) -> float:
+        return -max((SequenceMatcher(None, name, aim).ratio() for aim in aims), default=0.0)
+
+    return _shown(sorted(names, key=distance))
 
 
 def quoted(value: object) -> str:
@@ -120,6 +141,8 @@ def quoted(value: object) -> str:
 
 
 def _listing(candidates: list[str]) -> str:
-    shown = ", ".join(candidates[:12])
-    more = f" and {len(candidates) - 12} more" if len(candidates) > 12 else ""
-    return f"known are {shown}{more}" if candidates else "none is known here"
+    return f"known are {_shown(candidates)}" if candidates else "none is known here"
+
+
+def _shown(names: list[str]) -> str:
+    return ", ".join(names[:12]) + (f" and {len(names) - 12} more" if len(names) > 12 else "")

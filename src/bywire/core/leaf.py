@@ -29,6 +29,8 @@ class Leaf:
         """Return the admissible range in a unit of the same dimension."""
         unit = "" if symbol == "1" else f" {symbol}"
         low, high = self.low, self.high
+        if low == high:
+            return f"exactly {convert(low, self.unit.symbol, symbol):g}{unit}"
         parts = []
         if not math.isinf(low):
             low = convert(low, self.unit.symbol, symbol)

@@ -10,13 +10,14 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from types import ModuleType
 from typing import Any, Generic, Protocol, TypeVar
 
+from bywire.core.author_lines import warn_at_line
 from bywire.core.brake import (
     Brake,
     BrakeWarning,
@@ -26,6 +27,7 @@ from bywire.core.brake import (
     modules_below,
     modules_of,
 )
+from bywire.core.declared import declared_at, declared_line
 from bywire.core.errors import ModelError, UnknownNameError, unknown_name
 
 
@@ -90,11 +92,17 @@ class Kind(Generic[T]):
     def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
         """Return the error of a name that nothing of this kind, nor of the others, answers to.
 
-        It names the nearest known ones, and the brakes that declare none, with how that is done.
+        It names the nearest known ones, those of brakes that were loaded from files before ours,
+        and the brakes that declare none, with how that is done.
         """
         kinds = (self, *others)
-        title = " or ".join(kind.name for kind in kinds)
-        error = unknown_name(title, name, [n for kind in kinds for n in kind.all()])
+        title = " or ".join(dict.fromkeys(kind.name for kind in kinds))
+        files = loaded_files()
+        loaded = [brake.module for brake in brakes().values() if brake.file in files]
+        error = unknown_name(
+            title, name, [n for kind in kinds for n in kind.all()],
+            first=[n for kind in kinds for module in loaded for n in kind.of(module)],
+        )  # fmt: skip
         hints = [
             f"the brake {brake.name!r} declares no {title}: that takes {self.declared} in a module "
             f"or folder {' or '.join(self.folders)} of its package, or in its file, see "
@@ -102,7 +110,7 @@ class Kind(Generic[T]):
             for brake in brakes().values()
             if self.declared and not any(kind.of(brake.module) for kind in kinds)
         ]
-        if self.declared and not loaded_files() and "did you mean" not in str(error):
+        if self.declared and not files and "did you mean" not in str(error):
             hints.append("that of a brake of your own takes --system PATH, or bywire.load_system")
         return UnknownNameError("; ".join([str(error), *hints]).replace("?; ", "? "))
 
@@ -133,6 +141,14 @@ class Kind(Generic[T]):
     def owner(self, name: str) -> str:
         """Return the module of the brake that brings a thing; empty for a general one."""
         return next((owner for thing, owner in _all(self) if thing.name == name), "")
+
+    def place(self, name: str) -> tuple[str, int]:
+        """Return file and line where the thing of a name is declared; line 0 where nobody knows."""
+        module = self.owner(name)
+        brake = next((each for each in brakes().values() if each.module == module), None)
+        things = [(t, where) for t, where in _declared(self, brake) if t.name == name]
+        lines = ((where.__file__ or "", declared_line(where, thing)) for thing, where in things)
+        return max(lines, key=lambda place: place[1], default=("", 0))
 
 
 def _is_folder(module: str) -> bool | None:
@@ -170,7 +186,7 @@ def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
 
 @cache
 def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str], ...]:
-    places: dict[str, tuple[Any, str, str]] = {}
+    places: dict[str, tuple[Any, str, ModuleType]] = {}
     for owner in (None, *known):
         try:
             new = _declared(kind, owner)
@@ -179,51 +195,48 @@ def _gathered(kind: Kind[Any], known: tuple[Brake, ...]) -> tuple[tuple[Any, str
             if owner is None or not is_foreign(owner):
                 raise
             text = f"the {kind.name} of the installed brake {owner.name!r} is left out: {error}"
-            warnings.warn(text, BrakeWarning, stacklevel=2)
+            warn_at_line(text, BrakeWarning, error, str(Path(owner.file).parent), owner.file)
             continue
-        module = owner.module if owner is not None else ""
-        for thing, file in new:
-            places.setdefault(thing.name, (thing, module, file))
-    return tuple((thing, module) for thing, module, _ in places.values())
+        brake = owner.module if owner is not None else ""
+        for thing, module in new:
+            places.setdefault(thing.name, (thing, brake, module))
+    return tuple((thing, brake) for thing, brake, _ in places.values())
 
 
 def _require_new(
-    kind: Kind[Any], new: tuple[tuple[Any, str], ...], known: Mapping[str, tuple[Any, str, str]]
+    kind: Kind[Any],
+    new: tuple[tuple[Any, ModuleType], ...],
+    known: Mapping[str, tuple[Any, str, ModuleType]],
 ) -> None:
     """Refuse things whose name another one has, in the same brake or in an earlier one."""
-    seen: dict[str, tuple[Any, str]] = {name: (thing, f) for name, (thing, _, f) in known.items()}
-    for thing, file in new:
-        first, place = seen.setdefault(thing.name, (thing, file))
+    seen = {name: (thing, module) for name, (thing, _, module) in known.items()}
+    for thing, module in new:
+        first, place = seen.setdefault(thing.name, (thing, module))
         if first is not thing:
-            where = " twice" if place == file else f", and so does {place}"
             raise ModelError(
-                f"{file} declares the {kind.name} {thing.name!r}{where}: give it another name"
+                f"{declared_at(module, thing)}: the {kind.name} {thing.name!r} is declared in "
+                f"{declared_at(place, first)} already: give this one another name"
             )
 
 
 @cache
-def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, str], ...]:
-    """Return the general things of a kind, or those of a brake, each with its file."""
+def _declared(kind: Kind[Any], owner: Brake | None) -> tuple[tuple[Any, ModuleType], ...]:
+    """Return the general things of a kind, or those of a brake, each with its module."""
     if owner is not None:
         modules = modules_of(owner, kind.folders)
     else:
         modules = modules_below(kind.home) if kind.home else iter(())
-    return tuple(
-        (thing, module.__file__ or "") for module in modules for thing in kind.read(module)
-    )
+    return tuple((thing, module) for module in modules for thing in kind.read(module))
 
 
-def pick(
-    known: Mapping[str, Thing], name: str, kind: str, also: Iterable[str] = ()
-) -> Thing:
+def pick(known: Mapping[str, Thing], name: str, kind: str) -> Thing:
     """Return the thing of a name.
 
     Raises
     ------
     UnknownNameError
-        With the nearest known names, and those that would do ``also``; ``kind`` says what they
-        are names of.
+        With the nearest known names; ``kind`` says what they are names of.
     """
     if name not in known:
-        raise unknown_name(kind, name, {*known, *also})
+        raise unknown_name(kind, name, known)
     return known[name]

@@ -80,6 +80,8 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
 
 def range_text(leaf: Leaf) -> str:
     """Return the admissible range of a parameter in its display unit, for instance ``> 0 mm``."""
+    if leaf.low == leaf.high:
+        return f"exactly {amount(leaf.low, leaf.unit.symbol, 6)}"
     limits = []
     for sign, bound, is_open in (
         (">", leaf.low, leaf.low_open),

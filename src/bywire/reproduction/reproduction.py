@@ -207,7 +207,7 @@ class Source:
     reproduce: Callable[[Progress | None], Reproduction]
 
 
-SOURCES = Kind("source", ("paper",), instances(Source))
+SOURCES = Kind("source", ("paper",), instances(Source), declared="a Source")
 """every source that can be reproduced"""
 
 

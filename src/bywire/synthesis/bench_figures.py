@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
@@ -86,10 +86,13 @@ class BenchFigures:
     step
         Overshoot [%], settling time [s] and steady-state error [% of the step] of the loop's
         experiment; empty where it has no step response. NaN where not defined.
+    reasons
+        Why a figure of the step is not defined, by its name.
     """
 
     small: tuple[Small, ...]
     step: Mapping[str, float]
+    reasons: Mapping[str, str] = field(default_factory=dict)
 
 
 def bench_figures(
@@ -138,7 +141,7 @@ def bench_figures(
             _small(loop, tuned, value, responses.isel(variant=k, amplitude=j), target)
             for j in range(responses.sizes["amplitude"])
         )  # fmt: skip
-        rows.append(BenchFigures(small, {} if steps is None else steps[k]))
+        rows.append(BenchFigures(small, *(({},) if steps is None else steps[k])))
     return tuple(rows)
 
 
@@ -215,8 +218,10 @@ def loop_gain(
     return np.asarray(feedback * closed / (demand - feedback * closed))
 
 
-def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str, float]] | None:
-    """Return the step's figures for every set of gains."""
+def _steps(
+    bench: Bench, gains: Mapping[str, Sequence[float]]
+) -> list[tuple[dict[str, float], dict[str, str]]] | None:
+    """Return the step's figures for every set of gains, and why some are not defined."""
     definition = bench.definition
     if definition.step is None or not has_step(bench):
         return None
@@ -236,5 +241,6 @@ def _steps(bench: Bench, gains: Mapping[str, Sequence[float]]) -> list[dict[str,
         kpis = evaluate("step_response", recording, setting)
         row = {name: kpis[name].value for name in STEP_FIGURES}
         row["steady_state_error"] *= 100.0 / height if height else math.nan
-        rows.append(row)
+        missing = [name for name in STEP_FIGURES if math.isnan(row[name])]
+        rows.append((row, {n: kpis[n].note or "the step has no height" for n in missing}))
     return rows

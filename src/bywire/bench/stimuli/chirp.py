@@ -26,7 +26,7 @@ class Parameters(ParameterSet):
     """frequency at the end, above or below ``f_start``"""
     t_sweep: Duration
     """duration of the sweep; afterward the sine goes on at ``f_end``"""
-    t_start: TimeConstant
+    t_start: TimeConstant = 0.0
     """instant at which the sweep begins, with phase zero"""
     sweep: Literal["linear", "logarithmic"]
     """course of the frequency: equal Hz or equal octaves in equal times"""

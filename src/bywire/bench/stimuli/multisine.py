@@ -25,7 +25,7 @@ class Parameters(ParameterSet):
     """base frequency: first harmonic and spacing; one period lasts its inverse"""
     n: Count
     """number of harmonics: 1, 2, ..., n times the base frequency"""
-    t_start: TimeConstant
+    t_start: TimeConstant = 0.0
     """instant at which the first period begins; the signal jumps there"""
 
     @model_validator(mode="before")

@@ -22,7 +22,7 @@ class Parameters(ParameterSet):
     """value that the ramp leads to, above or below ``start``"""
     slope: LevelRate
     """magnitude of the slope, there and back"""
-    t_start: TimeConstant
+    t_start: TimeConstant = 0.0
     """instant at which the ramp begins"""
     t_hold: TimeConstant
     """time spent at ``end`` before the way back"""

@@ -21,9 +21,9 @@ class Parameters(ParameterSet):
     """amplitude: half of peak to peak"""
     f: Frequency
     """frequency"""
-    phase: Phase
+    phase: Phase = 0.0
     """phase at ``t_start``; the signal jumps there unless it is a multiple of pi"""
-    t_start: TimeConstant
+    t_start: TimeConstant = 0.0
     """instant at which the oscillation begins"""
 
 

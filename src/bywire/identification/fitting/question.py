@@ -11,7 +11,6 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.bench import Bench
-from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Unit
 from bywire.core.registry import Kind, instances
@@ -138,7 +137,7 @@ def find_method(name: str) -> Method:
         With the nearest known names, those of methods for a bench among them.
     """
     if name not in METHODS.all():
-        raise unknown_name("method", name, (*METHODS.all(), *BENCH_METHODS.all()))
+        raise METHODS.unknown(name, BENCH_METHODS)
     return METHODS.all()[name]
 
 

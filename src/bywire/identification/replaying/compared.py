@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case
-from bywire.core.errors import ParameterError, UnitError, unknown_name
+from bywire.core.errors import ParameterError, UnitError, nearest_first, unknown_name
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.data.column_units import measures, unit_of_symbol
@@ -46,7 +46,8 @@ def compared_outputs(
     if not wanted:
         raise ParameterError(
             "nothing measured is an output of the model: name signals as the model does (--map), "
-            f"for instance {', '.join(list(signals)[:6])}; measured are {', '.join(there)}"
+            f"for instance {', '.join(list(signals)[:6])}; measured are "
+            f"{nearest_first(there, signals)}"
         )
     for name in wanted:
         if name not in signals:

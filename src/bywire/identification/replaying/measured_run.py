@@ -16,7 +16,7 @@ import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
-from bywire.core.errors import ParameterError, StepError, unknown_name
+from bywire.core.errors import ParameterError, StepError, nearest_first, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -151,10 +151,10 @@ def _inputs(case: Case, data: xr.Dataset, wanted: Mapping[str, str] | None) -> d
     if wanted is None:
         wanted = {name: name for name in there if name in stimuli}
     if not wanted:
+        driven = [name for name in stimuli if not name.startswith("noise_")]
         raise ParameterError(
             f"nothing measured drives the model: give --input STIMULUS=SIGNAL with one of "
-            f"{', '.join(n for n in stimuli if not n.startswith('noise_'))} "
-            f"and one of {', '.join(there)}"
+            f"{', '.join(driven)} and one of {nearest_first(there, driven)}"
         )
     for stimulus, signal in wanted.items():
         if stimulus not in stimuli:

@@ -8,7 +8,7 @@ from typing import Any
 
 import xarray as xr
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, nearest_first, unknown_name
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 
@@ -89,8 +89,7 @@ def find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     """
     known = {relation.parameter for relation in RELATIONS.all().values()}
     relations = [
-        r for r in RELATIONS.all().values()
-        if name in (r.parameter, r.parameter.rpartition(".")[2])
+        r for r in RELATIONS.all().values() if name in (r.parameter, r.parameter.rpartition(".")[2])
     ]
     if not relations:
         raise unknown_name("parameter to track", name, known)
@@ -103,5 +102,5 @@ def find_relation(name: str, data: xr.Dataset, par: Any) -> Relation:
     wanted = " or ".join(", ".join(r.signals) for r in relations)
     raise ParameterError(
         f"tracking {relations[0].parameter} needs the measured signals {wanted}; measured are "
-        f"{', '.join(map(str, data.data_vars))}"
+        f"{nearest_first(map(str, data.data_vars), relations[0].signals)}"
     )

@@ -1,0 +1,5 @@
+"""``python -m bywire``: the same as the command ``bywire``."""
+
+from bywire.cli.main import main
+
+main()
