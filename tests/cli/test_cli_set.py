@@ -109,3 +109,40 @@ def test_stimulus_from_the_command_line(bywire, bench):
     kind = ("kind=table", "times=0 s, 10 ms", "values=0 A, 1 A", "between=linear")
     arguments = [part for text in kind for part in ("--set", f"stimulus.{text}")]
     assert bywire("run", path, *arguments).status == 0
+
+
+def test_shares_and_patterns_change_what_is_there(bench):
+    cited = package.parameters("dardanelli2010").leaves()
+    path = str(bench(f'{BRAKING}{QUICK}\n[set]\nseal.c = "2 s/rad"\n"motor.*" = "+10%"\n'))
+    changed = package.run(path, {"seal.T_pr": "+50%", "seal.c": " - 5 %"}).bench.par.leaves()
+    assert changed["seal.T_pr"] == pytest.approx(1.5 * cited["seal.T_pr"], rel=1e-12)
+    assert changed["seal.c"] == pytest.approx(0.95 * 2.0, rel=1e-12)  # of what the file gives
+    for name in ("motor.R_m", "motor.K_e"):
+        assert changed[name] == pytest.approx(1.1 * cited[name], rel=1e-12)
+    assert changed["gear.eta_g"] == cited["gear.eta_g"]
+    plain = package.Bench("hard-braking", "dardanelli2010", {"seal.*": "+50%", "seal.c": "2 s/rad"})
+    assert plain.par.seal.c == 2.0  # what is written out goes before a pattern
+    twice = plain.with_overrides({"seal.c": "+50%"})
+    assert twice.par.seal.c == pytest.approx(3.0)
+    margins = package.margins("pressure", overrides={"seal.*": "-10%"})
+    assert margins.case.par.seal.c == pytest.approx(0.9 * cited["seal.c"])
+
+
+@pytest.mark.parametrize(
+    ("change", "texts"),
+    [
+        ("seels.*=+50%", ["none is matched", "'seels.*'", "'seal.*'"]),
+        ("gear.law=+50%", ["gear.law = '+50%'", "quantities alone", "a choice, now paper"]),
+        ("*.law=+50%", ["none of what it matches is a quantity"]),
+        ("motor.R_m=-150%", ["motor.R_m = -0.175 ohm", "> 0 ohm", "got '-150%'"]),
+        ("motor.R_n=+5%", ["unknown parameter 'motor.R_n'", "'motor.R_m'"]),
+        ("motor.*=5", ["motor.R_m = '5' has the wrong unit"]),
+    ],
+)
+def test_bad_shares_and_patterns(bywire, bench, change, texts):
+    refused(bywire("run", bench(), "--set", change), *texts)
+
+
+def test_a_share_of_zero_is_refused(bywire, bench):
+    path = bench(f"{BRAKING}[set]\nseal.T_pr = 0\n")
+    refused(bywire("run", path, "--set", "seal.T_pr=+50%"), "a share of 0 changes nothing")

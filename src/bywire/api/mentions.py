@@ -70,8 +70,8 @@ class Mentioned(Answer):
             brief=[head, TableBlock(start, width=0)]
             + ([f"and {more} more: ask with more words"] if more > 0 else []),
             data={"name": self.words, "found": [
-                {"kind": mention.kind, "name": mention.name, "summary": mention.meaning, "unit": mention.unit}
-                for mention in self.mentions
+                {"kind": kind, "name": name, "summary": meaning, "unit": unit}
+                for kind, name, meaning, unit in self.mentions
             ]},
             has_files=False,
         )  # fmt: skip
@@ -86,22 +86,20 @@ def mentions(words: str) -> list[Mention]:
     asked = [word.lower() for word in _WORD.findall(words)]
     known = dict.fromkeys(_known()) if asked else {}
     return sorted(
-        (one for mention in known if all(_says(mention, word) for word in asked)),
+        (mention for mention in known if all(_says(mention, word) for word in asked)),
         key=lambda mention: not all(_begins(mention.name, word) for word in asked),
     )
 
 
 def nearest_words(name: str) -> Sequence[str]:
     """Return the declared words that are nearest to one that nothing mentions."""
-    words = {word for mention in _known() for word in _WORD.findall(mention.meaning) if len(word) > 3}
-    return get_close_matches(name, words, n=2, cutoff=0.75)
+    words = {word for mention in _known() for word in _WORD.findall(mention.meaning)}
+    return get_close_matches(name, [word for word in words if len(word) > 3], n=2, cutoff=0.75)
 
 
 def _says(mention: Mention, word: str) -> bool:
-    return _begins(f"{mention.name} {mention.meaning}", word) or word in (
-        mention.unit.lower(),
-        mention.name.lower(),
-    )
+    whole = mention.unit.lower(), mention.name.lower()
+    return word in whole or _begins(f"{mention.name} {mention.meaning}", word)
 
 
 def _begins(text: str, word: str) -> bool:

@@ -12,6 +12,7 @@ import xarray as xr
 
 from bywire.api.parameter_choice import set_for
 from bywire.api.replay import driven_bench
+from bywire.bench.relative_changes import settled
 from bywire.bench.values import parsed
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.data.file_format import Progress, no_progress
@@ -127,7 +128,7 @@ def _with_parameters(
     for key in overrides:
         if key in options.flat() and key not in base.flat():
             raise unknown_name("parameter (--option sets the method's)", key, base.flat())
-    changes = parsed(type(base), overrides, "parameter")
+    changes = parsed(type(base), settled(base, overrides), "parameter")
     return ChosenMethod(method, options, cited.name, base.replace(changes), changes)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from bywire.bench.relative_changes import settled
 from bywire.bench.values import parsed
 from bywire.core.catalog import PARAMETER_SETS, CitedSet, main_set
 from bywire.core.errors import ParameterError
@@ -47,7 +48,7 @@ def parameters_for(
     name
         Parameter set; empty for the main one of that brake.
     changes
-        Parameters by dotted name, with units.
+        Parameters by dotted name or pattern, with units or as a share, see `settled`.
 
     Raises
     ------
@@ -56,4 +57,4 @@ def parameters_for(
     """
     cited = set_for(subject, assembly, name)
     base = cited.parameters()
-    return cited.name, base.replace(parsed(type(base), changes, "parameter"))
+    return cited.name, base.replace(parsed(type(base), settled(base, changes), "parameter"))

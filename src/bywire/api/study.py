@@ -12,6 +12,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.api.parameter_choice import set_for
+from bywire.bench.relative_changes import settled
 from bywire.bench.running import Progress
 from bywire.bench.values import parsed
 from bywire.core.errors import unknown_name
@@ -189,7 +190,7 @@ def _changed(
     for name in of_study:
         if name not in options:
             raise unknown_name("option", name, (*options, *par.flat()))
-    of_brake = {name: value for name, value in overrides.items() if "." in name}
+    of_brake = settled(par, {n: value for n, value in overrides.items() if "." in n})
     definition.require_effect(of_brake)
     return (
         par.replace(parsed(type(par), of_brake, "parameter")),

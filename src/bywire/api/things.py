@@ -56,15 +56,15 @@ def _tested(named: set[str]) -> set[str]:
 
 def doubts() -> list[str]:
     """Return what is said of parameter sets whose assembly is nowhere."""
-    knits = ASSEMBLIES.all()
+    known = ASSEMBLIES.all()
     texts = []
     for cited in PARAMETER_SETS.all().values():
         if cited.assembly not in known:
             file, line = PARAMETER_SETS.place(cited.name)
             nearest = unknown_name("assembly", cited.assembly, known)
             texts.append(
-                f"{file}, line {line}: parameter set {cited.name!r} is for an assembly that no brake "
-                f"declares: {nearest}"
+                f"{file}, line {line}: parameter set {cited.name!r} is for an assembly that no "
+                f"brake declares: {nearest}"
             )
     return texts
 

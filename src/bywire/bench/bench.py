@@ -12,6 +12,7 @@ import numpy as np
 from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment, as_run
 from bywire.bench.extent import check_seed, checked_interval, checked_step
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
+from bywire.bench.relative_changes import settled
 from bywire.bench.requirements import check
 from bywire.bench.stimuli.registry import STIMULI, Stimulus, create
 from bywire.bench.stimulus_file import with_nodes
@@ -36,7 +37,8 @@ class Bench:
         Name of a parameter set of the catalog.
     overrides, options
         Other parameters and options of the experiment, by dotted name: SI numbers, or texts with
-        units such as ``"0.35 ohm"``. Durations below may be written so as well.
+        units such as ``"0.35 ohm"``. Durations below may be written so as well. Parameters may also
+        be changed by a share, ``{"seal.T_pr": "+50%"}``, and several by ``{"seal.*": "-10%"}``.
     stimulus
         ``{"kind": ..., **parameters}`` for experiments that take a stimulus; a table may come
         from a file, see ``stimulus_file``. Experiments of any brake also take such a mapping
@@ -84,6 +86,7 @@ class Bench:
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
         found = PARAMETER_SETS.find(self.parameters)
+        object.__setattr__(self, "overrides", settled(found.parameters(), self.overrides))
         if self.assembly == found.assembly:
             object.__setattr__(self, "assembly", "")
         chosen = self.definition
@@ -195,8 +198,8 @@ class Bench:
         }
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
-        """Return this bench with further parameters changed."""
-        return replace(self, overrides={**self.overrides, **overrides})
+        """Return this bench with further parameters changed; shares are of what it has."""
+        return replace(self, overrides={**self.overrides, **settled(self.par, overrides)})
 
 
 def experiment_of(

@@ -13,6 +13,7 @@ from bywire.bench.bench import Bench, experiment_of, stimulus_sections
 from bywire.bench.bench_text import PATHS
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
+from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.bench.values import parsed, require_unit, require_units
 from bywire.core.catalog import PARAMETER_SETS, main_set
@@ -55,15 +56,22 @@ def read(path: str | Path, changes: Mapping[str, str]) -> Bench:
         the main parameter set of its brake.
     changes
         ``options.NAME``, ``stimulus.NAME``, ``simulation.NAME``, ``requirements.NAME``,
-        ``experiment``, ``parameters``, or the dotted name of a parameter.
+        ``experiment``, ``parameters``, or the dotted name of a parameter, which may be a pattern;
+        a share, ``+50%``, is of what the file gives.
     """
     file = Path(path)
     content = _of_experiment(file, changes) or read_toml(
         file, "bench file", missing=_nearest, too_large=_TOO_LARGE
     )
+    relative = {
+        name: value for name, value in changes.items()
+        if is_relative(name, value) and name.partition(".")[0] not in _SECTIONS
+    }  # fmt: skip
     try:
         _require_shape(content)
-        return from_mapping(_changed(content, changes), file.parent, _printable(file.stem))
+        plain = {name: value for name, value in changes.items() if name not in relative}
+        bench = from_mapping(_changed(content, plain), file.parent, _printable(file.stem))
+        return bench.with_overrides(relative) if relative else bench
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
 
@@ -172,7 +180,8 @@ def _require_units(content: Mapping[str, Any]) -> None:
     )
     require_units(definition.options, options)
     overrides = flattened(content.get("set", {}))
-    require_units(type(PARAMETER_SETS.find(content["parameters"]).parameters()), overrides)
+    base = PARAMETER_SETS.find(content["parameters"]).parameters()
+    require_units(type(base), settled(base, overrides))
     simulation = content.get("simulation", {})
     for key in ("step", "record"):
         require_unit(simulation.get(key), "s", f"simulation.{key}")

@@ -116,7 +116,7 @@ def require_units(cls: type[ParameterSet], values: Mapping[str, Any], level_unit
 
 def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> None:
     """Refuse a plain number where a unit is wanted; see `require_units`."""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
+    if isinstance(value, (bool, units.Written)) or not isinstance(value, (int, float)):
         return
     try:
         is_plain = math.isfinite(value) and value != 0
@@ -129,6 +129,8 @@ def require_unit(value: Any, symbol: str, name: str, nominal: float = 1.0) -> No
 def _quantity(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     if isinstance(value, str) and _ZERO.fullmatch(value):
         return 0.0
+    if isinstance(value, units.Written):
+        return value
     number = units.parse(value, symbol, name, nominal)
     if not isinstance(value, str):
         return number

@@ -31,15 +31,22 @@ def declared_line(module: ModuleType, thing: object) -> int:
     for node in tree.body:
         if isinstance(node, ast.ClassDef) and vars(module).get(node.name) is thing:
             return node.lineno
-        targets = node.targets if isinstance(node, ast.Assign) else []
-        targets = [node.target] if isinstance(node, ast.AnnAssign) else targets
-        for target in targets:
-            held = vars(module).get(target.id) if isinstance(target, ast.Name) else None
-            if held is thing and held is not None:
-                return node.lineno
-            if type(held) is tuple and any(each is thing for each in held):
-                written = node.value
-                if isinstance(written, ast.Tuple) and len(written.elts) == len(held):
-                    return written.elts[[each is thing for each in held].index(True)].lineno
-                return node.lineno
+        if isinstance(node, (ast.Assign, ast.AnnAssign)):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            held = [vars(module).get(each.id) for each in targets if isinstance(each, ast.Name)]
+            line = next((_line(node, value, thing) for value in held if value is not None), 0)
+            if line:
+                return line
     return 0
+
+
+def _line(node: ast.Assign | ast.AnnAssign, held: object, thing: object) -> int:
+    """Return the line of a thing in an assignment whose name holds it; 0 where it does not."""
+    if held is thing:
+        return node.lineno
+    if type(held) is not tuple or not any(each is thing for each in held):
+        return 0
+    written = node.value
+    if isinstance(written, ast.Tuple) and len(written.elts) == len(held):
+        return written.elts[[each is thing for each in held].index(True)].lineno
+    return node.lineno

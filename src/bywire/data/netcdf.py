@@ -29,14 +29,27 @@ if TYPE_CHECKING:
 _VALUES = 1 << 22  # that are handed over at a time
 
 
-def write_recording(recording: xr.Dataset, path: Path) -> Path:
+def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     """Write a recording.
+
+    Parameters
+    ----------
+    recording
+        Signals with ``units`` among their attributes.
+    path
+        NetCDF file; one that is there is replaced.
+
+    Returns
+    -------
+    pathlib.Path
+        The file.
 
     Raises
     ------
     FileError
         When the file cannot be written, for instance because the disk is full.
     """
+    path = Path(path)
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
     try:
         with replacing(path) as fresh:

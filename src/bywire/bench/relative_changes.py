@@ -1,0 +1,89 @@
+"""Changes of parameters by a share of what they are, and of several by a pattern of their names."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from fnmatch import fnmatchcase
+from typing import Any
+
+from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.units import Written
+
+_SHARE = re.compile(r"\s*([+-]\s*(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*%\s*")
+_PATTERN = re.compile(r"[*?\[]")
+
+
+def is_relative(name: str, value: object) -> bool:
+    """Tell whether a change hangs on what is there: a share such as ``+50%``, or a pattern."""
+    return bool(_PATTERN.search(name) or (isinstance(value, str) and _SHARE.fullmatch(value)))
+
+
+def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return changes by plain names, shares as numbers [SI].
+
+    Parameters
+    ----------
+    base
+        Parameters that are changed.
+    changes
+        Values by dotted name. A text with a sign and a percentage, ``"+50%"``, changes a quantity
+        by that share of what it is; ``*``, ``?`` and ``[...]`` in a name stand for any characters,
+        and a name that is written out goes before a pattern.
+
+    Raises
+    ------
+    UnknownNameError
+        When a pattern matches nothing.
+    ParameterError
+        When a share is wanted of what is no quantity, or of zero.
+    """
+    if not any(is_relative(name, value) for name, value in changes.items()):
+        return dict(changes)
+    values, leaves = base.flat(), leaf_fields(type(base))
+    spread: dict[str, Any] = {}
+    for pattern in filter(_PATTERN.search, changes):
+        names = [name for name in values if fnmatchcase(name, pattern)]
+        if not names:
+            groups = {f"{name.rpartition('.')[0]}.*" for name in values if "." in name}
+            raise unknown_name("parameter (none is matched)", pattern, {*values, *groups})
+        share = _share(changes[pattern])
+        if share is not None:
+            names = [name for name in names if name in leaves and any(_nodes(values[name]))]
+            if not names:
+                raise ParameterError(
+                    f"{pattern} = {quoted(changes[pattern])}: none of what it matches is a "
+                    "quantity other than zero: give a value"
+                )
+        spread |= dict.fromkeys(names, changes[pattern])
+    spread |= {name: value for name, value in changes.items() if not _PATTERN.search(name)}
+    return {
+        name: value if (share := _share(value)) is None or name not in values
+        else _scaled(name, value, share, values[name], name in leaves)
+        for name, value in spread.items()
+    }  # fmt: skip
+
+
+def _share(value: object) -> float | None:
+    """Return the share that a text asks for; None where it is a value."""
+    match = _SHARE.fullmatch(value) if isinstance(value, str) else None
+    return None if match is None else float(match[1].replace(" ", "")) / 100.0
+
+
+def _scaled(name: str, text: str, share: float, value: Any, is_quantity: bool) -> Any:
+    if not is_quantity:
+        raise ParameterError(
+            f"{name} = {quoted(text)}: a share is of quantities alone, and this is a choice, now "
+            f"{value}: name another one"
+        )
+    nodes = [*_nodes(value)]
+    if not any(nodes):
+        raise ParameterError(f"{name} = {quoted(text)}: a share of 0 changes nothing: give a value")
+    scaled = tuple(Written((1.0 + share) * node, text) for node in nodes)
+    return scaled if isinstance(value, tuple) else scaled[0]
+
+
+def _nodes(value: Any) -> Iterator[float]:
+    """Yield the number, or the numbers of a table."""
+    yield from value if isinstance(value, tuple) else (value,)
