@@ -64,11 +64,11 @@ class Mentioned(Answer):
         table, start = (
             text_table(("kind", "name", "meaning"), each) for each in (rows, rows[:_SHOWN])
         )
+        left = [f"and {more} more: ask with more words"] if more > 0 else []
         head = f"nothing is called {quoted(self.words)}; it is mentioned by"
         return Document(
             self.words, head, sections=[Section("Mentioned by", [TableBlock(table)])],
-            brief=[head, TableBlock(start, width=0)]
-            + ([f"and {more} more: ask with more words"] if more > 0 else []),
+            brief=[head, TableBlock(start, width=0), *left],
             data={"name": self.words, "found": [
                 {"kind": kind, "name": name, "summary": meaning, "unit": unit}
                 for kind, name, meaning, unit in self.mentions

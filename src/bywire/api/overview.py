@@ -126,9 +126,9 @@ def _things() -> tuple[Mapping[str, Any], list[str]]:
         pass  # none yet, or not ours
     from bywire.api.things import all_things, doubts
 
-    made = {"state": state, "things": all_things(), "doubts": doubts()}
-    keep_text(index, json.dumps(made))
-    return made["things"], made["doubts"]
+    things, texts = all_things(), doubts()
+    keep_text(index, json.dumps({"state": state, "things": things, "doubts": texts}))
+    return things, texts
 
 
 def _first(names: Iterable[str], width: int) -> str:
