@@ -12,8 +12,10 @@ import hashlib
 import os
 import subprocess
 import sys
+import tempfile
 import venv
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent
 VENV = ROOT / ".venv"
@@ -25,10 +27,10 @@ LOCKS["trust"] = LOCKS["test"]
 PYTEST = ["pytest", "-n", "auto", "--dist", "worksteal", "-q"]
 CHECKS = {
     "format and lint": ["ruff", "check", "."],
-    "types": ["mypy"],
     "layers": ["lint-imports"],
     "tests": [*PYTEST, "-m", "not trust"],
 }
+TYPES = ["mypy"]  # on one core alone, for most of a minute: beside the others
 TRUST = {"trust": [*PYTEST, "-m", "trust"]}
 
 HARD_BRAKING = (
@@ -71,8 +73,19 @@ def demo() -> int:
 
 
 def test() -> int:
-    """Run all checks, the quick ones first; stop at the first that fails."""
-    return every(CHECKS)
+    """Run all checks, the quick ones first and types beside them; stop at the first that fails."""
+    with tempfile.TemporaryFile("w+") as said:
+        types = subprocess.Popen(**command(*TYPES), stdout=said, stderr=subprocess.STDOUT)
+        try:
+            status = every(CHECKS) or types.wait()
+        finally:
+            ended = types.poll() is not None
+            types.kill()
+            types.wait()
+        if ended:
+            said.seek(0)
+            print("== types", said.read(), sep="\n", end="", flush=True)
+    return status
 
 
 def trust() -> int:
@@ -92,9 +105,9 @@ def every(checks: dict[str, list[str]]) -> int:
     """Run commands until one fails, and return its status."""
     # One process per core already: more threads of the libraries would wait for each other.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    for title, command in checks.items():
+    for title, check in checks.items():
         print(f"== {title}", flush=True)
-        status = run(*command)
+        status = run(*check)
         if status:
             return status
     return 0
@@ -146,13 +159,18 @@ def pip(*arguments: str) -> None:
 
 def run(program: str, *arguments: str) -> int:
     """Run a program of the virtual environment and return its exit status."""
-    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ.get('PATH', '')}"}
     try:
-        return subprocess.run(
-            [str(BIN / program), *arguments], cwd=ROOT, env=environment, check=False
-        ).returncode
+        return subprocess.run(**command(program, *arguments), check=False).returncode
     except KeyboardInterrupt:
         return 130
+
+
+def command(program: str, *arguments: str) -> dict[str, Any]:
+    """Return how a program of the virtual environment is called."""
+    environment = {**os.environ, "PATH": f"{BIN}{os.pathsep}{os.environ.get('PATH', '')}"}
+    # Tests start a hundred processes: without byte code each compiles all that it imports.
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
+    return {"args": [str(BIN / program), *arguments], "cwd": ROOT, "env": environment}
 
 
 if __name__ == "__main__":
