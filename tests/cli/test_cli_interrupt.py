@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -14,6 +15,7 @@ import pytest
 from command_line import LONG, SCRIPT, Outcome, no_half_files
 
 import bywire as package
+from bywire.api.overview import overview
 from bywire.bench.running import run
 from bywire.simulation.virtual_machine import VirtualMachine
 
@@ -143,6 +145,42 @@ def test_interrupt_while_the_operating_point_is_looked_for(bywire, bench, tmp_pa
     assert outcome.status == 130
     assert outcome.object["status"] == "interrupted"
     assert len(outcome.lines) == 1
+
+
+@pytest.mark.parametrize(
+    "error", [RuntimeError, SystemError, NotImplementedError, SystemExit, None]
+)
+def test_an_interrupt_that_a_library_turns_into_something_else(bywire, bench, monkeypatch, error):
+    """CasADi does, where it calls Python; or it goes on as if there were none."""
+
+    def turned(*_, **__):
+        with contextlib.suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        if error is None:
+            return overview()
+        raise error("SWIG director method error")
+
+    monkeypatch.setattr("bywire.api.run.run", turned)
+    outcome = bywire("run", bench())
+    assert outcome.status == 130
+    assert outcome.lines == ["bywire: interrupted"]
+
+
+@posix
+def test_interrupt_while_the_command_is_loaded():
+    """Within the first tenths of a second, when the libraries of the command line are imported."""
+    code = (
+        "import sys\n"
+        "from bywire.cli.main import main\n"
+        "sys.argv = ['bywire', 'list']\n"
+        "class Stop:\n"
+        "    def find_spec(self, name, path=None, target=None):\n"
+        "        if name == 'typer': import signal; signal.raise_signal(signal.SIGINT)\n"
+        "sys.meta_path.insert(0, Stop())\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (130, "bywire: interrupted\n")
 
 
 def test_interrupt_while_graphs_are_built_is_not_lost(

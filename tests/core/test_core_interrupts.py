@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from bywire.core.interrupts import interrupts_deferred
+from bywire.core.interrupts import interrupts_deferred, interrupts_noted
 
 
 @pytest.fixture(autouse=True)
@@ -80,3 +80,19 @@ def test_other_threads_are_left_alone():
     thread.start()
     thread.join()
     assert found == [signal.default_int_handler]
+
+
+def test_an_interrupt_that_is_swallowed_is_known():
+    with interrupts_noted() as was_interrupted:
+        assert not was_interrupted()
+        with pytest.raises(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        assert was_interrupted()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_an_interrupt_that_was_kept_back_is_known_too():
+    with interrupts_noted() as was_interrupted:
+        with pytest.raises(KeyboardInterrupt), interrupts_deferred():
+            signal.raise_signal(signal.SIGINT)
+        assert was_interrupted()

@@ -9,6 +9,9 @@ import sys
 
 from bywire.core.errors import FileError
 
+INTERRUPTED = 130
+"""exit status after Ctrl-C"""
+
 
 def open_streams() -> None:
     """Make both streams usable: there, and able to show any text."""

@@ -19,8 +19,6 @@ if TYPE_CHECKING:
     from bywire.bench.running import Progress
     from bywire.report.answer import Answer
 
-INTERRUPTED = 130
-
 
 def show(
     compute: Callable[[Progress], Answer], out: Path | None = None, as_json: bool = False
@@ -64,7 +62,7 @@ def show(
         except KeyboardInterrupt as stop:  # typer would exit without a word
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
-            raise typer.Exit(INTERRUPTED) from None
+            raise typer.Exit(output.INTERRUPTED) from None
     for text in document.heed:
         output.message(text)
     others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
@@ -90,4 +88,4 @@ def show(
         for line in [f"report: {out / document.page_name}"] if document.is_paged else written:
             output.message(line)
     if interrupted or not answer.holds:
-        raise typer.Exit(INTERRUPTED if interrupted else 1)
+        raise typer.Exit(output.INTERRUPTED if interrupted else 1)

@@ -1,0 +1,79 @@
+"""The commands of ``bywire``, in the order of the help."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import redirect_stdout
+from typing import Annotated
+
+import typer
+
+from bywire.cli.bench_commands import (
+    benchmark_command,
+    list_command,
+    reproduce_command,
+    run,
+)
+from bywire.cli.brake_commands import check_command, new_command
+from bywire.cli.data_commands import convert
+from bywire.cli.identification_commands import identify, replay
+from bywire.cli.loop_commands import (
+    agreement_command,
+    frequency_response_command,
+    linearize_command,
+    margins_command,
+)
+from bywire.cli.output import result
+from bywire.cli.sizing_commands import design_command, study_command
+
+app = typer.Typer(
+    name="bywire",
+    help="A virtual test bench for brake-by-wire actuators.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("list")(list_command)
+app.command("run")(run)
+app.command("reproduce")(reproduce_command)
+app.command("benchmark")(benchmark_command)
+app.command("linearize")(linearize_command)
+app.command("frequency-response")(frequency_response_command)
+app.command("agreement")(agreement_command)
+app.command("margins")(margins_command)
+app.command("study")(study_command)
+app.command("design")(design_command)
+app.command("convert")(convert)
+app.command("identify")(identify)
+app.command("replay")(replay)
+app.command("check")(check_command)
+app.command("new")(new_command)
+
+
+@app.callback(invoke_without_command=True)
+def _root(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version.")] = False,
+    system: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--system", metavar="PATH",
+            help="Load a brake of your own, a file or a package; its code is run. "
+            "Before or behind the command.",
+        ),
+    ] = None,
+) -> None:  # fmt: skip
+    if version:
+        from bywire.core.version import __version__
+
+        result(__version__)
+        raise typer.Exit
+    if system:
+        from bywire.core.brake import load_system
+
+        with redirect_stdout(sys.stderr):  # what its code prints is no result
+            for path in system:
+                load_system(path)
+        if context.invoked_subcommand is None:
+            result(context.get_help())
