@@ -116,3 +116,10 @@ def test_object() -> None:
     assert shown["residual_rms"] == pytest.approx(ESTIMATE.rms)
     assert (shown["degrees_of_freedom"], shown["colored_residuals"]) == (10.0, True)
     assert shown["notes"] == ["first"]
+
+
+@pytest.mark.parametrize("read", [as_object, str, Estimate.at_bounds, Estimate.parameters])
+def test_unknowns_and_values_that_do_not_belong_together_are_not_cut(read: object) -> None:
+    fewer = replace(ESTIMATE, unknowns=ESTIMATE.unknowns[:2])
+    with pytest.raises(ValueError, match=r"shorter|longer"):
+        read(fewer)  # type: ignore[operator]

@@ -200,3 +200,11 @@ def test_a_limit_adds_just_what_keeps_its_state_at_zero(body: Program, q: float)
     assert exact.flow == pytest.approx(exact.reaction)
     assert exact.flag == 0.0
     assert (exact.x[0] == 0.0) == (q <= -4.0)
+
+
+def test_away_from_its_limit_a_state_feels_nothing_of_it(body: Program) -> None:
+    """Not even the rounding of its balance, which some of these inflows leave."""
+    for q in np.linspace(-3.9, 1.5, 60):
+        result = substep(body, PARAMETERS, [0.02, 0.0], [0.0, 0.0], [0.0, q], exact=True)
+        assert 0.0 < result.x[0] < 1.0
+        assert result.reaction[1] == 0.0
