@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from bywire.analysis.crossings import bandwidth, margin
 from bywire.analysis.loop import LOOPS
-from bywire.analysis.margins import SENSES, LoopMargins, margins, worst
+from bywire.analysis.margins import SENSES, UNSTABLE, LoopMargins, margins, worst
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError
 
@@ -77,6 +77,15 @@ def test_what_nothing_has_is_worst_nowhere() -> None:
     assert worst([none, some], [1.0, 2.0])["delay"] == (7.0, 2.0)
     with pytest.raises(ParameterError, match="give at least one value"):
         worst([], [])
+
+
+def test_nothing_is_worse_than_an_unstable_loop() -> None:
+    """Not even margins of zero beside peaks of 1e300."""
+    awful = dict.fromkeys(SENSES, 0.0) | {"sensitivity": 1e300, "complementary": 1e300}
+    rows = [margins_by(), UNSTABLE, margins_by(**awful)]
+    for value, at in worst(rows, [10.0, 20.0, 30.0]).values():
+        assert math.isnan(value)
+        assert at == 20.0
 
 
 def test_margins_of_a_loop_are_solved_and_not_read_between_points() -> None:
