@@ -18,6 +18,7 @@ from bywire.core.version import __version__ as __version__
 if TYPE_CHECKING:
     from bywire.api.agreement import agreement
     from bywire.api.check import Check, check
+    from bywire.api.compare import Comparison, compare
     from bywire.api.convert import Conversion, convert
     from bywire.api.describe import describe
     from bywire.api.design import design
@@ -57,6 +58,8 @@ _HOMES = {
     "BenchResult": "api.run",
     "Check": "api.check",
     "check": "api.check",
+    "Comparison": "api.compare",
+    "compare": "api.compare",
     "Question": "identification.fitting.question",
     "Identification": "api.identification",
     "Replay": "api.replay",
@@ -100,6 +103,7 @@ __all__ = [
     "BywireError",
     "Check",
     "CitedSet",
+    "Comparison",
     "Conversion",
     "Ensemble",
     "Identification",
@@ -112,6 +116,7 @@ __all__ = [
     "TrustStudy",
     "agreement",
     "check",
+    "compare",
     "convert",
     "describe",
     "design",

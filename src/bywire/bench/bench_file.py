@@ -120,6 +120,12 @@ def flattened(tree: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
     return flat
 
 
+def names_experiment(source: str | Path) -> bool:
+    """Return whether a text is the bare name of an experiment, of a brake or of any."""
+    name = str(source)
+    return bool(_NAME.fullmatch(name)) and (name in EXPERIMENTS.all() or name in _any_brake())
+
+
 def _of_experiment(file: Path, changes: Mapping[str, str]) -> dict[str, Any]:
     """Return the shortest bench file of an experiment; nothing where there is a file instead."""
     name = str(file)

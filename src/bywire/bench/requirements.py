@@ -70,7 +70,7 @@ def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
     for name, text in requirements.items():
         if name not in kpis:
             raise unknown_name("KPI in [requirements]", name, kpis)
-        _bound(name, text, kpis[name])
+        limit_of(name, text, kpis[name])
 
 
 def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict, ...]:
@@ -79,14 +79,22 @@ def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict
     verdicts = []
     for name, text in requirements.items():
         kpi = by_name[name]
-        compare, bound = _bound(name, text, kpi.unit)
+        compare, bound = limit_of(name, text, kpi.unit)
         met = not math.isnan(kpi.value) and _COMPARE[compare](kpi.value, bound)
         verdicts.append(Verdict(name, text, kpi.value, kpi.unit, met, kpi.note))
     return tuple(verdicts)
 
 
-def _bound(name: str, text: Any, unit: str) -> tuple[str, float]:
-    """Return the comparison and the limit in the KPI's unit."""
+def limit_of(name: str, text: Any, unit: str) -> tuple[str, float]:
+    """Return the comparison and the limit in the KPI's unit.
+
+    Raises
+    ------
+    ParameterError
+        When the text is no requirement.
+    UnitError
+        When its unit measures something else than the KPI.
+    """
     example = "<= 15 %" if unit == "%" else f"<= {units.example(unit)}"
     written = text.strip() if isinstance(text, str) else ""
     compare = next((sign for sign in _COMPARE if written.startswith(sign)), "")

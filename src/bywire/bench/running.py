@@ -45,7 +45,9 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     definition, options = bench.definition, bench.chosen_options
     recordings: dict[str, xr.Dataset] = {}
     if definition.static is not None:
-        recordings |= definition.static(bench.par, options)
+        given = {"parameters": bench.par.model_dump_json(), **_bench_notes(bench)}
+        static = definition.static(bench.par, options)
+        recordings |= {label: each.assign_attrs(given) for label, each in static.items()}
     try:
         for number, case in enumerate(bench.cases()):
             recording = _recorded(bench, case, number, progress, engine)
@@ -76,16 +78,20 @@ def _recorded(
     with interrupts_deferred():
         prepare(made.model, made.par).engine(engine)
     trajectory = simulate(made, engine=engine, progress=report)
-    notes = {
+    notes = {**_bench_notes(bench), "case": case.label, "seed": bench.seed}
+    recording = record(made, trajectory, case.settle, case.keep, notes)
+    return recording if bench.definition.beside is None else _with_inputs(recording, case)
+
+
+def _bench_notes(bench: Bench) -> dict[str, str]:
+    """Return the attributes of a recording that say which bench it is of."""
+    return {
+        "model": bench.system,
         "experiment": bench.experiment,
-        "case": case.label,
         "parameter_set": bench.parameters,
-        "seed": bench.seed,
         "options": bench.chosen_options.model_dump_json(),
         "stimulus": json.dumps(_described(bench.chosen_stimuli)),
     }
-    recording = record(made, trajectory, case.settle, case.keep, notes)
-    return recording if bench.definition.beside is None else _with_inputs(recording, case)
 
 
 def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:

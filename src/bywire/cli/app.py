@@ -15,6 +15,7 @@ from bywire.cli.bench_commands import (
     run,
 )
 from bywire.cli.brake_commands import check_command, new_command
+from bywire.cli.compare_command import compare
 from bywire.cli.data_commands import convert
 from bywire.cli.identification_commands import identify, replay
 from bywire.cli.loop_commands import (
@@ -36,6 +37,7 @@ app = typer.Typer(
 )
 app.command("list")(list_command)
 app.command("run")(run)
+app.command("compare")(compare)
 app.command("reproduce")(reproduce_command)
 app.command("benchmark")(benchmark_command)
 app.command("linearize")(linearize_command)

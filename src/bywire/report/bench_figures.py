@@ -18,7 +18,7 @@ from bywire.report.bode import Response, bode
 from bywire.report.energy_balance import ledger_bars
 from bywire.report.hysteresis_loop import hysteresis_loop
 from bywire.report.overlaid_traces import overlaid_traces
-from bywire.report.step_marks import StepFacts, StepLimits
+from bywire.report.step_marks import StepFacts, step_limits
 from bywire.report.step_response import step_response
 from bywire.report.stribeck_curve import stribeck_curve
 from bywire.report.time_traces import time_traces
@@ -65,9 +65,9 @@ def _step_response(result: Result) -> list[Shown]:
     setting = definition.step(result.bench.chosen_options)
     recording = result.recordings["run"]
     kpis = {kpi.name: kpi.value for kpi in result.kpis}
-    limits, facts = None, None
-    if setting.start is not None and setting.end is not None and setting.start != setting.end:
-        limits = StepLimits(setting.t_step, setting.start, setting.end)
+    judged = step_limits(definition, result.bench.chosen_options)
+    facts = None
+    if judged is not None:
         facts = StepFacts(
             rise_time=kpis.get("rise_time"),
             settling_time=kpis.get("settling_time"),
@@ -78,7 +78,7 @@ def _step_response(result: Result) -> list[Shown]:
         recording,
         setting.signal,
         demand,
-        limits=limits,
+        limits=None if judged is None else judged[1],
         facts=facts,
         smoothing=setting.smoothing,
     )

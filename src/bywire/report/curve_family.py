@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from bywire.analysis.loop_curves import Family, LoopCurve
 from bywire.core.typing import Array
 from bywire.report import style
-from bywire.report.wording import amount, in_display_unit
+from bywire.report.value_scale import value_color, value_scale
+from bywire.report.wording import amount
 
 Points = Callable[[LoopCurve], tuple[Array, Array]]
-_COLORS = "cividis"  # made for any kind of color vision
-_BRIGHTEST = 0.9  # of the color map: what is brighter cannot be seen on white
 
 
 def draw_family(
@@ -44,7 +39,13 @@ def draw_family(
         if stable_only and not stable:
             continue
         top = k == family.worst
-        color = style.BLUE if not family.name else style.VERMILLION if top else _color(family, k)
+        color = (
+            style.BLUE
+            if not family.name
+            else style.VERMILLION
+            if top
+            else value_color(family.values, k)
+        )
         axes.plot(
             *points(curve), color=color, linestyle="-" if stable else "--",
             linewidth=1.8 if top else 0.9, zorder=3.5 if top else 3.0,
@@ -54,15 +55,8 @@ def draw_family(
 
 def value_bar(figure: Figure, panels: list[Axes], family: Family) -> None:
     """Put the scale of the varied parameter beside the panels; nothing for a single curve."""
-    if not family.name or len(family.curves) < 2:
-        return
-    factor, _ = in_display_unit(1.0, family.unit)
-    colors = mpl.colormaps[_COLORS].resampled(256)
-    shown = mpl.colors.ListedColormap(colors(np.linspace(0.0, _BRIGHTEST, 256)))
-    norm = Normalize(factor * min(family.values), factor * max(family.values))
-    bar = figure.colorbar(ScalarMappable(norm, shown), ax=panels, aspect=40, pad=0.02)
-    bar.ax.tick_params(labelsize=style.TEXT_SIZE)
-    bar.set_label(style.axis_label(family.name, family.unit), fontsize=style.TEXT_SIZE)
+    if family.name and len(family.curves) >= 2:
+        value_scale(figure, panels, family.name, family.unit, family.values)
 
 
 def _name(family: Family, label: str) -> str:
@@ -72,9 +66,3 @@ def _name(family: Family, label: str) -> str:
         return style.plain(f"{label}, {state}" if state else label)
     value = amount(family.values[family.worst], family.unit, 3)
     return style.plain(f"worst: {family.name} = {value}" + (f", {state}" if state else ""))
-
-
-def _color(family: Family, k: int) -> tuple[float, float, float, float]:
-    low, high = min(family.values), max(family.values)
-    share = (family.values[k] - low) / (high - low) if high > low else 0.0
-    return mpl.colormaps[_COLORS](_BRIGHTEST * share)

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.axes import Axes
 
+from bywire.bench.experiment import Experiment
+from bywire.bench.requirements import Verdict, limit_of
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
@@ -67,6 +71,30 @@ class StepFacts:
     overshoot: float | None = None
     rise_from: float = 0.1
     rise_to: float = 0.9
+
+
+def step_limits(
+    definition: Experiment, options: Any, verdicts: Sequence[Verdict] = ()
+) -> tuple[str, StepLimits] | None:
+    """Return the signal of a step and what it is judged by; None where nothing is known of one.
+
+    Parameters
+    ----------
+    definition, options
+        The experiment and its options.
+    verdicts
+        Requirements, of which one on the overshoot is drawn.
+    """
+    setting = None if definition.step is None else definition.step(options)
+    if setting is None or setting.start is None or setting.end is None:
+        return None
+    if setting.start == setting.end:
+        return None
+    limits = [limit_of(v.kpi, v.limit, v.unit)[1] for v in verdicts if v.kpi == "overshoot"]
+    overshoot = limits[0] / 100.0 if limits else None
+    return setting.signal, StepLimits(
+        setting.t_step, setting.start, setting.end, overshoot=overshoot
+    )
 
 
 def draw_limits(axes: Axes, limits: StepLimits, shown: Channel) -> None:

@@ -63,7 +63,7 @@ def time_traces(
     ParameterError
         When the recording has none of the variables, or a panel mixes units.
     """
-    present = _chosen(recording) if panels is None else _drawable(recording, panels)
+    present = _chosen(recording) if panels is None else drawable(recording, panels)
     if not present:
         wanted = ", ".join(trace.variable for panel in panels or () for trace in panel.traces)
         raise ParameterError(
@@ -82,7 +82,7 @@ def time_traces(
         _mark_saturation(axes, panel, recording)
         _mark_limit(axes, panel, recording, first)
         axes.margins(x=0.0)
-        _set_ticks(axes, panel, first)
+        set_ticks(axes, panel, first)
         if not panel.levels:  # a mode's ticks say all that its legend would
             style.legend_above(axes)
     _, unit = style.time_scale(first.time)
@@ -93,12 +93,12 @@ def time_traces(
 
 def _chosen(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
     """Return the declared panels of which the recording shows most, or those by unit."""
-    known = [_drawable(recording, each.panels) for each in declared_panels(recording)]
+    known = [drawable(recording, each.panels) for each in declared_panels(recording)]
     most = max(known, key=len, default=[])
-    return most or _drawable(recording, panels_by_unit(recording))
+    return most or drawable(recording, panels_by_unit(recording))
 
 
-def _drawable(
+def drawable(
     recording: xr.Dataset, panels: Sequence[Panel]
 ) -> list[tuple[Panel, list[Trace]]]:
     """Return the panels that show something, with their traces."""
@@ -172,7 +172,7 @@ def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
 
 def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel) -> None:
     """Draw the limits of a panel's first trace where it comes near; far away they say nothing."""
-    level = _parameter(recording, panel.limit) if panel.limit is not None else None
+    level = limit_of(recording, panel)
     if level is None:
         return
     level *= convert(1.0, first.symbol, first.unit)
@@ -185,15 +185,17 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
         )
 
 
-def _parameter(recording: xr.Dataset, path: str) -> float | None:
-    """Return a parameter with which a recording was made; None where it says none."""
+def limit_of(recording: xr.Dataset, panel: Panel) -> float | None:
+    """Return the limit [SI] of a panel's first trace; None where the recording says none."""
+    if panel.limit is None:
+        return None
     value = json.loads(str(recording.attrs.get("parameters", "{}")))
-    for name in path.split("."):
+    for name in panel.limit.split("."):
         value = value.get(name) if isinstance(value, dict) else None
     return float(value) if isinstance(value, (int, float)) else None
 
 
-def _set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
+def set_ticks(axes: Axes, panel: Panel, first: Channel) -> None:
     """Set the ticks of an ordinate: few numbers, or the names of a mode."""
     if not panel.levels:
         style.few_ticks(axes, 5 if panel.height < 1.5 else 7)

@@ -151,3 +151,18 @@ def test_energies_of_a_brake_of_ones_own_have_colors_of_their_own() -> None:
     colors = _colors(sinks)
     assert len(set(colors.values())) == len(sinks)
     assert colors["E_copper_moving"] == COLORS["E_copper_moving"]
+
+
+def test_benches_of_the_caliper_are_compared(command, tmp_path):
+    """Its own panels; what differs has the units of its parameters and options."""
+    bench = tmp_path / "soft.toml"
+    bench.write_text(
+        'experiment = "clamp-step"\nparameters = "emb42v"\n[set]\nmotor.R_m = "0.2 ohm"\n',
+        encoding="utf-8",
+    )
+    status, out, err = command("compare", bench, "clamp-step", "--out", tmp_path / "out", "--json")
+    assert status == 0, err
+    found = json.loads(out)
+    assert [row["name"] for row in found["settings"]] == ["motor.R_m"]
+    assert found["settings"][0]["unit"] == "ohm"
+    assert (tmp_path / "out" / "overlay.png").is_file()

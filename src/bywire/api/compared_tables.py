@@ -1,0 +1,130 @@
+"""What differs between runs, setting by setting and figure by figure, and the tables of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from bywire.api.compared_run import ComparedRun, Setting
+from bywire.report.tables import Cell, Column, Table, value_text
+from bywire.report.wording import amount, clean
+
+_LONGEST = 48  # characters of a value in a table
+
+
+@dataclass(frozen=True)
+class Compared:
+    """One setting or key figure of all runs.
+
+    Parameters
+    ----------
+    name, unit
+        What it is called, and its SI unit or ``"%"``.
+    values
+        Its value in each run; None where a run has no such thing, NaN where it is not defined.
+    """
+
+    name: str
+    unit: str
+    values: tuple[Any, ...]
+
+    @property
+    def differs(self) -> bool:
+        """Whether not all runs have the same value; what is not defined equals itself."""
+        first, *others = (_comparable(value) for value in self.values)
+        return any(value != first for value in others)
+
+
+def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
+    """Return everything that was set, or what all runs have of it."""
+    names = list(dict.fromkeys(name for each in runs for name in each.settings))
+    if shared_only:
+        names = [name for name in names if all(name in each.settings for each in runs)]
+    rows = []
+    for name in names:
+        present = [each.settings.get(name) for each in runs]
+        unit = next(each.unit for each in present if each is not None)
+        rows.append(Compared(name, unit, tuple(_value(each) for each in present)))
+    return tuple(rows)
+
+
+def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
+    """Return every key figure that some run has; those of another unit stay apart."""
+    keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
+    each_run = [{(k.name, k.unit): k.value for k in each.kpis} for each in runs]
+    return tuple(
+        Compared(name, unit, tuple(known.get((name, unit)) for known in each_run))
+        for name, unit in keys
+    )
+
+
+def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
+    """Return settings of all runs, a column each."""
+    return Table(
+        (Column("setting"), *(Column(label, numeric=True) for label in labels)),
+        tuple((Cell(clean(each.name)), *(_setting(v, each.unit) for v in each.values))
+              for each in rows),
+    )  # fmt: skip
+
+
+def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
+    """Return key figures of all runs, a column each; of two runs, with the change."""
+    pair = len(labels) == 2
+    return Table(
+        (
+            Column("name"), *(Column(label, numeric=True) for label in labels),
+            *([Column("change", numeric=True)] if pair else []),
+        ),
+        tuple(
+            (
+                Cell(clean(each.name)),
+                *(Cell(amount(v, each.unit), value=v) for v in each.values),
+                *([_change(each.values[0], each.values[1], each.unit)] if pair else []),
+            )
+            for each in rows
+        ),
+    )  # fmt: skip
+
+
+def verdict_table(runs: Sequence[ComparedRun]) -> Table:
+    """Return the requirements of all runs, one row each, with what every run makes of it."""
+    each_run = [{(v.kpi, v.limit): v for v in each.verdicts} for each in runs]
+    keys = dict.fromkeys(key for verdicts in each_run for key in verdicts)
+    rows = []
+    for name, limit in keys:
+        cells = []
+        for verdicts in each_run:
+            verdict = verdicts.get((name, limit))
+            if verdict is None:
+                cells.append(Cell("-"))
+                continue
+            text = f"{amount(verdict.value, verdict.unit)} {'ok' if verdict.met else 'failed'}"
+            cells.append(Cell(text, "good" if verdict.met else "bad", verdict.met))
+        rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
+    columns = (Column("requirement"), Column("limit", numeric=True))
+    return Table((*columns, *(Column(each.label, numeric=True) for each in runs)), tuple(rows))
+
+
+def _change(first: Any, second: Any, unit: str) -> Cell:
+    if first is None or second is None or not math.isfinite(second - first):
+        return Cell("-")
+    change = second - first
+    share = f" ({100 * change / abs(first):+.3g} %)" if first and unit != "%" else ""
+    sign = "+" if change > 0 else ""
+    return Cell(f"{sign}{amount(change, unit, 3)}{share}", value=change)
+
+
+def _setting(value: Any, unit: str) -> Cell:
+    text = value_text(value, unit)
+    return Cell(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…", value=value)
+
+
+def _value(setting: Setting | None) -> Any:
+    return None if setting is None else setting.value
+
+
+def _comparable(value: Any) -> Any:
+    """Return what compares equal where two values are the same; NaN does not by itself."""
+    return "NaN" if isinstance(value, float) and math.isnan(value) else value

@@ -1,0 +1,114 @@
+"""What ``bywire run --out`` left in a folder, read back: recordings, key figures, verdicts."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Verdict
+from bywire.core.errors import FileError
+from bywire.data.netcdf import read_recording
+
+RECORD = "result.json"
+"""file of a result folder that says what it holds; written last"""
+_AGAIN = "run the bench again with --out, or name another folder"
+
+
+@dataclass(frozen=True)
+class FolderResult:
+    """What a folder holds of a bench that was run.
+
+    Parameters
+    ----------
+    name
+        What the bench was called.
+    recordings
+        One dataset per run of the experiment, by label.
+    kpis, verdicts
+        Key figures, and the requirements beside them.
+    status
+        ``passed`` or ``failed``.
+    """
+
+    name: str
+    recordings: Mapping[str, xr.Dataset]
+    kpis: tuple[Kpi, ...]
+    verdicts: tuple[Verdict, ...]
+    status: str
+
+
+def is_result_folder(path: Path) -> bool:
+    """Return whether a path is a folder that says what bench left it."""
+    return (path / RECORD).is_file()
+
+
+def read_result(folder: Path) -> FolderResult:
+    """Read a result folder into memory.
+
+    Raises
+    ------
+    FileError
+        When it is no result folder, is not finished, or something in it is damaged or missing.
+    """
+    record = _record(folder)
+    try:
+        status = str(record["status"])
+        if status == "interrupted":
+            raise FileError(f"{folder} is not finished: its run was interrupted; {_AGAIN}")
+        kpis = tuple(_kpi(name, each) for name, each in record["kpis"].items())
+        verdicts = tuple(_verdict(each) for each in record["requirements"])
+        # Names alone, within the folder: it may have moved since.
+        files = [folder / Path(str(text)).name for text in record["files"]]
+        name = str(record["bench"])
+    except (AttributeError, KeyError, TypeError, ValueError) as error:
+        raise FileError(
+            f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_AGAIN}"
+        ) from None
+    recordings = {path.stem: _recording(path) for path in files if path.suffix == ".nc"}
+    if not recordings:
+        raise FileError(f"{folder / RECORD} names no recording; {_AGAIN}")
+    return FolderResult(name, recordings, kpis, verdicts, status)
+
+
+def _record(folder: Path) -> dict[str, Any]:
+    path = folder / RECORD
+    if not folder.is_dir():
+        raise FileError(f"{folder} is no folder: check the path")
+    if not path.is_file():
+        raise FileError(
+            f"{folder} is no finished result of bywire run: it has no {RECORD}; {_AGAIN}"
+        )
+    try:
+        record = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path} cannot be read ({error}); {_AGAIN}") from None
+    if not isinstance(record, dict):
+        raise FileError(f"{path} is damaged: it holds no JSON object; {_AGAIN}")
+    return record
+
+
+def _recording(path: Path) -> xr.Dataset:
+    if not path.is_file():
+        raise FileError(f"{path.parent} is damaged: {path.name} is missing; {_AGAIN}")
+    return read_recording(path)
+
+
+def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
+    return Kpi(name, _number(record["value"]), str(record["unit"]), "", str(record.get("note", "")))
+
+
+def _verdict(record: Mapping[str, Any]) -> Verdict:
+    value, unit = _number(record["value"]), str(record["unit"])
+    return Verdict(str(record["kpi"]), str(record["limit"]), value, unit, bool(record["met"]), "")
+
+
+def _number(value: Any) -> float:
+    """Return a number of a JSON object, in which null stands for what is not defined."""
+    return math.nan if value is None else float(value)

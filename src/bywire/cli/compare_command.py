@@ -1,0 +1,38 @@
+"""Options of the command that lays runs beside each other."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
+from bywire.cli.show import show
+
+
+def compare(
+    runs: Annotated[
+        list[Path],
+        typer.Argument(
+            metavar="RUN RUN...",
+            help="Result folders of run --out, bench files, or experiments.",
+            show_default=False,
+        ),
+    ],
+    set_: BenchChanges = None,
+    full: Annotated[
+        bool, typer.Option("--full", help="Show settings and key figures that are the same, too.")
+    ] = False,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:
+    """Compare runs: settings and key figures that differ, verdicts, curves on top of each other."""
+    from bywire.api.compare import compare as compare_runs
+
+    show(
+        lambda progress: compare_runs(
+            *runs, overrides=changes(set_), is_full=full, progress=progress
+        ),
+        out, json,
+    )  # fmt: skip

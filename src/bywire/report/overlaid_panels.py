@@ -1,0 +1,271 @@
+"""Figure: several recordings on top of each other, in the panels of their brake.
+
+Every recording has a color, of the palette that any color vision tells apart or, over a range of
+values, of a scale; what a line is, its dashes say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bywire.core.errors import ParameterError
+from bywire.core.units import convert
+from bywire.report import style
+from bywire.report.channel import Channel, channel
+from bywire.report.decimation import decimate
+from bywire.report.line_role import Role
+from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
+from bywire.report.ripple import inside
+from bywire.report.step_marks import StepLimits, draw_limits
+from bywire.report.time_traces import NEAR, drawable, limit_of, set_ticks
+from bywire.report.value_scale import Color, value_color, value_scale
+from bywire.report.wording import duration
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+FEW = 3
+"""recordings up to which the second trace of a panel is drawn as well"""
+_DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (6, 1.5, 1.5, 1.5)))
+_DOTS: style.Dash = (0, (1.2, 1.2))
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What recordings were varied over: name, SI unit and a value for each."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class _Look:
+    label: str
+    color: str | Color
+    dash: style.Dash
+
+
+Chosen = list[tuple[Panel, list[Trace]]]
+
+
+def overlaid_panels(
+    recordings: Mapping[str, xr.Dataset],
+    *,
+    step: tuple[str, StepLimits] | None = None,
+    scale: Scale | None = None,
+) -> Figure:
+    """Draw the signals that all recordings share, in the panels of the first one's brake.
+
+    Panels that stay at zero in all recordings are left out. Set points that are the same are
+    drawn once. Of more than `FEW` recordings, each panel shows its first trace and set points.
+
+    Parameters
+    ----------
+    recordings
+        Recordings by the label that the legend shows.
+    step
+        Signal, and the step by which it is judged: its band and limit are drawn.
+    scale
+        The range that they belong to: a scale then stands in the legend's place.
+
+    Raises
+    ------
+    ParameterError
+        When the recordings share no signal that could be drawn.
+    """
+    data = _shared(list(recordings.values()))
+    present = _chosen(data)
+    if not present:
+        raise ParameterError(
+            f"the {len(recordings)} recordings share no signal over time that moves: there is "
+            "nothing to lay on top of each other"
+        )
+    looks = _looks(list(recordings), scale)
+    heights = [panel.height for panel, _ in present]
+    figure, rows = style.new_figure(0.6 + 1.2 * sum(heights), heights)
+    for axes, (panel, traces) in zip(rows, present, strict=True):
+        entries: list[Artist] = [*_draw_panel(axes, panel, traces, data, looks)]
+        if step is not None and traces[0].variable == step[0]:
+            draw_limits(axes, step[1], channel(_longest(data), step[0]))
+            entries += axes.get_legend_handles_labels()[0]
+        heads = (
+            []
+            if scale is not None or axes is not rows[0]
+            else [_entry(each.label, each.color, each.dash) for each in looks]
+        )
+        style.legend_above(axes, [*heads, *entries])
+        axes.margins(x=0.0)
+    rows[-1].set_xlabel(f"time [{_factor(data)[1]}]")
+    figure.align_ylabels(rows)
+    if scale is not None:
+        value_scale(figure, rows, scale.name, scale.unit, scale.values)
+    return figure
+
+
+def can_overlay(recordings: Sequence[xr.Dataset]) -> bool:
+    """Return whether recordings share a signal that `overlaid_panels` would draw."""
+    return bool(_chosen(_shared(recordings)))
+
+
+def _shared(recordings: Sequence[xr.Dataset]) -> list[xr.Dataset]:
+    """Return recordings with the signals over time that all of them have, in one unit."""
+    names = [
+        str(name)
+        for name, variable in recordings[0].data_vars.items()
+        if all(
+            name in each.data_vars
+            and each[name].dims == ("time",)
+            and each[name].size > 0
+            and each[name].attrs.get("units") == variable.attrs.get("units")
+            for each in recordings
+        )
+    ]
+    return [each[names] for each in recordings]
+
+
+def _chosen(recordings: Sequence[xr.Dataset]) -> Chosen:
+    """Return the declared panels of which the recordings show most, or those by unit."""
+    first = recordings[0]
+    declared = [_present(recordings, each.panels) for each in declared_panels(first)]
+    most = max(declared, key=len, default=[])
+    return most or _present(recordings, panels_by_unit(first))
+
+
+def _present(recordings: Sequence[xr.Dataset], panels: Sequence[Panel]) -> Chosen:
+    """Return the panels that some recording shows, with the traces that some recording moves."""
+    each = [{id(panel): traces for panel, traces in drawable(r, panels)} for r in recordings]
+    chosen: Chosen = []
+    for panel in panels:
+        moved = {trace.variable for drawn in each for trace in drawn.get(id(panel), ())}
+        traces = [trace for trace in panel.traces if trace.variable in moved]
+        if traces:
+            chosen.append((panel, traces))
+    return chosen
+
+
+def _looks(labels: Sequence[str], scale: Scale | None) -> list[_Look]:
+    if scale is not None:
+        return [_Look(n, value_color(scale.values, k), "-") for k, n in enumerate(labels)]
+    palette = style.SEQUENCE
+    return [
+        _Look(n, palette[k % len(palette)], _DASHES[k // len(palette) % len(_DASHES)])
+        for k, n in enumerate(labels)
+    ]
+
+
+def _draw_panel(
+    axes: Axes,
+    panel: Panel,
+    traces: Sequence[Trace],
+    recordings: Sequence[xr.Dataset],
+    looks: Sequence[_Look],
+) -> list[Line2D]:
+    """Draw a panel and label its ordinate; return the entries of its legend."""
+    first = channel(recordings[0], traces[0].variable)
+    factor = _factor(recordings)[0]
+    targets = [trace for trace in traces if trace.role is Role.SET_POINT]
+    lines = [trace for trace in traces if trace not in targets] or targets[:1]
+    entries: list[Line2D] = []
+    for k, trace in enumerate(lines[: 2 if len(recordings) <= FEW else 1]):
+        averages = [
+            _draw_line(axes, channel(recording, trace.variable), look, factor, second=k > 0)
+            for recording, look in zip(recordings, looks, strict=True)
+        ]
+        width = max(averages)
+        if k > 0 or width:
+            dash = _DOTS if k > 0 else "-"
+            label = channel(recordings[0], trace.variable).label
+            label += f", {duration(width)} average" if width else ""
+            entries.append(_entry(label, style.GRAY, dash))
+    for target in [t for t in targets if t not in lines]:
+        entries.append(_draw_target(axes, target.variable, recordings, looks, factor))
+    entries += _draw_limits(axes, panel, recordings, looks, first)
+    axes.set_ylabel(style.axis_label(panel.quantity, first.symbol, "\n"))
+    set_ticks(axes, panel, first)
+    return entries
+
+
+def _draw_line(axes: Axes, shown: Channel, look: _Look, factor: float, *, second: bool) -> float:
+    """Draw a line, of a ripple that fills an area its average; return its averaging time [s]."""
+    average = inside(shown)
+    shown, width = (shown, 0.0) if average is None else average
+    axes.plot(
+        *decimate(factor * shown.time, shown.values), color=look.color,
+        linestyle=_DOTS if second else look.dash, linewidth=0.9 if second else 1.2,
+        zorder=2.8 if second else 3.0, label="_",
+    )  # fmt: skip
+    return width
+
+
+def _draw_target(
+    axes: Axes,
+    name: str,
+    recordings: Sequence[xr.Dataset],
+    looks: Sequence[_Look],
+    factor: float,
+) -> Line2D:
+    """Draw a set point: once, in black, where it is the same in all recordings."""
+    stroke = style.STROKES[Role.SET_POINT]
+    shown = [channel(recording, name) for recording in recordings]
+    same = all(
+        np.array_equal(each.time, shown[0].time) and np.array_equal(each.values, shown[0].values)
+        for each in shown[1:]
+    )
+    colors = [stroke.color] if same else [look.color for look in looks]
+    for each, color in zip(shown, colors, strict=False):
+        average = inside(each)
+        each = each if average is None else average[0]
+        axes.plot(
+            *decimate(factor * each.time, each.values), color=color, linestyle=stroke.linestyle,
+            linewidth=0.9, zorder=3.2 if same else 2.9, label="_",
+        )  # fmt: skip
+    return _entry(shown[0].label, stroke.color if same else style.GRAY, stroke.linestyle)
+
+
+def _draw_limits(
+    axes: Axes, panel: Panel, recordings: Sequence[xr.Dataset], looks: Sequence[_Look],
+    first: Channel,
+) -> list[Line2D]:  # fmt: skip
+    """Draw the limits of a panel's first trace where it comes near; each once."""
+    factor, stroke = convert(1.0, first.symbol, first.unit), style.STROKES[Role.LIMIT]
+    levels = [limit_of(recording, panel) for recording in recordings]
+    is_one = len(set(levels)) == 1
+    drawn = set()
+    for recording, look, level in zip(recordings, looks, levels, strict=True):
+        if level is None:
+            continue
+        values = channel(recording, first.name).values
+        for side in (1.0, -1.0):
+            at = side * factor * level
+            if float(np.nanmax(side * values)) < NEAR * factor * level or at in drawn:
+                continue
+            drawn.add(at)
+            axes.axhline(
+                at, color=stroke.color if is_one else look.color, linestyle=stroke.linestyle,
+                linewidth=stroke.linewidth, zorder=stroke.zorder, label="_",
+            )  # fmt: skip
+    color = stroke.color if is_one else style.GRAY
+    return [_entry("limit", color, stroke.linestyle)] if drawn else []
+
+
+def _entry(label: str, color: str | Color, dash: Any) -> Line2D:
+    text = style.plain(label, 110)
+    return Line2D([], [], color=color, linestyle=dash, linewidth=1.4, label=text)
+
+
+def _longest(recordings: Sequence[xr.Dataset]) -> xr.Dataset:
+    return max(recordings, key=lambda each: float(each["time"][-1] - each["time"][0]))
+
+
+def _factor(recordings: Sequence[xr.Dataset]) -> tuple[float, str]:
+    """Return factor and unit of the time axis, as of the longest recording."""
+    return style.time_scale(np.asarray(_longest(recordings)["time"].values, dtype=np.float64))

@@ -1,0 +1,46 @@
+"""Colors of lines that belong to values of a varied quantity, and the scale beside the panels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure
+
+from bywire.report import style
+from bywire.report.wording import in_display_unit
+
+Color = tuple[float, float, float, float]
+
+_COLORS = "cividis"  # made for any kind of color vision
+_BRIGHTEST = 0.9  # of the color map: what is brighter cannot be seen on white
+
+
+def value_color(values: Sequence[float], k: int) -> Color:
+    """Return the color of one of some values."""
+    low, high = min(values), max(values)
+    share = (values[k] - low) / (high - low) if high > low else 0.0
+    return mpl.colormaps[_COLORS](_BRIGHTEST * share)
+
+
+def value_scale(
+    figure: Figure, panels: list[Axes], name: str, unit: str, values: Sequence[float]
+) -> None:
+    """Put the scale of a varied quantity beside the panels.
+
+    Parameters
+    ----------
+    name, unit, values
+        Quantity, its SI unit and its values.
+    """
+    factor, _ = in_display_unit(1.0, unit)
+    colors = mpl.colormaps[_COLORS].resampled(256)
+    shown = ListedColormap(colors(np.linspace(0.0, _BRIGHTEST, 256)))
+    norm = Normalize(factor * min(values), factor * max(values))
+    bar = figure.colorbar(ScalarMappable(norm, shown), ax=panels, aspect=40, pad=0.02)
+    bar.ax.tick_params(labelsize=style.TEXT_SIZE)
+    bar.set_label(style.axis_label(name, unit), fontsize=style.TEXT_SIZE)
