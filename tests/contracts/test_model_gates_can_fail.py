@@ -94,7 +94,7 @@ def seeded(folder: Path, name: str, mistake: Mistake | None = None) -> Iterator[
             text = text.replace(right, wrong)
         source.write_text(text, encoding="utf-8")
     with loaded(package):
-        yield next(demand.on for demand in demands_on(f"{name}-actuator"))
+        yield next(demand.on for demand in demands_on(f"{name}-actuator", ()))
 
 
 @pytest.mark.parametrize("mistake", MISTAKES)

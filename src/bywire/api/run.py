@@ -8,6 +8,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from bywire.api.run_remarks import remarks
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
@@ -21,6 +22,7 @@ from bywire.report.document import (
     Details,
     Document,
     FigureBlock,
+    Listing,
     Paragraph,
     Section,
     TableBlock,
@@ -78,7 +80,9 @@ class BenchResult(Result, Answer):
         """Return key figures, verdicts, figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
+        said = remarks(self)
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
+        notes += [Listing(said)] if said else []
         return Document(
             bench.name or bench.experiment,
             f"{bench.definition.summary}; parameter set {bench.parameters}",
@@ -88,8 +92,8 @@ class BenchResult(Result, Answer):
                 *self._energy(),
                 self._made(),
             ],
-            brief=[table] if self.kpis else [],
-            data=self._data(),
+            brief=[*([Listing(said)] if said else []), *([table] if self.kpis else [])],
+            data={**self._data(), "remarks": said},
             banner=self._banner(),
             attachments=[
                 recording_file(f"{label}.nc", recording)

@@ -22,7 +22,8 @@ class Result:
     recordings
         One dataset per run of the experiment, by label.
     status
-        ``passed``, ``failed`` (a requirement was not met) or ``interrupted``.
+        ``done`` (nothing was required), ``passed``, ``failed`` (a requirement was not met) or
+        ``interrupted``.
     """
 
     bench: Bench

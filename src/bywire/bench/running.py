@@ -62,6 +62,7 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     kpis = definition.judge(recordings, options)
     verdicts = judge(bench.requirements, kpis)
     status = "passed" if all(v.met for v in verdicts) else "failed"
+    status = status if verdicts else "done"
     return Result(bench, recordings, kpis, verdicts, status)
 
 

@@ -16,8 +16,8 @@ def check_command(
     name: Annotated[
         str | None,
         typer.Argument(
-            help="A brake, model, element, control law or parameter set; what --system loads, "
-            "else all."
+            help="A brake, model, experiment, element, control law or parameter set; what --system "
+            "loads, else all."
         ),
     ] = None,
     out: OutFolder = None,

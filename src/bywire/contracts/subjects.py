@@ -1,11 +1,12 @@
-"""What can be checked by name: brakes, models, elements, control laws and parameter sets."""
+"""What can be checked by name: brakes, models, experiments, elements, laws, parameter sets."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from typing import Any
 
-from bywire.contracts import element_contracts, model_contracts
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.contracts import element_contracts, experiment_contracts, model_contracts
 from bywire.contracts.elements import Element, elements_of, every_element
 from bywire.contracts.finding import Demand
 from bywire.contracts.start import start_of, start_of_a_rig
@@ -16,14 +17,16 @@ from bywire.core.errors import unknown_name
 from bywire.core.model import ASSEMBLIES
 
 
-def demands_on(name: str | None) -> Iterator[Demand]:
+def demands_on(name: str | None, figures: Collection[str]) -> Iterator[Demand]:
     """Yield every contract that something has to keep.
 
     Parameters
     ----------
     name
-        Of a brake, a model, an element, a control law or a parameter set; everything installed
-        where there is none.
+        Of a brake, a model, an experiment, an element, a control law or a parameter set;
+        everything installed where there is none.
+    figures
+        Names of the figures that experiments may ask for.
 
     Raises
     ------
@@ -33,14 +36,16 @@ def demands_on(name: str | None) -> Iterator[Demand]:
     if name is None:
         yield from _on_elements(every_element().values())
         for brake in brakes().values():
-            yield from _on_brake(brake)
+            yield from _on_brake(brake, figures)
     elif name in brakes():
         yield from _on_elements(elements_of(brakes()[name]).values())
-        yield from _on_brake(brakes()[name])
+        yield from _on_brake(brakes()[name], figures)
     elif name in ASSEMBLIES.all():
         yield from _on_model(ASSEMBLIES.find(name))
     elif name in PARAMETER_SETS.all():
         yield from _on_set(PARAMETER_SETS.find(name))
+    elif name in EXPERIMENTS.all():
+        yield from experiment_contracts.demands_on(EXPERIMENTS.find(name), figures)
     else:
         yield from element_contracts.demands_on(_element(name))
 
@@ -51,9 +56,9 @@ def _element(name: str) -> Element:
     ends = [full for full in known if full.rpartition(".")[2] == name]
     if name in known or len(ends) == 1:
         return known[name if name in known else ends[0]]
-    every = {*known, *brakes(), *ASSEMBLIES.all(), *PARAMETER_SETS.all()}
+    every = {*known, *brakes(), *ASSEMBLIES.all(), *PARAMETER_SETS.all(), *EXPERIMENTS.all()}
     every |= {full.rpartition(".")[2] for full in known}
-    raise unknown_name("brake, model, element or parameter set", name, ends or every)
+    raise unknown_name("brake, model, experiment, element or parameter set", name, ends or every)
 
 
 def _on_elements(elements: Iterable[Element]) -> Iterator[Demand]:
@@ -61,11 +66,13 @@ def _on_elements(elements: Iterable[Element]) -> Iterator[Demand]:
         yield from element_contracts.demands_on(element)
 
 
-def _on_brake(brake: Brake) -> Iterator[Demand]:
+def _on_brake(brake: Brake, figures: Collection[str]) -> Iterator[Demand]:
     for entry in PARAMETER_SETS.of(brake.module).values():
         yield from _on_set(entry)
     for model in ASSEMBLIES.of(brake.module).values():
         yield from _on_model(model)
+    for experiment in EXPERIMENTS.of(brake.module).values():
+        yield from experiment_contracts.demands_on(experiment, figures)
 
 
 def _on_set(entry: CitedSet) -> Iterator[Demand]:

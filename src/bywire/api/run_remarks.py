@@ -1,0 +1,69 @@
+"""What stands above the key figures of a run: how far they can be read as those of the brake."""
+
+from __future__ import annotations
+
+import math
+
+from bywire.bench.kpis.registry import FAMILIES
+from bywire.bench.result import Result
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.parameters import leaf_fields
+from bywire.report.tables import value_text
+from bywire.report.wording import amount
+
+_MOST = {"share_stuck": 0.5, "share_sat_current": 0.1, "share_sat_duty": 0.1}
+_MISSED = 0.05  # of the step's height
+_SHOWN = 6  # changes that are named
+
+
+def remarks(result: Result) -> list[str]:
+    """Return what was changed from the cited set, and what a run did instead of what was asked.
+
+    A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
+    it, or that ends off its set point by more than a twentieth of the step.
+    """
+    return [*_changes(result), *_shares(result), *_set_point(result)]
+
+
+def _changes(result: Result) -> list[str]:
+    bench = result.bench
+    cited, par = PARAMETER_SETS.find(bench.parameters).parameters().flat(), bench.par.flat()
+    leaves = leaf_fields(type(bench.par))
+    units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in par}
+    texts = []
+    for name in (name for name in par if par[name] != cited[name]):
+        now, before = (value_text(each[name], units[name]) for each in (par, cited))
+        texts.append(f"{name} = {now} (was {before})")
+    if not texts:
+        return []
+    more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
+    return [f"changed from {bench.parameters}: {', '.join(texts[:_SHOWN])}{more}"]
+
+
+def _shares(result: Result) -> list[str]:
+    measures = FAMILIES.find("occupation").measures
+    texts = []
+    for kpi in result.kpis:
+        name = next((each for each in measures if kpi.name.startswith(each)), "")
+        if name and kpi.value > _MOST[name]:  # NaN is not
+            what = measures[name].definition.rpartition(" which ")[2].rstrip(".")
+            where = kpi.name.removeprefix(name).strip("_")
+            texts.append(f"{what} {100 * kpi.value:.3g} % of the time{where and f' ({where})'}")
+    return texts
+
+
+def _set_point(result: Result) -> list[str]:
+    definition, kpis = result.bench.definition, {kpi.name: kpi for kpi in result.kpis}
+    error = kpis.get("steady_state_error")
+    if definition.step is None or error is None or math.isnan(error.value):
+        return []
+    step = definition.step(result.bench.chosen_options)
+    if step.start is None or step.end is None or step.start == step.end:
+        return []
+    share = error.value / abs(step.end - step.start)
+    if not share > _MISSED:
+        return []
+    return [
+        f"misses its set point: {step.signal} ends {amount(error.value, error.unit)} off "
+        f"{amount(step.end, error.unit)}, {100 * share:.3g} % of the step"
+    ]
