@@ -129,7 +129,7 @@ def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:
             f"the data does not tell {', '.join(silent)}: nothing that it acts on moves; "
             "excite it, or take it as known"
         )
-    _, s, V = np.linalg.svd(W / size)
+    _, s, V = np.linalg.svd(W / size, full_matrices=False)  # U would have samples squared
     if s[-1] < 1e-10 * s[0]:
         together = [u.label for u, v in zip(unknowns, V[-1], strict=True) if abs(v) > 0.1]
         raise ParameterError(

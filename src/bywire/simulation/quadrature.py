@@ -7,6 +7,7 @@ share; the frame's end multiplies the sums.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
@@ -67,19 +68,27 @@ def factored(
 def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
     """Return the same values, each as a sum of coefficient times value where that is shorter."""
     new = list(roots)
+    needs = [_moving(graph, [root], level) for root in roots]
+    users = Counter(node for listed in needs for node in listed)
     for k, root in enumerate(roots):
-        others = [n for j, n in enumerate(new) if j != k]
-        computed = frozenset(needed(graph, others, lambda n: level[n] < 2))
-        if root in computed:
-            continue
-        own = [n for n in needed(graph, [root], lambda n: level[n] < 2) if n not in computed]
-        terms = _Expansion(graph, computed, level).terms(root)
-        inner = [p for p in terms if p is not None]
-        fresh = [n for n in needed(graph, inner, lambda n: level[n] < 2) if n not in computed]
-        factors = sum(1 for p, c in terms.items() if p is not None and c != graph.constant(1.0))
-        if len(fresh) + factors + len(terms) - 1 < len(own):
-            new[k] = _summed(graph, terms)
+        users.subtract(needs[k])  # of the other roots
+        computed = frozenset(node for node, count in users.items() if count)
+        if root not in computed:
+            own = [n for n in needs[k] if n not in computed]
+            terms = _Expansion(graph, computed, level).terms(root)
+            inner = [p for p in terms if p is not None]
+            fresh = [n for n in _moving(graph, inner, level) if n not in computed]
+            factors = sum(1 for p, c in terms.items() if p is not None and c != graph.constant(1.0))
+            if len(fresh) + factors + len(terms) - 1 < len(own):
+                new[k] = _summed(graph, terms)
+                needs[k] = _moving(graph, [new[k]], level)
+        users.update(needs[k])
     return new
+
+
+def _moving(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
+    """Return what the roots need that changes in every substep."""
+    return needed(graph, roots, lambda n: level[n] < 2)
 
 
 def _summed(graph: Graph, terms: Terms) -> Node:
