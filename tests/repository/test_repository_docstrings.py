@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import ast
+import inspect
 import re
 import subprocess
 import sysconfig
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from repository_sources import MODULES, ROOT, label, offenders
+
+import bywire
 
 RUFF = Path(sysconfig.get_path("scripts")) / "ruff"
 BARE = "class A:\n    def f(self): ...\n    def _g(self): ...\ndef h(): ...\n"
@@ -101,3 +104,34 @@ def test_the_gates_can_fail():
     assert misnamed_parameters(ast.parse("\n".join(lines))) == ["f: y"]
     known = next(path for path in MODULES if path.name == "dc_motor.py")
     assert offenders(lambda module: ["x"], [known]) == {"src/bywire/plant/dc_motor.py": ["x"]}
+
+
+def unexplained(function: Callable[..., object]) -> list[str]:
+    """Return the sections that numpydoc wants and a public function of the package lacks."""
+    text = inspect.getdoc(function) or ""
+    explains = set(re.findall(r"^([A-Z]\w+)\n-+$", text, re.MULTILINE))
+    listed = re.findall(r"^([\w*, ]+)\n    ", text, re.MULTILINE)
+    names = {name.strip() for line in listed for name in line.split(",")}
+    missing = {"Parameters", "Returns", "Raises"} - explains
+    return sorted(missing) + sorted(set(inspect.signature(function).parameters) - names)
+
+
+def test_public_functions_say_what_they_take_return_and_raise() -> None:
+    functions = {name: getattr(bywire, name) for name in bywire.__all__}
+    functions = {name: one for name, one in functions.items() if inspect.isfunction(one)}
+    assert len(functions) > 20
+    assert {name: gaps for name, one in functions.items() if (gaps := unexplained(one))} == {}
+
+
+def test_the_gate_of_explained_functions_can_fail() -> None:
+    def bare(x: float, y: float) -> float:
+        """Return the sum.
+
+        Parameters
+        ----------
+        x
+            One of them.
+        """
+        return x + y
+
+    assert unexplained(bare) == ["Raises", "Returns", "y"]

@@ -152,6 +152,12 @@ def agreement(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    LoopAgreement
+        What the loop's responses differ by, cause by cause: frequencies in Hz, gains and phases in
+        degree, shares of the difference in percent.
+
     Raises
     ------
     InputError

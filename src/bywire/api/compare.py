@@ -259,6 +259,11 @@ def compare(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    Comparison
+        What differs in settings and parameters, and the key figures of all runs in SI units.
+
     Raises
     ------
     InputError

@@ -138,6 +138,11 @@ def convert(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    Conversion
+        What was read, resampled and written, with rates in Hz and gaps in s.
+
     Raises
     ------
     InputError

@@ -286,6 +286,12 @@ def design(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    LoopDesign or LoopScheduleDesign
+        Gains in SI units, the figures that they give, which requirement binds, and what the bench
+        shows of them.
+
     Raises
     ------
     InputError

@@ -232,6 +232,11 @@ def frequency_response(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    FrequencyResponse
+        Gain and phase [degree] by frequency [Hz] and amplitude [SI], with bandwidths in Hz.
+
     Raises
     ------
     InputError

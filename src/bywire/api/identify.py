@@ -76,6 +76,12 @@ def identify(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    Identification
+        Parameters in SI units with their 95 % intervals, the checks of the result, and what it was
+        identified from.
+
     Raises
     ------
     InputError

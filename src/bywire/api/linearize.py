@@ -213,6 +213,11 @@ def linearize(
     dither
         Of a loop: whether it is also linearized about its motion under dither, friction on.
 
+    Returns
+    -------
+    LinearizedLoop, LinearizedPlant or PlantLocus
+        The linear model, SI units inside, with its poles in 1/s; along a range its poles alone.
+
     Raises
     ------
     InputError

@@ -159,6 +159,12 @@ def margins(
     over
         Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"``, or ``"at=5 bar:35 bar:7"``.
 
+    Returns
+    -------
+    Margins
+        Gain margin as a factor, phase margin in degree, crossover and bandwidth in Hz, delay margin
+        in s: at the operating point, or at each value of the range with the worst.
+
     Raises
     ------
     InputError

@@ -239,6 +239,11 @@ def replay(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    Replay
+        Measurement and model by signal, in SI units, with the figures of their difference.
+
     Raises
     ------
     InputError

@@ -18,6 +18,11 @@ def reproduce(source: str, *, progress: Progress | None = None) -> Reproduction:
     progress
         Called with the label of a table or figure and its finished share, 0 to 1.
 
+    Returns
+    -------
+    Reproduction
+        What is stated beside what is computed, each in the unit of the statement.
+
     Raises
     ------
     UnknownNameError

@@ -193,6 +193,11 @@ def run(
     engine
         ``auto``, ``compiled`` or ``virtual-machine``.
 
+    Returns
+    -------
+    BenchResult
+        Recordings and key figures in SI units, verdicts on what was required, books of energy in J.
+
     Raises
     ------
     InputError

@@ -169,6 +169,11 @@ def study(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    StudyResult
+        The designs with their figures in SI units, the best, and what limits it.
+
     Raises
     ------
     InputError

@@ -133,6 +133,11 @@ def trust(
     progress
         Called with a label and the finished share, 0 to 1.
 
+    Returns
+    -------
+    TrustStudy
+        How far what was put in comes back: errors and intervals of each parameter, in SI units.
+
     Raises
     ------
     InputError

@@ -36,6 +36,11 @@ def load(path: str | Path) -> Bench:
         TOML file with ``experiment`` and ``parameters``, and the sections ``[options]``,
         ``[stimulus]``, ``[set]``, ``[simulation]`` and ``[requirements]`` as wanted.
 
+    Returns
+    -------
+    Bench
+        What the file says, SI units inside; nothing is run.
+
     Raises
     ------
     FileError

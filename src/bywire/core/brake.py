@@ -147,6 +147,11 @@ def load_system(path: str | Path) -> Brake:
         Python file, or folder with an ``__init__.py``, that declares a ``BRAKE``; also that file,
         or the folder of a project that keeps one such package in its ``src``.
 
+    Returns
+    -------
+    Brake
+        The brake, also where it is loaded already.
+
     Raises
     ------
     FileError

@@ -79,6 +79,16 @@ def main_set(assembly: str) -> str:
 def parameters(name: str) -> ParameterSet:
     """Return the parameters of a set, validated.
 
+    Parameters
+    ----------
+    name
+        Of the parameter set, see ``bywire list``.
+
+    Returns
+    -------
+    ParameterSet
+        The values by group, SI units inside.
+
     Raises
     ------
     UnknownNameError

@@ -66,6 +66,16 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
 def read_recording(path: str | Path) -> xr.Dataset:
     """Read a recording into memory.
 
+    Parameters
+    ----------
+    path
+        NetCDF file.
+
+    Returns
+    -------
+    xarray.Dataset
+        Signals with ``units`` among their attributes, over ``time`` [s].
+
     Raises
     ------
     FileError

@@ -140,6 +140,11 @@ def simulate_ensemble(
     threads
         Threads to use, >= 1; all cores by default.
 
+    Returns
+    -------
+    Ensemble
+        Times [s], shape (samples,), and each signal in its SI unit, shape (cases, samples).
+
     Raises
     ------
     UnknownNameError

@@ -121,12 +121,19 @@ def simulate(
 
     Parameters
     ----------
+    run
+        Model, parameters, initial values, stimulus, steps.
     signals
         Outputs to record; all by default.
     engine
         See ``engine.Prepared.engine``.
     progress
         Called with the finished share, 0 to 1, now and then.
+
+    Returns
+    -------
+    Trajectory
+        Times [s], shape (samples,), and each signal in its SI unit, of the same shape.
 
     Raises
     ------

@@ -109,6 +109,8 @@ def simulate_with_sensitivities(
 
     Parameters
     ----------
+    run
+        Model, parameters, initial values, stimulus, steps.
     parameters
         Dotted names of the parameters and of other directions.
     signals
@@ -118,6 +120,12 @@ def simulate_with_sensitivities(
         (states, parameters); zero by default.
     memory
         The same of the initial memory, shape (memories, parameters).
+
+    Returns
+    -------
+    Sensitivity
+        The run's signals in SI units, and their derivatives by each direction, in the signal's unit
+        over the direction's.
 
     Raises
     ------
