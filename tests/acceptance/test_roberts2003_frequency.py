@@ -8,7 +8,6 @@ import re
 import pytest
 
 from bywire.brakes.wedge.paper import fig6 as roberts2003_fig6
-from bywire.brakes.wedge.paper.frequency_causes import causes
 
 
 @pytest.fixture(scope="module")
@@ -17,11 +16,11 @@ def items(wedge_paper):
     return {item.id: item for item in wedge_paper.reproduction.items if shown.match(item.id)}
 
 
-def test_what_disagrees_has_its_cause(items):
+def test_what_disagrees_has_its_cause(items, wedge_paper):
     wrong = {name for name, item in items.items() if item.agrees is False}
     assert wrong == {"fig5.wedge", "fig6.wedge", "fig6.friction"}
-    all_items = list(items.values())
-    explained = [one.id for cause in causes(all_items) for one in cause.explained(all_items)]
+    causes = wedge_paper.reproduction.causes
+    explained = [item.id for cause in causes for item in cause.explained(items.values())]
     assert set(explained) == wrong
 
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from bywire.core.parameters import ParameterSet
 from bywire.core.provenance import chosen, paper
 from bywire.core.quantities import Fraction, Length, Resistance
+from bywire.report.page import table_html
 from bywire.report.parameter_rows import parameter_rows
-from bywire.report.table_html import table_html
-from bywire.report.table_text import table_text
 from bywire.report.tables import (
     KpiRow,
     ParameterRow,
@@ -19,6 +18,7 @@ from bywire.report.tables import (
     text_table,
     verdict_table,
 )
+from bywire.report.terminal import table_text
 
 KPIS = kpi_table(
     [

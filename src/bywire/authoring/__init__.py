@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from bywire.bench.bench import Bench
     from bywire.bench.experiment import Case, Experiment, Recordings, as_run, fixed
     from bywire.bench.kpis import effort, hysteresis, occupation, step_response
-    from bywire.bench.kpis.kpi import Kpi, Undefined, measure
+    from bywire.bench.kpis.kpi import Figures, Kpi, Undefined, measure
     from bywire.bench.kpis.registry import evaluate, units_of
     from bywire.bench.result import Result
     from bywire.bench.stimuli.registry import Stimulus
@@ -140,7 +140,7 @@ _HOMES = {
     "bench.bench": "Bench",
     "bench.result": "Result",
     "bench.experiment": "Case Experiment Recordings as_run fixed",
-    "bench.kpis.kpi": "Kpi Undefined measure",
+    "bench.kpis.kpi": "Figures Kpi Undefined measure",
     "bench.kpis.registry": "evaluate units_of",
     "bench.stimuli.registry": "Stimulus",
     "report.bench_figures": "FigureKind Shown:ShownFigure",
@@ -195,8 +195,8 @@ __all__ = [
     "BreakawayFactor", "Case", "Check", "CitedSet", "Conductance", "ContactCompliance", "Current",
     "Curve", "Cut", "Damping", "Density", "Duration", "DutyPerCurrent", "DutyPerCurrentTime",
     "Effort", "Energy", "Estimate", "Exhibit", "Experiment", "Fact", "Factor", "FigureKind",
-    "Findings", "Force", "Fraction", "Frequency", "Gain", "GearRatio", "Identified", "Inductance",
-    "Inertia", "Integral", "InternalResistance", "Item", "Kpi", "Length", "LineRole",
+    "Figures", "Findings", "Force", "Fraction", "Frequency", "Gain", "GearRatio", "Identified",
+    "Inductance", "Inertia", "Integral", "InternalResistance", "Item", "Kpi", "Length", "LineRole",
     "LinearModel", "Loop", "Map", "Mark", "Mass", "Matrix", "Method", "Model", "ModelError",
     "Nodes", "Overlap", "Panel", "Panels", "ParameterError", "ParameterSet", "Part", "Plant",
     "PlantPoint", "Point", "Position", "Power", "Pressure", "Problem", "Progress", "Quantity",

@@ -85,9 +85,9 @@ class Bench:
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
-        found = PARAMETER_SETS.find(self.parameters)
-        object.__setattr__(self, "overrides", settled(found.parameters(), self.overrides))
-        if self.assembly == found.assembly:
+        known = PARAMETER_SETS.find(self.parameters)
+        object.__setattr__(self, "overrides", settled(known.parameters(), self.overrides))
+        if self.assembly == known.assembly:
             object.__setattr__(self, "assembly", "")
         chosen = self.definition
         if chosen.assembly != self.system:
@@ -96,7 +96,7 @@ class Bench:
                 + (
                     f"assembly = {self.assembly!r}"
                     if self.assembly
-                    else f"parameter set {found.name!r} is for a {found.assembly}"
+                    else f"parameter set {known.name!r} is for a {known.assembly}"
                 )
             )
         self._check_stimulus(chosen)
@@ -175,17 +175,17 @@ class Bench:
 
     def _made(self, make: Cases) -> tuple[Case, ...]:
         """Return cases, or refuse overrides without effect and steps that do not divide."""
-        found = self.cases_with(self.par, self.chosen_options, make)
-        for case in found:
+        cases = self.cases_with(self.par, self.chosen_options, make)
+        for case in cases:
             _check_driven(case, self.definition)
-        wanted, made = self.par.flat(), [case.par.flat() for case in found]
+        wanted, given = self.par.flat(), [case.par.flat() for case in cases]
         for name in self.overrides:
-            if made and all(values[name] != wanted[name] for values in made):
+            if given and all(values[name] != wanted[name] for values in given):
                 raise ParameterError(
                     f"{name} = {wanted[name]!r} would have no effect: experiment "
-                    f"{self.experiment!r} sets it to {made[0][name]!r}; leave it out"
+                    f"{self.experiment!r} sets it to {given[0][name]!r}; leave it out"
                 )
-        return tuple(case.aligned(self.step, self.record) for case in found)
+        return tuple(case.aligned(self.step, self.record) for case in cases)
 
     def runs(self) -> dict[str, Run]:
         """Return the runs by label, for ensembles and sensitivities.

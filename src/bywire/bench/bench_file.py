@@ -215,11 +215,11 @@ def _simulation(section: Mapping[str, Any]) -> dict[str, Any]:
     for key in section:
         if key not in _SIMULATION:
             raise unknown_name("key in [simulation]", key, _SIMULATION)
-    found = dict(section)
-    seed = found.get("seed")
+    settings = dict(section)
+    seed = settings.get("seed")
     if isinstance(seed, str) and seed.isdecimal() and len(seed) < 20:
-        found["seed"] = int(seed)  # as --set gives it
-    return found
+        settings["seed"] = int(seed)  # as --set gives it
+    return settings
 
 
 def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str, Any]:

@@ -62,12 +62,12 @@ def _stimulus(bench: Bench) -> dict[str, tuple[Mapping[str, Any], Mapping[str, s
     levels = {} if definition.beside is None else dict(definition.beside(options))
     if definition.driven_unit is not None:
         levels[""] = definition.driven_unit(options)
-    found: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {}
+    stimuli: dict[str, tuple[Mapping[str, Any], Mapping[str, str]]] = {}
     for name, section in stimulus_sections(bench.stimulus).items():
         cls = STIMULI.find(str(section["kind"])).parameter_class
         units = _units(cls, levels[name])
-        found[f"stimulus.{name}" if name else "stimulus"] = (section, units)
-    return found
+        stimuli[f"stimulus.{name}" if name else "stimulus"] = (section, units)
+    return stimuli
 
 
 def _units(cls: type[ParameterSet], level: str = "") -> dict[str, str]:

@@ -66,10 +66,7 @@ def role_attributes(role: Role | None) -> dict[str, str]:
 def actuator_ledger(recording: xr.Dataset) -> Ledger:
     """Return the books of an actuator or rig, between the ends of a recording.
 
-    Parameters
-    ----------
-    recording
-        Recording with energies [J].
+    ``recording``: recording with energies [J].
     """
     return _ledger(recording, "")
 
@@ -155,12 +152,12 @@ def _role_of(variable: xr.DataArray) -> Role | None:
 
 def _changes(recording: xr.Dataset) -> dict[str, float]:
     """Return what every energy grew by [J]."""
-    found = {}
+    changes = {}
     for key in recording.data_vars:
         name, values = str(key), recording[key].values
         if name.startswith(("E_", "W_")) and values.ndim == 1:
-            found[name] = float(values[-1] - values[0])
-    return found
+            changes[name] = float(values[-1] - values[0])
+    return changes
 
 
 def _split(recording: xr.Dataset) -> dict[str, float]:
@@ -170,11 +167,11 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
     """
     every = {str(key): _role_of(recording[key]) for key in recording.data_vars}
     still = next((name for name, role in every.items() if role and role.side == "standstill"), "")
-    found: dict[str, float] = {}
+    changes: dict[str, float] = {}
     for name in (name for name, role in every.items() if role and role.split and still):
         names = (name, still, "time")
         energy, stuck, time = (np.diff(recording[each].values) for each in names)
         holding = float(np.sum(energy * np.clip(stuck / time, 0.0, 1.0)))
         whole = float(recording[name].values[-1] - recording[name].values[0])
-        found |= {f"{name}_moving": whole - holding, f"{name}_holding": holding}
-    return found
+        changes |= {f"{name}_moving": whole - holding, f"{name}_holding": holding}
+    return changes

@@ -185,12 +185,12 @@ def as_run(
     `Case.aligned` says. Signals of the stimulus named ``noise_*`` are standard normal, each
     drawn from a generator of its own, so that a longer run begins with the same samples.
     """
-    own = case.aligned(step, interval)
-    fields = own.model.Stimulus._fields
+    begun = case.aligned(step, interval)
+    fields = begun.model.Stimulus._fields
     noises = [k for k, name in enumerate(fields) if name.startswith("noise_")]
 
     def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
-        given = own.stimulus(t - own.settle)
+        given = begun.stimulus(t - begun.settle)
         rows = np.zeros((t.size, len(fields)))
         for k, name in enumerate(fields):
             if name in given:
@@ -201,14 +201,14 @@ def as_run(
         return rows
 
     return Run(
-        model=own.model,
-        par=own.par,
-        state=own.state,
-        memory=own.memory,
+        model=begun.model,
+        par=begun.par,
+        state=begun.state,
+        memory=begun.memory,
         stimulus=stimulus,
-        duration=own.settle + own.duration,
+        duration=begun.settle + begun.duration,
         step=step,
-        record=own.record,
+        record=begun.record,
     )
 
 

@@ -55,12 +55,7 @@ def check_seed(value: Any) -> None:
 def check_extent(case: Case, run: Run) -> None:
     """Refuse a run that records nothing, or more than the memory of this machine holds.
 
-    Parameters
-    ----------
-    case
-        The run as the experiment describes it.
-    run
-        The same as the engine takes it.
+    ``case``: the run as the experiment describes it; ``run``: the same as the engine takes it.
 
     Raises
     ------
@@ -78,10 +73,7 @@ def check_extent(case: Case, run: Run) -> None:
 def check_memory(run: Run, signals: int) -> None:
     """Refuse a run whose rows do not fit into this machine.
 
-    Parameters
-    ----------
-    signals
-        How many signals are recorded.
+    ``signals``: how many signals are recorded.
 
     Raises
     ------

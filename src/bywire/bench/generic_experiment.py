@@ -10,15 +10,17 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
+from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import Field, create_model
 from pydantic.fields import FieldInfo
 
-from bywire.bench.experiment import Case, Experiment
+from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, recorded
+from bywire.bench.kpis.registry import evaluate, recorded, units_of
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ModelError, ParameterError, quoted, unknown_name
 from bywire.core.model import Model
@@ -44,6 +46,8 @@ class Subject:
 
     Parameters
     ----------
+    generic
+        The experiment as any system gets it.
     model
         The system under test.
     names
@@ -54,6 +58,7 @@ class Subject:
         Class of the options with these units, and what they are unless given.
     """
 
+    generic: GenericExperiment
     model: Model
     names: Mapping[str, str]
     units: Mapping[str, str]
@@ -75,33 +80,67 @@ class Subject:
         """Whether the input is of the output's unit: a set point that the output follows."""
         return self.units["input"] == self.units["output"]
 
-    def case(
-        self, par: Any, course: Course, beside: Mapping[str, Stimulus], **timing: float
-    ) -> Case:
-        """Return the run that starts at rest, with the input on a course.
+    def experiment(
+        self,
+        course: Callable[[Any, Mapping[str, Stimulus]], Course],
+        judged: Mapping[str, Callable[[Any], Any]],
+        *figures: str,
+        duration: Callable[[Any], float] = lambda options: float(options.duration),
+        resolved: Mapping[str, str] = MappingProxyType({}),
+        **more: Any,
+    ) -> Experiment:
+        """Return an experiment of one run that starts at rest, with the input on a course.
 
         Parameters
         ----------
         course
-            ``course(t)``: the input [SI] at times [s].
-        beside
-            Stimuli of other inputs by their names.
-        timing
-            ``duration``, ``settle`` and ``record`` of the case [s].
+            ``course(options, stimuli)``: a function that gives the input [SI] at times [s].
+        judged
+            Families of key figures with ``setting(options)``; effort and occupation follow them.
+        figures
+            Kinds of figures beside time traces and energy balance.
+        duration
+            ``duration(options)`` of the run [s].
+        resolved
+            SI unit of every placeholder of the families beside ``level``, the output's.
+        more
+            Further fields of the `Experiment`.
         """
-        state, memory = at_rest(self.model, par)
+        stimuli = _known(self.model, "stimulus")
+        others = {name: signal.unit for name, signal in stimuli.items() if name != self.input}
 
-        def stimulus(t: Array) -> dict[str, Array]:
-            others = {name: each.sample(t) for name, each in beside.items() if name}
-            return {**others, self.input: course(t)}
+        def cases(par: Any, options: Any, given: Mapping[str, Stimulus]) -> tuple[Case, ...]:
+            driven = course(options, given)
 
-        return Case("run", self.model, par, state, memory, stimulus, keep=0.0, **timing)
+            def stimulus(t: Array) -> dict[str, Array]:
+                beside = {name: each.sample(t) for name, each in given.items() if name}
+                return {**beside, self.input: driven(t)}
 
-    def beside(self) -> Callable[[Any], Mapping[str, str]]:
-        """Return the SI unit of every other stimulus that a bench may drive, by its name."""
-        known = _known(self.model, "stimulus")
-        units = {name: signal.unit for name, signal in known.items() if name != self.input}
-        return lambda _: units
+            case = Case(
+                "run", self.model, par, *at_rest(self.model, par), stimulus, duration(options),
+                settle=options.settle, record=options.record,
+            )  # fmt: skip
+            return (case,)
+
+        def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
+            run = recordings["run"]
+            kpis = [evaluate(family, run, of(options)).values() for family, of in judged.items()]
+            return (*chain.from_iterable(kpis), *self.judged(run))
+
+        units = units_of(*judged, resolved={"level": self.units["output"], **resolved})
+        return Experiment(
+            name=self.generic.name,
+            assembly=self.model.name,
+            summary=self.generic.summary,
+            options=self.options,
+            defaults=self.defaults,
+            cases=cases,
+            judge=judge,
+            kpis={**units, **self.totals()},
+            figures=self.figures(*figures),
+            beside=lambda _: others,
+            **more,
+        )
 
     def totals(self) -> dict[str, str]:
         """Return units of the key figures of effort and occupation that the model can show."""
@@ -182,18 +221,18 @@ class GenericExperiment:
         names = {option: name for option, (name, _) in known.items()}
         defaults = options.create({**self._levels(options), **names})
         units = {option: signal.unit for option, (_, signal) in known.items()}
-        return self.build(Subject(model, names, units, options, defaults))
+        return self.build(Subject(self, model, names, units, options, defaults))
 
     def _levels(self, options: type[ParameterSet]) -> dict[str, Any]:
         """Return the defaults, levels in SI."""
         templates, leaves = leaf_fields(self.options), leaf_fields(options)
-        found = dict(self.defaults)
+        levels = dict(self.defaults)
         for name, leaf in leaves.items():
-            if name in found and leaf.unit != templates[name].unit:
-                size, value = leaf.unit.nominal, found[name]
+            if name in levels and leaf.unit != templates[name].unit:
+                size, value = leaf.unit.nominal, levels[name]
                 several = isinstance(value, tuple)
-                found[name] = tuple(size * v for v in value) if several else size * value
-        return found
+                levels[name] = tuple(size * v for v in value) if several else size * value
+        return levels
 
 
 GENERIC_EXPERIMENTS = Kind(
@@ -293,9 +332,9 @@ def at_rest(model: Model, par: Any) -> tuple[Any, Any]:
     rest = getattr(model, "rest", None)
     if rest is None:
         return zeros(model.State), zeros(model.Memory)
-    found = rest(par)
-    if not (isinstance(found, tuple) and len(found) == 2):
+    start = rest(par)
+    if not (isinstance(start, tuple) and len(start) == 2):
         raise ModelError(
-            f"{model.name}: rest(par) must return (State, Memory), got {quoted(found)}"
+            f"{model.name}: rest(par) must return (State, Memory), got {quoted(start)}"
         )
-    return found
+    return start

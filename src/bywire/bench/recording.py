@@ -29,14 +29,8 @@ def record(
 ) -> xr.Dataset:
     """Return the recording of a run.
 
-    Parameters
-    ----------
-    settle
-        Time of the run [s] that lies before the recording's zero.
-    keep
-        How much of it is kept, at negative times.
-    notes
-        Further attributes, for instance the experiment's name.
+    ``settle``: time of the run [s] that lies before the recording's zero; ``keep``: how much of it
+    is kept, at negative times; ``notes``: further attributes, for instance the experiment's name.
 
     Returns
     -------
@@ -73,25 +67,25 @@ def record(
 
 
 def _attributes(signal: Signal) -> dict[str, str]:
-    found = {"units": signal.unit, "long_name": signal.label}
-    found |= {"set_point_of": signal.set_point_of} if signal.set_point_of else {}
-    return found | role_attributes(signal.role)
+    attributes = {"units": signal.unit, "long_name": signal.label}
+    attributes |= {"set_point_of": signal.set_point_of} if signal.set_point_of else {}
+    return attributes | role_attributes(signal.role)
 
 
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     """Return what the user should know of a recording: validity left, stops met, solver trouble."""
-    found: list[str] = []
+    doubts: list[str] = []
     if not recording.sizes["time"]:  # interrupted before the first row
-        return found
+        return doubts
     if trajectory.doubt:
-        found.append(trajectory.doubt.replace("; ", ", "))  # what joins the warnings
+        doubts.append(trajectory.doubt.replace("; ", ", "))  # what joins the warnings
     if trajectory.unsettled:
-        found.append(
+        doubts.append(
             f"{trajectory.unsettled} substeps hit the cap of the contact iteration: "
             "take a smaller step"
         )
-    found += run.model.watch(recording, run.par)
-    return found
+    doubts += run.model.watch(recording, run.par)
+    return doubts
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:

@@ -51,12 +51,7 @@ class Verdict:
 def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
     """Refuse requirements that cannot be judged.
 
-    Parameters
-    ----------
-    requirements
-        Texts by KPI name.
-    kpis
-        Unit of every KPI of the experiment by name.
+    ``requirements``: texts by KPI name; ``kpis``: unit of every KPI of the experiment by name.
 
     Raises
     ------

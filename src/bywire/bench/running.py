@@ -73,14 +73,14 @@ def _as_it_is(recording: xr.Dataset, _: Any) -> xr.Dataset:
 def _recorded(
     bench: Bench, case: Case, number: int, progress: Progress | None, engine: str
 ) -> xr.Dataset:
-    made = as_run(case, bench.step, seed=(bench.seed, number))
-    check_extent(case, made)
+    whole = as_run(case, bench.step, seed=(bench.seed, number))
+    check_extent(case, whole)
     report = None if progress is None else (lambda share: progress(case.label, share))
     with interrupts_deferred():
-        prepare(made.model, made.par).engine(engine)
-    trajectory = simulate(made, engine=engine, progress=report)
+        prepare(whole.model, whole.par).engine(engine)
+    trajectory = simulate(whole, engine=engine, progress=report)
     notes = {**_bench_notes(bench), "case": case.label, "seed": bench.seed}
-    recording = record(made, trajectory, case.settle, case.keep, notes)
+    recording = record(whole, trajectory, case.settle, case.keep, notes)
     return recording if bench.definition.beside is None else _with_inputs(recording, case)
 
 

@@ -17,14 +17,8 @@ _ZERO = re.compile(r"\s*[+-]?(?:0+\.?0*|\.0+)\s*")
 def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dict[str, Any]:
     """Return values by dotted name, numbers in SI.
 
-    Parameters
-    ----------
-    cls
-        Class of the parameter set that they are for.
-    values
-        Numbers (SI), texts with units, sequences of these for tables, or choices.
-    kind
-        What the names are called in errors.
+    ``cls``: class of the parameter set that they are for; ``values``: numbers (SI), texts with
+    units, sequences of these for tables, or choices; ``kind``: what the names are called in errors.
 
     Raises
     ------
@@ -36,17 +30,17 @@ def parsed(cls: type[ParameterSet], values: Mapping[str, Any], kind: str) -> dic
         When several values stand where one is wanted, or a number is not finite.
     """
     leaves, choices = leaf_fields(cls), choice_fields(cls)
-    found: dict[str, Any] = {}
+    accepted: dict[str, Any] = {}
     for name, value in values.items():
         if name in leaves:
             read = nodes if _is_table(cls, name) else number
             unit = leaves[name].unit
-            found[name] = read(value, unit.symbol, name, unit.nominal)
+            accepted[name] = read(value, unit.symbol, name, unit.nominal)
         elif name in choices:
-            found[name] = value
+            accepted[name] = value
         else:
             raise unknown_name(kind, name, (*leaves, *choices))
-    return found
+    return accepted
 
 
 def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
@@ -67,10 +61,10 @@ def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[flo
     if isinstance(value, str):
         return _listed(value, symbol, name, nominal)
     several = isinstance(value, Sequence)
-    found = value if several else (value,)
+    entries = value if several else (value,)
     return tuple(
         _quantity(node, symbol, f"{name}.{k}" if several else name, nominal)
-        for k, node in enumerate(found)
+        for k, node in enumerate(entries)
     )
 
 

@@ -47,16 +47,9 @@ def linearize_many(
 ) -> LinearBatch:
     """Return what ``linearize`` returns, for many operating points of one parameter set.
 
-    Parameters
-    ----------
-    model, par
-        The system and its parameters.
-    states, memories
-        Operating points, shapes (points, n) and (points, nm), in the order of State and Memory.
-    inputs
-        Fields of Memory.
-    outputs
-        Fields of Output.
+    ``model``, ``par``: the system and its parameters; ``states``, ``memories``: operating points,
+    shapes (points, n) and (points, nm), in the order of State and Memory; ``inputs``: fields of
+    Memory; ``outputs``: fields of Output.
 
     Raises
     ------

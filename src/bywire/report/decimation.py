@@ -19,14 +19,8 @@ def kept_samples(x: Array, y: Array, columns: int = COLUMNS) -> IntArray:
     Of every column the first, the lowest, the highest and the last sample stay, so that a line
     drawn through them covers the same pixels; a gap (NaN) stays a gap.
 
-    Parameters
-    ----------
-    x
-        Abscissa, not decreasing, shape ``(n,)``.
-    y
-        Ordinate, shape ``(n,)``.
-    columns
-        Pixel columns.
+    ``x``: abscissa, not decreasing, shape ``(n,)``; ``y``: ordinate, shape ``(n,)``; ``columns``:
+    pixel columns.
 
     Returns
     -------

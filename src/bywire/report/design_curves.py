@@ -48,12 +48,8 @@ class DesignCurve:
 def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Figure:
     """Draw magnitude and phase of the loop gains; the phase margin read as a vertical span.
 
-    Parameters
-    ----------
-    curves
-        At most three sets of gains, in their order.
-    phase_margin
-        The required one [degree], drawn as a limit of the phase at the crossovers.
+    ``curves``: at most three sets of gains, in their order; ``phase_margin``: the required one
+    [degree], drawn as a limit of the phase at the crossovers.
     """
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
     for design, color, line in zip(curves, _COLORS, _LINES, strict=False):
@@ -85,13 +81,7 @@ def loop_gains(curves: Sequence[DesignCurve], phase_margin: float | None) -> Fig
 
 
 def sensitivities(curves: Sequence[DesignCurve]) -> Figure:
-    """Draw |S| and |T| of the stable loops with the limits that are usually asked for.
-
-    Parameters
-    ----------
-    curves
-        See `loop_gains`.
-    """
+    """Draw |S| and |T| of the stable loops with the limits that are usually asked for."""
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
         look = style.STROKES[Role.LIMIT]

@@ -28,12 +28,7 @@ def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
     The first time, the layout of the figure is computed and then kept: computed again it would
     move by fractions of a pixel, and the same figure would give other bytes.
 
-    Parameters
-    ----------
-    figure
-        Figure to draw.
-    kind
-        ``"png"`` or ``"svg"``.
+    ``figure``: figure to draw; ``kind``: ``"png"`` or ``"svg"``.
 
     Raises
     ------

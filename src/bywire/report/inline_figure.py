@@ -22,12 +22,8 @@ def inline_figures(figures: Sequence[tuple[Figure, str]], budget: int = BUDGET) 
     All are SVG at first; while they exceed the budget, the largest becomes a PNG if that is
     smaller.
 
-    Parameters
-    ----------
-    figures
-        Figures and the texts that stand for them where they cannot be seen.
-    budget
-        Bytes for all of them.
+    ``figures``: figures and the texts that stand for them where they cannot be seen; ``budget``:
+    bytes for all of them.
     """
     markup = [_svg(figure, text, f"f{k}-") for k, (figure, text) in enumerate(figures, 1)]
     largest_first = sorted(range(len(markup)), key=lambda k: -len(markup[k]))

@@ -16,13 +16,7 @@ from bywire.report.curve_family import draw_family, value_bar
 
 
 def loop_gain(family: Family) -> Figure:
-    """Draw magnitude and phase of the loop gain; margins of the worst curve as vertical spans.
-
-    Parameters
-    ----------
-    family
-        Loop gains.
-    """
+    """Draw magnitude and phase of the loop gain; margins of the worst curve as vertical spans."""
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))
     draw_family(upper, family, _magnitude, label="loop gain L")
     draw_family(lower, family, _phase)

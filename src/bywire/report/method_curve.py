@@ -13,13 +13,13 @@ from bywire.core.typing import Array
 from bywire.core.units import convert
 from bywire.identification.method import Curve
 from bywire.report import style
-from bywire.report.band_width import LINE, band_label
 from bywire.report.decimation import kept_samples
 from bywire.report.line_role import Role
 from bywire.report.record_marks import mark_records
-from bywire.report.wording import amount
+from bywire.report.wording import amount, in_display_unit
 
 _MOST = 6  # curves of a family that have a color each
+_LINE = 1.3  # width of the line in the middle of a band [pt]
 
 
 def method_curve(curve: Curve) -> Figure:
@@ -81,7 +81,11 @@ def _over_frequency(upper: Axes, lower: Axes, symbol: str) -> None:
 
 
 def _draw_pair(
-    axes: Axes, at: Array, pair: tuple[Array, Array], label: str, color: str,
+    axes: Axes,
+    at: Array,
+    pair: tuple[Array, Array],
+    label: str,
+    color: str,
     few: bool,
 ) -> None:
     """Draw measured and modeled; of a family both in its own color, measured pale and wide."""
@@ -118,7 +122,7 @@ def _bands(axes: Axes, curve: Curve) -> None:
             low, high = _row(data["low"], data[x], k), _row(data["high"], data[x], k)
             axes.fill_between(at, low, high, color=color, alpha=0.25, linewidth=0.0)
         axes.plot(
-            at, _row(data["value"], data[x], k), color=color, linewidth=LINE,
+            at, _row(data["value"], data[x], k), color=color, linewidth=_LINE,
             label=style.plain(label or "modeled"),
         )  # fmt: skip
         if "measured" in data:
@@ -136,7 +140,7 @@ def _bands(axes: Axes, curve: Curve) -> None:
     if banded:
         shade = style.GRAY if len(family) > 1 else style.SEQUENCE[0]
         half = 0.5 * np.asarray(data["high"].values - data["low"].values, dtype=float)
-        label = band_label(axes, half, str(value.attrs.get("units", "1")))
+        label = _band_label(axes, half, str(value.attrs.get("units", "1")))
         entries.append(Patch(color=shade, alpha=0.25, linewidth=0.0, label=label))
     style.legend_above(axes, entries)
 
@@ -183,3 +187,20 @@ def _abscissa(data: xr.Dataset, x: str, k: int) -> Array:
 def _x_label(data: xr.Dataset, x: str) -> str:
     symbol = str(data[x].attrs.get("units", "s" if x == "time" else "1"))
     return style.axis_label(str(data[x].attrs.get("long_name", x)), symbol)
+
+
+def _band_label(axes: Axes, half: Array, symbol: str) -> str:
+    """Return the entry of a 95 % band: how wide it is, and whether the line hides it.
+
+    ``half`` widths of the band are in ``symbol``, NaN where there is none; the limits of the axes
+    are set by what is drawn.
+    """
+    if not np.isfinite(half).any():
+        return "95 % band"
+    most = float(np.nanmax(half))
+    low, high = axes.get_ylim()
+    figure = axes.get_figure()
+    points = 0.0 if figure is None else 72.0 * axes.bbox.height / figure.dpi
+    drawn = 2.0 * in_display_unit(most, symbol)[0] / max(abs(high - low), 1e-300) * points
+    hidden = ", within the line" if drawn < _LINE else ""
+    return f"95 % band (± {amount(most, symbol, 2)} at most{hidden})"

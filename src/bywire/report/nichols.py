@@ -28,11 +28,6 @@ def nichols(family: Family) -> Figure:
 
     The area around -180° is what the disk margin of the worst curve keeps free: there
     ``|S - T|`` is larger than its largest value on the curve.
-
-    Parameters
-    ----------
-    family
-        Loop gains.
     """
     figure, (axes,) = style.new_figure(5.0)
     left, right = _phases(family)

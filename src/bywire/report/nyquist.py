@@ -23,11 +23,6 @@ def nyquist(family: Family) -> Figure:
 
     The mirror image of negative frequencies is left out. The disk belongs to the worst curve; a
     loop gain outside it tolerates changes of gain and phase at once. Unstable loops have none.
-
-    Parameters
-    ----------
-    family
-        Loop gains.
     """
     figure, (axes,) = style.new_figure(5.2)
     worst = family.curves[family.worst]

@@ -23,8 +23,10 @@ from bywire.report.document import (
 )
 from bywire.report.files import write_bytes
 from bywire.report.inline_figure import inline_figures
-from bywire.report.table_html import table_html
+from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
+
+_MARKS = {"good": "✓ ", "bad": "✗ ", "none": ""}
 
 
 def write_page(
@@ -88,7 +90,7 @@ def fragment_html(document: Document, notes: Sequence[str] = ()) -> str:
         _banner(document.banner) if document.banner is not None else "",
         *(_section(section, k, numbered) for k, section in enumerate(sections, 1)),
     ]
-    return "<div class=\"bywire\">\n" + "\n".join(part for part in parts if part) + "\n</div>"
+    return '<div class="bywire">\n' + "\n".join(part for part in parts if part) + "\n</div>"
 
 
 # The browser itself then refuses scripts and anything from elsewhere.
@@ -148,11 +150,38 @@ def _block(block: Block, numbered: _Numbered) -> str:
         return f"<details>\n<summary>{_text(block.title)}</summary>\n{body}\n</details>"
     if isinstance(block, FigureBlock):
         caption = f"Figure {next(numbered.figure_numbers)}. {_text(block.caption)}"
-        return (
-            f"<figure>\n{next(numbered.figures)}\n<figcaption>{caption}</figcaption>\n</figure>"
-        )
+        return f"<figure>\n{next(numbered.figures)}\n<figcaption>{caption}</figcaption>\n</figure>"
     caption = ""
     if block.caption:
         number = next(numbered.table_numbers)
         caption = f"<figcaption>Table {number}. {_text(block.caption)}</figcaption>\n"
     return f"<figure>\n{caption}{table_html(block.table)}\n</figure>"
+
+
+def table_html(table: Table) -> str:
+    """Return a table as HTML; every text in it is escaped."""
+    heading = "".join(
+        f'<th scope="col"{_number_class(column)}>{escape(column.heading)}</th>'
+        for column in table.columns
+    )
+    body = "\n".join(
+        "<tr>"
+        + "".join(_table_cell(c, column) for c, column in zip(row, table.columns, strict=True))
+        + "</tr>"
+        for row in table.rows
+    )
+    return (
+        f'<div class="scroll"><table>\n<thead><tr>{heading}</tr></thead>\n'
+        f"<tbody>\n{body}\n</tbody>\n</table></div>"
+    )
+
+
+def _table_cell(cell: Cell, column: Column) -> str:
+    text = escape(_MARKS[cell.verdict] + cell.text).replace("\n", "<br>")
+    if cell.verdict != "none":
+        return f'<td class="{cell.verdict}">{text}</td>'
+    return f"<td{_number_class(column)}>{text}</td>"
+
+
+def _number_class(column: Column) -> str:
+    return ' class="number"' if column.numeric else ""

@@ -64,14 +64,8 @@ class Panel:
 class Panels:
     """The panels of a brake, or of a rig.
 
-    Parameters
-    ----------
-    name
-        What messages call them.
-    assemblies
-        Names of the models whose recordings they show.
-    panels
-        From top to bottom.
+    ``name``: what messages call them; ``assemblies``: names of the models whose recordings they
+    show; ``panels``: from top to bottom.
     """
 
     name: str

@@ -21,12 +21,8 @@ _APART = 16  # of the points that show a model beside the first one
 def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[str, Figure]]:
     """Return name and figure of every output that answers the first input.
 
-    Parameters
-    ----------
-    models
-        Label -> model, of the same inputs and outputs.
-    band
-        End of the frequencies [Hz].
+    ``models``: label -> model, of the same inputs and outputs; ``band``: end of the frequencies
+    [Hz].
     """
     f = np.geomspace(band * 10.0**-_DECADES, band, _POINTS)
     first = next(iter(models.values()))

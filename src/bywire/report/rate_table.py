@@ -17,10 +17,7 @@ def rate_table(model: LinearModel) -> Table:
     A negative real pole of a sampled model swings at half the sampling frequency, and is marked:
     it is a single one, of no damping ratio.
 
-    Parameters
-    ----------
-    model
-        Poles of what does not move are left out, see `left_out`.
+    ``model``: poles of what does not move are left out, see `left_out`.
     """
     rows = []
     for s in rates(model):
@@ -38,13 +35,7 @@ def rate_table(model: LinearModel) -> Table:
 
 
 def left_out(model: LinearModel) -> list[str]:
-    """Return a line on the poles that `rate_table` does not show; none where it shows all.
-
-    Parameters
-    ----------
-    model
-        The same one.
-    """
+    """Return a line on the poles that `rate_table` does not show; none where it shows all."""
     speeds = rates(model)
     still, dead = int(np.sum(np.abs(speeds) < STILL)), len(model.states) - len(speeds)
     parts = []

@@ -19,12 +19,7 @@ _BEYOND = 0.35  # of the radius: what is shown of the unstable half plane
 def planes(titles: tuple[str, ...], height: float = 4.2) -> tuple[Figure, list[Axes]]:
     """Return a figure with planes side by side.
 
-    Parameters
-    ----------
-    titles
-        One per plane.
-    height
-        Of the figure [inch].
+    ``titles``: one per plane; ``height``: of the figure [inch].
     """
     figure = Figure(figsize=(style.WIDTH, height), layout="constrained", facecolor="white")
     panels = list(figure.subplots(1, len(titles), squeeze=False)[0])

@@ -22,13 +22,7 @@ _LOWEST = -60.0  # what is drawn, dB
 
 
 def sensitivity(family: Family) -> Figure:
-    """Draw the magnitudes of S and T over frequency; unstable loops have none.
-
-    Parameters
-    ----------
-    family
-        Loop gains.
-    """
+    """Draw the magnitudes of S and T over frequency; unstable loops have none."""
     figure, panels = style.new_figure(4.8, (1.0, 1.0))
     for axes, quantity, limit in ((panels[0], "S", MOST_S), (panels[1], "T", MOST_T)):
         _panel(axes, family, quantity, limit)

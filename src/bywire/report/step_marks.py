@@ -100,14 +100,8 @@ def step_limits(
 def draw_limits(axes: Axes, limits: StepLimits, shown: Channel) -> None:
     """Draw tolerance band and overshoot limit, from the step to the end of the recording.
 
-    Parameters
-    ----------
-    axes
-        Axes in the display unit of ``shown``.
-    limits
-        The step.
-    shown
-        The channel that is judged.
+    ``axes``: axes in the display unit of ``shown``; ``limits``: the step; ``shown``: the channel
+    that is judged.
     """
     factor = convert(1.0, shown.symbol, shown.unit)
     scale, _ = style.time_scale(shown.time)

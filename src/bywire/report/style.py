@@ -82,12 +82,7 @@ BAND_ORDER = 2.4
 def new_figure(height: float, heights: Sequence[float] = (1.0,)) -> tuple[Figure, list[Axes]]:
     """Return a figure with panels one above the other that share their abscissa.
 
-    Parameters
-    ----------
-    height
-        Height of the figure [inch].
-    heights
-        Relative heights of the panels.
+    ``height``: height of the figure [inch]; ``heights``: relative heights of the panels.
     """
     figure = Figure(figsize=(WIDTH, height), layout="constrained", facecolor="white")
     grid = figure.subplots(

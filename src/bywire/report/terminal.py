@@ -1,4 +1,4 @@
-"""A document as plain text for terminals and logs."""
+"""Documents and tables as plain text for terminals and logs."""
 
 from __future__ import annotations
 
@@ -6,10 +6,15 @@ import shutil
 import textwrap
 
 from bywire.report.document import Document, FigureBlock, Flat, Listing, Paragraph
-from bywire.report.table_text import table_text
+from bywire.report.tables import Table
 
 WIDTH = 100
 """characters of a line of prose"""
+GAP = "  "
+NARROWEST = 12
+"""least width of a column that is wrapped"""
+LONGEST_WORD = 40
+"""longest word that is never broken"""
 
 
 def terminal_text(document: Document) -> str:
@@ -37,3 +42,55 @@ def _bullet(text: str) -> str:
         text, width, initial_indent="- ", subsequent_indent="  ", break_long_words=False,
         break_on_hyphens=False,
     )  # fmt: skip
+
+
+def table_text(table: Table, width: int = 100) -> str:
+    """Return a table as lines of at most ``width`` characters where its columns allow that.
+
+    The widest columns are wrapped first, between words.
+    """
+    headings = [column.heading for column in table.columns]
+    content = [[cell.text for cell in row] for row in table.rows]
+    widths = _widths([headings, *content], width)
+    rule = GAP.join("-" * w for w in widths)
+    body = [line for row in content for line in _lines(table, row, widths)]
+    return "\n".join([*_lines(table, headings, widths), rule, *body])
+
+
+def _widths(rows: list[list[str]], width: int) -> list[int]:
+    """Return the columns' widths: as wanted, then the widest cut back until all fit."""
+    widths = [
+        max(len(line) for row in rows for line in (row[k].splitlines() or [""]))
+        for k in range(len(rows[0]))
+    ]
+    least = [max(NARROWEST, min(LONGEST_WORD, _longest_word(rows, k))) for k in range(len(widths))]
+    available = width - len(GAP) * (len(widths) - 1)
+    while sum(widths) > available:
+        shrinkable = [k for k, w in enumerate(widths) if w > least[k]]
+        if not shrinkable:
+            break
+        widths[max(shrinkable, key=widths.__getitem__)] -= 1
+    return widths
+
+
+def _longest_word(rows: list[list[str]], column: int) -> int:
+    return max((len(word) for row in rows for word in row[column].split()), default=0)
+
+
+def _lines(table: Table, row: list[str], widths: list[int]) -> list[str]:
+    """Return the lines of one row."""
+    wrapped = [
+        [part for line in text.splitlines() or [""]
+         for part in textwrap.wrap(line, w, break_on_hyphens=False) or [""]]
+        for text, w in zip(row, widths, strict=True)
+    ]  # fmt: skip
+    height = max(len(parts) for parts in wrapped)
+    lines = []
+    for k in range(height):
+        parts = [parts[k] if k < len(parts) else "" for parts in wrapped]
+        aligned = [
+            part.rjust(w) if column.numeric else part.ljust(w)
+            for part, w, column in zip(parts, widths, table.columns, strict=True)
+        ]
+        lines.append(GAP.join(aligned).rstrip())
+    return lines

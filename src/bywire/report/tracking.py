@@ -19,12 +19,7 @@ if TYPE_CHECKING:
 def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:
     """Draw a variable with its set point, and below it the error between them.
 
-    Parameters
-    ----------
-    recording
-        Recording to draw.
-    variable, set_point
-        Two variables of the same unit.
+    ``recording``: recording to draw; ``variable``, ``set_point``: two variables of the same unit.
 
     Raises
     ------

@@ -13,6 +13,36 @@ the end of a figure's axis; a requirement on the design; a limit that physics se
 or nothing but our number"""
 
 
+SHARE = "share"
+"""unit of an allowance that is a share of the stated number"""
+
+
+@dataclass(frozen=True)
+class Allowance:
+    """A tolerance with its reason.
+
+    Parameters
+    ----------
+    what
+        What it is used for.
+    size
+        Largest difference that counts as agreement.
+    unit
+        Unit of ``size`` in pint's syntax, or `SHARE`.
+    reason
+        Why so much and not more.
+    """
+
+    what: str
+    size: float
+    unit: str
+    reason: str
+
+    def around(self, stated: float) -> float:
+        """Return the tolerance around a stated number, in that number's unit."""
+        return self.size * abs(stated) if self.unit == SHARE else self.size
+
+
 @dataclass(frozen=True)
 class Fact:
     """A number that a source states, and where; or a bound that physics sets to it.
@@ -33,6 +63,11 @@ class Fact:
     unit: str
     where: str
     kind: Kind = "printed"
+
+
+def reading(value: float, unit: str, where: str) -> Fact:
+    """Return a sentence of a source that is put as a number: ``where`` says how it was read."""
+    return Fact(value, unit, where, "reading")
 
 
 @dataclass(frozen=True)
@@ -77,7 +112,7 @@ def compared(
     name: str,
     fact: Fact,
     computed: float,
-    tolerance: Tolerance | None,
+    tolerance: Tolerance | Allowance | None,
     note: str = "",
     *,
     tuned: Literal["", "calibrated", "an input"] = "",
@@ -93,15 +128,16 @@ def compared(
     computed
         What we compute, in the fact's unit; NaN agrees with nothing.
     tolerance
-        See `Item`.
+        See `Item`; an `Allowance` is taken around what is stated.
     note
         What a reader should know beside the place of the statement.
     tuned
         How the value was made to agree: then it proves nothing, and is not judged.
     """
+    if isinstance(tolerance, Allowance):
+        tolerance = tolerance.around(fact.value)
     agrees = None if tuned or tolerance is None else holds(fact.value, computed, tolerance)
-    parts = (fact.where, tuned, note)
-    note = _joined(parts)
+    note = _joined((fact.where, tuned, note))
     return Item(name, fact.unit, fact.value, computed, tolerance, agrees, note, fact.kind)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import xarray as xr
@@ -25,11 +25,10 @@ from bywire.report.document import (
     recording_file,
 )
 from bywire.report.tables import Table
-from bywire.reproduction.item import Item
+from bywire.reproduction.item import Allowance, Item
 from bywire.reproduction.root_cause import RootCause
-from bywire.reproduction.statements import KINDS, statements, tolerances, verdicts
-from bywire.reproduction.tally import tallies, tally
-from bywire.reproduction.tolerance import Allowance
+from bywire.reproduction.runs import Runs
+from bywire.reproduction.statements import KINDS, statements, tallies, tally, tolerances, verdicts
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -94,7 +93,7 @@ class Reproduction(Answer):
 
     source: str
     citation: str
-    parts: tuple[Part, ...]
+    parts: tuple[Part, ...] = ()
     causes: tuple[RootCause, ...] = ()
     allowances: tuple[Allowance, ...] = ()
     sets: Mapping[str, str] = field(default_factory=dict)
@@ -205,6 +204,39 @@ class Source:
     name: str
     summary: str
     reproduce: Callable[[Progress | None], Reproduction]
+
+
+def reproduced(
+    source: Reproduction,
+    runs: Runs,
+    parts: Mapping[str, Callable[[Any], Part]],
+    causes: Callable[[tuple[Item, ...]], tuple[RootCause, ...]],
+) -> Reproduction:
+    """Return a source with its parts, made one after the other, and why they disagree.
+
+    Parameters
+    ----------
+    source
+        The source, without parts.
+    runs
+        Bench results that the parts share; told of the progress.
+    parts
+        ``part(runs)`` by the label of its table, figure or test.
+    causes
+        ``causes(items)``.
+
+    Raises
+    ------
+    RunError
+        When a run fails.
+    """
+    finished = []
+    for label, part in parts.items():
+        runs.report(label, 0.0)
+        finished.append(part(runs))
+        runs.report(label, 1.0)
+    whole = replace(source, parts=tuple(finished))
+    return replace(whole, causes=causes(whole.items))
 
 
 SOURCES = Kind("source", ("paper",), instances(Source), declared="a Source")

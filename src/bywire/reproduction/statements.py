@@ -1,8 +1,9 @@
-"""Statements of a source and tolerances as tables."""
+"""Statements of a source and tolerances as tables, and their verdicts counted."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 from bywire.report.tables import (
     ReproductionRow,
@@ -12,8 +13,7 @@ from bywire.report.tables import (
     verdict_table,
 )
 from bywire.report.wording import amount
-from bywire.reproduction.item import Item
-from bywire.reproduction.tolerance import SHARE, Allowance
+from bywire.reproduction.item import SHARE, Allowance, Item
 
 KINDS = (
     "Kinds of statements: 'printed' stands in the source's text, tables or equations, or follows "
@@ -62,3 +62,28 @@ def _size(allowance: Allowance) -> str:
     if allowance.unit == SHARE:
         return f"{100.0 * allowance.size:g} % of what is stated"
     return amount(allowance.size, allowance.unit)
+
+
+@dataclass(frozen=True)
+class Tally:
+    """Numbers of verdicts."""
+
+    agree: int
+    disagree: int
+    silent: int
+
+    def __str__(self) -> str:
+        return f"{self.agree} agree, {self.disagree} disagree, {self.silent} without verdict"
+
+
+def tally(items: Iterable[Item]) -> Tally:
+    """Count the verdicts."""
+    verdicts = [item.agrees for item in items]
+    return Tally(verdicts.count(True), verdicts.count(False), verdicts.count(None))
+
+
+def tallies(items: Iterable[Item]) -> dict[str, Tally]:
+    """Count the verdicts of each parameter set, by what follows ``@`` in the ids."""
+    listed = list(items)
+    names = dict.fromkeys(item.parameter_set for item in listed)
+    return {name: tally(i for i in listed if i.parameter_set == name) for name in names}

@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import GenericExperiment, Subject
 from bywire.bench.kpis import extremes
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus, wanted
+from bywire.bench.stimuli.registry import wanted
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
 
@@ -31,39 +26,11 @@ class Options(ParameterSet):
 
 
 def build(subject: Subject) -> Experiment:
-    """Return the experiment of a model."""
-
-    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
-        """Return the one run."""
-        course = wanted(stimuli.get(""), "open-loop")
-        return (
-            subject.case(
-                par, course.sample, stimuli, duration=options.duration, settle=options.settle,
-                record=options.record,
-            ),
-        )  # fmt: skip
-
-    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return extremes of the output, effort and occupation."""
-        run = recordings["run"]
-        found = evaluate("extremes", run, extremes.Setting(subject.output))
-        return (*found.values(), *subject.judged(run))
-
-    return Experiment(
-        name=GENERIC.name,
-        assembly=subject.model.name,
-        summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
-        cases=cases,
-        judge=judge,
-        kpis={
-            **units_of("extremes", resolved={"level": subject.units["output"]}),
-            **subject.totals(),
-        },
-        figures=subject.figures(),
+    """Return the experiment of a model, judged by the extremes of the output."""
+    return subject.experiment(
+        lambda options, stimuli: wanted(stimuli.get(""), "open-loop").sample,
+        {"extremes": lambda options: extremes.Setting(subject.output)},
         driven_unit=lambda _: subject.units["input"],
-        beside=subject.beside(),
     )
 
 

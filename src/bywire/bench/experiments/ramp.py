@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.generic_experiment import GenericExperiment, InputLevel, InputRate, Subject
+from bywire.bench.experiment import Experiment
+from bywire.bench.generic_experiment import (
+    Course,
+    GenericExperiment,
+    InputLevel,
+    InputRate,
+    Subject,
+)
 from bywire.bench.kpis import extremes, hysteresis
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli import ramp
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ParameterError
@@ -43,59 +47,35 @@ class Options(ParameterSet):
 
 
 def build(subject: Subject) -> Experiment:
-    """Return the experiment of a model."""
-    drive_unit = subject.units["drive"]
-    units = {
-        "drive": drive_unit,
-        "drive*response": f"{drive_unit}*{subject.units['output']}",
-        "level": subject.units["output"],
-    }
+    """Return the experiment of a model, judged by its loop and the extremes of the output."""
+    drive, unit = subject.units["drive"], subject.units["input"]
 
-    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
-        """Return the one run."""
-        height = abs(options.end - options.start)
-        if height == 0.0:
+    def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
+        if options.start == options.end:
             raise ParameterError(
-                f"options.start and options.end are both {options.end:g} {subject.units['input']}: "
-                "that is no ramp"
+                f"options.start and options.end are both {options.end:g} {unit}: that is no ramp"
             )
         shape = ramp.Parameters(
             start=options.start, end=options.end, slope=options.slope, t_start=0.0,
             t_hold=options.t_hold, after="return",
         )  # fmt: skip
-        return (
-            subject.case(
-                par, lambda t: ramp.sample(t, shape), stimuli,
-                duration=2.0 * height / options.slope + options.t_hold, settle=options.settle,
-                record=options.record,
-            ),
-        )  # fmt: skip
+        return lambda t: ramp.sample(t, shape)
+
+    def duration(options: Any) -> float:
+        return float(2.0 * abs(options.end - options.start) / options.slope + options.t_hold)
 
     def loop(options: Any) -> hysteresis.Setting:
-        """Return what the loop is of."""
         return hysteresis.Setting(
             subject.names["drive"], subject.output, options.smoothing, demand=subject.input
         )
 
-    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return key figures of the loop, extremes of the output, effort and occupation."""
-        run = recordings["run"]
-        found = evaluate("hysteresis", run, loop(options))
-        found |= evaluate("extremes", run, extremes.Setting(subject.output))
-        return (*found.values(), *subject.judged(run))
-
-    return Experiment(
-        name=GENERIC.name,
-        assembly=subject.model.name,
-        summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
-        cases=cases,
-        judge=judge,
-        kpis={**units_of("hysteresis", "extremes", resolved=units), **subject.totals()},
-        figures=subject.figures("hysteresis-loop"),
+    return subject.experiment(
+        course,
+        {"hysteresis": loop, "extremes": lambda options: extremes.Setting(subject.output)},
+        "hysteresis-loop",
+        duration=duration,
+        resolved={"drive": drive, "drive*response": f"{drive}*{subject.units['output']}"},
         loop=loop,
-        beside=subject.beside(),
     )
 
 

@@ -7,11 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.generic_experiment import GenericExperiment, InputLevel, OutputLevel, Subject
+from bywire.bench.experiment import Experiment
+from bywire.bench.generic_experiment import (
+    Course,
+    GenericExperiment,
+    InputLevel,
+    OutputLevel,
+    Subject,
+)
 from bywire.bench.kpis import release
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
@@ -41,39 +45,14 @@ class Options(ParameterSet):
 
 
 def build(subject: Subject) -> Experiment:
-    """Return the experiment of a model."""
+    """Return the experiment of a model, judged by the time to empty and what is left."""
 
-    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
-        """Return the one run."""
-        ramp = max(options.t_ramp, 1e-9)
-        fall = options.end - options.start
-        return (
-            subject.case(
-                par, lambda t: options.start + fall * np.clip(t / ramp, 0.0, 1.0), stimuli,
-                duration=options.duration, settle=options.settle, record=options.record,
-            ),
-        )  # fmt: skip
+    def course(options: Any, _: Mapping[str, Stimulus]) -> Course:
+        ramp, fall = max(options.t_ramp, 1e-9), options.end - options.start
+        return lambda t: options.start + fall * np.clip(t / ramp, 0.0, 1.0)
 
-    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return time to empty and what is left, effort and occupation."""
-        run = recordings["run"]
-        setting = release.Setting(subject.output, options.empty)
-        return (*evaluate("release", run, setting).values(), *subject.judged(run))
-
-    return Experiment(
-        name=GENERIC.name,
-        assembly=subject.model.name,
-        summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
-        cases=cases,
-        judge=judge,
-        kpis={
-            **units_of("release", resolved={"level": subject.units["output"]}),
-            **subject.totals(),
-        },
-        figures=subject.figures(),
-        beside=subject.beside(),
+    return subject.experiment(
+        course, {"release": lambda options: release.Setting(subject.output, options.empty)}
     )
 
 

@@ -9,16 +9,15 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import (
+    Course,
     GenericExperiment,
     InputAmplitude,
     InputLevel,
     Subject,
 )
 from bywire.bench.kpis import sine_sweep
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
@@ -58,51 +57,30 @@ class Options(ParameterSet):
 
 
 def build(subject: Subject) -> Experiment:
-    """Return the experiment of a model."""
-    gain = sine_sweep.gain_unit(subject.units["input"], subject.units["output"])
+    """Return the experiment of a model, judged by gain, bandwidth and lag."""
 
-    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
-        """Return the one run."""
+    def driven(options: Any, _: Mapping[str, Stimulus]) -> Course:
         _require_rows(options)
-        return (
-            subject.case(
-                par, lambda t: course(t, options), stimuli, duration=windows(options)[-1][2],
-                settle=options.settle, record=options.record,
-            ),
-        )  # fmt: skip
+        return lambda t: course(t, options)
 
     def sweep(options: Any) -> sine_sweep.Setting:
-        """Return where the sines are."""
         return sine_sweep.Setting(subject.input, subject.output, windows(options))
 
-    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return gain, bandwidth and lag, effort and occupation."""
-        run = recordings["run"]
-        return (*evaluate("sine_sweep", run, sweep(options)).values(), *subject.judged(run))
-
-    return Experiment(
-        name=GENERIC.name,
-        assembly=subject.model.name,
-        summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
-        cases=cases,
-        judge=judge,
-        kpis={**units_of("sine_sweep", resolved={"gain": gain}), **subject.totals()},
-        figures=subject.figures("sine-sweep"),
-        sweep=sweep,
-        beside=subject.beside(),
-    )
+    gain = sine_sweep.gain_unit(subject.units["input"], subject.units["output"])
+    return subject.experiment(
+        driven, {"sine_sweep": sweep}, "sine-sweep",
+        duration=lambda options: windows(options)[-1][2], resolved={"gain": gain}, sweep=sweep,
+    )  # fmt: skip
 
 
 def windows(options: Any) -> tuple[tuple[float, float, float], ...]:
     """Return frequency [Hz], beginning and end [s] of what is looked at, of every sine."""
-    found, begin = [], 0.0
+    spans, begin = [], 0.0
     for f in np.geomspace(options.f_start, options.f_end, options.n):
         looked = begin + options.n_settle / f
         begin = looked + options.n_periods / f
-        found.append((float(f), float(looked), float(begin)))
-    return tuple(found)
+        spans.append((float(f), float(looked), float(begin)))
+    return tuple(spans)
 
 
 def course(t: Array, options: Any) -> Array:

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import GenericExperiment, InputLevel, Subject
 from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli.quantities import reached
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
 
@@ -40,16 +36,7 @@ class Options(ParameterSet):
 
 
 def build(subject: Subject) -> Experiment:
-    """Return the experiment of a model."""
-
-    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
-        """Return the one run."""
-        return (
-            subject.case(
-                par, lambda t: np.where(reached(t, 0.0), options.end, options.start), stimuli,
-                duration=options.duration, settle=options.settle, record=options.record,
-            ),
-        )  # fmt: skip
+    """Return the experiment of a model, judged by its step response."""
 
     def step(options: Any) -> step_response.Setting:
         """Return the step; without a set point its levels are those of the response."""
@@ -60,27 +47,10 @@ def build(subject: Subject) -> Experiment:
             set_point=subject.input,
         )  # fmt: skip
 
-    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return key figures of the step, effort and occupation."""
-        run = recordings["run"]
-        return (*evaluate("step_response", run, step(options)).values(), *subject.judged(run))
-
-    return Experiment(
-        name=GENERIC.name,
-        assembly=subject.model.name,
-        summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
-        cases=cases,
-        judge=judge,
-        kpis={
-            **units_of("step_response", resolved={"level": subject.units["output"]}),
-            **subject.totals(),
-        },
-        figures=subject.figures("step-response"),
-        step=step,
-        beside=subject.beside(),
-    )
+    return subject.experiment(
+        lambda options, _: lambda t: np.where(reached(t, 0.0), options.end, options.start),
+        {"step_response": step}, "step-response", step=step,
+    )  # fmt: skip
 
 
 GENERIC = GenericExperiment(

@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Experiment, Recordings
 from bywire.bench.generic_experiment import GenericExperiment, Subject, at_rest
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.core.errors import ParameterError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
@@ -51,9 +51,15 @@ def build(subject: Subject) -> Experiment:
     velocity, along = subject.names["friction"], subject.names["along"]
     force = _FORCES.get(subject.units["friction"], f"W/({subject.units['friction']})")
 
-    def cases(par: Any, options: Any, stimuli: Any) -> tuple[Case, ...]:
-        """Return no run: the curve is a static characteristic."""
-        return ()
+    figures = Figures(
+        breakaway_forward=(
+            force, "Largest friction from rest toward positive speeds, over the levels."
+        ),
+        breakaway_backward=(
+            force, "Largest friction from rest toward negative speeds, over the levels."
+        ),
+        least_friction=(force, "Smallest friction in either direction, over speeds and levels."),
+    )  # fmt: skip
 
     def static(par: Any, options: Any) -> dict[str, xr.Dataset]:
         """Return friction over level and speed; at rest the breakaway force of each side."""
@@ -78,14 +84,11 @@ def build(subject: Subject) -> Experiment:
         """Return the friction from rest in both directions, and the smallest one in motion."""
         friction = recordings["curve"]["friction"].values
         forward, backward = friction[:, _SIDE:], -friction[:, _SIDE - 1 :: -1]
-        return (
-            Kpi("breakaway_forward", float(forward[:, 0].max()), force,
-                "Largest friction from rest toward positive speeds, over the levels."),
-            Kpi("breakaway_backward", float(backward[:, 0].max()), force,
-                "Largest friction from rest toward negative speeds, over the levels."),
-            Kpi("least_friction", float(min(forward.min(), backward.min())), force,
-                "Smallest friction in either direction, over speeds and levels."),
-        )  # fmt: skip
+        return figures(
+            breakaway_forward=forward[:, 0].max(),
+            breakaway_backward=backward[:, 0].max(),
+            least_friction=min(forward.min(), backward.min()),
+        )
 
     return Experiment(
         name=GENERIC.name,
@@ -93,17 +96,15 @@ def build(subject: Subject) -> Experiment:
         summary=GENERIC.summary,
         options=subject.options,
         defaults=subject.defaults,
-        cases=cases,
+        cases=lambda *_: (),
         judge=judge,
-        kpis=dict.fromkeys(("breakaway_forward", "breakaway_backward", "least_friction"), force),
+        kpis=figures.units,
         figures=("stribeck-curve",),
         static=static,
     )
 
 
-def _curve(
-    model: Model, par: Any, velocity: str, along: str, level: float, side: Array
-) -> Array:
+def _curve(model: Model, par: Any, velocity: str, along: str, level: float, side: Array) -> Array:
     """Return the friction at speeds of both signs: -0 and +0 are both ends of the rest."""
     rest, memory = at_rest(model, par)
     place = model.frictions.index(velocity)

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Experiment
 from bywire.bench.generic_experiment import GenericExperiment, Subject
 from bywire.bench.kpis import tracking
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus, wanted
+from bywire.bench.stimuli.registry import wanted
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant
@@ -34,7 +31,7 @@ class Options(ParameterSet):
 
 
 def build(subject: Subject) -> Experiment:
-    """Return the experiment of a model.
+    """Return the experiment of a model, judged by how well the output follows.
 
     Raises
     ------
@@ -47,42 +44,14 @@ def build(subject: Subject) -> Experiment:
             f"{subject.input} in {subject.units['input']}: name an output of that unit"
         )
 
-    def cases(par: Any, options: Any, stimuli: Mapping[str, Stimulus]) -> tuple[Case, ...]:
-        """Return the one run."""
-        course = wanted(stimuli.get(""), "tracking")
-        return (
-            subject.case(
-                par, course.sample, stimuli, duration=options.duration, settle=options.settle,
-                record=options.record,
-            ),
-        )  # fmt: skip
-
     def followed(options: Any) -> tracking.Setting:
-        """Return what follows what."""
         return tracking.Setting(subject.output, subject.input, options.smoothing)
 
-    def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-        """Return how well the output follows, effort and occupation."""
-        run = recordings["run"]
-        return (*evaluate("tracking", run, followed(options)).values(), *subject.judged(run))
-
-    return Experiment(
-        name=GENERIC.name,
-        assembly=subject.model.name,
-        summary=GENERIC.summary,
-        options=subject.options,
-        defaults=subject.defaults,
-        cases=cases,
-        judge=judge,
-        kpis={
-            **units_of("tracking", resolved={"level": subject.units["output"]}),
-            **subject.totals(),
-        },
-        figures=subject.figures("tracking"),
-        followed=followed,
-        driven_unit=lambda _: subject.units["input"],
-        beside=subject.beside(),
-    )
+    return subject.experiment(
+        lambda options, stimuli: wanted(stimuli.get(""), "tracking").sample,
+        {"tracking": followed}, "tracking",
+        followed=followed, driven_unit=lambda _: subject.units["input"],
+    )  # fmt: skip
 
 
 GENERIC = GenericExperiment(

@@ -64,8 +64,8 @@ def select(recording: xr.Dataset, setting: Setting) -> Effort:
     """Return what the figures need; a signal that is not recorded leaves its figures undefined."""
     t, _ = signal(recording, "time")
     names = (setting.current, setting.power, setting.energy)
-    found = (signal(recording, name)[0] if name in recording else None for name in names)
-    return Effort(t, *found)
+    signals = (signal(recording, name)[0] if name in recording else None for name in names)
+    return Effort(t, *signals)
 
 
 @measure("A", needs=("current",))

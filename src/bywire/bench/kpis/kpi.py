@@ -11,7 +11,7 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, Protocol, TypeVar
+from typing import Generic, Protocol, SupportsFloat, TypeVar
 
 import numpy as np
 import xarray as xr
@@ -43,6 +43,66 @@ class Kpi:
     unit: str
     definition: str
     note: str = ""
+
+
+class Figures:
+    """Key figures of an experiment, each declared once by name, unit and definition.
+
+    Parameters
+    ----------
+    undefined
+        Why a figure whose value is no number is not defined.
+    declared
+        SI unit (or ``"%"``) and definition by name.
+
+    Examples
+    --------
+    >>> figures = Figures(force=("N", "Largest force."), undefined="nothing presses")
+    >>> figures.units
+    {'force': 'N'}
+    >>> figures(force=math.nan)[0].note
+    'nothing presses'
+    """
+
+    def __init__(self, *, undefined: str = "", **declared: tuple[str, str]) -> None:
+        self.undefined = undefined
+        self.declared = declared
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Unit of every figure by name."""
+        return self.ending("")
+
+    def ending(self, *endings: str) -> dict[str, str]:
+        """Return the unit of every figure by its name with each of several endings."""
+        return {f"{name}{e}": unit for e in endings for name, (unit, _) in self.declared.items()}
+
+    def __call__(
+        self, ending: str = "", /, **values: SupportsFloat | tuple[float, str]
+    ) -> tuple[Kpi, ...]:
+        """Return those figures that have a value, in the order of their declaration.
+
+        Parameters
+        ----------
+        ending
+            What follows their names.
+        values
+            Value by name, in the declared unit, NaN where it is not defined; or value and note.
+        """
+        unknown = values.keys() - self.declared.keys()
+        if unknown:
+            raise unknown_name("key figure", min(unknown), self.declared)
+        kpis = []
+        for name in (name for name in self.declared if name in values):
+            unit, definition = self.declared[name]
+            given = values[name]
+            if isinstance(given, tuple):
+                value, note = given
+            else:
+                value = float(given)
+                note = "" if math.isfinite(value) else self.undefined
+            kpis.append(Kpi(name + ending, float(value), unit, definition, note))
+        return tuple(kpis)
 
 
 @dataclass(frozen=True)

@@ -63,8 +63,8 @@ def select(recording: xr.Dataset, setting: Setting) -> Occupation:
     """Return what the figures need; a signal that is not recorded leaves its figure undefined."""
     t, _ = signal(recording, "time")
     names = (setting.stuck, setting.t_stuck, setting.sat_current, setting.sat_duty)
-    found = (signal(recording, name)[0] if name in recording else None for name in names)
-    return Occupation(t, *found)
+    signals = (signal(recording, name)[0] if name in recording else None for name in names)
+    return Occupation(t, *signals)
 
 
 @measure("1", needs=("t_stuck", "stuck"))

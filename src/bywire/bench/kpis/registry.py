@@ -54,13 +54,13 @@ FAMILIES = Kind("family of key figures", ("kpis",), _declared, "bywire.bench.kpi
 
 def definitions() -> Mapping[str, Measure[Any]]:
     """Return every key figure by name, for listings; names are unique over the families."""
-    found: dict[str, Measure[Any]] = {}
+    known: dict[str, Measure[Any]] = {}
     for each in FAMILIES.all().values():
-        twice = found.keys() & each.measures.keys()
+        twice = known.keys() & each.measures.keys()
         if twice:
             raise TypeError(f"key figures declared twice: {', '.join(sorted(twice))}")
-        found |= each.measures
-    return found
+        known |= each.measures
+    return known
 
 
 def units_of(*names: str, resolved: Mapping[str, str] = MappingProxyType({})) -> dict[str, str]:

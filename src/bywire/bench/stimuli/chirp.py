@@ -40,18 +40,6 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
     with :math:`f = f_0 + (f_1 - f_0) s` (linear) or :math:`f = f_0 (f_1/f_0)^s` (logarithmic),
     :math:`s` the elapsed share of the sweep. The phase is the exact integral of the frequency,
     so the signal has no jump, neither inside nor at the end of the sweep.
-
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    par
-        Mean, amplitude and course of the frequency.
-
-    Returns
-    -------
-    numpy.ndarray
-        Driven signal [level], shape of ``t``.
     """
     elapsed = np.maximum(t - par.t_start, 0.0)
     within = np.minimum(elapsed, par.t_sweep)

@@ -45,18 +45,6 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
     No random numbers: the same parameters always give the same signal. Its RMS value is
     :math:`\hat u \sqrt{n / 2}`, its peak about 1.7 times that for many harmonics.
 
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    par
-        Mean, amplitude, base frequency, harmonics and start.
-
-    Returns
-    -------
-    numpy.ndarray
-        Driven signal [level], shape of ``t``.
-
     References
     ----------
     M. R. Schroeder, "Synthesis of low-peak-factor signals and binary sequences with low

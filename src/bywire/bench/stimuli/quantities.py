@@ -1,7 +1,8 @@
 """Quantities of stimuli, and when an instant counts as reached.
 
 A stimulus may drive a current, a voltage, a pressure or a force. Its levels therefore carry the
-unit ``level``, which the registry replaces by the unit of the driven signal.
+unit ``level``, which the registry replaces by the unit of the driven signal. Every stimulus is a
+function ``sample(t, par)``: times [s] of any shape give the driven signal [level] in that shape.
 """
 
 from __future__ import annotations
@@ -26,11 +27,6 @@ TOLERANCE = 1e-9  # s: ticks at k * T carry rounding errors far below it
 def reached(t: NDArray[np.float64], instant: float) -> NDArray[np.bool_]:
     """Return where the time has reached an instant, rounding errors of a tick forgiven.
 
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    instant
-        Instant [s].
+    ``t``: times [s], any shape; ``instant``: instant [s].
     """
     return t >= instant - TOLERANCE

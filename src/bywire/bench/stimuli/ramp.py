@@ -39,18 +39,6 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
     with :math:`h = |u_1 - u_0|` and the way back beginning at :math:`t_1`. Eq. (17) of
     Dardanelli, Alli, Savaresi (2010) is ``start = 0 A``, ``end = 5 A``, ``slope = 0.2 A/s``,
     ``t_start = t_hold = 0``, ``after = "return"``.
-
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    par
-        Levels, slope and times.
-
-    Returns
-    -------
-    numpy.ndarray
-        Driven signal [level], shape of ``t``.
     """
     height = abs(par.end - par.start)
     course: NDArray[np.float64] = np.clip(par.slope * (t - par.t_start), 0.0, height)

@@ -31,18 +31,6 @@ def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
     r"""Return the sine.
 
     .. math:: u = \bar u + \hat u \sin(2 \pi f (t - t_0) + \varphi), \quad t \ge t_0
-
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    par
-        Mean, amplitude, frequency, phase and start.
-
-    Returns
-    -------
-    numpy.ndarray
-        Driven signal [level], shape of ``t``.
     """
     wave = np.sin(2.0 * math.pi * par.f * (t - par.t_start) + par.phase)
     return par.mean + par.amplitude * np.where(reached(t, par.t_start), wave, 0.0)

@@ -22,18 +22,5 @@ class Parameters(ParameterSet):
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
-    """Return the step; at ``t_step`` itself the value is ``end``.
-
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    par
-        Levels and instant.
-
-    Returns
-    -------
-    numpy.ndarray
-        Driven signal [level], shape of ``t``.
-    """
+    """Return the step; at ``t_step`` itself the value is ``end``."""
     return np.where(reached(t, par.t_step), par.end, par.start)

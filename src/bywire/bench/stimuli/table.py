@@ -40,20 +40,7 @@ class Parameters(ParameterSet):
 
 
 def sample(t: NDArray[np.float64], par: Parameters) -> NDArray[np.float64]:
-    """Return the table's values; outside its range the nearest end holds.
-
-    Parameters
-    ----------
-    t
-        Times [s], any shape.
-    par
-        Nodes and the rule between them.
-
-    Returns
-    -------
-    numpy.ndarray
-        Driven signal [level], shape of ``t``.
-    """
+    """Return the table's values; outside its range the nearest end holds."""
     if par.between == "linear":
         return np.interp(t, par.times, par.values)
     passed = np.searchsorted(np.asarray(par.times), t + TOLERANCE, side="right") - 1

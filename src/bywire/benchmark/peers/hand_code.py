@@ -102,14 +102,8 @@ class HandCode:
     def ensemble(self, run: Run, cases: Sequence[ParameterSet], signals: Sequence[str]) -> Call:
         """Prepare one run per parameter set, with the initial values and the stimulus of ``run``.
 
-        Parameters
-        ----------
-        run
-            Its own parameters count only as structure.
-        cases
-            Parameter sets.
-        signals
-            Outputs to record.
+        ``run``: its own parameters count only as structure; ``cases``: parameter sets; ``signals``:
+        outputs to record.
         """
         shared, state, values = arrays(run, cases, signals)
         selected = np.array([self._subject.outputs.index(s) for s in signals], dtype=np.int32)

@@ -60,10 +60,7 @@ class Subject:
     def text(self, par: ParameterSet, scheme: str | None = None) -> str:
         """Return the complete C source for the structure of a parameter set.
 
-        Parameters
-        ----------
-        scheme
-            Another file in place of ``source``.
+        ``scheme``: another file in place of ``source``.
 
         Raises
         ------

@@ -28,24 +28,17 @@ def case_from_rest(
 ) -> Case:
     """Return a run that starts in equilibrium.
 
-    Parameters
-    ----------
-    mode
-        What the stimulus commands.
-    p_start
-        Pressure at the start [Pa].
-    changes
-        Further parameters that the experiment sets.
-    timing
-        ``settle``, ``keep`` and ``record`` of the case [s].
+    ``mode``: what the stimulus commands; ``p_start``: pressure at the start [Pa]; ``changes``:
+    further parameters that the experiment sets; ``timing``: ``settle``, ``keep`` and ``record`` of
+    the case [s].
     """
-    own = par.replace({"drive.mode": mode, **(changes or {})})
+    changed = par.replace({"drive.mode": mode, **(changes or {})})
     return Case(
         label=label,
         model=MotorcycleBrake(),
-        par=own,
-        state=state_at(p_start, own),
-        memory=memory_at(p_start, own),
+        par=changed,
+        state=state_at(p_start, changed),
+        memory=memory_at(p_start, changed),
         stimulus=stimulus,
         duration=duration,
         **timing,

@@ -119,11 +119,11 @@ def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) 
         m = m._replace(V_pedal=V_pedal)
     state = pressure_pid.State(m.pid_integral, m.pid_slope, m.pid_last)
     signals = pressure_pid.Input(p_ref=p_ref, p_meas=m.p_meas)
-    own = par.ecu.pressure_at(m.p_meas)
+    scheduled = par.ecu.pressure_at(m.p_meas)
     if par.ecu.schedule.law != "off":
         last = par.ecu.pressure_at(p_before)
-        state = pressure_pid.transferred(state, signals, last.k_p, own)
-    pid, out = pressure_pid.output(state, signals, par.ecu.T_s, own)
+        state = pressure_pid.transferred(state, signals, last.k_p, scheduled)
+    pid, out = pressure_pid.output(state, signals, par.ecu.T_s, scheduled)
     saturated = ops.where(ops.fabs(out.i) >= par.ecu.pressure.i_max, 1.0, 0.0)
     return m._replace(
         p_ref=p_ref,

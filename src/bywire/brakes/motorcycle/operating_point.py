@@ -27,12 +27,7 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
     equilibrium without friction. The current is found by runs of the settling time, each
     corrected by the ratio of the last.
 
-    Parameters
-    ----------
-    p
-        Mean pressure wanted [Pa].
-    settle
-        Settling time [s] of a run.
+    ``p``: mean pressure wanted [Pa]; ``settle``: settling time [s] of a run.
 
     Raises
     ------
@@ -41,22 +36,23 @@ def settled_start(p: float, par: MotorcycleParameters, settle: float) -> float:
     """
     start = p
     for _ in range(_ROUNDS):
-        found = _settled(start, par, settle)
-        if abs(found - p) <= _TOLERANCE * p:
+        settled = _settled(start, par, settle)
+        if abs(settled - p) <= _TOLERANCE * p:
             return start
-        if found <= 0.05 * p:
+        if settled <= 0.05 * p:
             break
-        start *= p / found
+        start *= p / settled
     raise SolverError(
         f"no current lets the dithered pressure settle at {p / 1e5:g} bar (last: "
-        f"{found / 1e5:.4g} bar): take another p_start, a longer settle, or start = 'frictionless'"
+        f"{settled / 1e5:.4g} bar): take another p_start, a longer settle, or start = "
+        "'frictionless'"
     )
 
 
 def _settled(start: float, par: MotorcycleParameters, settle: float) -> float:
     """Return the mean pressure [Pa] at the end of a run with constant current demand."""
-    own = par.replace({"drive.mode": "current"})
-    i = holding_current(start, own)
+    driven = par.replace({"drive.mode": "current"})
+    i = holding_current(start, driven)
     fields = MotorcycleBrake.Stimulus._fields
 
     def stimulus(t: np.ndarray) -> np.ndarray:
@@ -64,10 +60,10 @@ def _settled(start: float, par: MotorcycleParameters, settle: float) -> float:
         rows[:, fields.index("i_set")] = i
         return rows
 
-    T = own.ecu.T_s
+    T = driven.ecu.T_s
     step = T / max(_SUBSTEPS, math.ceil(T / _LONGEST - 1e-9))
-    x, m = state_at(start, own), memory_at(start, own)
-    run = Run(MotorcycleBrake(), own, x, m, stimulus, settle, step=step, record=T)
+    x, m = state_at(start, driven), memory_at(start, driven)
+    run = Run(MotorcycleBrake(), driven, x, m, stimulus, settle, step=step, record=T)
     check_memory(run, 1)
     with interrupts_deferred():
         prepare(run.model, run.par).engine()

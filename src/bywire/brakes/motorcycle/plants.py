@@ -25,14 +25,8 @@ def linear(
 ) -> LinearModel:
     """Return the exact plant with a source in place of the ECU.
 
-    Parameters
-    ----------
-    par, at
-        Parameters and operating point.
-    mode
-        Value of ``drive.mode``.
-    inputs, outputs
-        As in `linearize`.
+    ``par``, ``at``: parameters and operating point; ``mode``: value of ``drive.mode``; ``inputs``,
+    ``outputs``: as in `linearize`.
 
     Raises
     ------

@@ -14,14 +14,8 @@ from bywire.core.typing import Array
 class Jumps:
     """Phases of slip between two of stick that raised the pressure.
 
-    Parameters
-    ----------
-    times
-        When each began [s], shape (n,).
-    rises
-        By how much each raised the pressure [Pa], shape (n,).
-    levels
-        Pressures at which each ended [Pa], shape (n,).
+    ``times``: when each began [s], shape (n,); ``rises``: by how much each raised the pressure
+    [Pa], shape (n,); ``levels``: pressures at which each ended [Pa], shape (n,).
     """
 
     times: Array
@@ -44,10 +38,10 @@ def jumps(recording: xr.Dataset, least: float = 0.1e5) -> Jumps:
     stuck = recording["stuck"].values > 0.5
     begins = np.flatnonzero(stuck[:-1] & ~stuck[1:])
     ends = np.flatnonzero(~stuck[:-1] & stuck[1:]) + 1
-    found = []
+    stairs = []
     for begin in begins:
         after = ends[ends > begin]
         if after.size and p[after[0]] - p[begin] >= least:
-            found.append((time[begin], p[after[0]] - p[begin], p[after[0]]))
-    table = np.array(found).reshape(-1, 3)
+            stairs.append((time[begin], p[after[0]] - p[begin], p[after[0]]))
+    table = np.array(stairs).reshape(-1, 3)
     return Jumps(table[:, 0], table[:, 1], table[:, 2])

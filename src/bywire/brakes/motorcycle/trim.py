@@ -128,8 +128,8 @@ def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
         return measured._replace(v_source=par.motor.R_m * i)
     if par.drive.mode == "current-source":
         return measured._replace(i_source=i, i_ref=i)
-    own = par.ecu.pressure_at(p)
-    pid = pressure_pid.at_rest(pressure_pid.Input(p_ref=p, p_meas=p), i, own)
+    scheduled = par.ecu.pressure_at(p)
+    pid = pressure_pid.at_rest(pressure_pid.Input(p_ref=p, p_meas=p), i, scheduled)
     low = low_pass_2.at_rest(i)
     duty = _duty_for(i, par)
     return measured._replace(

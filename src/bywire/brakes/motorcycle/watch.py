@@ -14,21 +14,16 @@ from bywire.core.parameters import ParameterSet
 def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
     """Return the warnings of a recording, of which the signals may be a selection.
 
-    Parameters
-    ----------
-    recording
-        At least one row.
-    par
-        The run's parameters.
+    ``recording``: at least one row.
     """
-    found: list[str] = []
+    warnings: list[str] = []
     if "at_stop" in recording and "F_stop" in recording:
         far = recording["F_stop"].values > 0
         if far.any():
             first = float(recording["time"].values[int(np.argmax(far))])
-            found.append(f"the piston reached its end stop at t = {first:.4g} s")
+            warnings.append(f"the piston reached its end stop at t = {first:.4g} s")
     known = par.flat()
-    return found + _pressed_back(recording, known)
+    return warnings + _pressed_back(recording, known)
 
 
 def _pressed_back(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:

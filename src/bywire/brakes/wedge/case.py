@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.recording import energy_residual
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import PARKED
@@ -22,21 +22,24 @@ from bywire.core.typing import Array
 
 Signals = Mapping[str, Array]
 
-UNITS = {
-    "contact_time": "s",
-    "time_to_90": "s",
-    "peak_power": "W",
-    "peak_power_filtered": "W",
-    "peak_normal_force": "N",
-    "caliper_energy": "J",
-    "disc_share": "%",
-    "rate_limited": "%",
-    "peak_speed": "rad/s",
-    "energy_in": "J",
-    "energy_braked": "J",
-    "energy_left": "J",
-}
-"""units of the key figures of :func:`braking`"""
+BRAKING = Figures(
+    contact_time=("s", "Time until the pads press on the disc."),
+    time_to_90=("s", "Time until the moment sensor first shows 90 % of the demand."),
+    peak_power=("W", "Largest power at the drives' input."),
+    peak_power_filtered=("W", "Largest power at the drives' input, as the rig measures it."),
+    peak_normal_force=("N", "Largest normal force."),
+    caliper_energy=("J", "Largest energy of the caliper before the demand changes."),
+    disc_share=("%", "Work of the disc on the wedge until then, over that energy."),
+    rate_limited=(
+        "%", "Share of the time until the demand changes on the software rate limit."
+    ),
+    peak_speed=("rad/s", "Largest speed of motor 1."),
+    energy_in=("J", "Energy at the drives' input, standby included."),
+    energy_braked=("J", "Energy taken from the disc."),
+    energy_left=("J", "Largest residual of the energy balance: the step's error."),
+    undefined="the level is never reached in time",
+)  # fmt: skip
+"""key figures of :func:`braking`"""
 
 
 def case_from_parked(
@@ -56,13 +59,13 @@ def case_from_parked(
     timing
         ``settle``, ``keep`` and ``record`` of the case [s].
     """
-    own = par.replace({"command.mode": "moment", **(changes or {})})
+    changed = par.replace({"command.mode": "moment", **(changes or {})})
     return Case(
         label=label,
         model=WedgeBrake(),
-        par=own,
-        state=state_at(0.0, own),
-        memory=memory_at(0.0, own),
+        par=changed,
+        state=state_at(0.0, changed),
+        memory=memory_at(0.0, changed),
         stimulus=stimulus,
         duration=duration,
         **timing,
@@ -80,12 +83,8 @@ def steps(t: Array, levels: Mapping[float, float]) -> Array:
 def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
     """Return the key figures of a braking that begins at time zero, in the disc's direction.
 
-    Parameters
-    ----------
-    target
-        Moment demanded [N m].
-    end
-        Time [s] at which the demand changes for the first time.
+    ``target``: moment demanded [N m]; ``end``: time [s] at which the demand changes for the first
+    time.
     """
     run = along_disc(run)
     after = run.sel(time=slice(-1e-9, None))
@@ -93,41 +92,28 @@ def braking(run: xr.Dataset, target: float, end: float) -> tuple[Kpi, ...]:
     peak = int(np.argmax(held["U_caliper"].values))
     stored = float(held["U_caliper"].values[peak])
     work = float(held["W_disc"].values[peak] - held["W_disc"].values[0])
-    share = 100.0 * work / stored if stored > 0 else math.nan
-    texts: dict[str, tuple[float, str]] = {
-        "contact_time": (_contact(held), "Time until the pads press on the disc."),
-        "time_to_90": (first(held, "y_M", 0.9 * target),
-                       "Time until the moment sensor first shows 90 % of the demand."),
-        "peak_power": (float(after["P_in"].max()), "Largest power at the drives' input."),
-        "peak_power_filtered": (float(after["P_meas"].max()),
-                                "Largest power at the drives' input, as the rig measures it."),
-        "peak_normal_force": (float(after["F_N"].max()), "Largest normal force."),
-        "caliper_energy": (stored, "Largest energy of the caliper before the demand changes."),
-        "disc_share": (share, "Work of the disc on the wedge until then, over that energy."),
-        "rate_limited": (100.0 * float(held["sat_rate"].mean()),
-                         "Share of the time until the demand changes on the software rate limit."),
-        "peak_speed": (float(np.abs(after["omega_1"]).max()), "Largest speed of motor 1."),
-        "energy_in": (_gained(after, "W_supply"), "Energy at the drives' input, standby included."),
-        "energy_braked": (_gained(after, "W_brake"), "Energy taken from the disc."),
-        "energy_left": (float(np.abs(energy_residual(run)).max()),
-                        "Largest residual of the energy balance: the step's error."),
-    }  # fmt: skip
-    problem = "the level is never reached in time"
-    problems = dict.fromkeys(UNITS, problem) | {"disc_share": "the caliper stores no energy"}
-    return tuple(
-        figure(name, texts[name][0], unit, texts[name][1], problems[name])
-        for name, unit in UNITS.items()
+    share = (
+        (100.0 * work / stored, "") if stored > 0 else (math.nan, "the caliper stores no energy")
+    )
+    return BRAKING(
+        contact_time=_contact(held),
+        time_to_90=first(held, "y_M", 0.9 * target),
+        peak_power=after["P_in"].max(),
+        peak_power_filtered=after["P_meas"].max(),
+        peak_normal_force=after["F_N"].max(),
+        caliper_energy=stored,
+        disc_share=share,
+        rate_limited=100.0 * float(held["sat_rate"].mean()),
+        peak_speed=np.abs(after["omega_1"]).max(),
+        energy_in=_gained(after, "W_supply"),
+        energy_braked=_gained(after, "W_brake"),
+        energy_left=np.abs(energy_residual(run)).max(),
     )
 
 
 def _contact(held: xr.Dataset) -> float:
     """Return when the pads first press [s]; without clearance they touch from the start."""
     return 0.0 if parameters_of(held).caliper.clearance == 0.0 else first(held, "F_N", 0.0)
-
-
-def figure(name: str, value: float, unit: str, text: str, problem: str) -> Kpi:
-    """Return a key figure; one that is no number says which problem left it undefined."""
-    return Kpi(name, value, unit, text, "" if math.isfinite(value) else problem)
 
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:

@@ -60,7 +60,7 @@ def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Me
     rotation = ops.where(r.Omega < 0, -1.0, 1.0)
     direction = ops.where(m.mode < 0.5, rotation, m.direction)
     measured = rotation * r.M
-    found = moment_control.output(
+    law = moment_control.output(
         moment_control.State(m.mode, m.rate, m.theta_c),
         moment_control.Input(
             M_set=u.M_set,
@@ -72,15 +72,15 @@ def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Me
         T,
         control,
     )
-    limited = ops.where(ops.fabs(found.rate) >= control.rate_max, 1.0, 0.0)
-    in_moment = ops.where((found.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0)
+    limited = ops.where(ops.fabs(law.rate) >= control.rate_max, 1.0, 0.0)
+    in_moment = ops.where((law.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0)
     return m._replace(
         M_set=u.M_set,
         M_meas=measured,
         direction=direction,
-        mode=found.mode,
-        rate=found.rate,
-        theta_c=found.theta_c,
+        mode=law.mode,
+        rate=law.rate,
+        theta_c=law.theta_c,
         sat_rate=limited * in_moment,
     )
 

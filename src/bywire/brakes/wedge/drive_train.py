@@ -35,14 +35,8 @@ class Demand(NamedTuple):
 def wire(drive: Drive, motor: Motor, i_ref: float, on: float, force: float, par: Par) -> None:
     """Connect one motor to its drive and its screw.
 
-    Parameters
-    ----------
-    i_ref
-        Current demand [A].
-    on
-        1 while the power stage is on.
-    force
-        Axial force on the screw [N], positive toward clamping.
+    ``i_ref``: current demand [A]; ``on``: 1 while the power stage is on; ``force``: axial force on
+    the screw [N], positive toward clamping.
     """
     emf = servo_motor.torque_constant(motor.par) * motor.x.omega
     drive.u = current_drive.Input(i_ref=i_ref, i=motor.x.i, emf=emf, on=on)
@@ -71,10 +65,8 @@ def torque(motor: Motor) -> float:
 def bounds(omega: float, torque: float, force: float, par: Par) -> Bounds:
     """Return the limits [N m] of the dry friction of bearings and screw on one shaft.
 
-    Parameters
-    ----------
-    omega, torque, force
-        Speed of the shaft [rad/s], torque of its motor [N m], axial force on its screw [N].
+    ``omega``, ``torque``, ``force``: speed of the shaft [rad/s], torque of its motor [N m], axial
+    force on its screw [N].
     """
     bearing = bearing_friction(omega, force, par)
     screw = screw_friction(torque, force, par)
@@ -96,12 +88,8 @@ def command(
 ) -> Command:
     """Run the real-time computer once for one motor of a rig.
 
-    Parameters
-    ----------
-    mode
-        Whether the motor's position is controlled, or its drive is handed the demanded current.
-    theta
-        What the encoder shows [rad].
+    ``mode``: whether the motor's position is controlled, or its drive is handed the demanded
+    current; ``theta``: what the encoder shows [rad].
     """
     x, out = position_pd.output(
         position_pd.State(held.last, held.speed),

@@ -161,12 +161,7 @@ def rigid(mechanical: LinearModel, par: Par) -> LinearModel:
 
     The forces between the bodies do no work on this motion and drop out.
 
-    Parameters
-    ----------
-    mechanical
-        From `mechanical`.
-    par
-        The same parameters.
+    ``mechanical``: from `mechanical`; ``par``: the same parameters.
 
     Notes
     -----

@@ -62,14 +62,8 @@ def brake(
 ) -> WedgeParameters:
     """Return the brake with another wedge and other pads; its controllers know the wedge.
 
-    Parameters
-    ----------
-    par
-        The given brake.
-    mu_B, tan_alpha
-        Friction coefficient of the pads and slope of the wedge.
-    known
-        Whether the moment controller knows the friction coefficient too.
+    ``mu_B``, ``tan_alpha``: friction coefficient of the pads and slope of the wedge; ``known``:
+    whether the moment controller knows the friction coefficient too.
     """
     redesign = redesigned(par, tan_alpha, par.screw.lead)
     slope = redesign.control.moment.slope_hat

@@ -22,21 +22,16 @@ _SWINGS = 10  # reversals on the current limit, each within _LONG of the last, t
 def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
     """Return the warnings of a wedge brake; none where the recording lacks its signals.
 
-    Parameters
-    ----------
-    recording
-        At least one row.
-    par
-        The run's parameters.
+    ``recording``: at least one row.
     """
     known = par.flat()
     if not {"F_end", "M_set", "i_1_ref", "i_2_ref"} <= set(recording):
         return []
-    found = _end_stop(recording)
+    warnings = _end_stop(recording)
     if known["command.mode"] == "moment":  # elsewhere the demanded currents are the test's own
-        found += _out_of_reach(recording, known) or _not_reached(recording, known)
-        found += _limits(recording, known)
-    return found + _holding_screw(known)
+        warnings += _out_of_reach(recording, known) or _not_reached(recording, known)
+        warnings += _limits(recording, known)
+    return warnings + _holding_screw(known)
 
 
 def _end_stop(recording: xr.Dataset) -> list[str]:
@@ -118,15 +113,15 @@ def _limits(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
 
 def _swings(recording: xr.Dataset, known: Mapping[str, Any]) -> tuple[float, float, int] | None:
     """Return begin and end [s] of the longest swing between both limits, and its reversals."""
-    t, limit, found = recording["time"].values, _limit(known) * (1.0 - 1e-9), None
+    t, limit, begin = recording["time"].values, _limit(known) * (1.0 - 1e-9), None
     for name in ("i_1_ref", "i_2_ref"):
         current = recording[name].values
         rows = np.flatnonzero(np.abs(current) >= limit)
         reversals = t[rows[1:]][np.diff(np.sign(current[rows])) != 0]
         for chain in np.split(reversals, np.flatnonzero(np.diff(reversals) > _LONG) + 1):
-            if chain.size >= max(_SWINGS, 0 if found is None else found[2] + 1):
-                found = float(chain[0]), float(chain[-1]), int(chain.size)
-    return found
+            if chain.size >= max(_SWINGS, 0 if begin is None else begin[2] + 1):
+                begin = float(chain[0]), float(chain[-1]), int(chain.size)
+    return begin
 
 
 def _short_of(recording: xr.Dataset, known: Mapping[str, Any]) -> Rows:

@@ -10,7 +10,7 @@ from rig_runs import emf_inertia, rig
 
 import bywire
 from bywire.bench.recording import energy_residual
-from bywire.brakes.wedge.rigs.rig_case import parameters_of
+from bywire.brakes.wedge.case import parameters_of
 from bywire.core.errors import ParameterError
 
 NAMES = (

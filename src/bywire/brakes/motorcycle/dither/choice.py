@@ -52,14 +52,8 @@ class Least:
 def least(gains: Array, figures: Figures, limits: Mapping[str, float]) -> Least:
     """Return the weakest dither that overcomes the friction, from there on upward.
 
-    Parameters
-    ----------
-    gains
-        Shape (n,), ascending.
-    figures
-        Name -> values at these gains, shape (n,).
-    limits
-        Largest value of each of `OVERCOMES` and `COSTS`.
+    ``gains``: shape (n,), ascending; ``figures``: name -> values at these gains, shape (n,);
+    ``limits``: largest value of each of `OVERCOMES` and `COSTS`.
     """
     wanted = {name: crossing(gains, figures[name], limits[name]) for name in OVERCOMES}
     binding = max(OVERCOMES, key=lambda name: (math.isnan(wanted[name]), wanted[name]))
@@ -101,20 +95,10 @@ def crossing(gains: Array, values: Array, limit: float) -> float:
 class Candidate:
     """The least gain of one frequency that is enough at every pressure.
 
-    Parameters
-    ----------
-    gain
-        NaN where none on the grid is enough.
-    decisive
-        Which pressure asks for that gain.
-    binding
-        Which of `OVERCOMES` asks for it.
-    price
-        Copper power [W], mean over the pressures.
-    ripple
-        Ripple at the caliper [Pa], worst pressure.
-    exceeded
-        Which of `COSTS` exceed their limits at any pressure.
+    ``gain``: naN where none on the grid is enough; ``decisive``: which pressure asks for that gain;
+    ``binding``: which of `OVERCOMES` asks for it; ``price``: copper power [W], mean over the
+    pressures; ``ripple``: ripple at the caliper [Pa], worst pressure; ``exceeded``: which of
+    `COSTS` exceed their limits at any pressure.
     """
 
     gain: float

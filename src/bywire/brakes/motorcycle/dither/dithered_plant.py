@@ -25,12 +25,7 @@ _ROUNDS, _CLOSE = 12, 1e-4  # corrections of the current, and what counts as the
 class DitheredPlant:
     """The plant about its motion under dither, current loop closed, pressure loop open.
 
-    Parameters
-    ----------
-    i
-        Mean current demand [A].
-    model
-        From ``i_set`` to ``p_mc``.
+    ``i``: mean current demand [A]; ``model``: from ``i_set`` to ``p_mc``.
     """
 
     i: float

@@ -25,12 +25,8 @@ Report = Callable[[float], None]
 class Grid:
     """The dithers to compare.
 
-    Parameters
-    ----------
-    pressures, gains, frequencies
-        Pressures [Pa], gains of the law (ascending), frequencies [Hz].
-    trial
-        How each is tried.
+    ``pressures``, ``gains``, ``frequencies``: pressures [Pa], gains of the law (ascending),
+    frequencies [Hz]; ``trial``: how each is tried.
     """
 
     pressures: Sequence[float]

@@ -73,10 +73,7 @@ def reach(par: Par, f: float, p: float) -> float:
     Every harmonic of the sampled waveform passes filter and current loop; a square's fundamental
     alone exceeds its amplitude.
 
-    Parameters
-    ----------
-    f
-        Frequency [Hz] whose period is a whole number of sample times.
+    ``f``: frequency [Hz] whose period is a whole number of sample times.
     """
     samples = waveform(par, f)
     n = samples.size

@@ -43,13 +43,9 @@ _STEP = 20e-6
 class Trial:
     """How dithers are tried.
 
-    Parameters
-    ----------
-    settle, window
-        Time [s] until the pressure loop has settled, and over which figures are taken, rounded
-        down to whole periods of each dither.
-    approach
-        Distance [Pa] from which the pressure is approached, from below and from above.
+    ``settle``, ``window``: time [s] until the pressure loop has settled, and over which figures are
+    taken, rounded down to whole periods of each dither; ``approach``: distance [Pa] from which the
+    pressure is approached, from below and from above.
     """
 
     settle: float = 4.0
@@ -152,10 +148,7 @@ def area_ratios(par: Par, designs: Sequence[tuple[float, float]]) -> list[float]
     Loops are averaged over one dither period. Most of what is left is delay rather than friction,
     and shrinks with the ramp's slope.
 
-    Parameters
-    ----------
-    designs
-        Gain and frequency [Hz] of each dither.
+    ``designs``: gain and frequency [Hz] of each dither.
     """
     options = friction_ramp.EXPERIMENT.defaults
     case = friction_ramp.cases(par, friction_ramp.Options.model_validate(options.model_dump()))[1]

@@ -6,7 +6,6 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, step_response
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
@@ -24,9 +23,7 @@ class Options(ParameterSet):
     """recording interval, finer than the ECU's sample time"""
 
 
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run: from the retracted piston, past dither and low-pass filter."""
     stimulus = step_at_zero("i_set", 0.0, options.i_step)
     return (
@@ -45,9 +42,9 @@ def step(options: Options) -> step_response.Setting:
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the step's KPIs of the motor current."""
     run = recordings["run"]
-    found = evaluate("step_response", run, step(options))
-    found |= evaluate("effort", run, effort.Setting())
-    return tuple(found.values())
+    kpis = evaluate("step_response", run, step(options))
+    kpis |= evaluate("effort", run, effort.Setting())
+    return tuple(kpis.values())
 
 
 EXPERIMENT = Experiment(

@@ -9,16 +9,18 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import hysteresis, occupation
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli import ramp
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, CurrentRate, Frequency, TimeConstant
 
 WITHOUT, WITH = "without-dither", "with-dither"
+
+PEAK = Figures(p_max=("Pa", "Largest master-cylinder pressure."))
+RATIO = Figures(loop_area_ratio=("1", "Area of the loop with dither over that without."))
 
 
 class Options(ParameterSet):
@@ -34,9 +36,7 @@ class Options(ParameterSet):
     """moving average for the loop's KPIs; one dither period unless given, 0 for the raw signals"""
 
 
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the two runs, from the retracted piston; closed current loop."""
     shape = ramp.Parameters(
         start=0.0, end=options.i_max, slope=options.slope, t_start=0.0, t_hold=0.0, after="return"
@@ -71,26 +71,21 @@ def loop(options: Options) -> hysteresis.Setting:
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return each loop's KPIs and their ratio."""
-    found: dict[str, Kpi] = {}
+    loops: dict[str, Kpi] = {}
     setting = loop(options)
     for label, suffix in ((WITHOUT, "undithered"), (WITH, "dithered")):
         run = recordings[label]
         kpis = evaluate("hysteresis", run, setting) | evaluate(
             "occupation", run, occupation.Setting()
         )
-        kpis["p_max"] = Kpi(
-            "p_max", float(run["p_mc"].max()), "Pa", "Largest master-cylinder pressure."
-        )
-        for name, kpi in kpis.items():
-            found[f"{name}_{suffix}"] = replace(kpi, name=f"{name}_{suffix}")
-    ratio = Kpi(
-        "loop_area_ratio",
-        found["loop_area_dithered"].value / found["loop_area_undithered"].value,
-        "1",
-        "Area of the loop with dither over that without.",
-        found["loop_area_undithered"].note,
-    )
-    return (*found.values(), ratio)
+        loops |= {
+            f"{name}_{suffix}": replace(k, name=f"{name}_{suffix}") for name, k in kpis.items()
+        }
+        (peak,) = PEAK(f"_{suffix}", p_max=run["p_mc"].max())
+        loops[peak.name] = peak
+    plain = loops["loop_area_undithered"]
+    ratio = loops["loop_area_dithered"].value / plain.value
+    return (*loops.values(), *RATIO(loop_area_ratio=(ratio, plain.note)))
 
 
 _LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*response": "A*Pa"})
@@ -106,9 +101,9 @@ EXPERIMENT = Experiment(
     kpis={
         f"{name}_{suffix}": unit
         for suffix in ("undithered", "dithered")
-        for name, unit in {**_LOOP, "p_max": "Pa"}.items()
+        for name, unit in {**_LOOP, **PEAK.units}.items()
     }
-    | {"loop_area_ratio": "1"},
+    | RATIO.units,
     figures=("hysteresis-loop", "time-traces"),
     finish=finish,
     loop=loop,

@@ -6,7 +6,6 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
@@ -28,9 +27,7 @@ class Options(ParameterSet):
     """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
 
 
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     stimulus = step_at_zero("p_set", options.p_from, options.p_to)
     return (
@@ -52,10 +49,10 @@ def step(options: Options) -> step_response.Setting:
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the step's, the effort's and the occupation's KPIs, of the pressure p_mc."""
     run = recordings["run"]
-    found = evaluate("step_response", run, step(options))
-    found |= evaluate("effort", run, effort.Setting())
-    found |= evaluate("occupation", run, occupation.Setting())
-    return tuple(found.values())
+    kpis = evaluate("step_response", run, step(options))
+    kpis |= evaluate("effort", run, effort.Setting())
+    kpis |= evaluate("occupation", run, occupation.Setting())
+    return tuple(kpis.values())
 
 
 EXPERIMENT = Experiment(

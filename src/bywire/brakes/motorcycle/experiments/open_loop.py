@@ -13,6 +13,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.experiments.friction_ramp import PEAK
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.errors import ParameterError
@@ -64,16 +65,10 @@ def cases(
     offset = holding if options.add_holding else 0.0
     return (
         case_from_rest(
-            "run",
-            par,
-            mode,
-            options.p_start,
-            lambda t: {name: offset + stimulus.sample(t)},
-            options.duration,
-            settle=options.settle,
-            record=options.record,
+            "run", par, mode, options.p_start, lambda t: {name: offset + stimulus.sample(t)},
+            options.duration, settle=options.settle, record=options.record,
         ),
-    )
+    )  # fmt: skip
 
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
@@ -89,10 +84,10 @@ def without(options: Options) -> tuple[str, ...]:
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return effort and occupation."""
     run = recordings["run"]
-    found = evaluate("effort", run, effort.Setting())
-    found |= evaluate("occupation", run, occupation.Setting())
-    peak = Kpi("p_max", float(run["p_mc"].max()), "Pa", "Largest master-cylinder pressure.")
-    return (*(kpi for name, kpi in found.items() if name not in without(options)), peak)
+    kpis = evaluate("effort", run, effort.Setting())
+    kpis |= evaluate("occupation", run, occupation.Setting())
+    kept = (kpi for name, kpi in kpis.items() if name not in without(options))
+    return (*kept, *PEAK(p_max=run["p_mc"].max()))
 
 
 EXPERIMENT = Experiment(
@@ -105,7 +100,7 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
-    kpis={**units_of("effort", "occupation"), "p_max": "Pa"},
+    kpis={**units_of("effort", "occupation"), **PEAK.units},
     figures=("time-traces", "energy-balance"),
     finish=finish,
     driven_unit=lambda options: _SOURCES[options.source][2],

@@ -12,7 +12,6 @@ from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, tracking
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.control import pedal_map
@@ -43,9 +42,7 @@ class Options(ParameterSet):
     """moving average for the tracking KPIs; one dither period unless given, 0 for raw ones"""
 
 
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run; it starts at rest at the first sample's pressure."""
     ride = _ride(par, options)
     t = ride["time"].values - float(ride["time"][0])
@@ -68,10 +65,10 @@ def followed(options: Options) -> tracking.Setting:
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how well the pressure follows its set point."""
     run = recordings["run"]
-    found = evaluate("tracking", run, followed(options))
-    found |= evaluate("effort", run, effort.Setting())
-    found |= evaluate("occupation", run, occupation.Setting())
-    return tuple(found.values())
+    kpis = evaluate("tracking", run, followed(options))
+    kpis |= evaluate("effort", run, effort.Setting())
+    kpis |= evaluate("occupation", run, occupation.Setting())
+    return tuple(kpis.values())
 
 
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:

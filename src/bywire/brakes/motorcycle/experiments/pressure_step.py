@@ -6,15 +6,18 @@ from typing import Literal
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, step_response
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Pressure, TimeConstant
+
+GAIN = Figures(
+    static_gain=("Pa/A", "Change of the mean pressure per change of the current demand."),
+)
 
 
 class Options(ParameterSet):
@@ -34,9 +37,7 @@ class Options(ParameterSet):
     """moving average for the step's KPIs; one dither period unless given, 0 for the raw pressure"""
 
 
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run, open pressure loop, closed current loop."""
     p = options.p_start
     if options.start == "settled" and options.settle > 0:
@@ -44,9 +45,7 @@ def cases(
     return _from(p, par, options)
 
 
-def preview(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def preview(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the run as if the pressure settled at the equilibrium without friction."""
     return _from(options.p_start, par, options)
 
@@ -71,18 +70,12 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the step's KPIs, and the static gain."""
     run = recordings["run"]
     setting = step(options)
-    found = evaluate("step_response", run, setting)
-    found |= evaluate("effort", run, effort.Setting())
-    found |= evaluate("occupation", run, occupation.Setting())
+    kpis = evaluate("step_response", run, setting)
+    kpis |= evaluate("effort", run, effort.Setting())
+    kpis |= evaluate("occupation", run, occupation.Setting())
     data = step_response.select(run, setting)
-    gain = Kpi(
-        "static_gain",
-        (data.end - data.start) / options.i_step,
-        "Pa/A",
-        "Change of the mean pressure per change of the current demand.",
-        data.note,
-    )
-    return (*found.values(), gain)
+    gain = (data.end - data.start) / options.i_step
+    return (*kpis.values(), *GAIN(static_gain=(gain, data.note)))
 
 
 EXPERIMENT = Experiment(
@@ -97,7 +90,7 @@ EXPERIMENT = Experiment(
     judge=judge,
     kpis={
         **units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
-        "static_gain": "Pa/A",
+        **GAIN.units,
     },
     figures=("step-response", "time-traces"),
     step=step,

@@ -9,14 +9,20 @@ import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import effort, occupation, release
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.kpis.registry import evaluate, units_of
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.motorcycle.case import case_from_rest, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure, TimeConstant
+
+ENERGIES = Figures(
+    energy_stored=("J", "Stored energy that the release sets free."),
+    energy_returned=("J", "Work that the gear gives back to the motor's shaft, net."),
+    energy_fed_back=("J", "Electrical energy fed back into the battery, from recorded samples."),
+    energy_gear=("J", "Loss of gear and screw; negative where the paper's law gives energy."),
+)
 
 
 class Options(ParameterSet):
@@ -36,9 +42,7 @@ class Options(ParameterSet):
     """time before the release in which dither and loop settle"""
 
 
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
+def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     keep = min(options.settle, 0.1)
     if options.how == "current-off":
@@ -65,25 +69,22 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = recordings["run"]
     after = run.sel(time=slice(-1e-9, None))
     fallen = evaluate("release", run, release.Setting("p_pd", options.p_empty))
-    time = after["time"].values
-    power = after["P_el"].values
-    fed_back = float(np.trapezoid(np.minimum(power, 0.0), time))
-    stored = after["E_stored"].values
-    own = (
+    fed_back = np.trapezoid(np.minimum(after["P_el"].values, 0.0), after["time"].values)
+    energies = {name: after[name].values for name in ("E_stored", "W_shaft", "E_gear")}
+    gained = {name: values[-1] - values[0] for name, values in energies.items()}
+    fallen_to = (
         fallen["time_to_empty"],
         replace(fallen["residual_level"], name="residual_pressure"),
-        Kpi("energy_stored", float(stored[0] - stored[-1]), "J",
-            "Stored energy that the release sets free."),
-        Kpi("energy_returned", float(after["W_shaft"].values[0] - after["W_shaft"].values[-1]), "J",
-            "Work that the gear gives back to the motor's shaft, net."),
-        Kpi("energy_fed_back", -fed_back, "J",
-            "Electrical energy fed back into the battery, from recorded samples."),
-        Kpi("energy_gear", float(after["E_gear"].values[-1] - after["E_gear"].values[0]), "J",
-            "Loss of gear and screw; negative where the paper's law gives energy."),
-    )  # fmt: skip
-    found = evaluate("effort", run, effort.Setting())
-    found |= evaluate("occupation", run, occupation.Setting())
-    return (*own, *found.values())
+        *ENERGIES(
+            energy_stored=-gained["E_stored"],
+            energy_returned=-gained["W_shaft"],
+            energy_fed_back=-fed_back,
+            energy_gear=gained["E_gear"],
+        ),
+    )
+    totals = evaluate("effort", run, effort.Setting())
+    totals |= evaluate("occupation", run, occupation.Setting())
+    return (*fallen_to, *totals.values())
 
 
 EXPERIMENT = Experiment(
@@ -99,10 +100,7 @@ EXPERIMENT = Experiment(
     kpis={
         "time_to_empty": "s",
         "residual_pressure": "Pa",
-        "energy_stored": "J",
-        "energy_returned": "J",
-        "energy_fed_back": "J",
-        "energy_gear": "J",
+        **ENERGIES.units,
         **units_of("effort", "occupation"),
     },
     figures=("time-traces", "energy-balance"),

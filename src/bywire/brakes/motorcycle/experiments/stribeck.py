@@ -8,13 +8,21 @@ import numpy as np
 import xarray as xr
 from pydantic import Field
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.experiment import Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Nodes, Unit
 from bywire.plant import seal_friction
+
+FIGURES = Figures(
+    breakaway_apply=(
+        "N*m", "Largest friction torque while applying, at the highest pressure."
+    ),
+    breakaway_release=(
+        "N*m", "Largest friction torque while releasing, at the highest pressure."
+    ),
+)  # fmt: skip
 
 
 class Options(ParameterSet):
@@ -24,13 +32,6 @@ class Options(ParameterSet):
     """master-cylinder pressures, one curve each"""
     omega_max: Annotated[float, Unit("rad/s", 2.0), Field(gt=0, allow_inf_nan=False)]
     """largest motor speed, both directions"""
-
-
-def cases(
-    par: MotorcycleParameters, options: Options, _: Stimulus | None = None
-) -> tuple[Case, ...]:
-    """Return no run: the curve is a static characteristic."""
-    return ()
 
 
 def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]:
@@ -46,36 +47,23 @@ def static(par: MotorcycleParameters, options: Options) -> dict[str, xr.Dataset]
         for j, omega in enumerate(speeds):
             friction = seal_friction.output(seal_friction.Input(float(omega), p), par.seal)
             torque[k, j] = friction.T_p if forward[j] else -friction.T_n
-    curve = xr.Dataset(
-        {
-            "T_fr": (
-                ("p_mc", "omega"),
-                torque,
-                {"units": "N*m", "long_name": "friction torque"},
-            )
-        },
-        coords={
-            "p_mc": (
-                "p_mc",
-                np.array(options.pressures),
-                {"units": "Pa", "long_name": "master-cylinder pressure"},
-            ),
-            "omega": ("omega", speeds, {"units": "rad/s", "long_name": "motor speed"}),
-        },
-    )
-    return {"curve": curve}
+    axes = {
+        "p_mc": (np.array(options.pressures), "Pa", "master-cylinder pressure"),
+        "omega": (speeds, "rad/s", "motor speed"),
+    }
+    coords = {
+        name: (name, axis, {"units": unit, "long_name": label})
+        for name, (axis, unit, label) in axes.items()
+    }
+    attrs = {"units": "N*m", "long_name": "friction torque"}
+    return {"curve": xr.Dataset({"T_fr": (("p_mc", "omega"), torque, attrs)}, coords)}
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the breakaway torques at the highest pressure."""
     curve = recordings["curve"]
     torque = curve["T_fr"].values[int(np.argmax(curve["p_mc"].values))]
-    return (
-        Kpi("breakaway_apply", float(torque.max()), "N*m",
-            "Largest friction torque while applying, at the highest pressure."),
-        Kpi("breakaway_release", float(-torque.min()), "N*m",
-            "Largest friction torque while releasing, at the highest pressure."),
-    )  # fmt: skip
+    return FIGURES(breakaway_apply=torque.max(), breakaway_release=-torque.min())
 
 
 EXPERIMENT = Experiment(
@@ -84,9 +72,9 @@ EXPERIMENT = Experiment(
     summary="friction torque over speed at 2, 20 and 40 bar (Fig. 4)",
     options=Options,
     defaults=Options(pressures=(2e5, 20e5, 40e5), omega_max=2.0),
-    cases=cases,
+    cases=lambda *_: (),
     judge=judge,
-    kpis={"breakaway_apply": "N*m", "breakaway_release": "N*m"},
+    kpis=FIGURES.units,
     figures=("stribeck-curve",),
     static=static,
 )

@@ -26,18 +26,9 @@ class Coefficients:
         \dot{\delta p}_{mc} &= b_p (\delta p_{pd} - \delta p_{mc}) + b_\Omega \delta\Omega \\
         \dot{\delta p}_{pd} &= c_p (\delta p_{mc} - \delta p_{pd})
 
-    Parameters
-    ----------
-    a_p
-        Speed by pressure [rad/(s^2 Pa)].
-    a_T
-        Speed by torque [rad/(s^2 N m)].
-    a_Omega
-        Speed by speed [1/s].
-    b_p, c_p
-        Equalization of the two pressures [1/s].
-    b_Omega
-        Pressure by speed [Pa/rad].
+    ``a_p``: speed by pressure [rad/(s^2 Pa)]; ``a_T``: speed by torque [rad/(s^2 N m)];
+    ``a_Omega``: speed by speed [1/s]; ``b_p``, ``c_p``: equalization of the two pressures [1/s];
+    ``b_Omega``: pressure by speed [Pa/rad].
     """
 
     a_p: float
@@ -97,10 +88,7 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
 def linear_model(par: Par, p: float = 20e5, x: float | None = None) -> LinearModel:
     """Return eq. (14) with the motor current as input and the pressure p_mc as output.
 
-    Parameters
-    ----------
-    par, p, x
-        As in `coefficients`.
+    ``par``, ``p``, ``x``: as in `coefficients`.
     """
     c = coefficients(par, p, x)
     return LinearModel(
@@ -135,10 +123,7 @@ def theoretical(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 
     (the paper's mu is m here).
 
-    Parameters
-    ----------
-    par, p, x
-        As in `coefficients`.
+    ``par``, ``p``, ``x``: as in `coefficients`.
 
     References
     ----------
@@ -166,10 +151,7 @@ def two_pole(par: Par, p: float = 20e5, x: float | None = None) -> Rational:
 
     .. math:: G = \frac{K}{(1 + s T_1)(1 + s T_2)}
 
-    Parameters
-    ----------
-    par, p, x
-        As in `coefficients`.
+    ``par``, ``p``, ``x``: as in `coefficients`.
 
     Notes
     -----
@@ -192,12 +174,7 @@ def two_pole_error(
 ) -> ReductionError:
     """Return how far eq. (21) is off eq. (15) up to a frequency [Hz].
 
-    Parameters
-    ----------
-    par, p, x
-        As in `coefficients`.
-    high
-        End of the band [Hz].
+    ``par``, ``p``, ``x``: as in `coefficients`; ``high``: end of the band [Hz].
     """
     whole, less = linear_model(par, p, x), two_pole(par, p, x)
     a_2, a_1, _ = less.den

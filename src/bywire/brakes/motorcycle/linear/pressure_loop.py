@@ -29,14 +29,8 @@ class PressureLoop:
     The current loop is that of the locked rotor: a model from current to pressure has the
     rotor's motion in it. Converters are ideal, the dither is off.
 
-    Parameters
-    ----------
-    par
-        Parameters of ECU, motor, supply and filters.
-    brake
-        Transfer function from motor current to pressure [Pa/A].
-    p
-        Pressure of the operating point [Pa].
+    ``par``: parameters of ECU, motor, supply and filters; ``brake``: transfer function from motor
+    current to pressure [Pa/A]; ``p``: pressure of the operating point [Pa].
     """
 
     par: MotorcycleParameters
@@ -108,14 +102,8 @@ class PressureLoop:
 def cancelling_pi(loop: PressureLoop, T: float, crossover: float) -> PressureLoop:
     """Return the loop with a PI whose zero cancels a time constant T [s].
 
-    Parameters
-    ----------
-    loop
-        The loop whose PID is replaced.
-    T
-        Time constant [s].
-    crossover
-        Frequency [Hz] at which the gain shall be 1.
+    ``loop``: the loop whose PID is replaced; ``T``: time constant [s]; ``crossover``: frequency
+    [Hz] at which the gain shall be 1.
     """
     unit = loop.par.replace(
         {"ecu.pressure.k_p": 1e-5, "ecu.pressure.k_i": 1e-5 / T, "ecu.pressure.k_d": 0.0}

@@ -17,12 +17,8 @@ _BAR = 1e5
 class Rational:
     """A transfer function from current to pressure, SI.
 
-    Parameters
-    ----------
-    name
-        What figures and messages call it.
-    num, den
-        Coefficients of numerator [Pa/A] and denominator, highest power of s first.
+    ``name``: what figures and messages call it; ``num``, ``den``: coefficients of numerator [Pa/A]
+    and denominator, highest power of s first.
     """
 
     name: str
@@ -100,14 +96,8 @@ def first_orders(
 
     .. math:: G = K \prod (1 + s \tau_j) / \prod (1 + s T_k)
 
-    Parameters
-    ----------
-    name
-        What figures and messages call it.
-    gain
-        Static gain K [Pa/A].
-    zeros_hz, poles_hz
-        Corner frequencies 1/(2 pi tau_j) and 1/(2 pi T_k) [Hz].
+    ``name``: what figures and messages call it; ``gain``: static gain K [Pa/A]; ``zeros_hz``,
+    ``poles_hz``: corner frequencies 1/(2 pi tau_j) and 1/(2 pi T_k) [Hz].
     """
 
     def product(corners: tuple[float, ...]) -> Array:

@@ -6,53 +6,45 @@ from collections.abc import Iterable
 
 from bywire.brakes.motorcycle.paper import facts
 from bywire.reproduction.item import Item
-from bywire.reproduction.quoted import Quoted
-from bywire.reproduction.root_cause import RootCause
+from bywire.reproduction.root_cause import Quoted, RootCause, causes_of
 
 
 def causes(items: Iterable[Item]) -> tuple[RootCause, ...]:
     """Return the root causes, the numbers taken from the items."""
-    q = Quoted(items)
-    return (
-        _tables(q), _gear(q), _gain(q), _bandwidth(q), _slow_pair(q), _hysteresis(q), _single(q)
-    )  # fmt: skip
+    return causes_of(items, _tables, _gear, _gain, _bandwidth, _slow_pair, _hysteresis, _single)
 
 
 def _tables(q: Quoted) -> RootCause:
     t1 = [q(f"table2.{key}@table1") for key in ("K", "zero", "pole1", "pole2")]
     t2 = [q.stated(f"table2.{key}") for key in ("K", "zero", "pole1", "pole2")]
-    return RootCause(
-        "Tables 1 and 2 contradict each other: Table 1 in eq. (15) gives a gain of "
-        f"{t1[0]}, a zero of {t1[1]} and slow poles of {t1[2]} and {t1[3]}, where Table 2 prints "
-        f"{t2[0]}, {t2[1]}, {t2[2]} and {t2[3]}; the calibrated set changes five values, such as "
-        f"A_mc from {q.stated('calibrated.A_mc')} to {q('calibrated.A_mc')}; with Table 1's light "
-        "rotor, free to move, the current loop's bandwidth falls from "
-        f"{q.stated('fig3.bandwidth.free')} to {q('fig3.bandwidth.free@table1')}.",
-        ("table2.*@table1", "fig3.bandwidth.free@table1"),
-    )
+    return RootCause("Tables 1 and 2 contradict each other: Table 1 in eq. (15) gives a gain of "
+                     f"{t1[0]}, a zero of {t1[1]} and slow poles of {t1[2]} and {t1[3]}, where "
+                     f"Table 2 prints {t2[0]}, {t2[1]}, {t2[2]} and {t2[3]}; the calibrated set "
+                     f"changes five values, such as A_mc from {q.stated('calibrated.A_mc')} to "
+                     f"{q('calibrated.A_mc')}; with Table 1's light rotor, free to move, the "
+                     f"current loop's bandwidth falls from {q.stated('fig3.bandwidth.free')} to "
+                     f"{q('fig3.bandwidth.free@table1')}.",
+                     ("table2.*@table1", "fig3.bandwidth.free@table1"))  # fmt: skip
 
 
 def _gear(q: Quoted) -> RootCause:
     paper, ours = "gear.returned.paper", "gear.returned.directional"
-    return RootCause(
-        "Eq. (8) lets the gear give energy where the load drives it: a slow release from 37 bar "
-        f"returns {q(paper)} of {q.stated(paper)} stored ({q.share(paper)}; with Table 1 "
-        f"{q.share(f'{paper}@table1')}), where a loss that depends on direction returns {q(ours)} "
-        f"({q.share(ours)}).",
-        ("gear.returned.paper*",),
-    )
+    return RootCause("Eq. (8) lets the gear give energy where the load drives it: a slow release "
+                     f"from 37 bar returns {q(paper)} of {q.stated(paper)} stored "
+                     f"({q.share(paper)}; with Table 1 {q.share(f'{paper}@table1')}), where a loss "
+                     f"that depends on direction returns {q(ours)} ({q.share(ours)}).",
+                     ("gear.returned.paper*",))  # fmt: skip
 
 
 def _gain(q: Quoted) -> RootCause:
     low, high = q("table4.low.K"), q("table4.high.K")
-    return RootCause(
-        "Table 3's friction under eq. (20)'s dither does not leave Table 4's gain, because f_cfr,p "
-        f"exceeds f_cfr,n: {low} at low and {high} at high pressure ({q('table4.medium.K@table1')} "
-        f"with Table 1) instead of {q.stated('table4.low.K')} and {q.stated('table4.high.K')}; "
-        f"Table 4's gain would take Fig. 5's ramp to {q('table4.medium.p_ramp')}, where its axis "
-        f"ends at {q.stated('table4.medium.p_ramp')}.",
-        ("table4.*.K", "table4.*.K@table1"),
-    )
+    return RootCause("Table 3's friction under eq. (20)'s dither does not leave Table 4's gain, "
+                     f"because f_cfr,p exceeds f_cfr,n: {low} at low and {high} at high pressure "
+                     f"({q('table4.medium.K@table1')} with Table 1) instead of "
+                     f"{q.stated('table4.low.K')} and {q.stated('table4.high.K')}; Table 4's gain "
+                     f"would take Fig. 5's ramp to {q('table4.medium.p_ramp')}, where its axis "
+                     f"ends at {q.stated('table4.medium.p_ramp')}.",
+                     ("table4.*.K", "table4.*.K@table1"))  # fmt: skip
 
 
 def _bandwidth(q: Quoted) -> RootCause:
@@ -67,31 +59,34 @@ def _bandwidth(q: Quoted) -> RootCause:
         f"{q.stated('fig7.phase_margin')}) are reached, though only "
         f"{q('fig7.bandwidth.table4')} at -3 dB. Gains searched on the nonlinear bench itself meet "
         f"all four requirements, with an overshoot of {q('requirements.overshoot@retuned')}.",
-        ("fig7.bandwidth*", "table4.medium.corner*", "requirements.bandwidth*",
-         "table4.*.identified.T[12]"),
+        (
+            "fig7.bandwidth*",
+            "table4.medium.corner*",
+            "requirements.bandwidth*",
+            "table4.*.identified.T[12]",
+        ),
     )
 
 
 def _slow_pair(q: Quoted) -> RootCause:
     zero, pole = q.stated("table4.medium.zero"), q.stated("table4.medium.T_L")
-    return RootCause(
-        f"Table 4 has the zero of its slow pair below the pole ({zero} and {pole} at medium "
-        f"pressure), so that its step overshoots by {q.stated('table4.air')} and falls, which the "
-        f"paper puts down to air; 1 ml of air gives {q('table4.air')}. On our brake, without air, "
-        f"the paper's two steps give {q('table4.medium.identified.zero')} and "
-        f"{q('table4.medium.identified.T_L')}.",
-        ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"),
-    )
+    return RootCause(f"Table 4 has the zero of its slow pair below the pole ({zero} and {pole} at "
+                     f"medium pressure), so that its step overshoots by {q.stated('table4.air')} "
+                     "and falls, which the paper puts down to air; 1 ml of air gives "
+                     f"{q('table4.air')}. On our brake, without air, the paper's two steps give "
+                     f"{q('table4.medium.identified.zero')} and "
+                     f"{q('table4.medium.identified.T_L')}.",
+                     ("table4.air", "table4.*.identified.zero", "table4.*.identified.T_L"
+    ))  # fmt: skip
 
 
 def _hysteresis(q: Quoted) -> RootCause:
     ratio, slow = "fig5.loop_area_ratio", "fig5.loop_area_ratio.slow"
-    return RootCause(
-        "The hysteresis that is left under dither, where the paper says 'totally removed', is "
-        f"mostly delay: {q(ratio)} of the loop's area without dither ({q(f'{ratio}@table1')} with "
-        f"Table 1), but {q(slow)} ({q(f'{slow}@table1')}) on a ramp ten times slower.",
-        ("fig5.loop_area_ratio*", "fig5.removed_above*"),
-    )
+    return RootCause("The hysteresis that is left under dither, where the paper says 'totally "
+                     f"removed', is mostly delay: {q(ratio)} of the loop's area without dither "
+                     f"({q(f'{ratio}@table1')} with Table 1), but {q(slow)} "
+                     f"({q(f'{slow}@table1')}) on a ramp ten times slower.",
+                     ("fig5.loop_area_ratio*", "fig5.removed_above*"))  # fmt: skip
 
 
 def _single(q: Quoted) -> RootCause:

@@ -87,12 +87,9 @@ def part(runs: Runs) -> Part:
             found(f"fig5.loop_area_ratio.zeta{zeta:g}", "%", other.area_ratio, note),
         ]
     ideal = Loops(runs.bench("friction-ramp", MAIN, {"adc.law": "ideal"}))
-    items.append(
-        found(
-            "fig5.p_max.ideal_adc", "bar", ideal.p_max(WITHOUT),
-            "without dither, converters of infinite resolution: the jumps are a little higher",
-        )
-    )  # fmt: skip
+    items.append(found("fig5.p_max.ideal_adc", "bar", ideal.p_max(WITHOUT),
+                       "without dither, converters of infinite resolution: the jumps are a little "
+                       "higher"))  # fmt: skip
     text = (
         "Without dither the pressure climbs in stick-slip jumps. With dither the loop shrinks to "
         "a fraction. Most of what is left is no friction hysteresis but delay: a ramp ten times "
@@ -116,12 +113,11 @@ def part(runs: Runs) -> Part:
 def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
     """Return Fig. 5 for one parameter set."""
     recordings = runs.bench("friction-ramp", name).recordings
-    return Exhibit(
-        f"fig5{suffix.replace('@', '-')}",
-        hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
-        "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow ramp, "
-        f"averaged over one dither period; pale: with its ripple. Parameter set {name}.",
-    )
+    return Exhibit(f"fig5{suffix.replace('@', '-')}",
+                   hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
+                   "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow "
+                   "ramp, averaged over one dither period; pale: with its ripple. Parameter set "
+                   f"{name}.")  # fmt: skip
 
 
 def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
@@ -130,46 +126,31 @@ def _set_items(name: str, suffix: str, loops: Loops) -> list[Item]:
     levels = ", ".join(f"{level / BAR:.2f}" for level in stairs.levels)
     slow = 100.0 * _slow_area(name) / values["loop_area_undithered"]
     return [
-        compared(
-            f"fig5.p_max{suffix}", facts.FIG5_TOP, loops.p_max(WITHOUT), "<=", "without dither"
-        ),
-        compared(
-            f"fig5.p_max.dither{suffix}", facts.FIG5_TOP, loops.p_max(WITH), "<=", "with dither"
-        ),
-        compared(
-            f"fig5.loop_area_ratio{suffix}", facts.FIG5_LOOP, loops.area_ratio, LOOP.size,
-            "area with dither over that without, averaged over one dither period; mostly delay",
-        ),
-        compared(
-            f"fig5.loop_area_ratio.slow{suffix}", facts.FIG5_LOOP, slow, LOOP.size,
-            f"the same with dither on a ramp {SLOWER:g} times slower: friction alone",
-        ),
-        compared(
-            f"fig5.removed_above{suffix}", facts.FIG5_REMOVED, loops.removed_above,
-            LEVEL.size,
-            f"pressure above which the width stays below {100 * REMOVED:g} % of the undithered "
-            f"loop's at mid-height; {LEVEL.size:g} bar is the lowest level looked at",
-        ),
-        compared(
-            f"fig5.i_max.dither{suffix}", facts.FIG5_CURRENT,
-            peak(loops.result.recordings[WITH], "i_filtered"), "<=",
-            "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more ripple "
-            "than the figure has room for",
-        ),
+        compared(f"fig5.p_max{suffix}", facts.FIG5_TOP, loops.p_max(WITHOUT), "<=",
+                 "without dither"),
+        compared(f"fig5.p_max.dither{suffix}", facts.FIG5_TOP, loops.p_max(WITH), "<=",
+                 "with dither"),
+        compared(f"fig5.loop_area_ratio{suffix}", facts.FIG5_LOOP, loops.area_ratio, LOOP,
+                 "area with dither over that without, averaged over one dither period; mostly "
+                 "delay"),
+        compared(f"fig5.loop_area_ratio.slow{suffix}", facts.FIG5_LOOP, slow, LOOP,
+                 f"the same with dither on a ramp {SLOWER:g} times slower: friction alone"),
+        compared(f"fig5.removed_above{suffix}", facts.FIG5_REMOVED, loops.removed_above, LEVEL,
+                 f"pressure above which the width stays below {100 * REMOVED:g} % of the "
+                 f"undithered loop's at mid-height; {LEVEL.size:g} bar is the lowest level looked "
+                 "at"),
+        compared(f"fig5.i_max.dither{suffix}", facts.FIG5_CURRENT,
+                 peak(loops.result.recordings[WITH], "i_filtered"), "<=",
+                 "measured current behind the 20 Hz low-pass: dither of eq. (20) leaves more "
+                 "ripple than the figure has room for"),
         found(f"fig5.jumps{suffix}", "1", float(stairs.levels.size), f"ending at {levels} bar"),
-        found(
-            f"fig5.share_stuck{suffix}", "%", 100.0 * values["share_stuck_undithered"],
-            "of the time, without dither",
-        ),
-        found(
-            f"fig5.share_stuck.dither{suffix}", "%", 100.0 * values["share_stuck_dithered"],
-            "of the time, with dither",
-        ),
-        found(
-            f"fig5.dither_passed{suffix}", "%", loops.dither_passed,
-            "motor current at 50 Hz over the dither, through the 80 Hz filter and the current "
-            "loop; section 4.2, without a number: the loop correctly tracks the dither",
-        ),
+        found(f"fig5.share_stuck{suffix}", "%", 100.0 * values["share_stuck_undithered"],
+              "of the time, without dither"),
+        found(f"fig5.share_stuck.dither{suffix}", "%", 100.0 * values["share_stuck_dithered"],
+              "of the time, with dither"),
+        found(f"fig5.dither_passed{suffix}", "%", loops.dither_passed, "motor current at 50 Hz "
+              "over the dither, through the 80 Hz filter and the current loop; section 4.2, "
+              "without a number: the loop correctly tracks the dither"),
     ]  # fmt: skip
 
 
@@ -178,12 +159,12 @@ def _slow_area(name: str) -> float:
     slope = facts.RAMP_PEAK.value / 25.0 / SLOWER
     bench = Bench("friction-ramp", name, options={"slope": slope})
     case = next(c for c in bench.cases() if c.label == WITH)
-    found_run = simulate(as_run(case, bench.step), signals=("i", "p_mc"))
-    if found_run.status == "interrupted":
+    slow = simulate(as_run(case, bench.step), signals=("i", "p_mc"))
+    if slow.status == "interrupted":
         raise KeyboardInterrupt
-    t = found_run.time
+    t = slow.time
     period = 1.0 / parameters(name).ecu.dither.f_dit
-    i, p = (smoothed(t, found_run[signal], period) for signal in ("i", "p_mc"))
+    i, p = (smoothed(t, slow[signal], period) for signal in ("i", "p_mc"))
     return hysteresis.loop_area(hysteresis.Loop(t, i, p)).value
 
 

@@ -25,14 +25,8 @@ from bywire.reproduction.reproduction import Part
 class Change:
     """A value of Table 1 that the calibrated set changes.
 
-    Parameters
-    ----------
-    name
-        Parameter.
-    symbol
-        Its symbol in Table 1.
-    unit, factor
-        Unit at the edge, and how many of it one SI unit is.
+    ``name``: parameter; ``symbol``: its symbol in Table 1; ``unit``, ``factor``: unit at the edge,
+    and how many of it one SI unit is.
     """
 
     name: str
@@ -90,26 +84,17 @@ def _short_stroke() -> list[Item]:
     par = par.replace({"master_cylinder.x_rest": _rest(par)})
     p_end = float(brentq(lambda p: travel_at(p, par) - s_mc, P_NOMINAL, 60e5))
     return [
-        found(
-            "short_stroke.s_mc", "mm", 1e3 * s_mc, "gives Table 1 in (15) the pole 3 of Table 2"
-        ),
-        compared(
-            "short_stroke.pole3", facts.TABLE2["pole3"], pole(s_mc), DIGITS.around(wanted),
-            "Table 1 with that stroke", tuned="calibrated",
-        ),
-        compared(
-            "short_stroke.p_end", facts.SENSOR_RANGE,
-            p_end / BAR, None,
-            "pressure at which the piston meets the chamber's end with that stroke: within the "
-            "range; not judged, the stroke is a trial of ours",
-        ),
+        found("short_stroke.s_mc", "mm", 1e3 * s_mc, "gives Table 1 in (15) the pole 3 of Table 2"),
+        compared("short_stroke.pole3", facts.TABLE2["pole3"], pole(s_mc), DIGITS,
+                 "Table 1 with that stroke", tuned="calibrated"),
+        compared("short_stroke.p_end", facts.SENSOR_RANGE, p_end / BAR, None,
+                 "pressure at which the piston meets the chamber's end with that stroke: within "
+                 "the range; not judged, the stroke is a trial of ours"),
     ]  # fmt: skip
 
 
 def _with_stroke(par: MotorcycleParameters, s_mc: float) -> MotorcycleParameters:
-    return par.replace(
-        {"master_cylinder.s_mc": s_mc, "master_cylinder.x_end": s_mc * (1.0 - 1e-6)}
-    )
+    return par.replace({"master_cylinder.s_mc": s_mc, "master_cylinder.x_end": s_mc * (1.0 - 1e-6)})
 
 
 def _rest(par: MotorcycleParameters) -> float:
@@ -127,8 +112,6 @@ def _laminar(par: MotorcycleParameters) -> Item:
     d, nu, rho = par.pipeline.d_pl, par.fluid.nu, par.fluid.rho
     textbook = 128.0 * nu * rho * par.pipeline.L_pl / (math.pi * d**4)
     coefficient = par.pipeline.k_lf * textbook / pipeline.resistance(par.pipeline, par.fluid)
-    return compared(
-        "laminar.coefficient", facts.K_LF, coefficient, DIGITS.around(facts.K_LF.value),
-        "128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: a quarter; "
-        "the models use the paper's",
-    )  # fmt: skip
+    return compared("laminar.coefficient", facts.K_LF, coefficient, DIGITS,
+                    "128 nu rho L/(pi d^4) of Hagen and Poiseuille, written as k nu rho pi L/A^2: "
+                    "a quarter; the models use the paper's")  # fmt: skip

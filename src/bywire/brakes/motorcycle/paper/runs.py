@@ -35,14 +35,8 @@ class Runs(runs.Runs):
     def settled_step(self, name: str, p: float, i_step: float) -> Result:
         """Return a current step that begins where the dithered pressure has settled at ``p``.
 
-        Parameters
-        ----------
-        name
-            Parameter set.
-        p
-            Pressure before the step [Pa].
-        i_step
-            Height of the step [A].
+        ``name``: parameter set; ``p``: pressure before the step [Pa]; ``i_step``: height of the
+        step [A].
         """
         return self.bench("pressure-step", name, options={"p_start": p, "i_step": i_step})
 

@@ -26,16 +26,8 @@ def of_set_point(
 ) -> xr.Dataset:
     """Return pressure over its set point, dimensions amplitude and frequency.
 
-    Parameters
-    ----------
-    name
-        Parameter set.
-    p
-        Mean pressure [Pa].
-    amplitudes
-        Of the set point [Pa].
-    frequencies
-        In Hz.
+    ``name``: parameter set; ``p``: mean pressure [Pa]; ``amplitudes``: of the set point [Pa];
+    ``frequencies``: in Hz.
     """
     return _measured(LOOPS.find("pressure").point(parameters(name), p), "p_set", amplitudes,
                      frequencies)  # fmt: skip

@@ -37,12 +37,10 @@ def part(runs: Runs) -> Part:
     items += _corner(runs, measured)
     items += dardanelli2010_identified.items()
     K = facts.TABLE4["medium"]["K"]
-    items.append(
-        compared(
-            "table4.medium.p_ramp", facts.FIG5_TOP, K.value * facts.RAMP_PEAK.value, None,
-            "Table 4's gain times the ramp's 5 A; paper beside paper, not judged",
-        )
-    )  # fmt: skip
+    items.append(compared("table4.medium.p_ramp", facts.FIG5_TOP, K.value * facts.RAMP_PEAK.value,
+                          None,
+                          "Table 4's gain times the ramp's 5 A; paper beside paper, not judged"
+    ))  # fmt: skip
     text = (
         "Table 4's gains fit neither Fig. 5 nor the published friction with the published dither: "
         "f_cfr,p exceeds f_cfr,n, so that dither leaves a mean friction against applying. Dither "
@@ -52,7 +50,9 @@ def part(runs: Runs) -> Part:
         "friction and dither leave the first pole, and its zero beside T1."
     )
     return Part(
-        "Table 4: identified models", text, tuple(items),
+        "Table 4: identified models",
+        text,
+        tuple(items),
         (_figure(measured), dardanelli2010_identified.exhibit()),
     )
 
@@ -64,22 +64,15 @@ def _region(runs: Runs, region: str, p: float) -> list[Item]:
     for name, suffix in SETS.items():
         step = runs.settled_step(name, p, facts.FIG6_STEP.value)
         gain = kpis(step)["static_gain"] / BAR
-        items.append(
-            compared(
-                f"{prefix}.K{suffix}", row["K"], gain, GAIN.around(row["K"].value),
-                f"nonlinear brake with dither, step of 0.35 A at {before(step) / BAR:.1f} bar",
-            )
-        )  # fmt: skip
+        items.append(compared(f"{prefix}.K{suffix}", row["K"], gain, GAIN,
+                              "nonlinear brake with dither, step of 0.35 A at "
+                              f"{before(step) / BAR:.1f} bar"))  # fmt: skip
     par = parameters(MAIN)
     slow, fast, _ = theoretical(par, p, travel_at(p, par)).poles_hz
     for key, pole in (("T1", slow), ("T2", fast)):
-        items.append(
-            compared(
-                f"{prefix}.{key}", row[key], float(pole), CORNER.around(row[key].value),
-                "pole of eq. (15), tuned to Table 2, where the paper's fit started",
-                tuned="calibrated",
-            )
-        )  # fmt: skip
+        items.append(compared(f"{prefix}.{key}", row[key], float(pole), CORNER,
+                              "pole of eq. (15), tuned to Table 2, where the paper's fit started",
+                              tuned="calibrated"))  # fmt: skip
     note = "low-frequency pair, put down to air in the fluid; no counterpart in eqs. (13) to (15)"
     return [*items, *(quoted(f"{prefix}.{key}", row[key], note) for key in ("zero", "T_L"))]
 
@@ -87,12 +80,7 @@ def _region(runs: Runs, region: str, p: float) -> list[Item]:
 def step_peak(model: Rational, height: float) -> tuple[float, float]:
     """Return time [s] and height of the highest point of a step response.
 
-    Parameters
-    ----------
-    model
-        Linear model.
-    height
-        Height of the step, in the input's unit.
+    ``model``: linear model; ``height``: height of the step, in the input's unit.
     """
     t = np.arange(0.0, 10.0, 1e-3)
     y = height * model.step(t)
@@ -111,17 +99,12 @@ def _medium_step() -> list[Item]:
         found("table4.medium.step_peak", "bar", high / BAR, "eq. (22), step of 0.35 A"),
         found("table4.medium.step_peak_time", "s", t_peak, "eq. (22), step of 0.35 A"),
         found("table4.medium.step_final", "bar", final / BAR, "eq. (22), step of 0.35 A"),
-        found(
-            "table4.medium.zero_below_pole", "1", row["zero"].value / row["T_L"].value,
-            "zero over pole of the slow pair: below 1 the step overshoots and falls; a leak or air "
-            "that fills slowly needs more than 1",
-        ),
-        compared(
-            "table4.air", Fact(100.0 * (high / final - 1.0), "%", EQ22),
-            air, OVERSHOOT.size,
-            "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber, which "
-            "moves the slow pole and adds no pair below it: air is not what Table 4 shows",
-        ),
+        found("table4.medium.zero_below_pole", "1", row["zero"].value / row["T_L"].value,
+              "zero over pole of the slow pair: below 1 the step overshoots and falls; a leak or "
+              "air that fills slowly needs more than 1"),
+        compared("table4.air", Fact(100.0 * (high / final - 1.0), "%", EQ22), air, OVERSHOOT,
+                 "overshoot of the step; computed: eq. (15) with 1 ml of air in the chamber, which "
+                 "moves the slow pole and adds no pair below it: air is not what Table 4 shows"),
     ]  # fmt: skip
 
 
@@ -137,12 +120,12 @@ def _with_air(height: float) -> float:
 
 def _sines(runs: Runs) -> dict[str, xr.Dataset]:
     """Return the dithered brake's response to small sines of the current demand."""
-    found_tests: dict[str, xr.Dataset] = {}
+    tests: dict[str, xr.Dataset] = {}
     for name in SETS:
         step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
         start = step.bench.chosen_options.flat()["p_start"]
-        found_tests[name] = of_current(name, start, (AMPLITUDE,), FREQUENCIES).isel(amplitude=0)
-    return found_tests
+        tests[name] = of_current(name, start, (AMPLITUDE,), FREQUENCIES).isel(amplitude=0)
+    return tests
 
 
 def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
@@ -155,12 +138,10 @@ def _corner(runs: Runs, measured: dict[str, xr.Dataset]) -> list[Item]:
     items = []
     for name, suffix in SETS.items():
         step = runs.settled_step(name, facts.REGIONS["medium"], facts.FIG6_STEP.value)
-        one, static = measured[name], kpis(step)["static_gain"]
-        corner = fall(one["gain"].values, one["frequency"].values, static)
+        test, static = measured[name], kpis(step)["static_gain"]
+        corner = fall(test["gain"].values, test["frequency"].values, static)
         note = "-3 dB; computed: nonlinear brake with dither, sines of 0.1 A at 25 bar"
-        items.append(
-            compared(f"table4.medium.corner{suffix}", fact, corner, CORNER.around(stated), note)
-        )
+        items.append(compared(f"table4.medium.corner{suffix}", fact, corner, CORNER, note))
     return items
 
 
@@ -171,16 +152,15 @@ def _figure(measured: dict[str, xr.Dataset]) -> Exhibit:
         Response("eq. (15), calibrated", f, theoretical(parameters(MAIN)).response(f) / BAR),
         *(
             Response(
-                f"with dither, {name}", test["frequency"].values, complex_values(test) / BAR,
+                f"with dither, {name}",
+                test["frequency"].values,
+                complex_values(test) / BAR,
                 measured=True,
             )
             for name, test in measured.items()
         ),
     ]
-    return Exhibit(
-        "table4-bode",
-        bode(responses, gain_unit="bar/A"),
-        "Pressure over current demand at 25 bar: Table 4's medium model, eq. (15), and the "
-        "nonlinear brake with friction and dither (points: sines of 0.1 A through the 80 Hz "
-        "filter and the current loop).",
-    )
+    return Exhibit("table4-bode", bode(responses, gain_unit="bar/A"),
+                   "Pressure over current demand at 25 bar: Table 4's medium model, eq. (15), and "
+                   "the nonlinear brake with friction and dither (points: sines of 0.1 A through "
+                   "the 80 Hz filter and the current loop).")  # fmt: skip

@@ -28,16 +28,8 @@ _DOUBLE_POLE = math.sqrt(math.sqrt(2.0) - 1.0)  # -3 dB frequency of 1/(1+s)^2, 
 class Course:
     """A wanted pressure p_mc, its derivatives, and the caliper pressure, shape (n,) each.
 
-    Parameters
-    ----------
-    t
-        Times [s].
-    p, rate, bend
-        Pressure [Pa] and its first and second derivatives.
-    p_pd
-        Caliper pressure [Pa].
-    middle
-        Pressure [Pa] at which the compliances are taken.
+    ``t``: times [s]; ``p``, ``rate``, ``bend``: pressure [Pa] and its first and second derivatives;
+    ``p_pd``: caliper pressure [Pa]; ``middle``: pressure [Pa] at which the compliances are taken.
     """
 
     t: Array
@@ -52,18 +44,10 @@ class Course:
 class Motion:
     """What the motor does, shape (n,) each, SI.
 
-    Parameters
-    ----------
-    omega
-        Speed [rad/s].
-    torque
-        Electromagnetic torque [N m].
-    inertia
-        Part of it that accelerates rotor and piston [N m].
-    current, voltage
-        Current [A] and voltage of the winding [V], its inductance left out.
-    available
-        Voltage that the bridge can give at this current [V].
+    ``omega``: speed [rad/s]; ``torque``: electromagnetic torque [N m]; ``inertia``: part of it that
+    accelerates rotor and piston [N m]; ``current``, ``voltage``: current [A] and voltage of the
+    winding [V], its inductance left out; ``available``: voltage that the bridge can give at this
+    current [V].
     """
 
     omega: Array

@@ -164,9 +164,9 @@ def solve(d: Overlaps, par: Parameters) -> Forces:
     lower, upper = ops.fmin(d.d_1, d.d_2), ops.fmax(d.d_1, d.d_2)
     # The root moves down where a contact opens: the largest candidate is the root.
     none = d.d_12 / t
-    one = (d.d_12 + s / w * upper) / (t - s * s / w)
+    upper_alone = (d.d_12 + s / w * upper) / (t - s * s / w)
     both = (d.d_12 + s / w * (upper + lower)) / (t - 2.0 * s * s / w)
-    f_12 = ops.fmax(ops.fmax(none, 0.0), ops.fmax(one, both))
+    f_12 = ops.fmax(ops.fmax(none, 0.0), ops.fmax(upper_alone, both))
     return Forces(
         f_1=ops.fmax(d.d_1 + s * f_12, 0.0) / w,
         f_2=ops.fmax(d.d_2 + s * f_12, 0.0) / w,

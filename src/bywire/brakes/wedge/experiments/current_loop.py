@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
+from itertools import product
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis import step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.brakes.wedge.case import steps
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import check_current, shaft_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, Duration, Unit
-from bywire.core.typing import Array
 
 _Shares = tuple[Annotated[float, Field(gt=0, allow_inf_nan=False)], ...]
 ThreeFactors = Annotated[_Shares, Unit("1", 2.0), Field(min_length=3, max_length=3)]
 
 _WINDINGS, _GAINS = ("parallel", "single", "series"), ("soft", "usual", "sharp")
-_FIGURES = ("rise_time", "overshoot", "settling_time")
+_FIGURES = ("rise_time", "overshoot", "settling_time")  # of the step response
 _LABELS = tuple(f"{winding}_{gain}" for winding in _WINDINGS for gain in _GAINS)
-_UNITS = {"rise_time": "s", "overshoot": "%", "settling_time": "s", "bandwidth": "Hz"}
+LAG = Figures(bandwidth=("Hz", "Corner of the first-order lag with this rise time."))
+_UNITS = {name: units_of("step_response")[name] for name in _FIGURES} | LAG.units
 
 
 class Options(ParameterSet):
@@ -46,11 +47,12 @@ class Options(ParameterSet):
     """recording interval"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return one run per winding and gain, the shaft clamped."""
     check_current("i_step", options.i_step, par)
-    found: list[Case] = []
-    for label, (winding, gain) in zip(_LABELS, _factors(options), strict=True):
+    factors = product(options.windings, options.gains)
+    runs: list[Case] = []
+    for label, (winding, gain) in zip(_LABELS, factors, strict=True):
         changes: dict[str, Any] = {
             "rig.load": "dummy", "rig.clamp": "closed", "rig.mode_1": "current",
             "motor_1.R_ref": winding * par.motor_1.R_ref,
@@ -58,44 +60,28 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
             "drive.k_p": gain * par.drive.k_p,
             "drive.k_i": gain * par.drive.k_i,
         }  # fmt: skip
-        found.append(
+        runs.append(
             shaft_case(
-                label, par, _step(options.i_step), options.duration, changes,
+                label, par, lambda t: {"i_1_set": steps(t, {0.0: options.i_step})},
+                options.duration, changes,
                 settle=par.control.T_fast, keep=par.control.T_fast, record=options.record,
             )
         )  # fmt: skip
-    return tuple(found)
+    return tuple(runs)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of all steps, their names with the case's label behind."""
-    found: list[Kpi] = []
+    kpis: list[Kpi] = []
     for label in _LABELS:
         setting = step_response.Setting("i_1", 0.0, 0.0, options.i_step)
         step = evaluate("step_response", recordings[label], setting)
-        found += [
-            Kpi(f"{name}_{label}", own.value, own.unit, own.definition, own.note)
-            for name, own in ((name, step[name]) for name in _FIGURES)
-        ]
+        kpis += [replace(step[name], name=f"{name}_{label}") for name in _FIGURES]
         rise = step["rise_time"]
         # A first-order lag of corner f rises from 10 to 90 % within ln(9) / (2 pi f).
         bandwidth = math.log(9.0) / (2.0 * math.pi * rise.value)
-        found.append(
-            Kpi(f"bandwidth_{label}", bandwidth, "Hz",
-                "Corner of the first-order lag with this rise time.", rise.note)
-        )  # fmt: skip
-    return tuple(found)
-
-
-def _factors(options: Options) -> tuple[tuple[float, float], ...]:
-    return tuple((winding, gain) for winding in options.windings for gain in options.gains)
-
-
-def _step(level: float) -> Any:
-    def stimulus(t: Array) -> dict[str, Array]:
-        return {"i_1_set": np.where(t >= -1e-9, level, 0.0)}
-
-    return stimulus
+        kpis += LAG(f"_{label}", bandwidth=(bandwidth, rise.note))
+    return tuple(kpis)
 
 
 EXPERIMENT = Experiment(

@@ -7,15 +7,12 @@ disc stands; that the standing pad sticks is the other reading. Both are run.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
     case_from_parked,
     mean,
@@ -34,18 +31,21 @@ from bywire.plant.flywheel import DiscSpeed
 READINGS = ("drop", "stick")
 _CALM = 0.05  # time after the stop [s] in which wedge and current may still move
 
-_UNITS = {
-    "stopping_time": "s",
-    "stopping_angle": "rad",
-    "moment_before_stop": "N*m",
-    "force_before_stop": "N",
-    "force_held": "N",
-    "force_change": "N",
-    "reference_change": "rad",
-    "hold_power": "W",
-    "release_time": "s",
-    "parking_time": "s",
-}
+FIGURES = Figures(
+    stopping_time=("s", "Time from the demand until the disc stands."),
+    stopping_angle=("rad", "Angle of the disc until then."),
+    moment_before_stop=(
+        "N*m", "Mean moment in the last tenth of braking; the run-out is in it."
+    ),
+    force_before_stop=("N", "Mean normal force in the last tenth of braking."),
+    force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
+    force_change=("N", "Normal force peak to peak in that time."),
+    reference_change=(
+        "rad", "How far the common reference moves toward clamping while the disc stands: wind-up."
+    ),
+    hold_power=("W", "Mean input power in the time of the held force, standby included."),
+)  # fmt: skip
+_UNITS = {**FIGURES.units, "release_time": "s", "parking_time": "s"}
 
 
 class Options(ParameterSet):
@@ -63,7 +63,7 @@ class Options(ParameterSet):
     """time parked before braking"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return one run for each reading of what the pads do to the wedge on a standing disc."""
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return tuple(
@@ -80,113 +80,52 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Stop:
-    """The rows of a run around its standstill: braking, and standing until the release."""
-
-    run: xr.Dataset
-    turning: xr.Dataset
-    standing: xr.Dataset
-    t_release: float
-
-    @property
-    def begin(self) -> float:
-        """Time [s] from which the held brake is judged."""
-        return float(self.standing["time"].values[0]) + _CALM
-
-    def moved(self, name: str) -> float:
-        """Return how far a signal moves away from zero, from the standstill to the release."""
-        values = np.abs(self.standing[name].values)
-        return float(values[-1] - values[0])
-
-
-def find_stop(run: xr.Dataset, options: Options) -> Stop | str:
-    """Return the standstill of a run, or why there is none to judge."""
+def stop_figures(run: xr.Dataset, options: Options) -> dict[str, float] | str:
+    """Return key figures around the standstill of a run, or why there is none to judge."""
     braked = run.sel(time=slice(-1e-9, options.t_hold - 1e-9))
     turns = np.abs(braked["Omega"].values) > parameters_of(run).flywheel.Omega_still
     if not turns[:1].any():
         return "the disc stands from the start"
     if turns[-1]:
         return "the disc still turns when the demand falls to zero"
-    stop = int(np.flatnonzero(turns)[-1]) + 1
-    found = Stop(
-        run,
-        braked.isel(time=slice(None, stop)),
-        braked.isel(time=slice(stop, None)),
-        options.t_hold,
-    )
-    if found.begin > float(braked["time"].values[-1]):
+    k = int(np.flatnonzero(turns)[-1]) + 1
+    turning, standing = braked.isel(time=slice(None, k)), braked.isel(time=slice(k, None))
+    stop = float(standing["time"].values[0])
+    begin, end = stop + _CALM, options.t_hold
+    if begin > float(braked["time"].values[-1]):
         return f"the disc stands for less than {_CALM:g} s before the demand falls to zero"
-    return found
+    reference = np.abs(standing["theta_ref"].values)
+    return {
+        "stopping_time": stop,
+        "stopping_angle": abs(float(standing["phi"].values[0] - turning["phi"].values[0])),
+        "moment_before_stop": _last_tenth(turning, "M_B"),
+        "force_before_stop": _last_tenth(turning, "F_N"),
+        "force_held": mean(standing, "F_N", begin, end),
+        "force_change": swing(standing, "F_N", begin, end),
+        "reference_change": float(reference[-1] - reference[0]),
+        "hold_power": mean(standing, "P_in", begin, end),
+    }
 
 
-def _held(stop: Stop) -> float:
-    return mean(stop.standing, "F_N", stop.begin, stop.t_release)
-
-
-def _last(signal: str) -> Callable[[Stop], float]:
+def _last_tenth(turning: xr.Dataset, signal: str) -> float:
     """Return the mean magnitude of a signal over the last tenth of braking."""
-
-    def of(stop: Stop) -> float:
-        rows = np.abs(stop.turning[signal].values)
-        return float(rows[-max(1, rows.size // 10) :].mean())
-
-    return of
-
-
-_FIGURES: dict[str, tuple[Callable[[Stop], float], str]] = {
-    "stopping_time": (
-        lambda s: float(s.standing["time"].values[0]),
-        "Time from the demand until the disc stands.",
-    ),
-    "stopping_angle": (
-        lambda s: abs(float(s.standing["phi"].values[0] - s.turning["phi"].values[0])),
-        "Angle of the disc until then.",
-    ),
-    "moment_before_stop": (
-        _last("M_B"),
-        "Mean moment in the last tenth of braking; the run-out is in it.",
-    ),
-    "force_before_stop": (_last("F_N"), "Mean normal force in the last tenth of braking."),
-    "force_held": (_held, f"Mean normal force from {_CALM:g} s after the stop to the release."),
-    "force_change": (
-        lambda s: swing(s.standing, "F_N", s.begin, s.t_release),
-        "Normal force peak to peak in that time.",
-    ),
-    "reference_change": (
-        lambda s: s.moved("theta_ref"),
-        "How far the common reference moves toward clamping while the disc stands: wind-up.",
-    ),
-    "hold_power": (
-        lambda s: mean(s.standing, "P_in", s.begin, s.t_release),
-        "Mean input power in the time of the held force, standby included.",
-    ),
-}  # fmt: skip
+    rows = np.abs(turning[signal].values)
+    return float(rows[-max(1, rows.size // 10) :].mean())
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how the disc stops, what is held on it, and how the brake lets go, per reading."""
-    return tuple(kpi for reading in READINGS for kpi in _judge_one(recordings, reading, options))
-
-
-def _judge_one(recordings: Recordings, reading: str, options: Options) -> tuple[Kpi, ...]:
-    run = recordings[reading]
-    stop = find_stop(run, options)
-    found = [
-        Kpi(
-            f"{name}_{reading}",
-            math.nan if isinstance(stop, str) else figure(stop),
-            _UNITS[name],
-            text,
-            stop if isinstance(stop, str) else "",
-        )
-        for name, (figure, text) in _FIGURES.items()
-    ]
-    return (
-        *found,
-        release_time(run, options.t_hold, f"release_time_{reading}"),
-        parking_time(run, options.t_hold, f"parking_time_{reading}"),
-    )
+    kpis: list[Kpi] = []
+    for reading in READINGS:
+        run = recordings[reading]
+        stop = stop_figures(run, options)
+        if isinstance(stop, str):
+            kpis += FIGURES(f"_{reading}", **dict.fromkeys(FIGURES.units, (math.nan, stop)))
+        else:
+            kpis += FIGURES(f"_{reading}", **stop)
+        kpis.append(release_time(run, options.t_hold, f"release_time_{reading}"))
+        kpis.append(parking_time(run, options.t_hold, f"parking_time_{reading}"))
+    return tuple(kpis)
 
 
 EXPERIMENT = Experiment(

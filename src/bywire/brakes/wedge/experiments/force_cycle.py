@@ -9,35 +9,34 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import parameters_of
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
     Stimuli,
-    parameters_of,
+    heart_case,
     screw_case,
     slope_of,
+    squeezing_current,
     torque_constant_of,
 )
-from bywire.brakes.wedge.start import memory_at
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Length
 from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
 LABELS = ("sensor", "heart")
-_UNITS = {
-    "force_compression": "N",
-    "force_tension": "N",
-    "stiffness": "N/m",
-    "peak_current_sensor": "A",
-    "peak_current_heart": "A",
-    "hysteresis": "N*m",
-}
+FIGURES = Figures(
+    force_compression=("N", "Largest force on the sensor."),
+    force_tension=("N", "Largest tension on the sensor."),
+    stiffness=("N/m", "Force over travel with the sensor between, by a straight line."),
+    peak_current_sensor=("A", "Largest mean current of both motors, on the sensor."),
+    peak_current_heart=("A", "The same in the brake heart."),
+    hysteresis=("N*m", "Friction torque, half the loop's width, mean over the cycle."),
+    undefined="no travel: ask for more",
+)
 
 
 class Options(ParameterSet):
@@ -53,17 +52,15 @@ class Options(ParameterSet):
     """speed of both motors"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return both stages; the wedge stays in its clearance."""
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
-    # Without an offset of the screws, so that the test begins without force.
-    own = par.replace({"command.mode": "position", "control.offset.delta_preload": 0.0})
     squeeze, t_sensor = _cycle(par, options.c_sensor, options.c_sensor, options)
     seize, t_heart = _cycle(par, options.c_close, options.c_apart, options)
-    heart = Case(
-        "heart", WedgeBrake(), own, state_at(0.0, own), memory_at(0.0, own), seize, t_heart
+    return (
+        screw_case("sensor", par, squeeze, t_sensor, modes),
+        heart_case(par, seize, t_heart, "position"),
     )
-    return (screw_case("sensor", par, squeeze, t_sensor, modes), heart)
 
 
 def _cycle(
@@ -85,34 +82,17 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the forces reached, the line's stiffness, and what friction makes of a cycle."""
     run = recordings["sensor"]
     par = parameters_of(run)
-    F, i = run["y_F"].values, _current(run)
+    F, i = run["y_F"].values, squeezing_current(run)
     d = slope_of(par) * (run["q_1"].values - run["q_2"].values)
     work = 0.5 * abs(float(np.trapezoid(torque_constant_of(par) * i, F)))
-    width = work / max(float(np.ptp(F)), 1e-9)
-    values = {
-        "force_compression": (float(F.max()), "Largest force on the sensor."),
-        "force_tension": (float(-F.min()), "Largest tension on the sensor."),
-        "stiffness": (float(np.polyfit(d, F, 1)[0]) if np.ptp(d) > 0 else math.nan,
-                      "Force over travel with the sensor between, by a straight line."),
-        "peak_current_sensor": (_peak(run), "Largest mean current of both motors, on the sensor."),
-        "peak_current_heart": (_peak(recordings["heart"]), "The same in the brake heart."),
-        "hysteresis": (width, "Friction torque, half the loop's width, mean over the cycle."),
-    }  # fmt: skip
-    return tuple(_kpi(name, *values[name]) for name in _UNITS)
-
-
-def _current(run: xr.Dataset) -> Array:
-    """Return the current [A] that squeezes, the mean of both motors."""
-    return np.asarray(0.5 * (run["i_1"].values - run["i_2"].values))
-
-
-def _peak(run: xr.Dataset) -> float:
-    return float(np.abs(_current(run)).max())
-
-
-def _kpi(name: str, value: float, text: str) -> Kpi:
-    note = "" if math.isfinite(value) else "no travel: ask for more"
-    return Kpi(name, value, _UNITS[name], text, note)
+    return FIGURES(
+        force_compression=F.max(),
+        force_tension=-F.min(),
+        stiffness=np.polyfit(d, F, 1)[0] if np.ptp(d) > 0 else math.nan,
+        peak_current_sensor=np.abs(i).max(),
+        peak_current_heart=np.abs(squeezing_current(recordings["heart"])).max(),
+        hysteresis=work / max(float(np.ptp(F)), 1e-9),
+    )
 
 
 EXPERIMENT = Experiment(
@@ -123,6 +103,6 @@ EXPERIMENT = Experiment(
     defaults=Options(c_sensor=1.5e-4, c_close=1.4e-4, c_apart=3e-4, omega_slow=0.3),
     cases=cases,
     judge=judge,
-    kpis=_UNITS,
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

@@ -9,11 +9,11 @@ import numpy as np
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import mean
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.position_steps import SomeAngle
-from bywire.brakes.wedge.rigs.rig_case import mean_between, peak, screw_case
+from bywire.brakes.wedge.rigs.rig_case import peak, screw_case
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency, Unit
 from bywire.core.typing import Array
@@ -23,9 +23,14 @@ SomeSpeed = Annotated[float, Unit("rad/s", 50.0), Field(gt=0, allow_inf_nan=Fals
 
 _MOTIONS = ("step", "ramp", "sine")
 _LABELS = tuple(f"{motion}_{pair}" for motion in _MOTIONS for pair in ("equal", "unequal"))
-_UNITS = {f"peak_force_{label}": "N" for label in _LABELS}
-_UNITS |= {f"static_force_{pair}": "N" for pair in ("equal", "unequal")}
-_UNITS |= {"peak_difference_sine_unequal": "rad"}
+_PAIRS = tuple(f"_{pair}" for pair in ("equal", "unequal"))
+PEAK = Figures(peak_force=("N", "Largest magnitude that the force sensor shows."))
+HELD = Figures(
+    static_force=(
+        "N", "Magnitude of the mean force in the last tenth of the time after the step."
+    ),
+)  # fmt: skip
+APART = Figures(peak_difference=("rad", "Largest difference of the encoders."))
 
 
 class Options(ParameterSet):
@@ -53,15 +58,15 @@ class Options(ParameterSet):
     """recording interval"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return every motion with the motors of the parameter set, and with motor 2 different."""
     modes = {"rig.mode_1": "position", "rig.mode_2": "position"}
-    own = par.motor_2
+    motor = par.motor_2
     different = {
-        "motor_2.K_ref": own.K_ref * (1.0 + options.more_K),
-        "motor_2.J_M": own.J_M * (1.0 + options.more_J),
-        "motor_2.R_ref": own.R_ref * (1.0 + options.more_R),
-        "motor_2.D_M": own.D_M * (1.0 + options.more_D),
+        "motor_2.K_ref": motor.K_ref * (1.0 + options.more_K),
+        "motor_2.J_M": motor.J_M * (1.0 + options.more_J),
+        "motor_2.R_ref": motor.R_ref * (1.0 + options.more_R),
+        "motor_2.D_M": motor.D_M * (1.0 + options.more_D),
     }
     return tuple(
         screw_case(
@@ -75,22 +80,16 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the largest forces, with and without the difference between the motors."""
-    found = [
-        Kpi(f"peak_force_{label}", peak(recordings[label], "y_F"), "N",
-            "Largest magnitude that the force sensor shows.")
-        for label in _LABELS
-    ]  # fmt: skip
-    for pair in ("equal", "unequal"):
-        run = recordings[f"step_{pair}"]
-        held = abs(mean_between(run, "y_F", 0.9 * options.duration, options.duration))
-        text = "Magnitude of the mean force in the last tenth of the time after the step."
-        found.append(Kpi(f"static_force_{pair}", held, "N", text))
+    kpis: list[Kpi] = []
+    for label in _LABELS:
+        kpis += PEAK(f"_{label}", peak_force=peak(recordings[label], "y_F"))
+    for pair in _PAIRS:
+        run = recordings[f"step{pair}"]
+        held = abs(mean(run, "y_F", 0.9 * options.duration, options.duration))
+        kpis += HELD(pair, static_force=held)
     run = recordings["sine_unequal"]
-    apart = float(np.abs(run["q_1"].values - run["q_2"].values).max())
-    found.append(
-        Kpi("peak_difference_sine_unequal", apart, "rad", "Largest difference of the encoders.")
-    )
-    return tuple(found)
+    apart = np.abs(run["q_1"].values - run["q_2"].values).max()
+    return (*kpis, *APART("_sine_unequal", peak_difference=apart))
 
 
 def _reference(motion: str, options: Options) -> Any:
@@ -120,6 +119,8 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
-    kpis=_UNITS,
+    kpis=PEAK.ending(*(f"_{label}" for label in _LABELS))
+    | HELD.ending(*_PAIRS)
+    | APART.ending("_sine_unequal"),
     figures=("time-traces", "energy-balance"),
 )  # fmt: skip

@@ -14,11 +14,10 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.case import case_from_parked, figure, mean, steps
+from bywire.brakes.wedge.case import case_from_parked, mean, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.panels import COMPARED
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -30,14 +29,22 @@ _BAND = 0.05  # of the step: half width of the band in which a stable loop ends
 _LAST = 0.2  # of the hold
 _NO_ROW = "no row of the recording lies there: record more often"
 
-_EACH = {"stable": "1", "overshoot": "%", "settling_time": "s", "hold_power": "W"}
-_ALL = {
-    "unstable": "1",
-    "overshoot_max": "%",
-    "settling_time_max": "s",
-    "hold_power_min": "W",
-    "hold_power_max": "W",
-}
+EACH = Figures(
+    stable=(
+        "1",
+        "1 where the last fifth of the hold stays within 5 % of the step, no end stop met.",
+    ),
+    hold_power=("W", "Mean input power in the last fifth of the hold, standby included."),
+    undefined=_NO_ROW,
+)
+ALL = Figures(
+    unstable=("1", "Number of friction coefficients at which the loop is not stable."),
+    overshoot_max=("%", "Largest overshoot."),
+    settling_time_max=("s", "Largest settling time (2 %)."),
+    hold_power_min=("W", "Smallest hold power."),
+    hold_power_max=("W", "Largest hold power."),
+    undefined=_NO_ROW,
+)
 
 
 class Options(ParameterSet):
@@ -62,7 +69,7 @@ class Options(ParameterSet):
     """time parked before the step"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return one run for each friction coefficient, on a true disc: its ripple would hide all."""
     levels = {0.0: options.M_step}
     changes: dict[str, Any] = {"flywheel.runout": 0.0}
@@ -78,61 +85,58 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
     )  # fmt: skip
 
 
-def _stable(run: xr.Dataset, options: Options, name: str) -> Kpi:
+def _stable(run: xr.Dataset, options: Options) -> tuple[float, str]:
     """Return whether a moment ends within 5 % of the step, without the help of an end stop."""
-    text = "1 where the last fifth of the hold stays within 5 % of the step, no end stop met."
     last = run.sel(time=slice((1.0 - _LAST) * options.t_hold, None))
     if not last.sizes["time"]:
-        return Kpi(name, math.nan, "1", text, _NO_ROW)
+        return math.nan, _NO_ROW
     if not last["F_N"].values.any():
-        return Kpi(name, math.nan, "1", text, "the pads do not press: there is no loop to judge")
+        return math.nan, "the pads do not press: there is no loop to judge"
     away = np.abs(np.abs(last["M_B"].values) - options.M_step).max()
-    inside = away <= _BAND * options.M_step and not run["F_end"].values.any()
-    return Kpi(name, float(inside), "1", text)
+    return float(away <= _BAND * options.M_step and not run["F_end"].values.any()), ""
 
 
-def _one(run: xr.Dataset, mu_B: float, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of one friction coefficient."""
+def _each(run: xr.Dataset, mu_B: float, options: Options) -> tuple[Kpi, ...]:
+    """Return the figures of a friction coefficient."""
     backward = float(run["Omega"].values[0]) < 0
     end = -options.M_step if backward else options.M_step
     step = evaluate("step_response", run, Setting("M_B", t_step=0.0, start=0.0, end=end))
-    begin = (1.0 - _LAST) * options.t_hold
-    at = f"_{tag(mu_B)}"
+    begin, at = (1.0 - _LAST) * options.t_hold, f"_{tag(mu_B)}"
     return (
-        _stable(run, options, "stable" + at),
+        *EACH(at, stable=_stable(run, options)),
         replace(step["overshoot"], name="overshoot" + at),
         replace(step["settling_time"], name="settling_time" + at),
-        figure("hold_power" + at, mean(run, "P_in", begin, options.t_hold), "W",
-               "Mean input power in the last fifth of the hold, standby included.", _NO_ROW),
-    )  # fmt: skip
+        *EACH(at, hold_power=mean(run, "P_in", begin, options.t_hold)),
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of every friction coefficient, and the worst of them."""
-    each = {mu_B: _one(recordings[tag(mu_B)], mu_B, options) for mu_B in options.mu_B}
+    each = {mu_B: _each(recordings[tag(mu_B)], mu_B, options) for mu_B in options.mu_B}
     stable, overshoot, settling, power = (
         [kpi.value for kpi in column] for column in zip(*each.values(), strict=True)
     )
     slow = [f"{m:g}" for m, t in zip(options.mu_B, settling, strict=True) if math.isnan(t)]
-    note = f"not settled at mu_B = {', '.join(slow)}" if slow else ""
     unjudged = sum(math.isnan(value) for value in stable)
-    return (
-        *(kpi for kpis in each.values() for kpi in kpis),
-        Kpi("unstable", math.nan if unjudged else float(sum(value == 0 for value in stable)), "1",
-            "Number of friction coefficients at which the loop is not stable.",
-            f"{unjudged} of them cannot be judged" if unjudged else ""),
-        Kpi("overshoot_max", max(overshoot), "%", "Largest overshoot."),
-        Kpi("settling_time_max", math.nan if slow else max(settling), "s",
-            "Largest settling time (2 %).", note),
-        figure("hold_power_min", min(power), "W", "Smallest hold power.", _NO_ROW),
-        figure("hold_power_max", max(power), "W", "Largest hold power.", _NO_ROW),
-    )  # fmt: skip
+    overall = ALL(
+        unstable=(math.nan, f"{unjudged} of them cannot be judged")
+        if unjudged
+        else float(sum(value == 0 for value in stable)),
+        overshoot_max=(max(overshoot), ""),
+        settling_time_max=(math.nan, f"not settled at mu_B = {', '.join(slow)}")
+        if slow
+        else max(settling),
+        hold_power_min=min(power),
+        hold_power_max=max(power),
+    )
+    return (*(kpi for kpis in each.values() for kpi in kpis), *overall)
 
 
 def named(options: Options) -> dict[str, str]:
     """Return the unit of every key figure."""
-    each = {f"{name}_{tag(mu_B)}": unit for mu_B in options.mu_B for name, unit in _EACH.items()}
-    return each | _ALL
+    units = units_of("step_response") | EACH.units
+    each = ("stable", "overshoot", "settling_time", "hold_power")
+    return {f"{k}_{tag(mu_B)}": units[k] for mu_B in options.mu_B for k in each} | ALL.units
 
 
 _DEFAULTS = Options(

@@ -13,15 +13,13 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import mean, parameters_of
 from bywire.brakes.wedge.experiments.moment_pulses import Count
 from bywire.brakes.wedge.experiments.screw_efficiency import SlowSpeed
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
     check_current,
-    mean_between,
-    parameters_of,
     screw_case,
     slope_of,
     torque_constant_of,
@@ -33,14 +31,17 @@ from bywire.core.typing import Array
 _TURN = 0.2  # of a stroke's time, at rest after it, while the current changes
 _RAMP = 0.2  # of a stroke's time, in which the speed rises, and falls again
 _SETTLED = 0.4  # of a stroke, left out of the means
-_UNITS = {
-    "force_max": "N",
-    "force_min": "N",
-    "eta_f_slope": "1",
-    "eta_f_true": "1",
-    "eta_b_slope": "1",
-    "eta_b_true": "1",
-}
+FIGURES = Figures(
+    force_max=("N", "Largest mean force of a stroke."),
+    force_min=("N", "Smallest mean force of a stroke."),
+    eta_f_slope=(
+        "1", "Torque by the force over motor torque, by their growth; motor 1 driving."
+    ),
+    eta_f_true=("1", "What was put in."),
+    eta_b_slope=("1", "The same, inverse, motor 1 driven back."),
+    eta_b_true=("1", "What was put in."),
+    undefined="the force does not grow with the current: more levels",
+)  # fmt: skip
 
 
 class Options(ParameterSet):
@@ -69,26 +70,29 @@ class Stroke(NamedTuple):
 def strokes(options: Options) -> tuple[Stroke, ...]:
     """Return the strokes: at every level one that motor 1 drives, and one that drives it back."""
     period = (1.0 + _TURN) * options.t_stroke
-    found = []
+    moves = []
     for k in range(options.levels):
         share = (k + 1.0) / options.levels
         for way, (sign, i) in enumerate(((1.0, options.i_drive), (-1.0, options.i_back))):
-            found.append(Stroke((2 * k + way + _TURN) * period, sign, share * i))
-    return tuple(found)
+            moves.append(Stroke((2 * k + way + _TURN) * period, sign, share * i))
+    return tuple(moves)
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run; motor 1 in current, motor 2 in position control."""
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
     moves = strokes(options)
-    corners = [0.0, *(t for one in moves for t in (one.begin, one.begin + options.t_stroke))]
-    levels = [0.0, *(i for one in moves for i in (one.i, one.i))]
+    corners = [
+        0.0,
+        *(t for stroke in moves for t in (stroke.begin, stroke.begin + options.t_stroke)),
+    ]
+    levels = [0.0, *(i for stroke in moves for i in (stroke.i, stroke.i))]
 
     def stimulus(t: Array) -> dict[str, Array]:
         moved = np.zeros(t.shape)
-        for one in moves:
-            moved = moved + one.sign * _moved(t - one.begin, options.t_stroke)
+        for stroke in moves:
+            moved = moved + stroke.sign * _moved(t - stroke.begin, options.t_stroke)
         return {
             "i_1_set": np.interp(t, corners, levels),
             "theta_2_set": options.omega_slow * moved,
@@ -111,37 +115,30 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     run = recordings["run"]
     par = parameters_of(run)
     k, K = slope_of(par), torque_constant_of(par)
-    rows = [(one.sign, *(_mean(run, one, name, options) for name in ("y_F", "i_1")))
-            for one in strokes(options)]  # fmt: skip
+    rows = [(stroke.sign, *(_mean(run, stroke, name, options) for name in ("y_F", "i_1")))
+            for stroke in strokes(options)]  # fmt: skip
     driving = _line([row[1:] for row in rows if row[0] > 0])
     back = _line([row[1:] for row in rows if row[0] < 0])
     forces = [row[1] for row in rows]
-    values = {
-        "force_max": (max(forces), "Largest mean force of a stroke."),
-        "force_min": (min(forces), "Smallest mean force of a stroke."),
-        "eta_f_slope": (k / (K * driving) if driving > 0 else math.nan,
-                        "Torque by the force over motor torque, by their growth; motor 1 driving."),
-        "eta_f_true": (par.screw.eta_f, "What was put in."),
-        "eta_b_slope": (K * back / k, "The same, inverse, motor 1 driven back."),
-        "eta_b_true": (par.screw.eta_b, "What was put in."),
-    }  # fmt: skip
-    return tuple(_kpi(name, *values[name]) for name in _UNITS)
+    return FIGURES(
+        force_max=max(forces),
+        force_min=min(forces),
+        eta_f_slope=k / (K * driving) if driving > 0 else math.nan,
+        eta_f_true=par.screw.eta_f,
+        eta_b_slope=K * back / k,
+        eta_b_true=par.screw.eta_b,
+    )
 
 
-def _mean(run: xr.Dataset, one: Stroke, name: str, options: Options) -> float:
-    begin, end = (one.begin + share * options.t_stroke for share in (_SETTLED, 1.0 - _RAMP))
-    return mean_between(run, name, begin, end)
+def _mean(run: xr.Dataset, stroke: Stroke, name: str, options: Options) -> float:
+    begin, end = (stroke.begin + share * options.t_stroke for share in (_SETTLED, 1.0 - _RAMP))
+    return mean(run, name, begin, end)
 
 
 def _line(rows: list[tuple[float, ...]]) -> float:
     """Return current over force, the slope of a line."""
     F, i = np.array(rows).T
     return float(np.polyfit(F, i, 1)[0]) if len(rows) > 1 and np.ptp(F) > 0 else math.nan
-
-
-def _kpi(name: str, value: float, text: str) -> Kpi:
-    note = "" if math.isfinite(value) else "the force does not grow with the current: more levels"
-    return Kpi(name, value, _UNITS[name], text, note)
 
 
 EXPERIMENT = Experiment(
@@ -152,6 +149,6 @@ EXPERIMENT = Experiment(
     defaults=Options(i_drive=12.0, i_back=3.0, levels=6, omega_slow=10.0, t_stroke=0.6),
     cases=cases,
     judge=judge,
-    kpis=_UNITS,
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
-    UNITS,
+    BRAKING,
     braking,
     case_from_parked,
     parking_time,
@@ -20,6 +19,11 @@ from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rows import along_disc
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+
+PEAKS = Figures(
+    peak_moment=("N*m", "Largest moment."),
+    peak_angle=("rad", "Largest common reference of both motors, from the parking position."),
+)
 
 
 class Options(ParameterSet):
@@ -37,7 +41,7 @@ class Options(ParameterSet):
     """time parked before the pulse"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     levels = {0.0: options.M_high, options.t_pulse: 0.0}
     return (
@@ -52,14 +56,12 @@ def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the figures of the braking and of the release."""
     run = along_disc(recordings["run"])
-    own = (
-        Kpi("peak_moment", float(run["M_B"].max()), "N*m", "Largest moment."),
-        Kpi("peak_angle", float(np.abs(run["theta_ref"]).max()), "rad",
-            "Largest common reference of both motors, from the parking position."),
+    return (
+        *braking(run, options.M_high, options.t_pulse),
+        *PEAKS(peak_moment=run["M_B"].max(), peak_angle=np.abs(run["theta_ref"]).max()),
         release_time(run, options.t_pulse),
         parking_time(run, options.t_pulse),
-    )  # fmt: skip
-    return (*braking(run, options.M_high, options.t_pulse), *own)
+    )
 
 
 EXPERIMENT = Experiment(
@@ -70,7 +72,6 @@ EXPERIMENT = Experiment(
     defaults=Options(M_high=950.0, t_pulse=0.2, t_end=0.3, omega_gap=60.0, settle=0.05),
     cases=cases,
     judge=judge,
-    kpis=UNITS
-    | {"peak_moment": "N*m", "peak_angle": "rad", "release_time": "s", "parking_time": "s"},
+    kpis=BRAKING.units | PEAKS.units | {"release_time": "s", "parking_time": "s"},
     figures=("time-traces", "energy-balance"),
 )

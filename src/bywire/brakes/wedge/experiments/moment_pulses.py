@@ -9,13 +9,11 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
-    UNITS,
+    BRAKING,
     braking,
     case_from_parked,
-    figure,
     mean,
     steps,
     swing,
@@ -27,6 +25,22 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Fraction, Unit
 
 Count = Annotated[int, Unit("1", 3.0), Field(ge=1, le=100)]
+
+_OVER = "over the disc's last revolution of the hold; over its second half where that is shorter"
+FIGURES = Figures(
+    hold_moment=("N*m", f"Mean moment {_OVER}."),
+    hold_error=(
+        "%", "That moment less the demand, over the demand: far below 0 where the demand is beyond "
+        "the brake.",
+    ),
+    hold_ripple=("N*m", f"Moment peak to peak {_OVER}: the disc's run-out."),
+    hold_power=("W", f"Mean input power {_OVER}, standby included."),
+    brake_power=("W", f"Mean braking power {_OVER}."),
+    pulse_moment=(
+        "N*m", "Mean moment over the disc's last revolution of the first pulse; over the pulse's "
+        "last fifth where it is shorter.",
+    ),
+)  # fmt: skip
 
 
 class Options(ParameterSet):
@@ -52,7 +66,7 @@ def _end(options: Options) -> float:
     return options.t_hold + options.pulses * (options.t_low + options.t_high)
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     levels = {0.0: options.M_high}
     for k in range(options.pulses):
@@ -74,20 +88,15 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     held = too_coarse(run, begin, end)
     hold, power = (math.nan if held else mean(run, name, begin, end) for name in ("M_B", "P_in"))
     ripple = math.nan if held else swing(run, "M_B", begin, end)
-    over = "over the disc's last revolution of the hold; over its second half where that is shorter"
-    own = (
-        figure("hold_moment", hold, "N*m", f"Mean moment {over}.", held),
-        figure("hold_error", 100.0 * (hold / options.M_high - 1.0), "%",
-               "That moment less the demand, over the demand: far below 0 where the demand is "
-               "beyond the brake.", held),
-        figure("hold_ripple", ripple, "N*m",
-               f"Moment peak to peak {over}: the disc's run-out.", held),
-        figure("hold_power", power, "W", f"Mean input power {over}, standby included.", held),
-        figure("brake_power", hold * mean(run, "Omega", begin, end), "W",
-               f"Mean braking power {over}.", held),
-        _pulse(run, options),
-    )  # fmt: skip
-    return (*braking(run, options.M_high, options.t_hold), *own)
+    pulses = FIGURES(
+        hold_moment=(hold, held),
+        hold_error=(100.0 * (hold / options.M_high - 1.0), held),
+        hold_ripple=(ripple, held),
+        hold_power=(power, held),
+        brake_power=(hold * mean(run, "Omega", begin, end), held),
+        pulse_moment=_pulse(run, options),
+    )
+    return (*braking(run, options.M_high, options.t_hold), *pulses)
 
 
 def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float, float]:
@@ -101,15 +110,11 @@ def _turn(run: xr.Dataset, begin: float, end: float, last: float) -> tuple[float
     return start + 2e-9, end - 2e-9
 
 
-def _pulse(run: xr.Dataset, options: Options) -> Kpi:
+def _pulse(run: xr.Dataset, options: Options) -> tuple[float, str]:
     """Return the moment in the first pulse; over less than a revolution the run-out would show."""
     begin, end = _turn(run, options.t_hold, options.t_hold + options.t_low, 0.2)
     problem = too_coarse(run, begin, end)
-    return figure(
-        "pulse_moment", math.nan if problem else mean(run, "M_B", begin, end), "N*m",
-        "Mean moment over the disc's last revolution of the first pulse; over the pulse's last "
-        "fifth where it is shorter.", problem,
-    )  # fmt: skip
+    return math.nan if problem else mean(run, "M_B", begin, end), problem
 
 
 EXPERIMENT = Experiment(
@@ -122,14 +127,6 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
-    kpis=UNITS
-    | {
-        "hold_moment": "N*m",
-        "hold_error": "%",
-        "hold_ripple": "N*m",
-        "hold_power": "W",
-        "brake_power": "W",
-        "pulse_moment": "N*m",
-    },
+    kpis=BRAKING.units | FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

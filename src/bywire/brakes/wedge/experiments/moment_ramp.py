@@ -9,9 +9,8 @@ import xarray as xr
 from pydantic import model_validator
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
-from bywire.brakes.wedge.case import UNITS, braking, case_from_parked, figure, steps
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import BRAKING, braking, case_from_parked, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rows import along_disc, too_coarse
@@ -20,6 +19,14 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 
 _ROWS = 10  # fewest on the ramp
+
+FIGURES = Figures(
+    ramp_error_mean=("N*m", "Mean of demand less moment, ramp."),
+    ramp_error_rms=(
+        "N*m", "Root mean square of demand less moment on the ramp; the run-out is in it."
+    ),
+    ramp_slope=("N*m/s", "Slope of a line through the moment on the ramp."),
+)  # fmt: skip
 
 
 class Options(ParameterSet):
@@ -58,7 +65,7 @@ def demand(t: Array, options: Options) -> Array:
     return stepped + (options.M_high - options.M_low) * ramp
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     duration = options.t_hold + options.t_low + options.t_ramp + options.t_end
     return (
@@ -76,15 +83,10 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     end = begin + options.t_ramp
     problem = too_coarse(run, begin, end, _ROWS)
     mean, rms, slope = (math.nan,) * 3 if problem else _followed(run, begin, end)
-    own = (
-        figure("ramp_error_mean", mean, "N*m", "Mean of demand less moment, ramp.", problem),
-        figure("ramp_error_rms", rms, "N*m",
-               "Root mean square of demand less moment on the ramp; the run-out is in it.",
-               problem),
-        figure("ramp_slope", slope, "N*m/s", "Slope of a line through the moment on the ramp.",
-               problem),
-    )  # fmt: skip
-    return (*braking(run, options.M_high, options.t_hold), *own)
+    ramp = FIGURES(
+        ramp_error_mean=(mean, problem), ramp_error_rms=(rms, problem), ramp_slope=(slope, problem)
+    )
+    return (*braking(run, options.M_high, options.t_hold), *ramp)
 
 
 def _followed(run: xr.Dataset, begin: float, end: float) -> tuple[float, float, float]:
@@ -105,6 +107,6 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
-    kpis=UNITS | {"ramp_error_mean": "N*m", "ramp_error_rms": "N*m", "ramp_slope": "N*m/s"},
+    kpis=BRAKING.units | FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

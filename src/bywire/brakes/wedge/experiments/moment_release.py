@@ -11,8 +11,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import (
     case_from_parked,
     clearance,
@@ -29,6 +28,22 @@ from bywire.core.quantities import Duration
 
 _LOW = 0.05  # of the moment at the release
 
+FALL = Figures(
+    moment_start=("N*m", "Moment when the demand falls."),
+    time_to_5=("s", "Time until the moment has fallen to 5 % of its start for good."),
+)
+FREEDOM = Figures(
+    drag_moment=("N*m", "Largest moment from parking on: residual drag."),
+    travel_left=("m", "Distance of the wedge from its middle at the end."),
+    clearance_regained=(
+        "m", "Clearance at the end, both pads together, no run-out; negative where they press."
+    ),
+    clearance_nominal=("m", "The same with the wedge centered."),
+    travel_beyond=("m", "Largest travel of the wedge past its middle, toward the other side."),
+    peak_current=("A", "Largest current of a motor during the release."),
+    energy_in=("J", "Energy at the drives' input until the brake is parked, standby included."),
+)  # fmt: skip
+
 
 class Options(ParameterSet):
     """The maneuver."""
@@ -41,7 +56,7 @@ class Options(ParameterSet):
     """time recorded after the demand fell to zero"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run: braking from the start of the settling time, no demand from zero on."""
     levels = {-options.settle: options.M_hold, 0.0: 0.0}
     return (
@@ -62,25 +77,21 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     end = float(run["x"].values[-1])
     until = run.sel(time=slice(None, home.value)) if parked is not None else run
     energy = float(until["W_supply"].values[-1] - until["W_supply"].values[0])
-    current = max(float(np.abs(run[name]).max()) for name in ("i_1", "i_2"))
+    counted = "" if parked is not None else "not parked: counted until the end of the recording"
     return (
-        Kpi("moment_start", float(run["M_B"].values[0]), "N*m", "Moment when the demand falls."),
-        _fall(run),
+        *FALL(moment_start=run["M_B"].values[0], time_to_5=_fall(run)),
         release_time(run, 0.0),
         home,
-        Kpi("drag_moment", drag, "N*m", "Largest moment from parking on: residual drag.",
-            home.note),
-        Kpi("travel_left", abs(end), "m", "Distance of the wedge from its middle at the end."),
-        Kpi("clearance_regained", clearance(end, par), "m",
-            "Clearance at the end, both pads together, no run-out; negative where they press."),
-        Kpi("clearance_nominal", par.caliper.clearance, "m", "The same with the wedge centered."),
-        Kpi("travel_beyond", max(0.0, -float(_toward(run).min())), "m",
-            "Largest travel of the wedge past its middle, toward the other side."),
-        Kpi("peak_current", current, "A", "Largest current of a motor during the release."),
-        Kpi("energy_in", energy, "J",
-            "Energy at the drives' input until the brake is parked, standby included.",
-            "" if parked is not None else "not parked: counted until the end of the recording"),
-    )  # fmt: skip
+        *FREEDOM(
+            drag_moment=(drag, home.note),
+            travel_left=abs(end),
+            clearance_regained=clearance(end, par),
+            clearance_nominal=par.caliper.clearance,
+            travel_beyond=max(0.0, -float(_toward(run).min())),
+            peak_current=max(float(np.abs(run[name]).max()) for name in ("i_1", "i_2")),
+            energy_in=(energy, counted),
+        ),
+    )
 
 
 def _toward(run: xr.Dataset) -> xr.DataArray:
@@ -88,21 +99,17 @@ def _toward(run: xr.Dataset) -> xr.DataArray:
     return run["x"] * (-1.0 if float(run["x"].values[0]) < 0 else 1.0)
 
 
-def _fall(run: xr.Dataset) -> Kpi:
+def _fall(run: xr.Dataset) -> tuple[float, str]:
     """Return the time until the moment has fallen to a twentieth for good."""
     t, M = run["time"].values, np.abs(run["M_B"].values)
     level = _LOW * M[0]
     above = np.flatnonzero(level < M)
-    value, note = math.nan, ""
     if not above.size:
-        note = "there is no moment at the release"
-    elif above[-1] + 1 == t.size:
-        note = "the moment does not fall that far in time"
-    else:
-        k = int(above[-1])
-        value = float(t[k] + (t[k + 1] - t[k]) * (M[k] - level) / (M[k] - M[k + 1]))
-    return Kpi("time_to_5", value, "s",
-               "Time until the moment has fallen to 5 % of its start for good.", note)  # fmt: skip
+        return math.nan, "there is no moment at the release"
+    k = int(above[-1])
+    if k + 1 == t.size:
+        return math.nan, "the moment does not fall that far in time"
+    return float(t[k] + (t[k + 1] - t[k]) * (M[k] - level) / (M[k] - M[k + 1])), ""
 
 
 EXPERIMENT = Experiment(
@@ -113,18 +120,6 @@ EXPERIMENT = Experiment(
     defaults=Options(M_hold=500.0, settle=0.6, duration=0.4),
     cases=cases,
     judge=judge,
-    kpis={
-        "moment_start": "N*m",
-        "time_to_5": "s",
-        "release_time": "s",
-        "parking_time": "s",
-        "drag_moment": "N*m",
-        "travel_left": "m",
-        "clearance_regained": "m",
-        "clearance_nominal": "m",
-        "travel_beyond": "m",
-        "peak_current": "A",
-        "energy_in": "J",
-    },
+    kpis=FALL.units | {"release_time": "s", "parking_time": "s"} | FREEDOM.units,
     figures=("time-traces", "energy-balance"),
 )

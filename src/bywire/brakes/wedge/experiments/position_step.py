@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from itertools import product
 from typing import Annotated, Any
 
 import numpy as np
@@ -15,10 +16,9 @@ import xarray as xr
 from pydantic import AfterValidator, Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.registry import evaluate, units_of
 from bywire.bench.kpis.step_response import Setting
-from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.wedge.case import case_from_parked, parameters_of, steps
 from bywire.brakes.wedge.elements import brake_heart
 from bywire.brakes.wedge.panels import COMPARED
@@ -31,15 +31,21 @@ BRAKE, SCREWS, MOTORS = "brake", "screws", "motors"
 _BANDS = ("low", "high")
 _AWAY = 1.0  # free-play [m] that no motor crosses
 
-_EACH = {
-    "rise_time": "s",
-    "overshoot": "%",
-    "settling_time": "s",
-    "steady_state_error": "rad",
-    "peak_current": "A",
-    "current_limited": "%",
-}
-_OVER = {"difference_screws": "%", "difference_motors": "%", "normal_force": "N"}
+STEP = ("rise_time", "overshoot", "settling_time", "steady_state_error")
+CURRENT = Figures(
+    peak_current=("A", "Largest current of a motor."),
+    current_limited=("%", "Share of the time after the step on the current limit."),
+)
+_REST = "largest over time and amplitudes, in % of the step."
+OVERALL = Figures(
+    difference_screws=(
+        "%", f"Difference of the mean angle to screws that preload each other, no wedge; {_REST}"
+    ),
+    difference_motors=(
+        "%", f"Difference of the mean angle to motors whose screws touch nothing; {_REST}"
+    ),
+    normal_force=("N", "Largest normal force: 0 while the steps stay within the clearance."),
+)  # fmt: skip
 
 
 def _distinct(values: tuple[float, ...]) -> tuple[float, ...]:
@@ -103,7 +109,7 @@ def _arrangements(par: WedgeParameters, delta: float) -> dict[str, dict[str, flo
     }
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return a run for every arrangement, bandwidth and amplitude."""
     bands = dict(zip(_BANDS, (options.f_low, options.f_high), strict=True))
     return tuple(
@@ -136,21 +142,24 @@ def finish(run: xr.Dataset, _: Options) -> xr.Dataset:
     return run.assign(theta=("time", mean, attrs))
 
 
-def _one(run: xr.Dataset, amplitude: float, ending: str) -> tuple[Kpi, ...]:
-    """Return the figures of one step of the assembled brake."""
+def _each(run: xr.Dataset, amplitude: float, ending: str) -> tuple[Kpi, ...]:
+    """Return the figures of a step of the assembled brake."""
     setting = Setting("theta", t_step=0.0, start=0.0, end=amplitude)
     step = evaluate("step_response", run, setting)
     after, par = run.sel(time=slice(-1e-9, None)), parameters_of(run)
     limit = min(par.control.position.i_max, par.drive.i_max) * (1.0 - 1e-9)
-    wanted = np.maximum(np.abs(after["i_1_ref"].values), np.abs(after["i_2_ref"].values))
-    found = np.maximum(np.abs(after["i_1"].values), np.abs(after["i_2"].values))
-    names = ("rise_time", "overshoot", "settling_time", "steady_state_error")
+    demand, current = (
+        np.maximum(np.abs(after[f"i_1{of}"].values), np.abs(after[f"i_2{of}"].values))
+        for of in ("_ref", "")
+    )
     return (
-        *(replace(step[name], name=name + ending) for name in names),
-        Kpi("peak_current" + ending, float(found.max()), "A", "Largest current of a motor."),
-        Kpi("current_limited" + ending, 100.0 * float(np.mean(wanted >= limit)), "%",
-            "Share of the time after the step on the current limit."),
-    )  # fmt: skip
+        *(replace(step[name], name=name + ending) for name in STEP),
+        *CURRENT(
+            ending,
+            peak_current=current.max(),
+            current_limited=100.0 * float(np.mean(demand >= limit)),
+        ),
+    )
 
 
 def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...]:
@@ -164,40 +173,35 @@ def _over(recordings: Recordings, band: str, options: Options) -> tuple[Kpi, ...
             apart = np.abs(brake["theta"].values - recordings[kind + ending]["theta"].values)
             worst[kind] = max(worst[kind], 100.0 * float(apart.max()) / amplitude)
     note = "the pads touch the disc: the step leaves the clearance" if touching > 0 else ""
-    rest = "largest over time and amplitudes, in % of the step."
-    return (
-        Kpi(f"difference_screws_{band}", worst[SCREWS], "%",
-            f"Difference of the mean angle to screws that preload each other, no wedge; {rest}",
-            note),
-        Kpi(f"difference_motors_{band}", worst[MOTORS], "%",
-            f"Difference of the mean angle to motors whose screws touch nothing; {rest}", note),
-        Kpi(f"normal_force_{band}", touching, "N",
-            "Largest normal force: 0 while the steps stay within the clearance.", note),
-    )  # fmt: skip
+    return OVERALL(
+        f"_{band}",
+        difference_screws=(worst[SCREWS], note),
+        difference_motors=(worst[MOTORS], note),
+        normal_force=(touching, note),
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return each step's figures, and how little the wedge matters."""
-    own = [
+    each = [
         kpi
-        for band in _BANDS
-        for amplitude in options.amplitudes
-        for kpi in _one(
+        for band, amplitude in product(_BANDS, options.amplitudes)
+        for kpi in _each(
             recordings[f"{BRAKE}-{band}-{_tag(amplitude)}"], amplitude, f"_{band}_{_tag(amplitude)}"
         )
     ]
-    return (*own, *(kpi for band in _BANDS for kpi in _over(recordings, band, options)))
+    return (*each, *(kpi for band in _BANDS for kpi in _over(recordings, band, options)))
 
 
 def named(options: Options) -> dict[str, str]:
     """Return the unit of every key figure."""
-    each = {
+    units = units_of("step_response", resolved={"level": "rad"})
+    each = {name: units[name] for name in STEP} | CURRENT.units
+    return {
         f"{name}_{band}_{_tag(amplitude)}": unit
-        for band in _BANDS
-        for amplitude in options.amplitudes
-        for name, unit in _EACH.items()
-    }
-    return each | {f"{name}_{band}": unit for band in _BANDS for name, unit in _OVER.items()}
+        for band, amplitude in product(_BANDS, options.amplitudes)
+        for name, unit in each.items()
+    } | OVERALL.ending(*(f"_{band}" for band in _BANDS))
 
 
 _DEFAULTS = Options(

@@ -7,14 +7,24 @@ import math
 import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import case_from_parked, steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rows import along_disc
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+
+FIGURES = Figures(
+    time_to_rest=("s", "Time from power off until all stick for good."),
+    drift=("m", "Largest change of the wedge's travel after that."),
+    relaxation=("m", "Change of the wedge's travel until that."),
+    moment_start=("N*m", "Moment at power off."),
+    moment_end=("N*m", "Moment at the end; the run-out is in it."),
+    preload_end=("N", "Preload of the wedge at the end."),
+    end_stop_force=("N", "Largest force of an end stop."),
+    undefined="the brake does not come to rest in the recorded time",
+)
 
 
 class Options(ParameterSet):
@@ -28,7 +38,7 @@ class Options(ParameterSet):
     """time recorded without power"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run: braking from the start of the settling time, power off at zero."""
     levels, off = {-options.settle: options.M_hold}, {0.0: 1.0}
     return (
@@ -46,22 +56,16 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     moving = np.flatnonzero(stuck == 0)
     rest = 0 if moving.size == 0 else int(moving[-1]) + 1
     rests = rest < t.size
-    note = "" if rests else "the brake does not come to rest in the recorded time"
-    t_rest = float(t[rest]) if rests else math.nan
-    drift = float(np.abs(x[rest:] - x[rest]).max()) if rests else math.nan
-    relaxed = float(x[rest] - x[0]) if rests else math.nan
     squeeze = np.minimum(after["f_1"].values, after["f_2"].values)
-    F_end = np.abs(after["F_end"].values)
-    return (
-        Kpi("time_to_rest", t_rest, "s", "Time from power off until all stick for good.", note),
-        Kpi("drift", drift, "m", "Largest change of the wedge's travel after that.", note),
-        Kpi("relaxation", relaxed, "m", "Change of the wedge's travel until that.", note),
-        Kpi("moment_start", float(after["M_B"].values[0]), "N*m", "Moment at power off."),
-        Kpi("moment_end", float(after["M_B"].values[-1]), "N*m",
-            "Moment at the end; the run-out is in it."),
-        Kpi("preload_end", max(0.0, float(squeeze[-1])), "N", "Preload of the wedge at the end."),
-        Kpi("end_stop_force", float(F_end.max()), "N", "Largest force of an end stop."),
-    )  # fmt: skip
+    return FIGURES(
+        time_to_rest=t[rest] if rests else math.nan,
+        drift=np.abs(x[rest:] - x[rest]).max() if rests else math.nan,
+        relaxation=x[rest] - x[0] if rests else math.nan,
+        moment_start=after["M_B"].values[0],
+        moment_end=after["M_B"].values[-1],
+        preload_end=max(0.0, float(squeeze[-1])),
+        end_stop_force=np.abs(after["F_end"].values).max(),
+    )
 
 
 EXPERIMENT = Experiment(
@@ -72,14 +76,6 @@ EXPERIMENT = Experiment(
     defaults=Options(M_hold=500.0, settle=0.6, duration=2.0),
     cases=cases,
     judge=judge,
-    kpis={
-        "time_to_rest": "s",
-        "drift": "m",
-        "relaxation": "m",
-        "moment_start": "N*m",
-        "moment_end": "N*m",
-        "preload_end": "N",
-        "end_stop_force": "N",
-    },
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

@@ -7,18 +7,18 @@ the scale: an inertia on the shaft, or the torque of a current.
 from __future__ import annotations
 
 import math
+from itertools import chain
 
 import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import parameters_of
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
     Stimuli,
     check_current,
-    parameters_of,
     shaft_case,
     torque_constant_of,
 )
@@ -28,9 +28,21 @@ from bywire.core.typing import Array
 
 LABELS = ("free", "added", "braked")
 _HALF = 0.5  # of the first speed, down to which decelerations are taken
-_UNITS = {f"stopping_time_{label}": "s" for label in LABELS}
-_UNITS |= {"speed": "rad/s", "inertia_by_added": "kg*m**2", "inertia_by_torque": "kg*m**2",
-           "inertia_true": "kg*m**2"}  # fmt: skip
+STOPPING = Figures(
+    stopping_time=("s", "Time from the end of the spin-up until the shaft rests."),
+    undefined="the shaft does not turn long enough, or does not come to rest",
+)
+FIGURES = Figures(
+    speed=("rad/s", "Speed at the end of the spin-up."),
+    inertia_by_added=(
+        "kg*m**2",
+        "Inertia of shaft and motor, by the mean decelerations over equal speeds with and without "
+        "the added one.",
+    ),
+    inertia_by_torque=("kg*m**2", "The same by the known current's torque."),
+    inertia_true=("kg*m**2", "What was put in."),
+    undefined=STOPPING.undefined,
+)
 
 
 class Options(ParameterSet):
@@ -50,7 +62,7 @@ class Options(ParameterSet):
     """recording interval"""
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the three runs of a single motor on its dummy shaft."""
     for name in ("i_spin", "i_brake"):
         check_current(name, getattr(options, name), par)
@@ -85,18 +97,16 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     by_added = _over(options.J_added * rate["added"], rate["free"] - rate["added"])
     torque = torque_constant_of(par) * options.i_brake
     by_torque = _over(torque, rate["braked"] - rate["free"])
-    values = {
-        f"stopping_time_{label}": (_stop(recordings[label]), "Time from the end of the spin-up "
-                                   "until the shaft rests.") for label in LABELS
-    }  # fmt: skip
-    values |= {
-        "speed": (_first(recordings["free"]), "Speed at the end of the spin-up."),
-        "inertia_by_added": (by_added, "Inertia of shaft and motor, by the mean decelerations "
-                             "over equal speeds with and without the added one."),
-        "inertia_by_torque": (by_torque, "The same by the known current's torque."),
-        "inertia_true": (J, "What was put in."),
-    }  # fmt: skip
-    return tuple(_kpi(name, *values[name]) for name in _UNITS)
+    stops = [STOPPING(f"_{label}", stopping_time=_stop(recordings[label])) for label in LABELS]
+    return (
+        *chain.from_iterable(stops),
+        *FIGURES(
+            speed=_first(recordings["free"]),
+            inertia_by_added=by_added,
+            inertia_by_torque=by_torque,
+            inertia_true=J,
+        ),
+    )
 
 
 def _speed(run: xr.Dataset) -> Array:
@@ -109,7 +119,7 @@ def _first(run: xr.Dataset) -> float:
 
 def _deceleration(recordings: Recordings, label: str) -> float:
     """Return the mean deceleration [rad/s^2] between two speeds that all runs pass."""
-    high = min(_first(recordings[one]) for one in LABELS)
+    high = min(_first(recordings[each]) for each in LABELS)
     speed = _speed(recordings[label])
     t = recordings[label]["time"].sel(time=slice(-1e-9, None)).values
     if not high > 0.0 or speed.min() > _HALF * high:
@@ -128,11 +138,6 @@ def _over(above: float, below: float) -> float:
     return above / below if below > 0 else math.nan
 
 
-def _kpi(name: str, value: float, text: str) -> Kpi:
-    failed = "the shaft does not turn long enough, or does not come to rest"
-    return Kpi(name, value, _UNITS[name], text, "" if math.isfinite(value) else failed)
-
-
 EXPERIMENT = Experiment(
     name="run-down",
     assembly="wedge-brake",
@@ -141,6 +146,6 @@ EXPERIMENT = Experiment(
     defaults=Options(i_spin=4.0, t_spin=0.1, J_added=1e-4, i_brake=0.5, duration=0.5, record=2e-4),
     cases=cases,
     judge=judge,
-    kpis=_UNITS,
+    kpis=STOPPING.ending(*(f"_{label}" for label in LABELS)) | FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

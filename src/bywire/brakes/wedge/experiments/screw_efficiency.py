@@ -14,13 +14,11 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import mean, parameters_of
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.rig_case import (
     check_current,
-    mean_between,
-    parameters_of,
     screw_case,
     shaft_case,
     slope_of,
@@ -35,19 +33,20 @@ SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=Fals
 
 _SETTLED = 0.3  # of the time in motion: what comes before is left out of the means
 _SPEED = 0.05  # by which mean speeds may differ from what is demanded
-_UNITS = {
-    "eta_f": "1",
-    "eta_f_raw": "1",
-    "eta_f_reverse": "1",
-    "eta_f_true": "1",
-    "eta_b": "1",
-    "eta_b_raw": "1",
-    "eta_b_reverse": "1",
-    "eta_b_true": "1",
-    "force": "N",
-    "force_reverse": "N",
-    "bearing_torque": "N*m",
-}
+FIGURES = Figures(
+    eta_f=("1", "Torque by the force over motor torque less bearing torque, motor 1 driving."),
+    eta_f_raw=("1", "Torque by the force over motor torque, motor 1 driving."),
+    eta_f_reverse=("1", "The same with the bearing torque taken off, motor 2 driving."),
+    eta_f_true=("1", "What was put in."),
+    eta_b=("1", "Holding torque and bearing torque over torque by the force, motor 2 driven."),
+    eta_b_raw=("1", "Holding torque over torque by the force, motor 2 driven."),
+    eta_b_reverse=("1", "The same with the bearing torque added, motor 1 driven."),
+    eta_b_true=("1", "What was put in."),
+    force=("N", "Mean force while motor 1 drives."),
+    force_reverse=("N", "Mean force while motor 1 is driven back."),
+    bearing_torque=("N*m", "Motor torque without load at the same speed."),
+    undefined="no steady motion under compression: a motor cannot do its part",
+)
 
 
 class Options(ParameterSet):
@@ -65,7 +64,7 @@ class Options(ParameterSet):
     """time in motion"""
 
 
-class Found(NamedTuple):
+class Reading(NamedTuple):
     """What a run in motion reads, friction counted against the motion."""
 
     F: Annotated[float, Signal("N", "force", 1000.0)]
@@ -74,7 +73,7 @@ class Found(NamedTuple):
     steady: Annotated[float, Signal("1", "1 in steady motion under compression, else NaN")]
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the motion without load, with motor 1 driving, and with motor 1 driven back."""
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
@@ -107,26 +106,19 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     T_b = torque_constant_of(par) * _mean(no_load, "i_1", options)
     there = _read(recordings["driving"], options.omega_slow, options)
     back = _read(recordings["driven_back"], -options.omega_slow, options)
-    values: dict[str, tuple[float, str]] = {
-        "eta_f": (there.steady * _ratio(k * there.F, there.T_1 - T_b),
-                  "Torque by the force over motor torque less bearing torque, motor 1 driving."),
-        "eta_f_raw": (there.steady * _ratio(k * there.F, there.T_1),
-                      "Torque by the force over motor torque, motor 1 driving."),
-        "eta_f_reverse": (back.steady * _ratio(k * back.F, -back.T_2 - T_b),
-                          "The same with the bearing torque taken off, motor 2 driving."),
-        "eta_f_true": (par.screw.eta_f, "What was put in."),
-        "eta_b": (there.steady * _ratio(-there.T_2 + T_b, k * there.F),
-                  "Holding torque and bearing torque over torque by the force, motor 2 driven."),
-        "eta_b_raw": (there.steady * _ratio(-there.T_2, k * there.F),
-                      "Holding torque over torque by the force, motor 2 driven."),
-        "eta_b_reverse": (back.steady * _ratio(back.T_1 + T_b, k * back.F),
-                          "The same with the bearing torque added, motor 1 driven."),
-        "eta_b_true": (par.screw.eta_b, "What was put in."),
-        "force": (there.F, "Mean force while motor 1 drives."),
-        "force_reverse": (back.F, "Mean force while motor 1 is driven back."),
-        "bearing_torque": (T_b, "Motor torque without load at the same speed."),
-    }  # fmt: skip
-    return tuple(_kpi(name, *values[name]) for name in _UNITS)
+    return FIGURES(
+        eta_f=there.steady * _ratio(k * there.F, there.T_1 - T_b),
+        eta_f_raw=there.steady * _ratio(k * there.F, there.T_1),
+        eta_f_reverse=back.steady * _ratio(k * back.F, -back.T_2 - T_b),
+        eta_f_true=par.screw.eta_f,
+        eta_b=there.steady * _ratio(-there.T_2 + T_b, k * there.F),
+        eta_b_raw=there.steady * _ratio(-there.T_2, k * there.F),
+        eta_b_reverse=back.steady * _ratio(back.T_1 + T_b, k * back.F),
+        eta_b_true=par.screw.eta_b,
+        force=there.F,
+        force_reverse=back.F,
+        bearing_torque=T_b,
+    )
 
 
 def _pushed(i: float, speed: float, options: Options) -> Any:
@@ -139,12 +131,12 @@ def _pushed(i: float, speed: float, options: Options) -> Any:
     return stimulus
 
 
-def _read(run: xr.Dataset, speed: float, options: Options) -> Found:
+def _read(run: xr.Dataset, speed: float, options: Options) -> Reading:
     K = torque_constant_of(parameters_of(run))
     T_1, T_2 = (K * _mean(run, name, options) for name in ("i_1", "i_2"))
     steady = all(abs(_speed(run, name, options) / speed - 1.0) < _SPEED for name in ("q_1", "q_2"))
     F = _mean(run, "y_F", options)
-    return Found(F, T_1, T_2, 1.0 if steady and F > 0 else math.nan)
+    return Reading(F, T_1, T_2, 1.0 if steady and F > 0 else math.nan)
 
 
 def _speed(run: xr.Dataset, name: str, options: Options) -> float:
@@ -155,17 +147,11 @@ def _speed(run: xr.Dataset, name: str, options: Options) -> float:
 
 
 def _mean(run: xr.Dataset, name: str, options: Options) -> float:
-    return mean_between(run, name, _SETTLED * options.duration, options.duration)
+    return mean(run, name, _SETTLED * options.duration, options.duration)
 
 
 def _ratio(above: float, below: float) -> float:
     return above / below if below > 0 else math.nan
-
-
-def _kpi(name: str, value: float, text: str) -> Kpi:
-    failed = "no steady motion under compression: a motor cannot do its part"
-    note = "" if math.isfinite(value) else failed
-    return Kpi(name, value, _UNITS[name], text, note)
 
 
 EXPERIMENT = Experiment(
@@ -176,6 +162,6 @@ EXPERIMENT = Experiment(
     defaults=Options(i_drive=12.0, i_back=3.0, omega_slow=10.0, settle=0.4, duration=1.0),
     cases=cases,
     judge=judge,
-    kpis=_UNITS,
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

@@ -11,23 +11,24 @@ import math
 import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import parameters_of
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.brakes.wedge.rigs.rig_case import parameters_of, shaft_case, torque_constant_of
+from bywire.brakes.wedge.rigs.rig_case import shaft_case, torque_constant_of
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant.axial_bearing import AngularSpeed
 
 _STARTED = 0.05  # of a stroke, after which the motion counts as steady
-_UNITS = {
-    "torque_forward": "N*m",
-    "torque_backward": "N*m",
-    "friction_torque": "N*m",
-    "ripple": "N*m",
-    "cogging_true": "N*m",
-}
+FIGURES = Figures(
+    torque_forward=("N*m", "Mean torque by the current, forward."),
+    torque_backward=("N*m", "The same backward."),
+    friction_torque=("N*m", "Half of their difference."),
+    ripple=("N*m", "Amplitude of a sine of the torque's deviation from its mean."),
+    cogging_true=("N*m", "Amplitude of the cogging torque that was put in."),
+    undefined="no row in the time in which the torque is taken",
+)
 
 
 class Options(ParameterSet):
@@ -46,7 +47,7 @@ def stroke(options: Options) -> float:
     return 2.0 * math.pi / options.omega_slow
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run, on a dummy shaft."""
     T = stroke(options)
 
@@ -71,20 +72,13 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     ]
     forward, backward = (float(way.mean()) if way.size else math.nan for way in ways)
     ripple = float(np.mean([way.std() for way in ways])) if all(w.size for w in ways) else math.nan
-    values = {
-        "torque_forward": (forward, "Mean torque by the current, forward."),
-        "torque_backward": (backward, "The same backward."),
-        "friction_torque": (0.5 * (forward - backward), "Half of their difference."),
-        "ripple": (math.sqrt(2.0) * ripple, "Amplitude of a sine of the torque's deviation from "
-                   "its mean."),
-        "cogging_true": (par.motor_1.T_cog, "Amplitude of the cogging torque that was put in."),
-    }  # fmt: skip
-    return tuple(_kpi(name, *values[name]) for name in _UNITS)
-
-
-def _kpi(name: str, value: float, text: str) -> Kpi:
-    note = "" if math.isfinite(value) else "no row in the time in which the torque is taken"
-    return Kpi(name, value, _UNITS[name], text, note)
+    return FIGURES(
+        torque_forward=forward,
+        torque_backward=backward,
+        friction_torque=0.5 * (forward - backward),
+        ripple=math.sqrt(2.0) * ripple,
+        cogging_true=par.motor_1.T_cog,
+    )
 
 
 EXPERIMENT = Experiment(
@@ -95,6 +89,6 @@ EXPERIMENT = Experiment(
     defaults=Options(omega_slow=0.5, settle=0.05, record=1e-3),
     cases=cases,
     judge=judge,
-    kpis=_UNITS,
+    kpis=FIGURES.units,
     figures=("time-traces", "energy-balance"),
 )

@@ -13,8 +13,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.stimuli.registry import Stimulus
+from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.wedge.case import case_from_parked, parameters_of
 from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
@@ -29,24 +28,28 @@ FREE, DRY = "frictionless", "friction"
 _SHARE = 0.2  # of the moment: how far the ramps go to either side
 _NO_FORCE = 1.0  # actuation force [N] below which the brake factor says nothing
 
-_EACH = {
-    "F_M": "N",
-    "F_M_closed": "N",
-    "F_M_rising": "N",
-    "F_M_falling": "N",
-    "C_star": "1",
-    "C_star_closed": "1",
-    "C_star_rising": "1",
-    "C_star_falling": "1",
-}
-_ALL = {
-    "F_M_error": "N",
-    "C_star_error": "%",
-    "neutral_mu": "1",
-    "neutral_mu_closed": "1",
-    "neutral_mu_rising": "1",
-    "neutral_mu_falling": "1",
-}
+EACH = Figures(
+    F_M=("N", "Actuation force at the end, without friction."),
+    F_M_closed=("N", "Closed form of it, (tan(alpha) - mu_B) F_N, at that normal force."),
+    F_M_rising=(
+        "N", "With friction: mean force while the moment rises slowly, at that normal force."
+    ),
+    F_M_falling=(
+        "N", "The same while it falls slowly: the force at rest is anywhere between."
+    ),
+    C_star=("1", "Brake factor without friction, 2 mu_B F_N / F_M."),
+    C_star_closed=("1", "Closed form of it, 2 mu_B / (tan(alpha) - mu_B)."),
+    C_star_rising=("1", "With friction: brake factor while the moment rises."),
+    C_star_falling=("1", "With friction: brake factor while it falls."),
+)  # fmt: skip
+ALL = Figures(
+    F_M_error=("N", "Largest difference of force and closed form, without friction."),
+    C_star_error=("%", "Largest difference of brake factor and closed form, without friction."),
+    neutral_mu=("1", "Coefficient at which no actuation force is needed, no friction."),
+    neutral_mu_closed=("1", "Closed form of it, tan(alpha)."),
+    neutral_mu_rising=("1", "The same with friction, while the moment rises."),
+    neutral_mu_falling=("1", "The same with friction, while the moment falls."),
+)
 
 
 class Options(ParameterSet):
@@ -72,7 +75,7 @@ def demand(t: Array, options: Options) -> Array:
     return options.M_hold * np.where(t < -1e-9, 0.0, course)
 
 
-def cases(par: WedgeParameters, options: Options, _: Stimulus | None = None) -> tuple[Case, ...]:
+def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return two runs for each friction coefficient, on a true disc driven at constant speed."""
     stand = {"flywheel.law": "driven", "flywheel.runout": 0.0}
     duration = options.t_start + 2.5 * options.t_ramp + options.t_hold
@@ -104,8 +107,8 @@ def _slope(run: xr.Dataset, begin: float, end: float) -> float:
     return _sign(run) * float(part["F_M"].mean()) / pressed if pressed > 0 else math.nan
 
 
-def _one(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, ...]:
-    """Return the figures of one friction coefficient."""
+def _each(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, ...]:
+    """Return the figures of a friction coefficient."""
     free, dry = (recordings[f"{kind}-{tag(mu_B)}"] for kind in (FREE, DRY))
     F_M, F_N = _held(free)
     tan_alpha = wedge.slope(parameters_of(free).wedge)
@@ -116,91 +119,71 @@ def _one(recordings: Recordings, mu_B: float, options: Options) -> tuple[Kpi, ..
     rising, falling = (
         F_N * _slope(dry, at - 0.25 * T, at + 0.25 * T) for at in (middle, middle + T)
     )
-    at, note = f"_{tag(mu_B)}", "" if F_N > 0 else "the pads do not press at the end"
+    note = "" if F_N > 0 else "the pads do not press at the end"
     bad = "" if math.isfinite(rising + falling) else "the pads do not press on the ramps"
-    factor = {
-        name: _factor(name + at, text, mu_B * F_N, F, note or extra)
-        for name, text, F, extra in (
-            ("C_star", "Brake factor without friction, 2 mu_B F_N / F_M.", F_M, ""),
-            ("C_star_closed", "Closed form of it, 2 mu_B / (tan(alpha) - mu_B).", closed, ""),
-            ("C_star_rising", "With friction: brake factor while the moment rises.", rising, bad),
-            ("C_star_falling", "With friction: brake factor while it falls.", falling, bad),
-        )
-    }
-    return (
-        Kpi("F_M" + at, F_M, "N", "Actuation force at the end, without friction.", note),
-        Kpi("F_M_closed" + at, closed, "N",
-            "Closed form of it, (tan(alpha) - mu_B) F_N, at that normal force.", note),
-        Kpi("F_M_rising" + at, rising, "N",
-            "With friction: mean force while the moment rises slowly, at that normal force.", bad),
-        Kpi("F_M_falling" + at, falling, "N",
-            "The same while it falls slowly: the force at rest is anywhere between.", bad),
-        *factor.values(),
-    )  # fmt: skip
+    F_B = mu_B * F_N
+    return EACH(
+        f"_{tag(mu_B)}",
+        F_M=(F_M, note),
+        F_M_closed=(closed, note),
+        F_M_rising=(rising, bad),
+        F_M_falling=(falling, bad),
+        C_star=_factor(F_B, F_M, note),
+        C_star_closed=_factor(F_B, closed, note),
+        C_star_rising=_factor(F_B, rising, note or bad),
+        C_star_falling=_factor(F_B, falling, note or bad),
+    )
 
 
-def _factor(name: str, text: str, F_B: float, F_M: float, problem: str) -> Kpi:
+def _factor(F_B: float, F_M: float, problem: str) -> tuple[float, str]:
     """Return a brake factor: both pads' braking force over the actuation force."""
     vague = f"the actuation force is below {_NO_FORCE:g} N: the brake factor is not bounded"
     note = problem or ("" if abs(F_M) >= _NO_FORCE else vague)
-    return Kpi(name, math.nan if note else 2.0 * F_B / F_M, "1", text, note)
+    return math.nan if note else 2.0 * F_B / F_M, note
 
 
-def _neutral(name: str, text: str, options: Options, forces: Array) -> Kpi:
-    """Return the friction coefficient at which a force changes its sign, by straight lines."""
+def _neutral(options: Options, F_M: list[float]) -> tuple[float, str]:
+    """Return the friction coefficient at which a force changes its sign, by straight lines.
+
+    Forces times mu_B are forces per normal force at equal moments: straight lines over mu_B.
+    """
     order = np.argsort(options.mu_B)
-    mu, F = np.array(options.mu_B)[order], forces[order]
+    mu, F = np.array(options.mu_B)[order], np.multiply(F_M, options.mu_B)[order]
     crossings = np.flatnonzero((F[:-1] > 0) & (F[1:] <= 0))
     if not crossings.size:
-        note = "the actuation force does not change its sign in this range"
-        return Kpi(name, math.nan, "1", text, note)
+        return math.nan, "the actuation force does not change its sign in this range"
     k = int(crossings[0])
-    value = mu[k] + (mu[k + 1] - mu[k]) * F[k] / (F[k] - F[k + 1])
-    return Kpi(name, float(value), "1", text)
+    return float(mu[k] + (mu[k + 1] - mu[k]) * F[k] / (F[k] - F[k + 1])), ""
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return forces and brake factors for every friction coefficient, and how they agree."""
-    each = [_one(recordings, mu_B, options) for mu_B in options.mu_B]
-    column = {name: [kpis[k].value for kpis in each] for k, name in enumerate(_EACH)}
+    each = [_each(recordings, mu_B, options) for mu_B in options.mu_B]
+    column = {name: [kpis[k].value for kpis in each] for k, name in enumerate(EACH.units)}
     wrong = [
-        abs(found - closed)
-        for found, closed in zip(column["F_M"], column["F_M_closed"], strict=True)
+        abs(force - closed)
+        for force, closed in zip(column["F_M"], column["F_M_closed"], strict=True)
         if math.isfinite(closed)
     ]
     shares = [
-        abs(found / closed - 1.0)
-        for found, closed in zip(column["C_star"], column["C_star_closed"], strict=True)
-        if math.isfinite(found * closed)
+        abs(factor / closed - 1.0)
+        for factor, closed in zip(column["C_star"], column["C_star_closed"], strict=True)
+        if math.isfinite(factor * closed)
     ]
-    tan_alpha = wedge.slope(parameters_of(next(iter(recordings.values()))).wedge)
-    # Forces times mu_B are forces per normal force at equal moments: straight lines over mu_B.
-    neutral = {
-        "neutral_mu": ("F_M", "Coefficient at which no actuation force is needed, no friction."),
-        "neutral_mu_rising": ("F_M_rising", "The same with friction, while the moment rises."),
-        "neutral_mu_falling": ("F_M_falling", "The same with friction, while the moment falls."),
-    }
-    found = {
-        name: _neutral(name, text, options, np.multiply(column[F], options.mu_B))
-        for name, (F, text) in neutral.items()
-    }
-    closed = Kpi("neutral_mu_closed", tan_alpha, "1", "Closed form of it, tan(alpha).")
-    return (
-        *(kpi for kpis in each for kpi in kpis),
-        Kpi("F_M_error", max(wrong, default=math.nan), "N",
-            "Largest difference of force and closed form, without friction.",
-            "" if wrong else "the pads press at no coefficient"),
-        Kpi("C_star_error", 100.0 * max(shares, default=math.nan), "%",
-            "Largest difference of brake factor and closed form, without friction.",
-            "" if shares else "no brake factor is bounded"),
-        found["neutral_mu"], closed, found["neutral_mu_rising"], found["neutral_mu_falling"],
-    )  # fmt: skip
+    overall = ALL(
+        F_M_error=max(wrong) if wrong else (math.nan, "the pads press at no coefficient"),
+        C_star_error=100.0 * max(shares) if shares else (math.nan, "no brake factor is bounded"),
+        neutral_mu=_neutral(options, column["F_M"]),
+        neutral_mu_closed=wedge.slope(parameters_of(next(iter(recordings.values()))).wedge),
+        neutral_mu_rising=_neutral(options, column["F_M_rising"]),
+        neutral_mu_falling=_neutral(options, column["F_M_falling"]),
+    )
+    return (*(kpi for kpis in each for kpi in kpis), *overall)
 
 
 def named(options: Options) -> dict[str, str]:
     """Return the unit of every key figure."""
-    each = {f"{name}_{tag(mu_B)}": unit for mu_B in options.mu_B for name, unit in _EACH.items()}
-    return each | _ALL
+    return EACH.ending(*(f"_{tag(mu_B)}" for mu_B in options.mu_B)) | ALL.units
 
 
 _DEFAULTS = Options(

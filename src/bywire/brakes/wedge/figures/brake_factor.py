@@ -24,14 +24,9 @@ FARTHEST = 60.0
 class WedgeForces:
     """Actuation force over normal force at some friction coefficients.
 
-    Parameters
-    ----------
-    mu_B
-        Friction coefficients of the pads, ascending.
-    free
-        Force ratio at rest without friction in the brake.
-    rising, falling
-        The same with friction, while the moment rises and falls slowly.
+    ``mu_B``: friction coefficients of the pads, ascending; ``free``: force ratio at rest without
+    friction in the brake; ``rising``, ``falling``: the same with friction, while the moment rises
+    and falls slowly.
     """
 
     mu_B: Sequence[float]
@@ -53,12 +48,8 @@ class WedgeForces:
 def brake_factor(forces: WedgeForces, tan_alpha: float) -> Figure:
     """Draw force ratio and brake factor C* over the friction coefficient.
 
-    Parameters
-    ----------
-    forces
-        What was computed.
-    tan_alpha
-        Tangent of the wedge's angle, where the closed form changes its sign.
+    ``forces``: what was computed; ``tan_alpha``: tangent of the wedge's angle, where the closed
+    form changes its sign.
     """
     mu = np.asarray(forces.mu_B, dtype=np.float64)
     figure, (upper, lower) = style.new_figure(5.0, (1.0, 1.0))

@@ -87,10 +87,8 @@ def observed(x: State, u: Input, par: Parameters) -> Moment:
 def next_mode(mode: Flag, wanted: Flag, touching: Flag, home: Flag) -> Flag:
     """Return the mode that follows, by flags of 0 or 1.
 
-    Parameters
-    ----------
-    wanted, touching, home
-        Whether braking is demanded, the pads touch, the reference is back at its parking position.
+    ``wanted``, ``touching``, ``home``: whether braking is demanded, the pads touch, the reference
+    is back at its parking position.
     """
     from_parked = ops.where(wanted > 0.5, GAP, PARKED)
     from_gap = ops.where(wanted > 0.5, ops.where(touching > 0.5, MOMENT, GAP), RETRACTING)

@@ -36,10 +36,7 @@ def two_motor_loop(
 ) -> Loop:
     """Return the position loop of two motors that follow one reference and share a load.
 
-    Parameters
-    ----------
-    name, summary, at, point, causes, proof
-        As those of a `Loop`.
+    ``name``, ``summary``, ``at``, ``point``, ``causes``, ``proof``: as those of a `Loop`.
     """
     return Loop(
         name=name,

@@ -19,12 +19,6 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     drive_sensors,
 )
 from bywire.brakes.wedge.methods.drive_train.screw_strokes import Stroke, fits, strokes
-from bywire.brakes.wedge.methods.drive_train.steady_motion import (
-    Motions,
-    motions,
-    steady_dynamics,
-    window_residuals,
-)
 from bywire.brakes.wedge.methods.simulated_record import sensed, turned
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
@@ -34,6 +28,12 @@ from bywire.identification.differentiation import differentiated
 from bywire.identification.equation import Equation
 from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Curve, Effort, Identified, Method
+from bywire.identification.steady_motion import (
+    Motions,
+    motions,
+    steady_dynamics,
+    window_residuals,
+)
 from bywire.identification.unknown import parameters_of
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 from bywire.plant.axial_bearing import AngularSpeed

@@ -25,12 +25,8 @@ _ANGLES = ("theta_", "last_")
 class Sensor:
     """What is read of a run.
 
-    Parameters
-    ----------
-    output
-        Output of the model.
-    sigma
-        Standard deviation of white noise on every sample [unit of the output].
+    ``output``: output of the model; ``sigma``: standard deviation of white noise on every sample
+    [unit of the output].
     """
 
     output: str
@@ -40,14 +36,7 @@ class Sensor:
 def sensed(case: Case, sensors: Mapping[str, Sensor], random: np.random.Generator) -> xr.Dataset:
     """Return one run's signals from time zero on, with noise.
 
-    Parameters
-    ----------
-    case
-        The run.
-    sensors
-        Signal -> what it reads.
-    random
-        Where the noise comes from.
+    ``sensors``: signal -> what it reads; ``random``: where the noise comes from.
     """
     run = as_run(case, _STEP)
     computed = simulate(run, tuple({s.output for s in sensors.values()}))
@@ -68,12 +57,8 @@ def turned(case: Case, angle: float) -> Case:
 
     Encoder counts and cogging then fall elsewhere, as they do on a bench from day to day.
 
-    Parameters
-    ----------
-    case
-        Of a rig, or of the wedge brake, whose wedge moves along.
-    angle
-        Added to every shaft's angle [rad].
+    ``case``: of a rig, or of the wedge brake, whose wedge moves along; ``angle``: added to every
+    shaft's angle [rad].
     """
 
     def shifted(row: Any) -> Any:

@@ -22,7 +22,6 @@ from bywire.brakes.wedge.methods.drive_train.rig_measurement import (
     RigOptions,
     drive_sensors,
 )
-from bywire.brakes.wedge.methods.drive_train.steady_motion import steady_dynamics
 from bywire.brakes.wedge.methods.drive_train.two_stages import TwoStages
 from bywire.brakes.wedge.methods.simulated_record import Sensor, sensed, turned
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -32,6 +31,7 @@ from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve, Effort, Identified, Method
 from bywire.identification.records import joined, split
+from bywire.identification.steady_motion import steady_dynamics
 from bywire.plant import shaft_encoder
 
 _PASSES = 3  # a fit finds the contacts, one without their kinks the forces, one uses both

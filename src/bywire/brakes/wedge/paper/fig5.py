@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from bywire.brakes.wedge.paper import facts, frequency
-from bywire.brakes.wedge.paper import frequency_facts as stated
 from bywire.brakes.wedge.paper.runs import parameters
 from bywire.brakes.wedge.paper.tolerances import ALIKE, AT_LIMIT, SAME_GAIN, SAME_PHASE
 from bywire.reproduction.item import Item, compared, found
@@ -25,17 +24,16 @@ def part(runs: Runs) -> Part:
     gain, phase = frequency.without_friction(_LOW)
     preload, nearest = frequency.nearest_preload()
     items = [
-        compared("fig5.limit", stated.NO_LIMIT, 100.0 * max(shares), AT_LIMIT.size,
+        compared("fig5.limit", facts.NO_LIMIT, 100.0 * max(shares), AT_LIMIT,
                  "largest share over frequencies and amplitudes"),
         *friction(_LOW, "fig5"),
         *_low_frequency(),
-        compared("fig5.linear.gain", stated.SAME_GAIN, gain, SAME_GAIN.size, "1 to 100 Hz"),
-        compared("fig5.linear.phase", stated.SAME_PHASE, phase, SAME_PHASE.size, "1 to 100 Hz"),
-        compared("fig5.wedge", facts.LITTLE, frequency.apart(_LOW), ALIKE.size,
+        compared("fig5.linear.gain", facts.SAME_GAIN, gain, SAME_GAIN, "1 to 100 Hz"),
+        compared("fig5.linear.phase", facts.SAME_PHASE, phase, SAME_PHASE, "1 to 100 Hz"),
+        compared("fig5.wedge", facts.LITTLE, frequency.apart(_LOW), ALIKE,
                  "largest distance of both responses, amplitudes of 0.5 and 1 rad"),
-        found("fig5.wedge.preload", "N", preload,
-              f"preload of the screw alone that comes closest to the wedge, of 25, 50, 75, 100 N; "
-              f"ours is {parameters().rig.F_0:g} N"),
+        found("fig5.wedge.preload", "N", preload, "preload of the screw alone that comes closest "
+              f"to the wedge, of 25, 50, 75, 100 N; ours is {parameters().rig.F_0:g} N"),
         found("fig5.wedge.nearest", "%", nearest, "largest distance with that preload"),
     ]  # fmt: skip
     text = (
@@ -55,37 +53,33 @@ def part(runs: Runs) -> Part:
 def friction(controller: str, figure: str) -> list[Item]:
     """Return what friction takes off the response at the lowest frequency."""
     items: list[Item] = []
-    found_ = frequency.screw()
-    f = found_["frequency"].values
+    sweep = frequency.screw()
+    f = sweep["frequency"].values
     linear = frequency.linear(controller, f)
     sizes = frequency.AMPLITUDES[controller]
-    away = 100.0 * float(np.abs(frequency.value(found_, controller, sizes[0])[0] - linear[0]))
-    items.append(
-        compared(f"{figure}.friction", stated.FRICTION_SEEN, away, ">=",
-                 f"amplitude {sizes[0]:g} rad")
-    )  # fmt: skip
+    away = 100.0 * float(np.abs(frequency.value(sweep, controller, sizes[0])[0] - linear[0]))
+    items.append(compared(f"{figure}.friction", facts.FRICTION_SEEN, away, ">=",
+                          f"amplitude {sizes[0]:g} rad"))  # fmt: skip
     for size in sizes:
-        value = frequency.value(found_, controller, size)
+        value = frequency.value(sweep, controller, size)
         lost = frequency.decibels(value / linear)
         late = np.degrees(np.angle(value / linear))
-        items.append(
-            found(f"{figure}.friction.{size:g}", "dB", float(lost[0]),
-                  f"gain at 1 Hz less that of the linear loop, amplitude {size:g} rad; phase "
-                  f"{late[0]:.2g} degree")
-        )  # fmt: skip
+        items.append(found(f"{figure}.friction.{size:g}", "dB", float(lost[0]),
+                           f"gain at 1 Hz less that of the linear loop, amplitude {size:g} rad; "
+                           f"phase {late[0]:.2g} degree"))  # fmt: skip
     return items
 
 
 def _low_frequency() -> list[Item]:
     """Return whether friction shows at low frequency in particular, and where it shows most."""
-    found_ = frequency.screw()
-    f = found_["frequency"].values
+    sweep = frequency.screw()
+    f = sweep["frequency"].values
     lost = np.array([
-        frequency.decibels(frequency.linear(_LOW, f) / frequency.value(found_, _LOW, size))
+        frequency.decibels(frequency.linear(_LOW, f) / frequency.value(sweep, _LOW, size))
         for size in frequency.AMPLITUDES[_LOW]
     ])  # fmt: skip
     return [
-        compared("fig5.friction.low_frequency", stated.FRICTION_LOW,
+        compared("fig5.friction.low_frequency", facts.FRICTION_LOW,
                  float((lost[:, 0] / lost[:, -1]).min()), ">=", "smallest ratio of all amplitudes"),
         found("fig5.friction.most", "Hz", float(f[lost[-1].argmax()]),
               f"where the gain loses most at 2 rad, {lost[-1].max():.3g} dB; {lost[-1][0]:.2g} dB "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,19 +12,21 @@ from bywire.analysis.crossings import bandwidth
 from bywire.analysis.loop import LOOPS
 from bywire.analysis.response.dataset import Sweep
 from bywire.analysis.response.frequency_response import frequency_response
+from bywire.analysis.response.harmonics import amplitudes
 from bywire.brakes.wedge.paper import facts, frequency
-from bywire.brakes.wedge.paper import frequency_facts as stated
-from bywire.brakes.wedge.paper import jump as roberts2003_jump
 from bywire.brakes.wedge.paper.fig5 import friction
 from bywire.brakes.wedge.paper.tolerances import ALIKE, SAME_GAIN, SAME_PHASE
 from bywire.core.typing import Array
 from bywire.reproduction.item import Item, compared, found
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs
+from bywire.simulation.run import simulate
 
 _HIGH = "high"
 _SMALL = 0.1  # rad: clear of the current limit up to 60 Hz where the screw loses nothing
 _SEEN = (1.0, 10.0, 60.0, 100.0)  # Hz
+_SHAKEN, _BELOW, _ABOVE = 1.0, 20.0, 30.0  # rad, Hz, Hz: where two responses answer one sine
+_T_FALL, _T_SEEN = 3.0, 1.0  # s
 _LAWS = {"load": "friction by the axial force", "drive": "loss by the motor's torque"}
 
 Complex = NDArray[np.complex128]
@@ -35,12 +38,12 @@ def part(runs: Runs) -> Part:
     runs.report("Fig. 6: current limit, efficiency", 0.5)
     items = [
         *_limit(),
-        *roberts2003_jump.items(),
+        *_jump(),
         *friction(_HIGH, "fig6"),
         *_efficiency(),
-        compared("fig6.linear.gain", stated.SAME_GAIN, gain, SAME_GAIN.size, "1 to 100 Hz"),
-        compared("fig6.linear.phase", stated.SAME_PHASE, phase, SAME_PHASE.size, "1 to 100 Hz"),
-        compared("fig6.wedge", facts.LITTLE, frequency.apart(_HIGH), ALIKE.size,
+        compared("fig6.linear.gain", facts.SAME_GAIN, gain, SAME_GAIN, "1 to 100 Hz"),
+        compared("fig6.linear.phase", facts.SAME_PHASE, phase, SAME_PHASE, "1 to 100 Hz"),
+        compared("fig6.wedge", facts.LITTLE, frequency.apart(_HIGH), ALIKE,
                  "largest distance of both responses, amplitudes of 0.25, 0.5 and 1 rad"),
         found("fig6.wedge.below_limit", "%", frequency.apart(_HIGH, limited=False),
               "the same where the screw does not reach the current limit"),
@@ -69,10 +72,10 @@ def _limit() -> list[Item]:
     falls = -np.diff(np.degrees(np.unwrap(np.angle(frequency.linear(_HIGH, f)))))
     onsets, kinks, each = [], [], list[Item]()
     for size in frequency.AMPLITUDES[_HIGH]:
-        one = frequency.of(frequency.screw(), _HIGH, size)
-        limited = np.flatnonzero(one["share_sat_current"].values > 0)
+        response = frequency.of(frequency.screw(), _HIGH, size)
+        limited = np.flatnonzero(response["share_sat_current"].values > 0)
         onset = float(f[limited[0]]) if limited.size else math.inf
-        drops = -np.diff(one["phase"].values)
+        drops = -np.diff(response["phase"].values)
         k = int(np.argmax(drops / falls))
         onsets.append(onset)
         kinks.append(float(drops[k] / falls[k]))
@@ -87,10 +90,10 @@ def _limit() -> list[Item]:
                   f"gain per decade over the last five frequencies, {size:g} rad"),
         ]  # fmt: skip
     return [
-        compared("fig6.limit", stated.LIMITED, max(onsets) / wide, "<=",
+        compared("fig6.limit", facts.LIMITED, max(onsets) / wide, "<=",
                  f"largest ratio of all amplitudes; the linear loop falls to -3 dB at "
                  f"{wide:.3g} Hz"),
-        compared("fig6.kink", stated.KINK, min(kinks), ">=", "smallest ratio of all amplitudes"),
+        compared("fig6.kink", facts.KINK, min(kinks), ">=", "smallest ratio of all amplitudes"),
         *each,
     ]  # fmt: skip
 
@@ -108,7 +111,7 @@ def _efficiency() -> list[Item]:
         lost = frequency.decibels(ideal / lossy)
         note = f"{_LAWS[law]}, amplitude {_SMALL:g} rad"
         items += [
-            compared(f"fig6.efficiency.{law}", stated.EFFICIENCY_HIGH, float(lost[-1] / lost[1]),
+            compared(f"fig6.efficiency.{law}", facts.EFFICIENCY_HIGH, float(lost[-1] / lost[1]),
                      ">=", note),
             *(
                 found(f"fig6.efficiency.{law}.{f:g}", "dB", float(-lost[k]),
@@ -122,11 +125,39 @@ def _efficiency() -> list[Item]:
 def _wedge(law: str) -> tuple[Complex, Complex]:
     """Return the assembled wedge's response with a screw without loss, and with its own."""
     loop, par = LOOPS.find("position"), frequency.changed(_HIGH).replace({"screw.law": law})
-    own = par.leaves()
+    leaves = par.leaves()
     sweep = Sweep(
         loop.inputs, loop.output, _SEEN, (_SMALL,),
-        {name: [1.0, own[name]] for name in ("screw.eta_f", "screw.eta_b")}, flags=(),
+        {name: [1.0, leaves[name]] for name in ("screw.eta_f", "screw.eta_b")}, flags=(),
     )  # fmt: skip
     measured = frequency_response(loop.point(par, 0.0).run(), sweep).isel(amplitude=0)
     values = measured["gain"].values * np.exp(1j * np.radians(measured["phase"].values))
     return values[0], values[1]
+
+
+def _jump() -> list[Item]:
+    """Return the gain after a start from rest, and after the frequency fell from above."""
+    return [
+        found("fig6.jump.from_rest", "1", _gain(_BELOW),
+              f"gain at {_BELOW:g} Hz and {_SHAKEN:g} rad, from rest: below the limit"),
+        found("fig6.jump.from_above", "1", _gain(_ABOVE), "the same after the frequency fell from "
+              f"{_ABOVE:g} Hz within {_T_FALL:g} s: the loop stays on the limit"),
+    ]  # fmt: skip
+
+
+def _gain(begin: float) -> float:
+    slope = (_BELOW - begin) / _T_FALL
+    at_end = 0.5 * (begin + _BELOW) * _T_FALL
+
+    def stimulus(t: Array) -> Array:
+        falling = begin * t + 0.5 * slope * t * t
+        turns = np.where(t < _T_FALL, falling, at_end + _BELOW * (t - _T_FALL))
+        return np.column_stack([_SHAKEN * np.sin(2.0 * math.pi * turns), 0.0 * t])
+
+    run = LOOPS.find("screw-position").point(frequency.changed(_HIGH), 0.0).run()
+    run = replace(run, stimulus=stimulus, duration=_T_FALL + _T_SEEN)
+    seen = simulate(run, ("theta_1",))
+    inside = (seen.time > _T_FALL - 1e-9) & (seen.time < _T_FALL + _T_SEEN - 1e-9)
+    angle = seen["theta_1"][inside]
+    line = amplitudes(seen.time[inside], angle, _BELOW, 1)[0]
+    return float(np.abs(line)) / _SHAKEN

@@ -53,19 +53,19 @@ def _swept(
         loop.inputs, loop.output, frequencies, amplitudes,
         {"control.position.f_n": list(BANDWIDTHS.values())}, flags=flags, most=_PATIENCE,
     )  # fmt: skip
-    found = frequency_response(loop.point(parameters(), 0.0).run(), sweep)
-    return found.assign_coords(controller=("variant", list(BANDWIDTHS)))
+    responses = frequency_response(loop.point(parameters(), 0.0).run(), sweep)
+    return responses.assign_coords(controller=("variant", list(BANDWIDTHS)))
 
 
-def of(found: xr.Dataset, controller: str, size: float) -> xr.Dataset:
+def of(responses: xr.Dataset, controller: str, size: float) -> xr.Dataset:
     """Return the figures of one controller and amplitude [rad], over frequency."""
-    return found.isel(variant=list(BANDWIDTHS).index(controller)).sel(amplitude=size)
+    return responses.isel(variant=list(BANDWIDTHS).index(controller)).sel(amplitude=size)
 
 
-def value(found: xr.Dataset, controller: str, size: float) -> Complex:
+def value(responses: xr.Dataset, controller: str, size: float) -> Complex:
     """Return a complex response, shape (frequencies,); NaN where the output sticks."""
-    one = of(found, controller, size)
-    return np.asarray(one["gain"].values * np.exp(1j * np.radians(one["phase"].values)))
+    figures = of(responses, controller, size)
+    return np.asarray(figures["gain"].values * np.exp(1j * np.radians(figures["phase"].values)))
 
 
 def changed(controller: str) -> ParameterSet:
@@ -91,23 +91,20 @@ def without_friction(controller: str) -> tuple[float, float]:
     current limit.
     """
     loop = LOOPS.find("screw-position")
-    own = loop.smooth(changed(controller))
+    smooth = loop.smooth(changed(controller))
     sweep = Sweep(
         loop.inputs, loop.output, FREQUENCIES[::4], loop.amplitudes[:1], flags=(), tolerance=1e-4
     )
-    found = frequency_response(loop.point(own, 0.0).run(), sweep).squeeze()
-    measured = found["gain"].values * np.exp(1j * np.radians(found["phase"].values))
-    ratio = measured / linear(controller, found["frequency"].values)
+    response = frequency_response(loop.point(smooth, 0.0).run(), sweep).squeeze()
+    measured = response["gain"].values * np.exp(1j * np.radians(response["phase"].values))
+    ratio = measured / linear(controller, response["frequency"].values)
     return float(np.abs(decibels(ratio)).max()), float(np.abs(np.degrees(np.angle(ratio))).max())
 
 
 def apart(controller: str, *, limited: bool = True) -> float:
     """Return how far the wedge's response is from the screw's at most, % of the amplitude.
 
-    Parameters
-    ----------
-    limited
-        Whether frequencies count at which the screw reaches the current limit.
+    ``limited``: whether frequencies count at which the screw reaches the current limit.
     """
     ours = screw().sel(frequency=wedge()["frequency"])
     largest = 0.0
@@ -129,8 +126,8 @@ def nearest_preload() -> tuple[float, float]:
         loop.inputs, loop.output, FREQUENCIES[::3], sizes, {"rig.F_0": list(_PRELOADS)}, flags=(),
         most=_PATIENCE,
     )  # fmt: skip
-    found = frequency_response(loop.point(changed("low"), 0.0).run(), sweep)
-    values = found["gain"].values * np.exp(1j * np.radians(found["phase"].values))
+    responses = frequency_response(loop.point(changed("low"), 0.0).run(), sweep)
+    values = responses["gain"].values * np.exp(1j * np.radians(responses["phase"].values))
     of_wedge = np.array([value(wedge(), "low", size) for size in sizes])
     away = np.abs(values - of_wedge).max(axis=(1, 2))
     k = int(away.argmin())
@@ -152,9 +149,9 @@ def beside(controller: str) -> Figure:
     """Return the Bode plot of the assembled wedge's response as points on the screw's."""
     lines = []
     for size in (size for size in AMPLITUDES[controller] if size in _WEDGE):
-        for label, found, points in (("screw", screw(), False), ("wedge", wedge(), True)):
-            f = found["frequency"].values
+        for label, responses, points in (("screw", screw(), False), ("wedge", wedge(), True)):
+            f = responses["frequency"].values
             lines.append(
-                Response(f"{label} {size:g} rad", f, value(found, controller, size), points)
+                Response(f"{label} {size:g} rad", f, value(responses, controller, size), points)
             )
     return bode(lines)

@@ -36,28 +36,27 @@ def part(runs: Runs) -> Part:
         "below the neutral point the wedge pushes the motors back until friction holds it."
     )
     run = off.recordings["run"]
-    exhibit = Exhibit(
-        "power-off-hold", stacked(run), "Power off at 500 Nm: what is left is the run-out's ripple."
-    )
+    exhibit = Exhibit("power-off-hold", stacked(run),
+                      "Power off at 500 Nm: what is left is the run-out's ripple.")  # fmt: skip
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 
 
 def _power_off(runs: Runs) -> list[Item]:
     neutral = {**with_friction(parameters(), tan_alpha(), known=True), **WITHOUT_RUNOUT}
     kept = kpis(runs.bench("power-off-hold", MAIN, neutral))
-    own = kpis(runs.bench("power-off-hold", MAIN))
+    usual = kpis(runs.bench("power-off-hold", MAIN))
     low = {**with_friction(parameters(), AWAY, known=True), **WITHOUT_RUNOUT}
     far = kpis(runs.bench("power-off-hold", MAIN, low))
     still = Fact(0.0, "m", "physical bound: what dry friction holds does not creep",
                  "physical bound")  # fmt: skip
     return [
-        compared("hold.neutral", facts.REMAINS, _share(kept), KEPT.size,
+        compared("hold.neutral", facts.REMAINS, _share(kept), KEPT,
                  "moment 2 s after power off in % of that before; run-out off, friction on"),
-        compared("hold.drift", still, own["drift"], "<=",
+        compared("hold.drift", still, usual["drift"], "<=",
                  "change of the wedge's travel in 2 s after all stuck; run-out on"),
-        found("hold.relaxation", "m", own["relaxation"],
+        found("hold.relaxation", "m", usual["relaxation"],
               "change of the wedge's travel from power off until all stick"),
-        found("hold.preload", "N", own["preload_end"], "preload that is left"),
+        found("hold.preload", "N", usual["preload_end"], "preload that is left"),
         found("hold.far", "%", _share(far),
               f"as hold.neutral at mu_B = {AWAY:g}: back-driven until friction holds"),
     ]  # fmt: skip
@@ -73,14 +72,13 @@ def _standing(runs: Runs) -> list[Item]:
     values = kpis(result)
     shares = {name: _self_reinforcement(run) for name, run in result.recordings.items()}
     return [
-        compared("hold.standing", facts.ONLY_TURNING, shares["drop"], STANDING.size,
+        compared("hold.standing", facts.ONLY_TURNING, shares["drop"], STANDING,
                  "(tan(alpha) F_N - F_M)/(tan(alpha) F_N) on a standing disc, pad term dropped as "
                  "in the paper"),
         found("hold.standing.stick", "1", shares["stick"],
               "the same where the standing pad sticks to the disc, our other reading"),
-        found("hold.force_held", "N", values["force_held_drop"],
-              f"normal force on the standing disc; {values['force_before_stop_drop']:.4g} N before "
-              "the stop"),
+        found("hold.force_held", "N", values["force_held_drop"], "normal force on the standing "
+              f"disc; {values['force_before_stop_drop']:.4g} N before the stop"),
     ]  # fmt: skip
 
 

@@ -28,7 +28,7 @@ def position(runs: Runs) -> Part:
     for controller in ("high", "low"):
         items += [
             compared(f"position.wedge.{controller}", facts.LITTLE,
-                     values[f"difference_screws_{controller}"], ALIKE.size,
+                     values[f"difference_screws_{controller}"], ALIKE,
                      f"{controller} bandwidth: largest difference over time and amplitudes"),
             found(f"position.motors.{controller}", "%", values[f"difference_motors_{controller}"],
                   f"{controller} bandwidth: the same against motors whose screws touch nothing"),
@@ -50,7 +50,7 @@ def force_fight(runs: Runs) -> Part:
     o = result.bench.chosen_options.flat()
     unequal = ", ".join(f"{100 * o[f'more_{key}']:+g} % {key}" for key in ("K", "J", "R", "D"))
     items = [
-        compared("force_fight.equal", facts.DIFFERENCES_FIGHT, equal, FORCE.size,
+        compared("force_fight.equal", facts.DIFFERENCES_FIGHT, equal, FORCE,
                  "equal motors: largest force of step, ramp and sine"),
         *(
             found(f"force_fight.{motion}", "N", values[f"peak_force_{motion}_unequal"],
@@ -66,9 +66,8 @@ def force_fight(runs: Runs) -> Part:
         "no forces. The rate limit's reason, higher speeds widen the angle between the motors, is "
         "looked for in Fig. 9's pulse with a weaker second motor."
     )
-    exhibit = Exhibit(
-        "force-fight", time_traces(result.recordings["step_unequal"]),
-        "Force fight: step of both motors, of which the second one differs.",
+    exhibit = Exhibit("force-fight", time_traces(result.recordings["step_unequal"]),
+                      "Force fight: step of both motors, of which the second one differs."
     )  # fmt: skip
     return Part("Force fight", text, tuple(items), (exhibit,))
 

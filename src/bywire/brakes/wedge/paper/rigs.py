@@ -6,7 +6,7 @@ from bywire.brakes.wedge.paper import facts
 from bywire.brakes.wedge.paper.runs import MAIN, parameters
 from bywire.brakes.wedge.paper.tolerances import RECOVERED
 from bywire.report.time_traces import time_traces
-from bywire.reproduction.item import Fact, Item, compared, found
+from bywire.reproduction.item import Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
 
@@ -19,10 +19,10 @@ def current_loop(runs: Runs) -> Part:
     result = runs.bench("current-loop", MAIN)
     values = kpis(result)
     bandwidths = [value for name, value in values.items() if name.startswith("bandwidth")]
-    own, position = values["bandwidth_parallel_usual"], parameters().control.position.f_n
+    usual, position = values["bandwidth_parallel_usual"], parameters().control.position.f_n
     items = [
-        compared("current_loop.bandwidth", facts.FAST_CURRENT, own / position, ">=",
-                 f"{own:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
+        compared("current_loop.bandwidth", facts.FAST_CURRENT, usual / position, ">=",
+                 f"{usual:.0f} Hz against {position:g} Hz of the high-bandwidth position control; "
                  "both are ours"),
         found("current_loop.slowest", "Hz", min(bandwidths),
               "over stators in parallel, alone and in series, and half to twice the gains"),
@@ -39,8 +39,8 @@ def efficiency(runs: Runs) -> Part:
     """Return the screw's efficiency as the rig measures it."""
     result = runs.bench("screw-efficiency", MAIN)
     values = {name: 100.0 * value for name, value in kpis(result).items()}
-    put_in = Fact(values["eta_f_true"], "%", facts.MEASURABLE, "reading")
-    allowed = RECOVERED.around(put_in.value)
+    put_in = reading(values["eta_f_true"], "%", facts.MEASURABLE)
+    allowed = RECOVERED
     bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
     items = [
         compared("efficiency.driving", facts.ETA, values["eta_f"], None,
@@ -60,10 +60,9 @@ def efficiency(runs: Runs) -> Part:
         "One motor in current control against the other in position control, a force sensor "
         "between their screws, in slow motion."
     )
-    exhibit = Exhibit(
-        "screw-efficiency", time_traces(result.recordings["driving"]),
-        "Screw efficiency: motor 1 drives with constant current while motor 2 gives way.",
-    )  # fmt: skip
+    exhibit = Exhibit("screw-efficiency", time_traces(result.recordings["driving"]),
+                      "Screw efficiency: motor 1 drives with constant current while motor 2 gives "
+                      "way.")  # fmt: skip
     return Part("Roller-screw efficiency", text, tuple(items), (exhibit,))
 
 
@@ -96,19 +95,19 @@ def _recovered(
     name: str, where: str, values: dict[str, float], key: str, unit: str, size: float
 ) -> Item:
     """Return a quantity as measured beside what was put in, in a unit of its own."""
-    put_in = Fact(values[f"{key}_true"] / size, unit, where, "reading")
-    return compared(name, put_in, values[key] / size, RECOVERED.around(put_in.value))
+    put_in = reading(values[f"{key}_true"] / size, unit, where)
+    return compared(name, put_in, values[key] / size, RECOVERED)
 
 
 def _directions(values: dict[str, float]) -> list[Item]:
     """Return how compression and tension compare."""
     K_F = parameters().rig.sensor.K_F
     line = 1.0 / (1.0 / values["K_line_compression"] - 1.0 / K_F)
-    same = Fact(line / MICRON, "N/um", facts.SAME_COMPRESSION, "reading")
+    same = reading(line / MICRON, "N/um", facts.SAME_COMPRESSION)
     compression = values["K_heart_compression"]
     return [
         compared("stiffness.compression", same, compression / MICRON,
-                 RECOVERED.around(same.value), "tip to tip, the force by the motors' current"),
+                 RECOVERED, "tip to tip, the force by the motors' current"),
         compared("stiffness.tension", facts.SOFTER_TENSION,
                  values["K_heart_tension"] / compression, "<=", "tension over compression"),
         found("stiffness.force_per_current", "N/A", values["force_per_current"],

@@ -7,14 +7,16 @@ from typing import Any
 
 import numpy as np
 
+from bywire.analysis.linear.linearize import linearize
 from bywire.brakes.wedge.case import swing
 from bywire.brakes.wedge.figures.brake_factor import WedgeForces, brake_factor
+from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.paper import facts
-from bywire.brakes.wedge.paper.poles import poles
 from bywire.brakes.wedge.paper.runs import IDEAL, MAIN, parameters, stacked, tan_alpha
-from bywire.brakes.wedge.paper.tolerances import FEW, FORCE, FORMULA, GRID
+from bywire.brakes.wedge.paper.tolerances import FEW, FORCE, FORMULA, GRID, NEUTRAL
 from bywire.brakes.wedge.series import tag, with_friction
-from bywire.reproduction.item import Fact, Item, compared, found
+from bywire.brakes.wedge.start import memory_at, travel_for
+from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
 
@@ -33,21 +35,24 @@ VARIANTS = (
 FREE = {"control.offset.delta_preload": 0.0}
 HOLD = (0.1, 0.5)
 """times [s] between which changes of contact are counted"""
+BELOW, ABOVE = 0.2, 0.5
+"""friction coefficients on both sides of the neutral point"""
+DEPTH = 5e-5
+"""wedge travel [m] beyond contact at which the brake is linearized; the model is linear there"""
+MECHANICAL = ("theta_1", "omega_1", "theta_2", "omega_2", "x", "v")
 
 
 def part(runs: Runs) -> Part:
     """Return the statements on brake factor, neutral point and instability."""
-    items = [*_static(runs), *poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
+    items = [*_static(runs), *_poles(), *_runaway(runs), *_closed_loop(runs), *_free_play(runs)]
     text = (
         "The paper derives the brake factor and the neutral point without friction. Without "
         "friction the model obeys both. With it the neutral point is a band: what friction holds "
         "does not run away, and the more load the less of it."
     )
     run = runs.bench("moment-pulses", MAIN, _at(0.6, {})).recordings["run"]
-    exhibit = Exhibit(
-        "unstable-region", stacked(run),
-        "Fig. 7's test in the unstable region, at mu_B = 0.6: the motors pull the wedge back.",
-    )  # fmt: skip
+    exhibit = Exhibit("unstable-region", stacked(run), "Fig. 7's test in the unstable region, at "
+                      "mu_B = 0.6: the motors pull the wedge back.")  # fmt: skip
     return Part("Neutral point and stability", text, tuple(items), (_figure(runs), exhibit))
 
 
@@ -66,19 +71,17 @@ def _static(runs: Runs) -> list[Item]:
             "section 'Introduction': C* = 2 mu_B/(tan(alpha) - mu_B), read as its value at our "
             "wedge angle"
         )
-        items.append(
-            compared(f"stability.C.{tag(mu_B)}", Fact(stated, "1", where, "reading"),
-                     values[f"C_star_{tag(mu_B)}"], FORMULA.around(stated),
-                     f"mu_B = {mu_B:g}, simulated without friction, "
-                     f"F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 Nm; with friction "
-                     f"{values[f'C_star_rising_{tag(mu_B)}']:.3g} rising, "
-                     f"{values[f'C_star_falling_{tag(mu_B)}']:.3g} falling"),
-        )  # fmt: skip
+        items.append(compared(f"stability.C.{tag(mu_B)}", reading(stated, "1", where),
+                              values[f"C_star_{tag(mu_B)}"], FORMULA, f"mu_B = {mu_B:g}, simulated "
+                              f"without friction, F_M = {values[f'F_M_{tag(mu_B)}']:.4g} N at 500 "
+                              f"Nm; with friction {values[f'C_star_rising_{tag(mu_B)}']:.3g} "
+                              f"rising, {values[f'C_star_falling_{tag(mu_B)}']:.3g} falling"
+        ))  # fmt: skip
     neutral = "coefficient without actuation force, with friction, while the moment"
     return [
         *items,
         compared("stability.F_M.neutral", facts.NEUTRAL_FORCE, values[f"F_M_{tag(tan_alpha())}"],
-                 FORCE.size, "simulated at mu_B = tan(alpha) without friction, at 500 Nm"),
+                 FORCE, "simulated at mu_B = tan(alpha) without friction, at 500 Nm"),
         found("stability.neutral.falling", "1", values["neutral_mu_falling"], f"{neutral} falls"),
         found("stability.neutral.rising", "1", values["neutral_mu_rising"], f"{neutral} rises"),
     ]  # fmt: skip
@@ -98,10 +101,9 @@ def _figure(runs: Runs) -> Exhibit:
         name: [values[f"{name}_{tag(m)}"] / F for m, F in zip(tried, pressed, strict=True)]
         for name in ("F_M", "F_M_rising", "F_M_falling")
     }
-    return Exhibit(
-        "brake-factor", brake_factor(WedgeForces(tried, *ratios.values()), tan_alpha()),
-        "Actuation force and brake factor at 500 Nm over the pads' friction coefficient.",
-    )  # fmt: skip
+    return Exhibit("brake-factor", brake_factor(WedgeForces(tried, *ratios.values()), tan_alpha()),
+                   "Actuation force and brake factor at 500 Nm over the pads' friction "
+                   "coefficient.")  # fmt: skip
 
 
 def _runaway(runs: Runs) -> list[Item]:
@@ -111,12 +113,11 @@ def _runaway(runs: Runs) -> list[Item]:
     note = "lowest mu_B tried at which the moment grows by itself when the power goes off at"
     high = facts.PULSE.value
     return [
-        compared("stability.runaway", stated, _lowest(runs, IDEAL, 500.0), GRID.size,
+        compared("stability.runaway", stated, _lowest(runs, IDEAL, 500.0), GRID,
                  f"{note} 500 Nm; without friction"),
         compared("stability.runaway.friction", stated, _lowest(runs, {"flywheel.runout": 0.0},
-                 500.0), GRID.size, f"{note} 500 Nm; with friction"),
-        found("stability.runaway.friction.950", "1",
-              _lowest(runs, {"flywheel.runout": 0.0}, high),
+                 500.0), GRID, f"{note} 500 Nm; with friction"),
+        found("stability.runaway.friction.950", "1", _lowest(runs, {"flywheel.runout": 0.0}, high),
               f"{note} {high:g} Nm; with friction"),
     ]  # fmt: skip
 
@@ -149,8 +150,8 @@ def _closed_loop(runs: Runs) -> list[Item]:
         values = kpis(
             runs.bench("friction-sweep", MAIN, None, {"slope": slope, "friction": friction})
         )
-        told = "knows" if slope == "known" else "does not know"
-        note = f"200 Nm, friction {friction}; the controller {told} mu_B"
+        belief = "knows" if slope == "known" else "does not know"
+        note = f"200 Nm, friction {friction}; the controller {belief} mu_B"
         items += [
             compared(f"stability.unstable{suffix}", facts.STABLE, values["unstable"], "<=",
                      f"coefficients without a settled hold; {note}"),
@@ -175,7 +176,7 @@ def _free_play(runs: Runs) -> list[Item]:
     }
     note = "changes of contact seen at the rows of 0.4 s of a hold at tan(alpha), without friction"
     return [
-        compared("stability.contact_changes", facts.NO_PLAY, float(changes["preload"]), FEW.size,
+        compared("stability.contact_changes", facts.NO_PLAY, float(changes["preload"]), FEW,
                  f"{note}, preload of the parameter set"),
         found("stability.contact_changes.free_play", "1", float(changes["free_play"]),
               f"{note}, no preload"),
@@ -185,3 +186,31 @@ def _free_play(runs: Runs) -> list[Item]:
             for name, run in held.items()
         ),
     ]  # fmt: skip
+
+
+def _poles() -> list[Item]:
+    """Return the slow open-loop poles at constant currents, without friction and cogging."""
+    note = "linear model at constant currents, without friction and cogging, mu_B ="
+    below, neutral, above = (slow_pole(mu_B) for mu_B in (BELOW, tan_alpha(), ABOVE))
+    return [
+        compared("stability.pole.neutral", facts.NEUTRAL_POLE, neutral.real, NEUTRAL,
+                 f"largest growth rate, {note} tan(alpha)"),
+        compared("stability.pole.above", facts.UNSTABLE_POLE, above.real, ">=",
+                 f"largest growth rate, {note} {ABOVE:g}"),
+        compared("stability.pole.below", facts.STABLE_POLE, below.real, "<=",
+                 f"largest growth rate, {note} {BELOW:g}"),
+        found("stability.swing.below", "rad/s", below.imag, f"of the slow pair, {note} {BELOW:g}"),
+    ]  # fmt: skip
+
+
+def slow_pole(mu_B: float) -> complex:
+    """Return the slow pole that grows fastest [1/s], the one with positive frequency of a pair."""
+    par = parameters().replace({**IDEAL, "command.mode": "current", "wedge.mu_B": mu_B})
+    state = state_at(travel_for(0.0, par) + DEPTH, par)
+    model = linearize(
+        WedgeBrake(), par, state, memory_at(state.x, par), inputs=("i_1_ref",), outputs=("x",)
+    )
+    # Held: the current loops, and the disc with its sensors, which do not feed back.
+    every = model.reduced(MECHANICAL, held=True).poles()
+    slow = every[np.argsort(np.abs(every))][:2]
+    return complex(max(slow, key=lambda s: (round(s.real, 6), s.imag)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -10,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case
+from bywire.brakes.wedge.case import case_from_parked
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.screw_rig import ScrewRig
 from bywire.brakes.wedge.rigs.shaft_rig import ShaftRig
@@ -31,12 +31,8 @@ def shaft_case(
 ) -> Case:
     """Return a run of the single motor's rig, from rest at the angle zero.
 
-    Parameters
-    ----------
-    changes
-        Parameters that the experiment sets, the rig's modes among them.
-    timing
-        ``settle``, ``keep`` and ``record`` of the case [s].
+    ``changes``: parameters that the experiment sets, the rig's modes among them; ``timing``:
+    ``settle``, ``keep`` and ``record`` of the case [s].
     """
     return _case(label, ShaftRig(), par.replace(changes), stimulus, duration, timing)
 
@@ -65,15 +61,24 @@ def _case(
     return Case(label, model, par, state, memory, stimulus, duration, **timing)
 
 
+def heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:
+    """Return a run of both motors in the brake heart, without an offset and so without force.
+
+    The command's ``mode`` is "current" or "position"; the wedge stays in its clearance.
+    """
+    changes = {"command.mode": mode, "control.offset.delta_preload": 0.0}
+    return case_from_parked(par, stimulus, duration, changes, "heart")
+
+
+def squeezing_current(run: xr.Dataset) -> Array:
+    """Return the current [A] that squeezes, the mean of both motors."""
+    return np.asarray(0.5 * (run["i_1"].values - run["i_2"].values))
+
+
 def check_current(name: str, i: float, par: WedgeParameters) -> None:
     """Refuse a current that the drives do not give.
 
-    Parameters
-    ----------
-    name
-        The option that asks for it.
-    i
-        Its value [A].
+    ``name``: the option that asks for it; ``i``: its value [A].
 
     Raises
     ------
@@ -86,11 +91,6 @@ def check_current(name: str, i: float, par: WedgeParameters) -> None:
             f"options.{name} = {i:g} A is not admissible: the drives give {limit:g} A at most "
             "(drive.i_max); ask for less"
         )
-
-
-def parameters_of(recording: xr.Dataset) -> WedgeParameters:
-    """Return the parameters that a recording was made with: the data sheets of its test."""
-    return WedgeParameters.model_validate_json(recording.attrs["parameters"])
 
 
 def slope_of(par: WedgeParameters) -> float:
@@ -112,9 +112,3 @@ def share_at(run: xr.Dataset, name: str, limit: float) -> float:
 def peak(run: xr.Dataset, name: str) -> float:
     """Return the largest magnitude of a signal after time zero."""
     return float(np.abs(run[name].sel(time=slice(-1e-9, None)).values).max())
-
-
-def mean_between(run: xr.Dataset, name: str, begin: float, end: float) -> float:
-    """Return the mean of a signal between two times [s]; NaN where nothing was recorded."""
-    values = run[name].sel(time=slice(begin - 1e-9, end + 1e-9)).values
-    return float(values.mean()) if values.size else math.nan

@@ -126,10 +126,7 @@ class ShaftRig(Assembly[WedgeParameters, Memory]):
 def friction(omega: float, torque: float, par: Par) -> Bounds:
     """Return the limits of the dry friction [N m] of bearings, screw and clamp.
 
-    Parameters
-    ----------
-    omega, torque
-        Speed of the shaft [rad/s], torque of its motor [N m].
+    ``omega``, ``torque``: speed of the shaft [rad/s], torque of its motor [N m].
 
     Notes
     -----

@@ -73,14 +73,7 @@ def failures(at: xr.Dataset, options: Options) -> list[str]:
 def around(grids: Sequence[xr.Dataset], best: xr.Dataset, options: Options) -> list[str]:
     """Return what happens one step away from the best design, on the finest grid that has it.
 
-    Parameters
-    ----------
-    grids
-        Maps of designs, coarse to fine.
-    best
-        One design of the last grid that holds it.
-    options
-        The study's.
+    ``grids``: maps of designs, coarse to fine; ``best``: one design of the last grid that holds it.
     """
     tan_alpha, lead = float(best["tan_alpha"]), float(best["lead"])
     power, texts = float(best[f"worst_{options.power}"]), []

@@ -47,14 +47,8 @@ def mapped(
 ) -> xr.Dataset:
     """Return what all designs on a grid do; on all cores, stopped by an interrupt.
 
-    Parameters
-    ----------
-    par
-        The given brake.
-    slopes, leads
-        Slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,).
-    progress
-        Called with the finished share, 0 to 1.
+    ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
+    ``progress``: called with the finished share, 0 to 1.
 
     Returns
     -------

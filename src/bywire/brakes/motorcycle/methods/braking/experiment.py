@@ -122,10 +122,7 @@ def of_eq22(
 ) -> dict[str, xr.Dataset]:  # fmt: skip
     """Return the same of a linear brake that is eq. (22) exactly, with dither on its current.
 
-    Parameters
-    ----------
-    models
-        Pressure at rest [Pa] and transfer function [Pa/A] by region.
+    ``models``: pressure at rest [Pa] and transfer function [Pa/A] by region.
     """
     from scipy import signal
 

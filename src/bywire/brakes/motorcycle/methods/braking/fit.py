@@ -80,10 +80,7 @@ class Whitening:
 def starts_of(par: MotorcycleParameters, p: float) -> dict[str, float]:
     """Return where the fit begins, as in the paper: eq. (15), and the pair one decade below.
 
-    Parameters
-    ----------
-    p
-        Pressure [Pa].
+    ``p``: pressure [Pa].
 
     References
     ----------
@@ -113,10 +110,8 @@ def unknowns_of(region: Region, starts: dict[str, float]) -> tuple[Unknown, ...]
 def over_time(region: Region, unknowns: tuple[Unknown, ...], near: Array) -> Problem:
     """Return the fit to the step responses, every block of time one residual.
 
-    Parameters
-    ----------
-    near
-        K, tau_L, T1, T2, T_L by which the noise of the measured current is weighed, shape (5,).
+    ``near``: k, tau_L, T1, T2, T_L by which the noise of the measured current is weighed, shape
+    (5,).
     """
     whitenings = [
         Whitening(near, step.pressure.size, step.block, step.before, step.sigma, step.sigma_i,

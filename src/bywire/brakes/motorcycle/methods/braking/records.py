@@ -66,16 +66,8 @@ class StepRecord:
 class Region:
     """All records of a pressure region.
 
-    Parameters
-    ----------
-    name
-        ``low``, ``medium`` or ``high``.
-    steps
-        Records of steps.
-    points
-        Frequency response of the records of sines, all together.
-    pressure
-        Mean pressure [Pa].
+    ``name``: ``low``, ``medium`` or ``high``; ``steps``: records of steps; ``points``: frequency
+    response of the records of sines, all together; ``pressure``: mean pressure [Pa].
     """
 
     name: str

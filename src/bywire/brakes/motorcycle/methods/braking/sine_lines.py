@@ -45,16 +45,8 @@ def lines(
 ) -> Array:
     """Return the frequencies [Hz] of a signal's sines within a band, shape (n,).
 
-    Parameters
-    ----------
-    u
-        Shape (rows,).
-    interval
-        Sample time [s].
-    low, high
-        Ends of the band [Hz].
-    others
-        Lines outside the band, with three harmonics, such as a dither [Hz].
+    ``u``: shape (rows,); ``interval``: sample time [s]; ``low``, ``high``: ends of the band [Hz];
+    ``others``: lines outside the band, with three harmonics, such as a dither [Hz].
     """
     n = u.size
     t = _centered(n, interval)
@@ -118,16 +110,9 @@ def measured_points(
 ) -> Points:
     """Return output over input at given lines, drift and other lines taken off both.
 
-    Parameters
-    ----------
-    u, y
-        Input and output in steady state, shape (rows,).
-    interval
-        Sample time [s].
-    frequencies
-        Lines [Hz].
-    others
-        Further lines of both signals, with three harmonics, such as a dither [Hz].
+    ``u``, ``y``: input and output in steady state, shape (rows,); ``interval``: sample time [s];
+    ``frequencies``: lines [Hz]; ``others``: further lines of both signals, with three harmonics,
+    such as a dither [Hz].
     """
     t = _centered(u.size, interval)
     omega = 2.0 * math.pi * frequencies

@@ -25,16 +25,8 @@ def stribeck_band(
 ) -> xr.Dataset:
     """Return friction torque over speed at several pressures, with 95 % bands.
 
-    Parameters
-    ----------
-    par
-        The identified friction.
-    estimate
-        Estimate of ``seal.*`` parameters.
-    pressures
-        [Pa].
-    omega
-        Shaft speeds [rad/s], shape (n,).
+    ``par``: the identified friction; ``estimate``: estimate of ``seal.*`` parameters;
+    ``pressures``: [Pa]; ``omega``: shaft speeds [rad/s], shape (n,).
 
     Returns
     -------
@@ -80,12 +72,7 @@ def _torque(par: seal_friction.Parameters, omega: float, p: float) -> float:
 def replayed(data: xr.Dataset, par: MotorcycleParameters, step: float) -> xr.Dataset:
     """Return the pressure over the whole ramp, measured and modeled, driven by the current.
 
-    Parameters
-    ----------
-    data
-        ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s].
-    step
-        Substep [s].
+    ``data``: ``i`` [A] and ``p_mc`` [Pa] over ``time`` [s]; ``step``: substep [s].
     """
     driven_par = par.replace({"drive.mode": "current-source"})
     start = max(float(data["p_mc"][0]), 0.0)

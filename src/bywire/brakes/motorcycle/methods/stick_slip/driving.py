@@ -50,16 +50,9 @@ class Driven:
 def driven_by(ramp: Run, shot: Shot, current: float, zero: float) -> Driven:
     """Return a slip's run, driven by its ramp, as the measured current drives it.
 
-    Parameters
-    ----------
-    ramp
-        Its demand ramps through the current that breaks the model away.
-    shot
-        The measured slip.
-    current
-        That breaks the model away [A].
-    zero
-        Reading of the current's sensor without current [A].
+    ``ramp``: its demand ramps through the current that breaks the model away; ``shot``: the
+    measured slip; ``current``: that breaks the model away [A]; ``zero``: reading of the current's
+    sensor without current [A].
     """
     middle = shot.clock + 0.5 * shot.interval
     width = 2 * int(0.5 * _SMOOTHED / shot.interval) + 1

@@ -68,12 +68,8 @@ class Whitening:
 class Noise:
     """How sure the measurements are.
 
-    Parameters
-    ----------
-    pressure, current
-        Standard deviation of a sample's noise [Pa], [A].
-    scatter
-        Standard deviation of the current that breaks away, from slip to slip [A].
+    ``pressure``, ``current``: standard deviation of a sample's noise [Pa], [A]; ``scatter``:
+    standard deviation of the current that breaks away, from slip to slip [A].
     """
 
     pressure: float
@@ -121,11 +117,8 @@ class SlipLoss:
     def __call__(self, values: Array) -> tuple[Array, Array]:
         """Return residuals and Jacobian: the slips' shapes, then one row for every beginning.
 
-        Parameters
-        ----------
-        values
-            Friction parameters, reading of the current's sensor without current [A], and by how
-            much the current at its peaks exceeds its mean [A].
+        ``values``: friction parameters, reading of the current's sensor without current [A], and by
+        how much the current at its peaks exceeds its mean [A].
         """
         seal, zero, ripple = values[: self._shooting.count], float(values[-2]), float(values[-1])
         driven = zero if self._whitenings is not None else None

@@ -65,14 +65,7 @@ class Fitted:
 class Shooting:
     """Runs slips of the motorcycle brake for values of the unknowns.
 
-    Parameters
-    ----------
-    par
-        Everything that is known.
-    unknowns
-        Friction parameters.
-    step
-        Substep [s].
+    ``par``: everything that is known; ``unknowns``: friction parameters; ``step``: substep [s].
     """
 
     def __init__(

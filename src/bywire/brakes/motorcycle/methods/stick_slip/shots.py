@@ -157,12 +157,8 @@ def onset_of(shot: Shot, shift: float) -> tuple[float, float]:
 def require_calm(shots: Sequence[Shot], noise: float, most: float) -> None:
     """Refuse a current that does not follow its ramp while the piston rests.
 
-    Parameters
-    ----------
-    noise
-        Standard deviation of the current's measurement [A].
-    most
-        Largest standard deviation beside it [A].
+    ``noise``: standard deviation of the current's measurement [A]; ``most``: largest standard
+    deviation beside it [A].
     """
     unrest = float(np.median([np.sqrt(max(s.unrest**2 - noise**2, 0.0)) for s in shots]))
     if unrest > most:

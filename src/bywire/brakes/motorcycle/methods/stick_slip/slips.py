@@ -20,14 +20,8 @@ _PAUSE = 0.05  # s: shorter rests belong to the slip around them
 class Slip:
     """A stretch of motion between two rests.
 
-    Parameters
-    ----------
-    begin, end
-        Samples at which the motion begins and ends (or the record does).
-    direction
-        1 for rising, -1 for falling.
-    rest
-        Level at which the signal rested before.
+    ``begin``, ``end``: samples at which the motion begins and ends (or the record does);
+    ``direction``: 1 for rising, -1 for falling; ``rest``: level at which the signal rested before.
     """
 
     begin: int
@@ -39,14 +33,8 @@ class Slip:
 def find_slips(values: Array, interval: float, least: float) -> list[Slip]:
     """Return the slips of a signal.
 
-    Parameters
-    ----------
-    values
-        Shape (n,).
-    interval
-        Sample time [s].
-    least
-        Changes smaller than this are no slips, nor such as the noise of the rest before makes.
+    ``values``: shape (n,); ``interval``: sample time [s]; ``least``: changes smaller than this are
+    no slips, nor such as the noise of the rest before makes.
     """
     width = max(round(_WINDOW / interval), 1)
     smooth = moving_mean(values, width)

@@ -27,18 +27,9 @@ _MOST = 8
 class Turning:
     """A shaft that turns slowly, sample by sample, shapes (n,).
 
-    Parameters
-    ----------
-    angle
-        [rad].
-    way
-        1 forward, -1 backward.
-    speed
-        Magnitude [rad/s].
-    torque
-        Of the motor, less what accelerates the inertia [N m].
-    waves
-        ``waves(order) -> (cosine, sine)`` of the angle, filtered like the torque.
+    ``angle``: [rad]; ``way``: 1 forward, -1 backward; ``speed``: magnitude [rad/s]; ``torque``: of
+    the motor, less what accelerates the inertia [N m]; ``waves``: ``waves(order) -> (cosine,
+    sine)`` of the angle, filtered like the torque.
     """
 
     angle: Array
@@ -67,14 +58,7 @@ class Turning:
 class CoggingFit:
     """What was fitted.
 
-    Parameters
-    ----------
-    turning
-        To what.
-    orders
-        Strongest first.
-    estimate
-        Of ``cogging_problem``.
+    ``turning``: to what; ``orders``: strongest first; ``estimate``: of ``cogging_problem``.
     """
 
     turning: Turning
@@ -154,10 +138,7 @@ def slope_as_known(cogging: CoggingFit, known: float) -> Check:
     the speed ripple, look alike: what the fit gives to the slope beyond the known one may be
     either.
 
-    Parameters
-    ----------
-    known
-        Slope of the friction over speed by its law [N m s/rad].
+    ``known``: slope of the friction over speed by its law [N m s/rad].
     """
     fit = cogging.estimate
     slope = fit["friction_slope"] if "friction_slope" in fit.names else known

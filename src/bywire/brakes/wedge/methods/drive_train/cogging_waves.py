@@ -31,12 +31,7 @@ def waves(q_1: Array, q_2: Array, order: float) -> Array:
     Where one motor stands, its cogging is no wave, but part of the offset: what is returned then
     are the waves of the other, and zeros.
 
-    Parameters
-    ----------
-    q_1, q_2
-        Angles [rad], shape (n,).
-    order
-        Periods per revolution, N.
+    ``q_1``, ``q_2``: angles [rad], shape (n,); ``order``: periods per revolution, N.
     """
     moving = [q for q in (q_1, q_2) if order * np.ptp(q) > np.pi]
     if len(moving) == 1:

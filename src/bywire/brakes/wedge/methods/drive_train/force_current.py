@@ -13,13 +13,13 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.brakes.wedge.methods.drive_train.cogging_waves import waves
-from bywire.brakes.wedge.methods.drive_train.steady_motion import windows
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.differentiation import low_passed
 from bywire.identification.measured import wrong_sign
 from bywire.identification.output_error import even_interval
+from bywire.identification.steady_motion import windows
 from bywire.identification.unknown import Unknown
 from bywire.plant import axial_bearing, roller_screw, servo_motor
 
@@ -92,7 +92,7 @@ class Reading:
         Low-pass of the speed [Hz].
     slowest, margin, length
         Of the closing speed [rad/s], and times [s]; see
-        :func:`bywire.brakes.wedge.methods.drive_train.steady_motion.windows`.
+        :func:`bywire.identification.steady_motion.windows`.
     speed
         Of one motor, that the current is stated at [rad/s]; the record's mean by default.
     """
@@ -107,17 +107,9 @@ class Reading:
 def squeeze(data: xr.Dataset, par: WedgeParameters, reading: Reading, where: str) -> Squeeze:
     """Return the steady motions of a record.
 
-    Parameters
-    ----------
-    data
-        ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N].
-    par
-        Lead of the screw, order of the cogging, corner of the force sensor, and how the friction
-        of bearings and motors changes with speed.
-    reading
-        How it is read.
-    where
-        What the record is, for messages.
+    ``data``: ``i_1``, ``i_2`` [A], ``q_1``, ``q_2`` [rad], ``y_F`` [N]; ``par``: lead of the screw,
+    order of the cogging, corner of the force sensor, and how the friction of bearings and motors
+    changes with speed; ``reading``: how it is read; ``where``: what the record is, for messages.
 
     Raises
     ------

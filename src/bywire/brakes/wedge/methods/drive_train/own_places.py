@@ -15,12 +15,8 @@ def at_own_places(places: Sequence[Array], rows: Sequence[Array]) -> tuple[Array
 
     Nothing is interpolated: what is shown as measured was measured there.
 
-    Parameters
-    ----------
-    places
-        Where each curve was read, shape (n_k,), in any order.
-    rows
-        What was read there, shape (..., n_k).
+    ``places``: where each curve was read, shape (n_k,), in any order; ``rows``: what was read
+    there, shape (..., n_k).
 
     Returns
     -------

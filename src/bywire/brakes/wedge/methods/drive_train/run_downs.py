@@ -8,12 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import xarray as xr
 
-from bywire.brakes.wedge.methods.drive_train.steady_motion import (
-    Motions,
-    motions,
-    steady_dynamics,
-    window_residuals,
-)
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.rigs.driven_shaft import DrivenShaft
 from bywire.core.errors import ParameterError
@@ -22,6 +16,12 @@ from bywire.identification.differentiation import differentiated
 from bywire.identification.equation import Equation
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import Problem
+from bywire.identification.steady_motion import (
+    Motions,
+    motions,
+    steady_dynamics,
+    window_residuals,
+)
 from bywire.identification.unknown import Unknown, parameters_of
 from bywire.plant import servo_motor
 
@@ -41,7 +41,7 @@ class Reading:
         Low-pass before the angle is differentiated [Hz].
     slowest, margin, length
         Of the motion [rad/s], and times [s]; see
-        :func:`bywire.brakes.wedge.methods.drive_train.steady_motion.windows`.
+        :func:`bywire.identification.steady_motion.windows`.
     """
 
     cutoff: float

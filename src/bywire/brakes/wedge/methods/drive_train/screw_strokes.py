@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from bywire.brakes.wedge.methods.drive_train.steady_motion import Motions
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check
 from bywire.identification.residuals import lack_of_fit
+from bywire.identification.steady_motion import Motions
 from bywire.plant import servo_motor
 
 
@@ -19,20 +19,9 @@ from bywire.plant import servo_motor
 class Stroke:
     """Means of one motion.
 
-    Parameters
-    ----------
-    side
-        Motor, 1 or 2.
-    omega
-        Speed [rad/s].
-    F
-        Magnitude of the force [N].
-    drives
-        Whether the screw drives the load, or is driven back by it.
-    torque
-        Of the motor, along the motion [N m].
-    error
-        What the fit leaves over of it [N m].
+    ``side``: motor, 1 or 2; ``omega``: speed [rad/s]; ``F``: magnitude of the force [N];
+    ``drives``: whether the screw drives the load, or is driven back by it; ``torque``: of the
+    motor, along the motion [N m]; ``error``: what the fit leaves over of it [N m].
     """
 
     side: int

@@ -89,14 +89,8 @@ def clear_of(contacts: Contacts, heart: Squeeze) -> NDArray[np.bool_]:
 class TwoStages:
     """What was measured in both stages, and the unknowns of the fit.
 
-    Parameters
-    ----------
-    par
-        What is known, the sensor's stiffness among it, and starts.
-    sensor, heart
-        The stages.
-    contacts
-        Where the search begins.
+    ``par``: what is known, the sensor's stiffness among it, and starts; ``sensor``, ``heart``: the
+    stages; ``contacts``: where the search begins.
     """
 
     par: WedgeParameters
@@ -185,10 +179,7 @@ class TwoStages:
     def fits(self, values: Array, count: int) -> Check:
         """Return whether curves of their own for every branch of both stages would fit better.
 
-        Parameters
-        ----------
-        count
-            Number of unknowns that were told.
+        ``count``: number of unknowns that were told.
         """
         left = [part.evaluate(values)[0] for part in self.parts()]
         F, d = self.heart_force(values, self.heart)[0], self.sensor.d

@@ -30,12 +30,8 @@ _FEWEST = 4  # samples of a window
 class Window:
     """Samples of steady motion.
 
-    Parameters
-    ----------
-    rows
-        Which samples.
-    motion
-        Number of the motion, from one reversal to the next, that they belong to.
+    ``rows``: which samples; ``motion``: number of the motion, from one reversal to the next, that
+    they belong to.
     """
 
     rows: slice
@@ -47,18 +43,9 @@ def windows(
 ) -> list[Window]:
     """Return windows within the motions of a signal.
 
-    Parameters
-    ----------
-    omega
-        Speed, shape (n,).
-    interval
-        Sample time [s].
-    slowest
-        Speed that a motion keeps.
-    margin
-        Time left out at either end of a motion [s].
-    length
-        Time of a window [s].
+    ``omega``: speed, shape (n,); ``interval``: sample time [s]; ``slowest``: speed that a motion
+    keeps; ``margin``: time left out at either end of a motion [s]; ``length``: time of a window
+    [s].
     """
     way = np.where(np.abs(omega) > slowest, np.sign(omega), 0.0)
     edges = np.flatnonzero(np.diff(np.concatenate(([0.0], way, [0.0]))))
@@ -80,12 +67,8 @@ def windows(
 class Motions:
     """What was measured of one body, and the windows of it that count.
 
-    Parameters
-    ----------
-    data
-        States, memories and the rate of the equation, over ``time`` [s].
-    windows
-        Where they are averaged.
+    ``data``: states, memories and the rate of the equation, over ``time`` [s]; ``windows``: where
+    they are averaged.
     """
 
     data: xr.Dataset
@@ -125,14 +108,8 @@ def steady_dynamics(parts: Sequence[Problem], unknowns: Sequence[Unknown], advic
 
     Every part counts by its own scatter, which a first fit tells.
 
-    Parameters
-    ----------
-    parts
-        As ``window_residuals`` gives them, all of the same unknowns.
-    unknowns
-        Theirs.
-    advice
-        Which experiment would tell more.
+    ``parts``: as ``window_residuals`` gives them, all of the same unknowns; ``advice``: which
+    experiment would tell more.
 
     Raises
     ------
