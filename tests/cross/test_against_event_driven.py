@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -53,6 +53,19 @@ def compare(run: Run, reference: dict[str, Any], limit: float) -> None:
     assert apart <= 1 + reference["t"].size // 1000
 
 
+class Short(NamedTuple):
+    """Hard braking with dither for a moment, and what the reference says of it."""
+
+    run: Run
+    reference: dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def short() -> Short:
+    run = replace(braking("directional", "sine"), duration=0.4)
+    return Short(run, run_reference(run, REFERENCE_STEP))
+
+
 laws = pytest.mark.parametrize("law", ["paper", "directional"])
 
 
@@ -80,10 +93,9 @@ def test_ramp(law: str) -> None:
     compare(run, reference, 0.005)
 
 
-def test_the_reference_is_converged() -> None:
+def test_the_reference_is_converged(short: Short) -> None:
     """Half its step changes it by less than a hundredth of what is asked of the engine."""
-    run = replace(braking("directional", "sine"), duration=0.4)
-    coarse, fine = (run_reference(run, step) for step in (REFERENCE_STEP, REFERENCE_STEP / 2.0))
+    coarse, fine = short.reference, run_reference(short.run, REFERENCE_STEP / 2.0)
     assert np.abs(coarse["p_mc"] - fine["p_mc"]).max() < 1e-4 * BAR
     np.testing.assert_array_equal(coarse["stuck"], fine["stuck"])
 
@@ -91,9 +103,9 @@ def test_the_reference_is_converged() -> None:
 @pytest.mark.parametrize(
     ("name", "factor"), [("seal.k_brk_p", 1.01), ("gear.eta_g", 1.01), ("fluid.beta", 0.8)]
 )
-def test_the_comparison_can_fail(name: str, factor: float) -> None:
+def test_the_comparison_can_fail(short: Short, name: str, factor: float) -> None:
     """One per cent of friction or efficiency shows, and so does a softer fluid."""
-    run = replace(braking("directional", "sine"), duration=0.4)
-    other = replace(run, par=run.par.replace({name: factor * run.par.leaves()[name]}))
+    par = short.run.par
+    other = replace(short.run, par=par.replace({name: factor * par.leaves()[name]}))
     with pytest.raises(AssertionError):
-        compare(other, run_reference(run, REFERENCE_STEP), 0.01)
+        compare(other, short.reference, 0.01)

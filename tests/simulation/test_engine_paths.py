@@ -40,7 +40,7 @@ def _braking() -> Run:
         "hard-braking",
         "dardanelli2010",
         overrides={"adc.law": "ideal"},
-        options={"settle": 0.02, "duration": 0.08},
+        options={"settle": 0.02, "duration": 0.04},
         record=2e-4,
     )
     return as_run(bench.cases()[0], 40e-6, bench.record)

@@ -111,9 +111,9 @@ def test_derivatives_of_a_slip(data: xr.Dataset) -> None:
 
 
 def test_from_starts_30_per_cent_off(data: xr.Dataset) -> None:
-    """Eight of ten starts reach the minimum, and it is the truth within 2 per cent."""
+    """Four of five starts reach the minimum, and it is the truth within 2 per cent."""
     off = PAR.replace({f"seal.{n}": getattr(PAR.seal, n) * f for n, f in OFF.items()})  # type: ignore[attr-defined]
-    found = METHOD.identify(data, off, OPTIONS, Effort(starts=10, spread=0.3))
+    found = METHOD.identify(data, off, OPTIONS, Effort(starts=5, spread=0.3))
     share = next(c.value for c in found.checks if c.name == "starts_at_minimum")
     assert share >= 0.8
     for name in OFF:
@@ -128,7 +128,7 @@ def test_from_starts_30_per_cent_off(data: xr.Dataset) -> None:
     assert float(width.max()) > 0.0
 
 
-@pytest.mark.parametrize("count", [2, pytest.param(10, marks=pytest.mark.trust)])
+@pytest.mark.parametrize("count", [1, pytest.param(10, marks=pytest.mark.trust)])
 def test_what_is_put_in_comes_back(count: int) -> None:
     """Through the ECU's converter, each experiment from one start off the truth."""
     study = trust(METHOD, PAR, OPTIONS, range(1, count + 1), Effort(starts=1, spread=0.3))
