@@ -56,7 +56,7 @@ def test_signals_in_memory_are_a_measurement() -> None:
     assert again.put_in == {}
     with pytest.raises(bywire.BywireError, match="give only one of"):
         bywire.identify("seal-friction", made.data, synthetic=2)
-    with pytest.raises(bywire.BywireError, match="--unknown is for methods of any bench"):
+    with pytest.raises(bywire.BywireError, match="unknowns is for methods of any bench"):
         bywire.identify("seal-friction", made.data, question=bywire.Question(unknowns="A"))
 
 
@@ -112,5 +112,5 @@ def test_a_file_is_converted(tmp_path: Path) -> None:
     assert found.alignment.samples == found.recording.sizes["time"] == 25
     assert found.as_object()["files"] == [str(target)]
     assert found.tables()["Signals"]["signal"].to_list() == ["p"]
-    with pytest.raises(bywire.BywireError, match="--rate"):
+    with pytest.raises(bywire.BywireError, match="give the rate too, as rate '1 kHz'"):
         bywire.convert(source, tmp_path / "other.nc", method="average")

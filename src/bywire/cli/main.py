@@ -23,11 +23,12 @@ GARBAGE = 50_000
 
 def main() -> None:
     """Run the command line; errors meant for the user become one message and an exit status."""
+    from bywire.core.callers import command_line
     from bywire.core.sources import command
 
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
-    with interrupts_noted() as was_interrupted, command():
+    with interrupts_noted() as was_interrupted, command(), command_line():
         status = _status(was_interrupted)
         flush()
     raise SystemExit(status)

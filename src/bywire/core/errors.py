@@ -21,13 +21,18 @@ from collections.abc import Iterable
 from difflib import SequenceMatcher, get_close_matches
 from typing import Any
 
+from bywire.core.callers import in_callers_words
+
 _SHOWN = 60  # characters of a value in a message
 
 
 class BywireError(Exception):
-    """Base of all errors raised on purpose; its text is meant for the user."""
+    """Base of all errors raised on purpose; its text is meant for the user, see `callers`."""
 
     exit_status = 3
+
+    def __str__(self) -> str:
+        return in_callers_words(super().__str__())
 
 
 class InputError(BywireError):

@@ -11,6 +11,7 @@ from functools import wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
+from bywire.core.callers import in_callers_words
 from bywire.core.errors import FileError
 from bywire.report.document import Document, FigureBlock, TableBlock
 
@@ -108,7 +109,7 @@ def use_case(function: Callable[Asked, Given]) -> Callable[Asked, Given]:
     def warned(*args: Asked.args, **kwargs: Asked.kwargs) -> Given:
         answer = function(*args, **kwargs)
         for text in (*answer.warnings, *answer.notes, *answer.failures):
-            warnings.warn(text, AnswerWarning, stacklevel=2)
+            warnings.warn(in_callers_words(text), AnswerWarning, stacklevel=2)
         return answer
 
     return warned
