@@ -23,7 +23,9 @@ TICK = 2_000_000_000
 """coarsest resolution [ns] of the times that file systems keep"""
 
 _ROOMS = ("bywire.core.", "bywire.plant", "bywire.control", "bywire.simulation", "bywire.brakes")
-_HARMLESS = {f"bywire.core.{name}" for name in ("callers", "errors", "sources", "version")}
+_HARMLESS = {
+    f"bywire.core.{name}" for name in ("callers", "errors", "interrupts", "sources", "version")
+}
 
 _started: list[int] = []
 
