@@ -32,10 +32,12 @@ if TYPE_CHECKING:
     from bywire.api.replay import Replay, replay
     from bywire.api.reproduce import reproduce
     from bywire.api.run import BenchResult, run
+    from bywire.api.run_over import BenchRange
     from bywire.api.study import study
     from bywire.api.trust import TrustStudy, trust
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
+    from bywire.bench.ensemble import BenchEnsemble, simulate_ensemble
     from bywire.core.brake import Brake, load_system
     from bywire.core.catalog import CitedSet, parameters
     from bywire.core.errors import BywireError
@@ -44,7 +46,7 @@ if TYPE_CHECKING:
     from bywire.data.netcdf import read_recording, write_recording
     from bywire.data.writing import write_measurement
     from bywire.identification.fitting.question import Question
-    from bywire.simulation.ensemble import Ensemble, simulate_ensemble
+    from bywire.simulation.ensemble import Ensemble
     from bywire.simulation.run import Run, Trajectory, simulate
     from bywire.simulation.sensitivity import Sensitivity, simulate_with_sensitivities
 
@@ -55,6 +57,8 @@ _HOMES = {
     "BywireError": "core.errors",
     "Conversion": "api.convert",
     "Ensemble": "simulation.ensemble",
+    "BenchEnsemble": "bench.ensemble",
+    "BenchRange": "api.run_over",
     "BenchResult": "api.run",
     "Check": "api.check",
     "check": "api.check",
@@ -89,7 +93,7 @@ _HOMES = {
     "NewBrake": "api.new",
     "run": "api.run",
     "simulate": "simulation.run",
-    "simulate_ensemble": "simulation.ensemble",
+    "simulate_ensemble": "bench.ensemble",
     "simulate_with_sensitivities": "simulation.sensitivity",
     "trust": "api.trust",
     "write_measurement": "data.writing",
@@ -98,6 +102,8 @@ _HOMES = {
 
 __all__ = [
     "Bench",
+    "BenchEnsemble",
+    "BenchRange",
     "BenchResult",
     "Brake",
     "BywireError",

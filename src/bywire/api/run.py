@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, overload
 
 from bywire.api.run_remarks import remarks
 from bywire.bench import bench_file, running
@@ -33,6 +33,7 @@ from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text
 from bywire.report.wording import amount
 
 if TYPE_CHECKING:
+    from bywire.api.run_over import BenchRange
     from bywire.report.bench_figures import Shown
 
 RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
@@ -171,15 +172,38 @@ class BenchResult(Result, Answer):
         }
 
 
+@overload
+def run(
+    bench: Bench | str | Path,
+    overrides: Mapping[str, str] = ...,
+    *,
+    over: Literal[""] = "",
+    progress: Progress | None = None,
+    engine: str = "auto",
+) -> BenchResult: ...
+
+
+@overload
+def run(
+    bench: Bench | str | Path,
+    overrides: Mapping[str, str] = ...,
+    *,
+    over: str,
+    progress: Progress | None = None,
+    engine: str = "auto",
+) -> BenchRange: ...
+
+
 @use_case
 def run(
     bench: Bench | str | Path,
     overrides: Mapping[str, str] = MappingProxyType({}),
     *,
+    over: str = "",
     progress: Progress | None = None,
     engine: str = "auto",
-) -> BenchResult:
-    """Make all runs of a bench, and judge them.
+) -> BenchResult | BenchRange:
+    """Make all runs of a bench, and judge them; over a range, for each of its values.
 
     Parameters
     ----------
@@ -188,6 +212,9 @@ def run(
         is then run with its defaults and the main parameter set of its brake.
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
+    over
+        Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``:
+        the values run side by side, and the result is a `BenchRange`.
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
@@ -209,6 +236,10 @@ def run(
         bench = bench_file.read(bench, overrides)
     elif overrides:
         bench = bench.with_overrides(overrides)
+    if over:
+        from bywire.api.run_over import run_over
+
+        return run_over(bench, over, progress, engine)
     result = running.run(bench, progress, engine)
     return BenchResult(
         result.bench, result.recordings, result.kpis, result.verdicts, result.status

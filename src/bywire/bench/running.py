@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import xarray as xr
@@ -18,7 +19,7 @@ from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
-from bywire.simulation.run import simulate
+from bywire.simulation.run import Run, Trajectory, simulate
 
 Progress = Callable[[str, float], None]
 
@@ -42,46 +43,65 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     RunError
         When a run fails.
     """
-    definition, options = bench.definition, bench.chosen_options
-    recordings: dict[str, xr.Dataset] = {}
-    if definition.static is not None:
-        given = {"parameters": bench.par.model_dump_json(), **_bench_notes(bench)}
-        static = definition.static(bench.par, options)
-        recordings |= {label: each.assign_attrs(given) for label, each in static.items()}
+    recordings = static_recordings(bench)
     try:
         for number, case in enumerate(bench.cases()):
-            recording = _recorded(bench, case, number, progress, engine)
-            is_complete = recording.attrs["status"] != "interrupted"
-            if is_complete or recording.sizes["time"] > 1:
-                finish = definition.finish or _as_it_is
-                recordings[case.label] = finish(recording, options)
+            computed = run_of(bench, case, number)
+            report = None if progress is None else partial(progress, case.label)
+            with interrupts_deferred():
+                prepare(computed.model, computed.par).engine(engine)
+            trajectory = simulate(computed, engine=engine, progress=report)
+            is_complete = trajectory.status != "interrupted"
+            if is_complete or trajectory.time.size > 1:
+                recordings[case.label] = recording_of(bench, case, computed, trajectory)
             if not is_complete:
                 raise KeyboardInterrupt
     except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
         return Result(bench, recordings, (), (), "interrupted")
-    kpis = definition.judge(recordings, options)
+    return judged(bench, recordings)
+
+
+def static_recordings(bench: Bench) -> dict[str, xr.Dataset]:
+    """Return what an experiment computes without any run, by label."""
+    static = bench.definition.static
+    if static is None:
+        return {}
+    notes = {"parameters": bench.par.model_dump_json(), **_bench_notes(bench)}
+    computed = static(bench.par, bench.chosen_options)
+    return {label: each.assign_attrs(notes) for label, each in computed.items()}
+
+
+def run_of(bench: Bench, case: Case, number: int) -> Run:
+    """Return the engine's description of one of a bench's cases.
+
+    Raises
+    ------
+    StepError
+        When it records nothing, or more than fits into this machine.
+    """
+    computed = as_run(case, bench.step, seed=(bench.seed, number))
+    check_extent(case, computed)
+    return computed
+
+
+def recording_of(bench: Bench, case: Case, computed: Run, trajectory: Trajectory) -> xr.Dataset:
+    """Return the recording of one of a bench's cases, with what its experiment adds."""
+    notes = {**_bench_notes(bench), "case": case.label, "seed": bench.seed}
+    recording = record(computed, trajectory, case.settle, case.keep, notes)
+    definition = bench.definition
+    if definition.beside is not None:
+        recording = _with_inputs(recording, case)
+    finish = definition.finish
+    return recording if finish is None else finish(recording, bench.chosen_options)
+
+
+def judged(bench: Bench, recordings: Mapping[str, xr.Dataset]) -> Result:
+    """Return recordings with their key figures, and whether these meet the requirements."""
+    kpis = bench.definition.judge(recordings, bench.chosen_options)
     verdicts = judge(bench.requirements, kpis)
     status = "passed" if all(v.met for v in verdicts) else "failed"
     status = status if verdicts else "done"
     return Result(bench, recordings, kpis, verdicts, status)
-
-
-def _as_it_is(recording: xr.Dataset, _: Any) -> xr.Dataset:
-    return recording
-
-
-def _recorded(
-    bench: Bench, case: Case, number: int, progress: Progress | None, engine: str
-) -> xr.Dataset:
-    whole = as_run(case, bench.step, seed=(bench.seed, number))
-    check_extent(case, whole)
-    report = None if progress is None else (lambda share: progress(case.label, share))
-    with interrupts_deferred():
-        prepare(whole.model, whole.par).engine(engine)
-    trajectory = simulate(whole, engine=engine, progress=report)
-    notes = {**_bench_notes(bench), "case": case.label, "seed": bench.seed}
-    recording = record(whole, trajectory, case.settle, case.keep, notes)
-    return recording if bench.definition.beside is None else _with_inputs(recording, case)
 
 
 def _bench_notes(bench: Bench) -> dict[str, str]:

@@ -38,13 +38,16 @@ def run(
         typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False),
     ],
     set_: BenchChanges = None,
+    over: Annotated[
+        str, typer.Option(help="Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
+    ] = "",
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Run a bench file or an experiment; exit status 1 when a requirement is not met."""
     from bywire.api.run import run as run_bench
 
-    show(lambda progress: run_bench(bench, changes(set_), progress=progress), out, json)
+    show(lambda progress: run_bench(bench, changes(set_), over=over, progress=progress), out, json)
 
 
 def reproduce_command(

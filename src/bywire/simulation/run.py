@@ -168,11 +168,11 @@ def simulate(
         repeated=int(counters[1]),
         engine=chosen.label,
         vector=vector,
-        doubt=_doubt(run),
+        doubt=doubt_of(run),
     )
 
 
-def _doubt(run: Run) -> str:
+def doubt_of(run: Run) -> str:
     """Return why the step may be too long for the contacts, judged at the start."""
     if not run.model.compliance(run.par):
         return ""

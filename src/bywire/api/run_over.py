@@ -1,0 +1,285 @@
+"""A bench over a range of one of its numbers: key figures by value, verdicts, overlaid curves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from bywire.api.loop_case import spread
+from bywire.bench.bench import Bench
+from bywire.bench.ensemble import changed, run_benches, varied_leaf
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import Verdict
+from bywire.bench.result import Result
+from bywire.bench.running import Progress
+from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Block,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+    recording_file,
+    spaced,
+)
+from bywire.report.subject import Subject
+from bywire.report.tables import Cell, Column, Table
+from bywire.report.wording import amount, clean
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_COLUMNS = 5  # key figures beside each other on a terminal
+
+
+@dataclass(frozen=True)
+class BenchRange(Answer):
+    """What a bench gave for every value of a range.
+
+    Parameters
+    ----------
+    bench
+        The bench as it is without the range.
+    name, unit, values
+        Parameter or ``options.NAME`` that was varied, its SI unit and its values.
+    results
+        What each value gave, with recordings, key figures and verdicts.
+    """
+
+    bench: Bench
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    results: tuple[Result, ...]
+
+    @property
+    def holds(self) -> bool:
+        """Whether every requirement is met at every value."""
+        return all(v.met for result in self.results for v in result.verdicts)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the runs warned of, and at which values."""
+        said: dict[str, list[float]] = {}
+        for value, result in zip(self.values, self.results, strict=True):
+            for text in result.warnings:
+                said.setdefault(text, []).append(value)
+        return [f"{text} ({self._at(values)})" for text, values in said.items()]
+
+    def kpi(self, name: str) -> Array:
+        """Return a key figure of every value, shape (values,); NaN where it is not defined.
+
+        Raises
+        ------
+        UnknownNameError
+            With the nearest known names.
+        """
+        return np.array([result.kpi(name).value for result in self.results])
+
+    @property
+    def recordings(self) -> dict[str, xr.Dataset]:
+        """The recordings by label, dimensions case and time, with the value of each case."""
+        labels = dict.fromkeys(label for result in self.results for label in result.recordings)
+        return {
+            label: xr.concat(
+                [r.recordings[label] for r in self.results if label in r.recordings],
+                dim="case", join="outer", combine_attrs="drop_conflicts",
+            ).assign_coords({self.name: ("case", self._values_of(label), {"units": self.unit})})
+            for label in labels
+        }  # fmt: skip
+
+    def document(self) -> Document:
+        """Return key figures by value, verdicts, curves."""
+        bench = self.bench
+        kpis = self._kpis()
+        title = bench.name or bench.experiment
+        subject = Subject(title, bench.definition.summary, bench.parameters, bench.par)
+        pieces = [kpis[k : k + _COLUMNS] for k in range(0, len(kpis), _COLUMNS)]
+        tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
+        verdicts = list(self._verdict_texts())
+        listing = [Listing(verdicts, "Requirements:")] if verdicts else []
+        return Document(
+            f"{title} over {self.name}",
+            subject.line,
+            sections=lambda: [
+                Section("Key figures", [*listing, TableBlock(self._table(kpis))]),
+                Section("Figures", self._figures()),
+                subject.provenance(f"Engine: {', '.join(self._engines())}."),
+            ],
+            brief=spaced([*tables, *listing]),
+            data=self._data(),
+            banner=self._banner(),
+            attachments=[
+                Attachment(f"{label}.nc", partial(self._write, label))
+                for label in dict.fromkeys(n for r in self.results for n in r.recordings)
+            ],
+            record="range.json",
+            remarks=[f"requirement not met: {text}" for text in verdicts if "failed" in text],
+        )
+
+    def _write(self, label: str, path: Any) -> Any:
+        return recording_file(path.name, self.recordings[label]).write(path)
+
+    def _values_of(self, label: str) -> list[float]:
+        pairs = zip(self.values, self.results, strict=True)
+        return [value for value, result in pairs if label in result.recordings]
+
+    def _at(self, values: Sequence[float]) -> str:
+        if len(values) == len(self.values):
+            return f"at all {len(values)} values of {self.name}"
+        low, high = (amount(v, self.unit) for v in (values[0], values[-1]))
+        where = low if len(values) == 1 else f"{len(values)} values from {low} to {high}"
+        return f"at {self.name} = {where}"
+
+    def _kpis(self) -> list[Kpi]:
+        """Return the key figures that any value has, as the first one that has it gives it."""
+        return list({kpi.name: kpi for r in reversed(self.results) for kpi in r.kpis}.values())
+
+    def _table(self, kpis: Sequence[Kpi]) -> Table:
+        """Return some key figures, one row for each value; a missed limit is marked."""
+        limits = self.bench.requirements
+        heads = [Column(f"{k.name} {limits.get(k.name, '')}".strip(), numeric=True) for k in kpis]
+        rows = [
+            (
+                Cell(amount(value, self.unit), value=value),
+                *(_cell(kpi.name, result) for kpi in kpis),
+            )
+            for value, result in zip(self.values, self.results, strict=True)
+        ]
+        return Table((Column(clean(self.name), numeric=True), *heads), tuple(rows))
+
+    def _verdicts(self) -> dict[str, list[tuple[float, Verdict]]]:
+        verdicts: dict[str, list[tuple[float, Verdict]]] = {}
+        for value, result in zip(self.values, self.results, strict=True):
+            for verdict in result.verdicts:
+                verdicts.setdefault(verdict.kpi, []).append((value, verdict))
+        return verdicts
+
+    def _verdict_texts(self) -> Iterator[str]:
+        for name, pairs in self._verdicts().items():
+            missed = [(value, verdict) for value, verdict in pairs if not verdict.met]
+            head = f"{name} {pairs[0][1].limit}"
+            if not missed:
+                yield f"{head}: ok {self._at([value for value, _ in pairs])}"
+                continue
+            sign = -1.0 if pairs[0][1].limit.strip().startswith("<") else 1.0
+            known = [(v, x) for v, x in missed if math.isfinite(x.value)]
+            worst = min(known, key=lambda pair: sign * pair[1].value, default=missed[0])
+            yield (
+                f"{head}: failed {self._at([value for value, _ in missed])}, worst "
+                f"{amount(worst[1].value, worst[1].unit)} at {amount(worst[0], self.unit)}"
+            )
+
+    def _banner(self) -> Banner:
+        if not self.bench.requirements:
+            return Banner(f"done for {len(self.values)} values")
+        met = sum(all(v.met for v in result.verdicts) for result in self.results)
+        text = f"all requirements met at {met} of {len(self.values)} values"
+        return Banner(text, "good" if self.holds else "bad")
+
+    def _figures(self) -> list[Block]:
+        from bywire.report.kpi_curves import kpi_curves
+        from bywire.report.overlaid_panels import can_overlay
+
+        captions = {
+            "curves": "The values on top of each other, in the color that the scale shows.",
+            "kpis": "Key figures over the value; dotted, the limit; crosses miss it. What is the "
+            "same for all values, or nowhere defined, is left out.",
+        }
+        blocks: list[Block] = [
+            FigureBlock(partial(kpi_curves, self), captions["kpis"], "key-figures")
+        ]
+        labels = dict.fromkeys(label for result in self.results for label in result.recordings)
+        for label in labels:
+            each = [r.recordings[label] for r in self.results if label in r.recordings]
+            if can_overlay(each):
+                name = f"overlay-{label}" if len(labels) > 1 else "overlay"
+                caption = captions["curves"] + (f" Run: {label}." if len(labels) > 1 else "")
+                blocks.append(FigureBlock(partial(self._drawn, label, each), caption, name))
+        return blocks
+
+    def _drawn(self, label: str, recordings: Sequence[xr.Dataset]) -> Figure:
+        from bywire.report.overlaid_panels import Scale, overlaid_panels
+        from bywire.report.step_marks import step_limits
+
+        steps = [step_limits(r.bench.definition, r.bench.chosen_options, r.verdicts)
+                 for r in self.results]  # fmt: skip
+        shared = steps[0] if all(each == steps[0] for each in steps) else None
+        values = self._values_of(label)
+        named = {amount(v, self.unit, 6): r for v, r in zip(values, recordings, strict=True)}
+        scale = Scale(self.name, self.unit, tuple(values))
+        return overlaid_panels(named, step=shared, scale=scale)
+
+    def _engines(self) -> list[str]:
+        each = [r.attrs.get("engine") for k in self.results for r in k.recordings.values()]
+        return [str(text) for text in dict.fromkeys(each) if text]
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "bench": self.bench.name or self.bench.experiment,
+            "over": self.name,
+            "unit": self.unit,
+            "cases": [
+                {
+                    "value": value,
+                    "status": result.status,
+                    "kpis": {k.name: {"value": k.value, "unit": k.unit, "note": k.note}
+                             for k in result.kpis},
+                    "requirements": [
+                        {"kpi": v.kpi, "limit": v.limit, "value": v.value, "unit": v.unit,
+                         "met": v.met} for v in result.verdicts
+                    ],
+                }
+                for value, result in zip(self.values, self.results, strict=True)
+            ],
+            "warnings": self.warnings,
+        }  # fmt: skip
+
+
+def run_over(bench: Bench, over: str, progress: Progress | None, engine: str) -> BenchRange:
+    """Return what a bench gives for every value of ``NAME=LOW:HIGH:COUNT``; see `bywire.run`.
+
+    Raises
+    ------
+    InputError
+        For what is no range, a name that is neither a number of the bench nor of its options,
+        and values that the bench refuses.
+    RunError
+        When a run fails.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    name, equals, text = (part.strip() for part in over.partition("="))
+    if not equals:
+        raise ParameterError(
+            f"over {over!r}: write NAME=LOW:HIGH:COUNT, for instance motor.R_m=0.2ohm:0.6ohm:9"
+        )
+    leaf = varied_leaf(bench, name)
+    values = spread(text, leaf.unit.symbol, name)
+    if len({*values}) < 2:
+        raise ParameterError(f"over {over!r}: name two different values at least")
+    benches = [changed(bench, {name: value}) for value in values]
+    results = run_benches(benches, progress, engine)
+    return BenchRange(bench, name, leaf.unit.symbol, tuple(values), results)
+
+
+def _cell(name: str, result: Result) -> Cell:
+    known: Mapping[str, Kpi] = {kpi.name: kpi for kpi in result.kpis}
+    if name not in known:
+        return Cell("-")
+    kpi = known[name]
+    text = amount(kpi.value, kpi.unit)
+    if any(v.kpi == name and not v.met for v in result.verdicts):
+        return Cell(f"{text} failed", "bad", kpi.value)
+    return Cell(text, value=kpi.value)

@@ -1,0 +1,239 @@
+"""One bench for many values of its parameters and options, side by side, each one judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any, overload
+
+import numpy as np
+import xarray as xr
+from numpy.typing import NDArray
+
+from bywire.bench.bench import Bench
+from bywire.bench.extent import check_memory
+from bywire.bench.result import Result
+from bywire.bench.running import Progress, judged, recording_of, run_of, static_recordings
+from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.core.leaf import Leaf
+from bywire.core.parameters import leaf_fields
+from bywire.core.typing import Array
+from bywire.simulation import ensemble
+from bywire.simulation.ensemble import Ensemble
+from bywire.simulation.run import Run, Trajectory, simulate
+from bywire.simulation.run_group import fit_lanes, simulate_group
+from bywire.simulation.variations import Variations
+
+_OPTION = "options."
+
+
+@dataclass(frozen=True)
+class BenchEnsemble:
+    """What a bench gave for many values.
+
+    Parameters
+    ----------
+    variations
+        Parameter, or ``options.NAME``, by name -> its value [SI] in each case, shape (cases,).
+    results
+        What each case gave, judged by the bench's requirements.
+    """
+
+    variations: Mapping[str, Array]
+    results: tuple[Result, ...]
+
+    def kpi(self, name: str) -> Array:
+        """Return a key figure of every case, shape (cases,); NaN where it is not defined."""
+        return np.array([result.kpi(name).value for result in self.results])
+
+    @property
+    def met(self) -> NDArray[np.bool_]:
+        """Whether each case meets all requirements, shape (cases,)."""
+        return np.array([all(v.met for v in result.verdicts) for result in self.results])
+
+    def __getitem__(self, signal: str) -> xr.DataArray:
+        """Return a signal of an experiment that makes one run, dimensions case and time.
+
+        Raises
+        ------
+        UnknownNameError
+            When there is no such signal.
+        ParameterError
+            When the experiment makes several runs: take ``results[k].recordings``.
+        """
+        each = [result.recording for result in self.results]
+        if signal not in each[0]:
+            raise unknown_name("signal", signal, map(str, each[0].data_vars))
+        joined = xr.concat([recording[signal] for recording in each], dim="case", join="outer")
+        return joined.assign_coords({name: ("case", v) for name, v in self.variations.items()})
+
+
+@overload
+def simulate_ensemble(
+    run: Run, variations: Variations, signals: Sequence[str], threads: int | None = None
+) -> Ensemble: ...
+
+
+@overload
+def simulate_ensemble(
+    run: Bench, variations: Variations, signals: None = None, threads: int | None = None
+) -> BenchEnsemble: ...
+
+
+def simulate_ensemble(
+    run: Run | Bench,
+    variations: Variations,
+    signals: Sequence[str] | None = None,
+    threads: int | None = None,
+) -> Ensemble | BenchEnsemble:
+    """Compute one run, or a bench with all its runs, for many values of its parameters.
+
+    Parameters
+    ----------
+    run
+        A run: model, parameters, initial values, stimulus, steps; see
+        `bywire.simulation.ensemble.simulate_ensemble`. Or a bench: every case then starts where
+        the experiment starts it with these parameters, and has its key figures and verdicts.
+    variations
+        Dotted name of a parameter, or of a bench ``options.NAME`` -> its value [SI] in each case,
+        shape (cases,). What is not named keeps its value.
+    signals
+        Outputs of a run to record. A bench records all that its key figures need.
+    threads
+        Threads to use, >= 1; all cores by default.
+
+    Returns
+    -------
+    Ensemble
+        Of a run: its signals, shape (cases, rows) each.
+    BenchEnsemble
+        Of a bench: recordings, key figures and verdicts of every case.
+
+    Raises
+    ------
+    InputError
+        For names that are unknown, values out of range, and variations of several lengths.
+    RunError
+        When a trajectory leaves the numbers.
+    """
+    if isinstance(run, Run):
+        if signals is None:
+            raise ParameterError("signals are missing: name the outputs of the run to record")
+        return ensemble.simulate_ensemble(run, variations, signals, threads)
+    if signals is not None:
+        raise ParameterError("a bench records all signals: leave signals out")
+    arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
+    lengths = {name: array.size for name, array in arrays.items()}
+    if not arrays or len(set(lengths.values())) != 1 or 0 in lengths.values():
+        raise ParameterError(f"variations must have one length >= 1 each, got {lengths}")
+    benches = [
+        changed(run, {name: float(array[k]) for name, array in arrays.items()})
+        for k in range(next(iter(lengths.values())))
+    ]
+    return BenchEnsemble(arrays, run_benches(benches, threads=threads))
+
+
+def varied_leaf(bench: Bench, name: str) -> Leaf:
+    """Return the description of a parameter, or of an option ``options.NAME``, that may vary.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest numbers of the bench.
+    """
+    known = dict(leaf_fields(type(bench.par)))
+    options = leaf_fields(type(bench.chosen_options))
+    known |= {f"{_OPTION}{option}": leaf for option, leaf in options.items()}
+    if name not in known:
+        raise unknown_name("parameter or option to vary", name, known)
+    return known[name]
+
+
+def changed(bench: Bench, values: Mapping[str, float]) -> Bench:
+    """Return a bench with other parameters and options [SI].
+
+    Raises
+    ------
+    InputError
+        When one is unknown or out of range, or contradicts another; the values are named.
+    """
+    for name in values:
+        varied_leaf(bench, name)
+    options = {n.removeprefix(_OPTION): v for n, v in values.items() if n.startswith(_OPTION)}
+    overrides = {n: v for n, v in values.items() if not n.startswith(_OPTION)}
+    try:
+        return replace(
+            bench,
+            overrides={**bench.overrides, **overrides},
+            options={**bench.options, **options},
+        )
+    except InputError as error:
+        said = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+        raise type(error)(f"{said} (in SI): {error}") from None
+
+
+def run_benches(
+    benches: Sequence[Bench],
+    progress: Progress | None = None,
+    engine: str = "auto",
+    threads: int | None = None,
+) -> tuple[Result, ...]:
+    """Make all runs of several benches of one experiment, and judge each bench.
+
+    Cases that differ in numbers alone (parameters, initial values, stimuli) run side by side in
+    lanes; others, and all without a compiler, one after the other.
+
+    Parameters
+    ----------
+    benches
+        Benches of one experiment.
+    progress
+        Called with a run's label and the finished share, 0 to 1.
+    engine
+        ``auto``, ``compiled`` or ``virtual-machine``, which has no lanes.
+    threads
+        Threads to use, >= 1; all cores by default.
+
+    Raises
+    ------
+    StepError
+        When the runs do not fit into this machine together, or steps do not divide each other.
+    RunError
+        When a run fails.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    cases = [bench.cases() for bench in benches]
+    recordings = [static_recordings(bench) for bench in benches]
+    for number in range(max(len(each) for each in cases)):
+        present = [k for k, each in enumerate(cases) if number < len(each)]
+        runs = [run_of(benches[k], cases[k][number], number) for k in present]
+        check_memory(runs[0], len(runs) * len(runs[0].model.Output._fields))
+        label = cases[present[0]][number].label
+        report = None if progress is None else partial(progress, label)
+        for k, run, trajectory in zip(
+            present, runs, _trajectories(runs, report, engine, threads), strict=True
+        ):
+            case = cases[k][number]
+            recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
+    return tuple(judged(bench, each) for bench, each in zip(benches, recordings, strict=True))
+
+
+def _trajectories(
+    runs: Sequence[Run], report: Any, engine: str, threads: int | None
+) -> Sequence[Trajectory]:
+    if engine != "virtual-machine" and len(runs) > 1 and fit_lanes(runs):
+        return simulate_group(runs, threads=threads, progress=report)
+    computed = []
+    for k, run in enumerate(runs):
+        share = None if report is None else partial(_share, report, k, len(runs))
+        trajectory = simulate(run, engine=engine, progress=share)
+        if trajectory.status == "interrupted":
+            raise KeyboardInterrupt
+        computed.append(trajectory)
+    return computed
+
+
+def _share(report: Any, k: int, count: int, share: float) -> None:
+    report((k + share) / count)

@@ -1,0 +1,108 @@
+"""Figure: key figures over what a bench was varied over, with their limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Protocol
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bywire.bench.bench import Bench
+from bywire.bench.requirements import limit_of
+from bywire.bench.result import Result
+from bywire.core.typing import Array
+from bywire.report import style
+from bywire.report.line_role import Role
+from bywire.report.wording import in_display_unit
+
+_COLUMNS = 2
+_HEIGHT = 1.35  # of a panel [inch]
+
+
+class Varied(Protocol):
+    """What a bench gave for every value of a range; a `BenchRange` is one."""
+
+    @property
+    def bench(self) -> Bench:
+        """The bench."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """What was varied."""
+        ...
+
+    @property
+    def unit(self) -> str:
+        """Its SI unit."""
+        ...
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """Its values."""
+        ...
+
+    @property
+    def results(self) -> tuple[Result, ...]:
+        """What each of them gave."""
+        ...
+
+
+def kpi_curves(varied: Varied) -> Figure:
+    """Draw every key figure that changes over the values, each in a panel of its own.
+
+    Where a requirement limits it, the limit is drawn and points that miss it are crosses.
+    """
+    shown = {name: pair for name, pair in _curves(varied).items() if _moves(pair[0])}
+    shown = shown or _curves(varied)
+    count = max(len(shown), 1)
+    rows = -(-count // _COLUMNS)
+    figure = Figure(figsize=(style.WIDTH, 0.6 + _HEIGHT * rows), layout="constrained",
+                    facecolor="white")  # fmt: skip
+    grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
+    abscissa = np.array([in_display_unit(v, varied.unit)[0] for v in varied.values])
+    for axes, name in zip(grid.flat, shown, strict=False):
+        style.dress(axes)
+        values, unit = shown[name]
+        factor = in_display_unit(1.0, unit)[0]
+        axes.plot(abscissa, factor * values, color=style.BLUE, linewidth=1.0, marker="o",
+                  markersize=3.0)  # fmt: skip
+        if name in varied.bench.requirements:
+            look = style.STROKES[Role.LIMIT]
+            bound = limit_of(name, varied.bench.requirements[name], unit)[1]
+            axes.axhline(factor * bound, color=look.color, linestyle=look.linestyle,
+                         linewidth=look.linewidth)  # fmt: skip
+            missed = _missed(name, varied.results)
+            axes.plot(abscissa[missed], factor * values[missed], color=look.color, marker="x",
+                      linestyle="none", markersize=6.0)  # fmt: skip
+        style.few_ticks(axes, 4)
+        axes.set_ylabel(style.axis_label(name.replace("_", " "), unit, "\n"))
+    for spare in list(grid.flat)[len(shown) :]:
+        spare.set_visible(False)
+    for axes in list(grid.flat)[max(count - _COLUMNS, 0) : count]:
+        axes.set_xlabel(style.axis_label(varied.name, varied.unit))
+        axes.tick_params(labelbottom=True)
+    return figure
+
+
+def _curves(varied: Varied) -> dict[str, tuple[Array, str]]:
+    """Return value by case, and unit, of every key figure by name."""
+    units = {kpi.name: kpi.unit for result in varied.results for kpi in result.kpis}
+    each: Sequence[Mapping[str, float]] = [
+        {kpi.name: kpi.value for kpi in result.kpis} for result in varied.results
+    ]
+    return {
+        name: (np.array([known.get(name, math.nan) for known in each]), unit)
+        for name, unit in units.items()
+    }
+
+
+def _moves(values: Array) -> bool:
+    finite = values[np.isfinite(values)]
+    return finite.size > 0 and bool(np.ptp(finite) > 0 or finite.size < values.size)
+
+
+def _missed(name: str, results: Sequence[Result]) -> Array:
+    return np.array([any(v.kpi == name and not v.met for v in r.verdicts) for r in results])

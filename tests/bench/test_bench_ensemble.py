@@ -1,0 +1,97 @@
+"""A bench for many values: as if each were run alone, with its start, its figures, its verdict."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.bench import ensemble
+from bywire.bench.running import run
+from bywire.core.errors import ParameterError, UnknownNameError
+
+OPTIONS = {"duration": "60 ms", "settle": "10 ms"}
+VALUES = (0.25, 0.35, 0.5)
+
+
+@pytest.fixture(scope="module")
+def bench():
+    return bywire.Bench("hard-braking", "dardanelli2010", options=OPTIONS,
+                        requirements={"peak_current": "<= 18 A"})  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def found(bench):
+    return bywire.simulate_ensemble(bench, {"motor.R_m": VALUES})
+
+
+def test_each_case_is_as_the_bench_alone(bench, found):
+    for value, result in zip(VALUES, found.results, strict=True):
+        alone = run(bench.with_overrides({"motor.R_m": value}))
+        assert [k.name for k in result.kpis] == [k.name for k in alone.kpis]
+        for ours, its in zip(result.kpis, alone.kpis, strict=True):
+            assert ours.note == its.note
+            assert math.isnan(ours.value) == math.isnan(its.value)
+            assert math.isnan(its.value) or ours.value == pytest.approx(its.value, rel=1e-6)
+        assert result.recording.attrs.keys() == alone.recording.attrs.keys()
+        assert result.status == alone.status
+        assert "lanes" in result.recording.attrs["engine"]
+
+
+def test_key_figures_and_verdicts_by_case(found):
+    peaks = found.kpi("peak_current")
+    assert peaks.shape == (3,)
+    assert (np.diff(peaks) < 0).all()
+    np.testing.assert_array_equal(found.met, peaks <= 18.0)
+    assert set(found.met.tolist()) == {True, False}
+    assert found["p_mc"].dims == ("case", "time")
+    np.testing.assert_array_equal(found["p_mc"]["motor.R_m"], VALUES)
+    with pytest.raises(UnknownNameError, match="p_mc"):
+        found["p_mx"]
+
+
+def test_options_vary_and_the_start_follows(bench):
+    found = bywire.simulate_ensemble(bench, {"options.p_from": [6e5, 12e5]})
+    starts = [float(r.recording["p_mc"].sel(time=0, method="nearest")) for r in found.results]
+    assert starts == pytest.approx([6e5, 12e5], rel=0.02)
+
+
+def test_an_experiment_of_several_runs():
+    bench = bywire.Bench("friction-ramp", "dardanelli2010",
+                         options={"i_max": 0.2, "slope": 2.0})  # fmt: skip
+    found = bywire.simulate_ensemble(bench, {"seal.T_pr": [0.002, 0.004]})
+    for value, result in zip((0.002, 0.004), found.results, strict=True):
+        alone = run(bench.with_overrides({"seal.T_pr": value}))
+        assert list(result.recordings) == ["without-dither", "with-dither"]
+        for label, recording in alone.recordings.items():
+            lane = result.recordings[label]
+            size = float(abs(recording["x_mc"]).max())
+            assert float(abs(lane["x_mc"] - recording["x_mc"]).max()) < 1e-9 * size
+    with pytest.raises(ParameterError, match="several recordings"):
+        found["x_mc"]
+
+
+def test_what_cannot_run_side_by_side_runs_one_by_one(bench, monkeypatch):
+    found = bywire.simulate_ensemble(bench, {"options.duration": [0.05, 0.06]})
+    assert [r.recording.sizes["time"] for r in found.results] == [61, 71]
+    monkeypatch.setattr(ensemble, "fit_lanes", lambda runs: False)
+    alone = bywire.simulate_ensemble(bench, {"motor.R_m": [0.25]})
+    assert "lanes" not in alone.results[0].recording.attrs["engine"]
+
+
+def test_what_is_refused(bench):
+    with pytest.raises(UnknownNameError, match=r"did you mean 'motor\.R_m'"):
+        bywire.simulate_ensemble(bench, {"motor.R_n": [0.3]})
+    with pytest.raises(ParameterError, match=r"motor\.R_m = -1 \(in SI\).*ohm"):
+        bywire.simulate_ensemble(bench, {"motor.R_m": [0.3, -1.0]})
+    with pytest.raises(ParameterError, match="one length"):
+        bywire.simulate_ensemble(bench, {"motor.R_m": [0.3], "motor.K_e": [0.03, 0.04]})
+    with pytest.raises(ParameterError, match="leave signals out"):
+        bywire.simulate_ensemble(bench, {"motor.R_m": [0.3]}, ["p_mc"])
+    (single,) = bench.runs().values()
+    with pytest.raises(ParameterError, match="signals are missing"):
+        bywire.simulate_ensemble(single, {"motor.R_m": [0.3]})
+    raw = bywire.simulate_ensemble(single, {"motor.R_m": [0.3]}, ["p_mc"])
+    assert raw["p_mc"].shape[0] == 1
