@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, Literal, overload
+from typing import TYPE_CHECKING, Any, overload
 
 from bywire.api.run_remarks import remarks
 from bywire.bench import bench_file, running
@@ -177,7 +177,6 @@ def run(
     bench: Bench | str | Path,
     overrides: Mapping[str, str] = ...,
     *,
-    over: Literal[""] = "",
     progress: Progress | None = None,
     engine: str = "auto",
 ) -> BenchResult: ...
@@ -224,6 +223,8 @@ def run(
     -------
     BenchResult
         Recordings and key figures in SI units, verdicts on what was required, books of energy in J.
+    BenchRange
+        Over a range: the same of every value.
 
     Raises
     ------
