@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from bywire.core.scratch import require_finished
+
 DOCS = Path(__file__).parent
 HEAD = """# Does what is put in come back?
 
@@ -68,6 +70,7 @@ def main(folder: Path) -> None:
     """Write one file per method and the page."""
     (DOCS / "trust").mkdir(exist_ok=True)
     for file in sorted(folder.glob("*/study.json")):
+        require_finished(file.parent)
         study = condensed(json.loads(file.read_text()), file.parent.name)
         text = json.dumps(study).replace('"], [', '"],\n[')
         (DOCS / "trust" / f"{study['label']}.json").write_text(text + "\n")

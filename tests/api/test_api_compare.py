@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
 
 import numpy as np
 import pytest
 
 import bywire
 from bywire.core.errors import FileError, ParameterError
+from bywire.core.scratch import UNFINISHED
 from bywire.report.answer import AnswerWarning
 from bywire.report.style import SEQUENCE
 
@@ -201,3 +203,10 @@ def test_a_set_that_is_not_known_here_leaves_values_without_units(folders, tmp_p
     (row,) = [each for each in comparison.settings if each.name == "motor.R_m"]
     assert row.values == pytest.approx((0.5, 0.35))
     assert np.isfinite(row.values).all()
+
+
+def test_a_folder_whose_result_was_not_written_to_its_end(folders, tmp_path):
+    shutil.copytree(folders[0], tmp_path / "half")
+    (tmp_path / "half" / UNFINISHED).write_text("")
+    with pytest.raises(FileError, match="half holds a result that was not written to its end"):
+        bywire.compare(tmp_path / "half", folders[1])

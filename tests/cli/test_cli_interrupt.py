@@ -17,6 +17,7 @@ from command_line import LONG, SCRIPT, Outcome, no_half_files
 import bywire as package
 from bywire.api.overview import overview
 from bywire.bench.running import run
+from bywire.core.scratch import UNFINISHED
 from bywire.simulation.virtual_machine import VirtualMachine
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
@@ -135,7 +136,19 @@ def test_interrupt_while_the_results_are_written(bywire, bench, tmp_path, monkey
     unfinished = f"the report in {tmp_path / 'out'} is not complete: the same command writes it"
     assert outcome.status == 130
     assert outcome.lines == [f"bywire: {unfinished}", "bywire: interrupted"]
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["curve.nc"]
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {"curve.nc", UNFINISHED}
+
+
+def test_interrupt_before_there_is_a_result_leaves_no_folder(bywire, bench, tmp_path, monkeypatch):
+    def stopped(*_, **__):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("bywire.api.run.run", stopped)
+    assert bywire("run", bench(), "--out", tmp_path / "new" / "out").status == 130
+    assert [p.name for p in tmp_path.iterdir()] == ["bench.toml"]
+    (tmp_path / "there").mkdir()
+    assert bywire("run", bench(), "--out", tmp_path / "there").status == 130
+    assert (tmp_path / "there").exists()
 
 
 def test_interrupt_while_the_operating_point_is_looked_for(bywire, bench, tmp_path, machine):

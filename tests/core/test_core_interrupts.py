@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 
 import pytest
 
-from bywire.core.interrupts import interrupts_deferred, interrupts_noted
+from bywire.core.interrupts import interrupt_heard, interrupts_deferred, interrupts_noted
 
 
 @pytest.fixture(autouse=True)
@@ -96,3 +97,49 @@ def test_an_interrupt_that_was_kept_back_is_known_too():
         with pytest.raises(KeyboardInterrupt), interrupts_deferred():
             signal.raise_signal(signal.SIGINT)
         assert was_interrupted()
+
+
+def swallowing(seconds: float) -> int:
+    """Interrupt, swallow it as CasADi does where it looks at arguments, and go on for a while."""
+    scope = {"__name__": "casadi.casadi", "signal": signal, "time": time}
+    code = """
+def swallow():
+    try:
+        signal.raise_signal(signal.SIGINT)
+    except KeyboardInterrupt:
+        pass
+"""
+    exec(code, scope)
+    scope["swallow"]()
+    steps = 0
+    give_up = time.monotonic() + seconds
+    while time.monotonic() < give_up:
+        time.sleep(0.01)
+        steps += 1
+    return steps
+
+
+def test_an_interrupt_that_casadi_swallows_comes_again():
+    started = time.monotonic()
+    with interrupts_noted(), pytest.raises(KeyboardInterrupt):
+        swallowing(10.0)
+    assert time.monotonic() - started < 5.0
+
+
+def test_an_interrupt_that_is_heard_does_not_come_again():
+    with interrupts_noted() as was_interrupted:
+        try:
+            signal.raise_signal(signal.SIGINT)
+        except KeyboardInterrupt:
+            interrupt_heard()
+        time.sleep(0.5)
+        assert was_interrupted()
+    time.sleep(0.3)
+
+
+def test_the_user_may_press_twice():
+    with interrupts_noted():
+        for _ in range(2):
+            with pytest.raises(KeyboardInterrupt):
+                signal.raise_signal(signal.SIGINT)
+            interrupt_heard()

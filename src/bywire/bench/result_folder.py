@@ -14,10 +14,11 @@ import xarray as xr
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.core.errors import FileError
+from bywire.core.scratch import require_finished
 from bywire.data.netcdf import read_recording
 
 RECORD = "result.json"
-"""file of a result folder that says what it holds; written last"""
+"""file of a result folder that says what it holds"""
 _AGAIN = "run the bench again with --out, or name another folder"
 
 
@@ -81,6 +82,7 @@ def _record(folder: Path) -> dict[str, Any]:
     path = folder / RECORD
     if not folder.is_dir():
         raise FileError(f"{folder} is no folder: check the path")
+    require_finished(folder)
     if not path.is_file():
         raise FileError(
             f"{folder} is no finished result of bywire run: it has no {RECORD}; {_AGAIN}"

@@ -16,7 +16,7 @@ from bywire.bench.recording import record
 from bywire.bench.requirements import judge
 from bywire.bench.result import Result
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.interrupts import interrupts_deferred
+from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, Trajectory, simulate
@@ -57,6 +57,7 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
             if not is_complete:
                 raise KeyboardInterrupt
     except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
+        interrupt_heard()
         return Result(bench, recordings, (), (), "interrupted")
     return judged(bench, recordings)
 

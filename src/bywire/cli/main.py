@@ -29,8 +29,12 @@ def main() -> None:
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
     with interrupts_noted() as was_interrupted, command(), command_line():
-        status = _status(was_interrupted)
-        flush()
+        try:
+            status = _status(was_interrupted)
+            flush()
+        except KeyboardInterrupt:  # while the last words were said
+            message("interrupted")
+            status = INTERRUPTED
     raise SystemExit(status)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import TemporaryFile
 
@@ -21,14 +24,18 @@ def folder(text: str) -> Path:
     return Path(text)
 
 
-def require_folder(out: Path) -> None:
+@contextmanager
+def output_folder(out: Path) -> Iterator[None]:
     """Make the output folder, so that nothing is computed for one that cannot be written.
+
+    What was made for it and is empty in the end is removed.
 
     Raises
     ------
     FileError
         When it cannot be made or written to.
     """
+    missing = [each for each in (out, *out.parents) if not os.path.lexists(each)]
     try:
         out.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=out):
@@ -38,3 +45,9 @@ def require_folder(out: Path) -> None:
         raise FileError(
             f"cannot write to the output folder {out}: {reason}; name another one with --out"
         ) from None
+    try:
+        yield
+    finally:
+        with suppress(OSError):  # there is a result
+            for each in missing:
+                each.rmdir()

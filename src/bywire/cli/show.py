@@ -5,15 +5,17 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from bywire.cli import output
-from bywire.cli.output_folder import require_folder
+from bywire.cli.output_folder import output_folder
 from bywire.cli.progress import progress_bar
 from bywire.core.errors import BywireError
+from bywire.core.interrupts import interrupt_heard
 
 if TYPE_CHECKING:
     from bywire.bench.running import Progress
@@ -44,22 +46,22 @@ def show(
     from bywire.report.answer import AnswerWarning, with_files, write_document
     from bywire.report.terminal import terminal_text
 
-    if out is not None:
-        require_folder(out)
     files: list[Path] = []
     trouble: BywireError | None = None
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         try:
-            with progress_bar() as progress:
-                answer = compute(progress)
-            document = answer.document()
-            if out is not None:
-                try:
-                    files = write_document(document, out)
-                except BywireError as error:
-                    trouble = error
+            with nullcontext() if out is None else output_folder(out):
+                with progress_bar() as progress:
+                    answer = compute(progress)
+                document = answer.document()
+                if out is not None:
+                    try:
+                        files = write_document(document, out)
+                    except BywireError as error:
+                        trouble = error
         except KeyboardInterrupt as stop:  # typer would exit without a word
+            interrupt_heard()
             for text in (*stop.args, "interrupted"):
                 output.message(str(text))
             raise typer.Exit(output.INTERRUPTED) from None

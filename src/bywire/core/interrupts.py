@@ -2,33 +2,81 @@
 
 from __future__ import annotations
 
+import _thread
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from types import FrameType
+
+_PAUSE = 0.2  # seconds until an interrupt that may have been swallowed is raised again
+
+
+class _Interrupts:
+    """Ctrl-C in a command: noted, raised, and raised again where a library swallowed it."""
+
+    def __init__(self) -> None:
+        self.arrived = False
+        self._is_pending = False
+        self._again: threading.Timer | None = None
+
+    def handle(self, number: int, frame: FrameType | None) -> None:
+        """Be the handler of the signal."""
+        timer, self._again = self._again, None
+        if timer is not None and not timer.is_alive() and not self._is_pending:
+            return  # the timer's own, which came too late
+        self.arrived = True
+        self._is_pending = _in_library(frame)
+        if self._is_pending:
+            self._again = threading.Timer(_PAUSE, _thread.interrupt_main)
+            self._again.daemon = True
+            self._again.start()
+        raise KeyboardInterrupt
+
+    def heard(self) -> None:
+        """Raise it no more: somebody acts on it."""
+        self._is_pending = False
+        if self._again is not None:
+            self._again.cancel()
+
+
+def _in_library(frame: FrameType | None) -> bool:
+    """Return whether CasADi has called what runs: it may swallow what is raised there."""
+    while frame is not None:
+        if frame.f_globals.get("__name__", "").partition(".")[0] == "casadi":
+            return True
+        frame = frame.f_back
+    return False
+
+
+_current: list[_Interrupts] = []
+
+
+def interrupt_heard() -> None:
+    """Say that an interrupt is acted on, where KeyboardInterrupt was caught and work goes on."""
+    for each in _current:
+        each.heard()
 
 
 @contextmanager
 def interrupts_noted() -> Iterator[Callable[[], bool]]:
     """Yield a function that tells whether Ctrl-C was pressed since the block began.
 
-    It raises KeyboardInterrupt, as ever; but a library that calls Python, as CasADi does, may make
-    an error of its own of that, or nothing at all.
+    It raises KeyboardInterrupt, as ever; but CasADi may make an error of its own of what is raised
+    where it calls Python, or nothing at all: then it is raised again until it is heard.
     """
-    arrived: list[int] = []
-
-    def note(number: int, _: object) -> None:
-        arrived.append(number)
-        raise KeyboardInterrupt
-
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
         yield lambda: False  # no interrupt arrives here
         return
-    signal.signal(signal.SIGINT, note)
+    interrupts = _Interrupts()
+    _current.append(interrupts)
+    signal.signal(signal.SIGINT, interrupts.handle)
     try:
-        yield lambda: bool(arrived)
+        yield lambda: interrupts.arrived
     finally:
+        interrupts.heard()
+        _current.remove(interrupts)
         signal.signal(signal.SIGINT, previous)
 
 

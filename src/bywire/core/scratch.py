@@ -19,11 +19,16 @@ from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
 
+from bywire.core.errors import FileError
+
 if sys.platform != "win32":
     import fcntl
 
 PREFIX = ".bywire-"
 """what the names of temporary folders begin with"""
+
+UNFINISHED = "unfinished"
+"""file of a folder whose result was not written to its end"""
 
 _OLD = 86400.0  # seconds; without locks, younger ones may be in use
 
@@ -81,6 +86,21 @@ def _folder_of(process: int) -> Path:
 
     atexit.register(remove)
     return folder
+
+
+def require_finished(folder: Path) -> None:
+    """Refuse a folder whose result was not written to its end.
+
+    Raises
+    ------
+    FileError
+        When it was not.
+    """
+    if (folder / UNFINISHED).exists():
+        raise FileError(
+            f"{folder} holds a result that was not written to its end: run the command that wrote "
+            "it again"
+        )
 
 
 def sweep(parent: Path) -> None:

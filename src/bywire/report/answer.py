@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 
 from bywire.core.callers import in_callers_words
-from bywire.core.errors import FileError
 from bywire.report.document import Document, FigureBlock, TableBlock
+from bywire.report.result_folder import ResultFolder, result_folder
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,53 +125,48 @@ def write_document(document: Document, folder: Path) -> list[Path]:
     KeyboardInterrupt
         When interrupted, with what to do about what is missing.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        reason = error.strerror or str(error)
-        raise FileError(f"cannot make the output folder {folder}: {reason}") from None
     if document.prepare is not None:
         document.prepare(folder)
-    try:
-        return _written(document, folder)
-    except KeyboardInterrupt:
-        raise KeyboardInterrupt(
-            f"the report in {folder} is not complete: the same command writes it"
-        ) from None
+    with result_folder(folder) as place:
+        names = _written(document, place)
+    return [folder / name for name in names]
 
 
-def _written(document: Document, folder: Path) -> list[Path]:
-    files: list[Path] = []
+def _written(document: Document, place: ResultFolder) -> list[str]:
+    """Write the files of a document and return their names."""
+    figures = []
+    if document.is_paged:
+        figures = [b for b in document.flat() if isinstance(b, FigureBlock) and b.name]
+    names = [
+        *(each.name for each in document.attachments),
+        *(f"{block.name}.png" for block in figures),
+        *([document.page_name] if document.is_paged else []),
+        *([document.record] if document.record else []),
+    ]
     for each in document.attachments:
-        target = folder / each.name
         if each.after_record and document.record:
-            _record(document, folder, [*files, target])
-        files.append(each.write(target))
+            _record(document, place, names)
+        each.write(place.scratch / each.name)
     if document.is_paged:
         from bywire.report.files import save_figure
         from bywire.report.page import write_page
 
-        files += [
-            save_figure(block.figure, folder / f"{block.name}.png")
-            for block in document.flat() if isinstance(block, FigureBlock) and block.name
-        ]  # fmt: skip
-        files.append(
-            write_page(
-                folder / document.page_name, document.title, document.summary, document.page,
-                banner=document.banner,
-            )
+        for block in figures:
+            save_figure(block.figure, place.scratch / f"{block.name}.png")
+        write_page(
+            place.scratch / document.page_name, document.title, document.summary, document.page,
+            banner=document.banner, files=names,
         )  # fmt: skip
     if document.record:
-        files.append(_record(document, folder, files))
-    return files
+        _record(document, place, names)
+    return names
 
 
-def _record(document: Document, folder: Path, files: list[Path]) -> Path:
+def _record(document: Document, place: ResultFolder, names: list[str]) -> None:
     from bywire.report.files import write_bytes
 
-    target = folder / document.record
-    shown = with_files(document, [*files, target])
-    return write_bytes(target, (json.dumps(shown, indent=2) + "\n").encode())
+    shown = with_files(document, [place.folder / name for name in names])
+    write_bytes(place.scratch / document.record, (json.dumps(shown, indent=2) + "\n").encode())
 
 
 def with_files(document: Document, files: list[Path]) -> dict[str, Any]:

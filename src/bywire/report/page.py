@@ -23,6 +23,7 @@ from bywire.report.document import (
 )
 from bywire.report.files import write_bytes
 from bywire.report.inline_figure import inline_figures
+from bywire.report.result_folder import listed
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
 
@@ -36,6 +37,7 @@ def write_page(
     sections: Sequence[Section],
     *,
     banner: Banner | None = None,
+    files: Sequence[str] = (),
 ) -> Path:
     """Write a report as one HTML file, whole or not at all.
 
@@ -51,23 +53,28 @@ def write_page(
         Contents.
     banner
         Outcome, shown above the contents.
+    files
+        Names of the files that belong to it.
 
     Raises
     ------
     FileError
         When the file cannot be written.
     """
-    return write_bytes(path, page_html(title, summary, sections, banner=banner).encode("utf-8"))
+    text = page_html(title, summary, sections, banner=banner, names=files)
+    return write_bytes(path, text.encode("utf-8"))
 
 
 def page_html(
-    title: str, summary: str, sections: Sequence[Section], *, banner: Banner | None = None
-) -> str:
+    title: str, summary: str, sections: Sequence[Section], *, banner: Banner | None = None,
+    names: Sequence[str] = (),
+) -> str:  # fmt: skip
     """Return a report as one HTML page; see :func:`write_page`."""
     numbered = _numbered(sections)
     style = files("bywire.report").joinpath("page.css").read_text(encoding="utf-8")
     parts = [
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{_POLICY}\n'
+        f"{listed(names)}"
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{_text(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>",
         f'<header>\n<h1>{_text(title)}</h1>\n<p class="summary">{_text(summary)}</p>',

@@ -8,6 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from bywire.core.errors import SolverError
+from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array
 from bywire.simulation.engine import Engine
 from bywire.simulation.layout import Layout
@@ -49,6 +50,7 @@ def advance_all(
         try:
             engine.advance(request, vector, begin, end, values[row:])
         except KeyboardInterrupt:
+            interrupt_heard()
             vector[:] = saved
             return begin
         require_finite(engine.layout, vector, f"the run left the numbers before t = "
@@ -58,6 +60,7 @@ def advance_all(
             if progress is not None:
                 progress(end / schedule.frames)
         except KeyboardInterrupt:
+            interrupt_heard()
             return begin
         elapsed = max(time.perf_counter() - started, 1e-9)
         factor = min(max(_CHUNK_SECONDS / elapsed, 0.5), 8.0)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.optimize import OptimizeResult, differential_evolution
 from scipy.stats import qmc
 
+from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.bench_figures import BenchFigures
 from bywire.synthesis.candidate import Candidate, judged, linear_slacks
@@ -138,6 +139,7 @@ def tune(
             rng=np.random.default_rng(seed), callback=passed,
         )  # fmt: skip
     except KeyboardInterrupt:
+        interrupt_heard()
         interrupted = True
         if not tried:
             raise

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from bywire.core.errors import ParameterError
+from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.floors import linear_floors
 from bywire.synthesis.linear_case import LinearCase, room, slack, values_of
@@ -75,6 +76,7 @@ def design(
             search = _by_figures(search, progress)
             conflicts = _conflicts(search, progress)
     except KeyboardInterrupt:
+        interrupt_heard()
         status = status if status == "infeasible" else "interrupted"
     z = first if search.best is None else search.best
     outcome = _judged(problem, z, "interrupted" if status == "interrupted" else None, conflicts)

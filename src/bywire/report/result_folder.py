@@ -1,0 +1,140 @@
+"""A folder holds one result: a new one takes the place of the old when it is whole.
+
+A process that is killed while a result is computed or drawn leaves the folder as it was. While
+files are moved a file ``unfinished`` says so, and lists what belongs to either.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from html import escape, unescape
+from pathlib import Path
+
+from bywire.core.errors import FileError
+from bywire.core.scratch import UNFINISHED, scratch_folder
+
+PAGE = "report.html"
+"""file of the page, which lists what belongs to it"""
+
+_SAYS = "This result was not written to its end: the same command writes it anew. Its files:"
+_OURS = (".html", ".json", ".nc", ".png", ".toml")
+_META = "bywire-files"
+_HEAD = 65536  # characters of a page, which has its list at the beginning
+
+
+class ResultFolder:
+    """Where the files of a result are written before they take the place of an older one.
+
+    Parameters
+    ----------
+    folder
+        The folder of the result.
+    scratch
+        Where its files are written first.
+    """
+
+    def __init__(self, folder: Path, scratch: Path) -> None:
+        self.folder, self.scratch = folder, scratch
+
+    def move(self, is_whole: bool = True) -> None:
+        """Put the files in place, remove those of the older result, and mark what is not whole."""
+        new = [path.name for path in self.scratch.iterdir() if path.is_file()]
+        if not new:
+            return
+        for name in new:
+            if (self.folder / name).is_dir():
+                raise FileError(
+                    f"cannot write {self.folder / name}: there is a folder of that name: remove "
+                    "it, or name another folder for the result"
+                )
+        old = earlier_files(self.folder)
+        marker = self.scratch / UNFINISHED
+        marker.write_text("\n".join([_SAYS, *sorted({*new, *old})]) + "\n", encoding="utf-8")
+        os.replace(marker, self.folder / UNFINISHED)
+        for name in sorted(old - set(new)):
+            (self.folder / name).unlink(missing_ok=True)
+        for name in sorted(new, key=_order):
+            os.replace(self.scratch / name, self.folder / name)
+        if is_whole:
+            (self.folder / UNFINISHED).unlink()
+
+
+@contextmanager
+def result_folder(folder: Path) -> Iterator[ResultFolder]:
+    """Yield where to write the files of a result, which are moved when the block has ended.
+
+    Raises
+    ------
+    FileError
+        When the folder cannot be made or written to; the older result then stays.
+    KeyboardInterrupt
+        When interrupted, with what to do; what is written then lies there, marked as unfinished.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(f"cannot make the output folder {folder}: {reason}") from None
+    try:
+        with scratch_folder(folder) as scratch:
+            place = ResultFolder(folder, scratch)
+            try:
+                yield place
+            except KeyboardInterrupt:
+                place.move(is_whole=False)
+                raise
+            place.move()
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"the report in {folder} is not complete: the same command writes it"
+        ) from None
+    except OSError as error:
+        reason = error.strerror or str(error)
+        raise FileError(
+            f"cannot write the result to {folder}: {reason}: make room there, or name another "
+            "folder"
+        ) from None
+
+
+def listed(names: Sequence[str]) -> str:
+    """Return the element of a page's head that lists the files of its result."""
+    return f'<meta name="{_META}" content="{escape(json.dumps(list(names)))}">\n' if names else ""
+
+
+def earlier_files(folder: Path) -> set[str]:
+    """Return the names of the files of the result that a folder holds, whole or not."""
+    names: set[str] = set()
+    for path in folder.glob("*.json"):
+        files = _files_of(path)
+        names |= files if path.name in files else set()  # a record of ours lists itself
+    names |= _files_of_page(folder / PAGE)
+    if (folder / UNFINISHED).is_file():
+        text = (folder / UNFINISHED).read_text(encoding="utf-8", errors="replace")
+        names |= {Path(line).name for line in text.splitlines()[1:]}
+    return {n for n in names if Path(n).suffix in _OURS and (folder / n).is_file()}
+
+
+def _files_of(record: Path) -> set[str]:
+    try:
+        return {Path(str(each)).name for each in json.loads(record.read_bytes())["files"]}
+    except (OSError, ValueError, KeyError, TypeError):  # not ours
+        return set()
+
+
+def _files_of_page(page: Path) -> set[str]:
+    try:
+        with page.open(encoding="utf-8") as stream:
+            entry = re.search(rf'<meta name="{_META}" content="([^"]*)">', stream.read(_HEAD))
+        names = json.loads(unescape(entry[1])) if entry else []
+        return {Path(str(each)).name for each in names}
+    except (OSError, ValueError, TypeError):  # not ours
+        return set()
+
+
+def _order(name: str) -> tuple[bool, str]:
+    """Return the order of moving: values never lie without what says whether to believe them."""
+    return Path(name).suffix != ".json", name
