@@ -133,7 +133,10 @@ def write_package(name: str, folder: Path) -> Path:
                 (draft / place).write_text(text, encoding="utf-8")
             os.rename(draft, target)
     except OSError as error:
-        raise FileError(f"{target} cannot be written: {error.strerror or error}") from None
+        raise FileError(
+            f"{target} cannot be written: {error.strerror or error}: make room there, or choose "
+            "another folder"
+        ) from None
     return target
 
 

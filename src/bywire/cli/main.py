@@ -5,6 +5,7 @@ Light to load, so that Ctrl-C is heard from the start: what commands need comes 
 
 from __future__ import annotations
 
+import errno
 import gc
 import sys
 import traceback
@@ -36,6 +37,15 @@ def main() -> None:
             message("interrupted")
             status = INTERRUPTED
     raise SystemExit(status)
+
+
+def _system_error(error: OSError) -> str:
+    """Return what the system refused, where, and what to do about it."""
+    reason = error.strerror or str(error) or type(error).__name__
+    place = f"{error.filename}: " if error.filename else ""
+    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+        return f"{place}{reason}: make room there, or name another place with --out or TMPDIR"
+    return f"{place}{reason}: check that it is there and that you may read and write it"
 
 
 def _foreign_line(error: Exception) -> str:
@@ -117,7 +127,7 @@ def _explained(error: BaseException) -> int:
         message(f"error: {error}")
         return error.exit_status
     if isinstance(error, OSError):
-        message(f"error: {error}")
+        message(f"error: {_system_error(error)}")
         return FAILED
     foreign = _foreign_line(error) if isinstance(error, Exception) else ""
     if foreign:

@@ -12,6 +12,8 @@ from bywire.core.errors import FileError
 INTERRUPTED = 130
 """exit status after Ctrl-C"""
 
+_WORD, _PATH, _MESSAGE = 120, 600, 3000  # characters that are shown of each
+
 
 def open_streams() -> None:
     """Make both streams usable: there, and able to show any text."""
@@ -38,15 +40,37 @@ def result(text: str) -> None:
         _abandon()
     except OSError as error:
         _abandon()
-        raise FileError(f"cannot write to standard output: {error.strerror}") from None
+        raise FileError(
+            f"cannot write to standard output: {error.strerror}: make room there, or send it "
+            "elsewhere"
+        ) from None
 
 
 def message(text: str) -> None:
-    """Print a line for the user on standard error; control characters become harmless."""
+    """Print a line for the user on standard error; control characters become harmless.
+
+    What is too long to be read is shortened in its middle: what to do stands at the end.
+    """
     from bywire.report.wording import clean
 
     with contextlib.suppress(OSError):
-        print(f"bywire: {clean(text)}", file=sys.stderr, flush=True)
+        print(f"bywire: {shortened(clean(text))}", file=sys.stderr, flush=True)
+
+
+def shortened(text: str) -> str:
+    """Return a message of a length that can be read, with its beginning and its end.
+
+    Examples
+    --------
+    >>> len(shortened("unknown parameter '" + 400 * "x" + "': known are a, b"))
+    155
+    """
+    words = [_cut(word, _WORD if "/" not in word else _PATH) for word in text.split(" ")]
+    return _cut(" ".join(words), _MESSAGE)
+
+
+def _cut(text: str, most: int) -> str:
+    return text if len(text) <= most else f"{text[: 2 * most // 3]}...{text[-most // 3 :]}"
 
 
 def flush() -> None:

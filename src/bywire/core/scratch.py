@@ -70,8 +70,20 @@ def scratch_folder(parent: Path) -> Iterator[Path]:
 
 
 def process_folder() -> Path:
-    """Return the temporary folder of this process, which nobody else can read."""
-    return _folder_of(os.getpid())
+    """Return the temporary folder of this process, which nobody else can read.
+
+    Raises
+    ------
+    FileError
+        When there is no room for temporary files.
+    """
+    try:
+        return _folder_of(os.getpid())
+    except OSError as error:
+        raise FileError(
+            f"a temporary folder cannot be made ({error.strerror or error}): make room where "
+            "temporary files go, or set TMPDIR to another folder"
+        ) from None
 
 
 @cache

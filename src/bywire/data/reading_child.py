@@ -15,6 +15,7 @@ milliseconds, starts from a sound state and has its own limits. Elsewhere it rea
 
 from __future__ import annotations
 
+import errno
 import importlib
 import json
 import math
@@ -132,6 +133,9 @@ def _serve(
             reason = "its parts do not fit together"
         what = f"{path} is damaged, as {kind.title} it cannot be read ({reason})"
         hint = "copy it again, or export it again from where it was made"
+        if getattr(error, "errno", None) == errno.ENOSPC:
+            what = f"{path} cannot be read: the library's temporary files have no room"
+            hint = "make room where they go, or set TMPDIR to another folder"
         send(answers, {"error": f"{what}: {hint}"})
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+from contextlib import redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -57,12 +59,19 @@ def write_measurement(
     _require_fit(dataset, target, kind)
     ready = _with_units(dataset)
     try:
-        with replacing(target) as fresh:
+        # What a library prints is no result of ours.
+        with replacing(target) as fresh, redirect_stdout(StringIO()):
             kind.write(ready, fresh, progress)
     except InputError:
         raise
-    except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
-        reason = getattr(error, "strerror", None) or str(error)
+    except MemoryError:
+        raise FileError(
+            f"cannot write {target}: {kind.title} of this size does not fit into memory: write "
+            "fewer signals at a time"
+        ) from None
+    except Exception as error:  # libraries fail in as many ways as there are
+        reason = getattr(error, "strerror", None) or " ".join(str(error).split())[:200]
+        reason = reason or type(error).__name__
         raise FileError(
             f"cannot write {target}: {reason}: make room there, or choose a folder that you may "
             "write to"

@@ -61,4 +61,7 @@ class JobStore:
             with self.path.open("a", encoding="utf-8") as file:
                 file.write(json.dumps(dict(row)) + "\n")
         except OSError as error:
-            raise FileError(f"cannot write {self.path}: {error.strerror}") from None
+            raise FileError(
+                f"cannot write {self.path}: {error.strerror}: make room there, or name another "
+                "folder"
+            ) from None

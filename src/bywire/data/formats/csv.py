@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -22,7 +23,9 @@ if TYPE_CHECKING:
 
 
 _BLOCK = 1 << 24  # bytes
+_PIECE = 1 << 18  # bytes of a block with a flaw that are looked at together: cells take much memory
 _ROWS = 1 << 16  # that are written at a time
+_QUOTED = rb'(?m)(?:^|%s) *"[^"\r\n]*"(?=%s|\r?$)'  # a cell, separators around it
 _OTHER_TEXT = (b"\xff\xfe", b"\xfe\xff")  # UTF-16: text still, and refused as such
 
 
@@ -50,7 +53,7 @@ class TextSource:
         for block in _blocks(self._path, self._dialect.start):
             columns = _fast(block, dialect, indices)
             if columns is None:
-                columns = strict_columns(self._path, block, line, dialect, indices)
+                columns = _careful(self._path, block, line, dialect, indices)
             done += len(block)
             if not growing.rows:  # as many rows as bytes promise, and a hundredth more
                 expected = 1.01 * len(columns[0]) * (size - self._dialect.start) / len(block)
@@ -107,8 +110,9 @@ def _fast(
     """Return the columns of a block without a flaw; None where each line needs a look."""
     import pandas as pd
 
+    separator = dialect.separator.encode()
     lines = block.count(b"\n") + (not block.endswith(b"\n"))
-    whole = block.count(dialect.separator.encode()) == lines * (dialect.width - 1)
+    whole = block.count(separator) == lines * (dialect.width - 1)
     if not whole or b'"' in block or b"\0" in block:
         return None
     options: dict[str, Any] = {"float_precision": "round_trip"}
@@ -125,6 +129,39 @@ def _fast(
     columns = [frame[k].to_numpy(dtype=np.float64) for k in indices]
     is_whole = all(len(column) == lines and not np.isinf(column).any() for column in columns)
     return columns if is_whole else None
+
+
+def _careful(
+    path: Path, block: bytes, line: int, dialect: Dialect, indices: Sequence[int]
+) -> list[NDArray[np.float64]]:
+    """Return the columns of a block with a flaw: line by line where it is, else by a library."""
+    parts = []
+    for piece in _pieces(block):
+        columns = _fast(_plain(piece, dialect), dialect, indices)
+        if columns is None:
+            columns = strict_columns(path, piece, line, dialect, indices)
+        parts.append(columns)
+        line += piece.count(b"\n")
+    return [np.concatenate(columns) for columns in zip(*parts, strict=True)]
+
+
+def _plain(piece: bytes, dialect: Dialect) -> bytes:
+    """Return lines without blank ones, and cells without quotation marks where that is all."""
+    if b'"' in piece:
+        mark = re.escape(dialect.separator.encode())
+        if 2 * len(re.findall(_QUOTED % (mark, mark), piece)) == piece.count(b'"'):
+            piece = piece.replace(b'"', b"")
+    return re.sub(rb"(?m)^[ \t\r]*\n", b"", piece)
+
+
+def _pieces(block: bytes) -> Iterator[bytes]:
+    """Yield a block in pieces of whole lines, which end outside of quotation marks."""
+    begin, end = 0, 0
+    while end < len(block):
+        end = block.find(b"\n", max(end, begin + _PIECE)) + 1 or len(block)
+        if end == len(block) or block.count(b'"', begin, end) % 2 == 0:
+            yield block[begin:end]
+            begin = end
 
 
 @contextmanager
