@@ -63,7 +63,7 @@ def shortened(text: str) -> str:
     Examples
     --------
     >>> len(shortened("unknown parameter '" + 400 * "x" + "': known are a, b"))
-    155
+    156
     """
     words = [_cut(word, _WORD if "/" not in word else _PATH) for word in text.split(" ")]
     return _cut(" ".join(words), _MESSAGE)
