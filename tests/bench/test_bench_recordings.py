@@ -10,7 +10,7 @@ import xarray as xr
 
 import bywire
 from bywire.bench.energy_ledger import role_attributes
-from bywire.bench.recording import energy_residual, parameter_hash
+from bywire.bench.recording import energy_residual, open_books, parameter_hash
 from bywire.core.errors import FileError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
@@ -163,3 +163,19 @@ def test_engines_agree_on_every_signal():
     for name in compiled.data_vars:
         scale = float(abs(compiled[name]).max())
         assert float(abs(compiled[name] - slow[name]).max()) <= 1e-6 * scale
+
+
+@pytest.mark.parametrize(("k_lf", "is_open"), [("32", False), ("3.2e-12", False),
+                                               ("3.2e-15", True), ("3.2e-19", True)])  # fmt: skip
+def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
+    """A pipeline nearly without friction lets fluid of a few grams whirl at absurd speed."""
+    result = bywire.run("hard-braking", {"pipeline.k_lf": k_lf})
+    said = [text for text in result.warnings if "the energy balance is open by" in text]
+    assert bool(said) == is_open
+    assert ("energy balance is open" in result.recordings["run"].attrs["warnings"]) == is_open
+
+
+def test_a_standing_body_with_much_energy_stored_closes_its_books():
+    names = {"E_source": 0.0, "E_stored": 1e3, "E_friction": 0.0}
+    rows = {n: ("time", value + 1e-13 * np.arange(3.0)) for n, value in names.items()}
+    assert open_books(xr.Dataset(rows, {"time": [0.0, 1.0, 2.0]})) == []

@@ -11,11 +11,14 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from bywire.bench.energy_ledger import role_attributes
+from bywire.bench.energy_ledger import actuator_ledger, role_attributes
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
 from bywire.simulation.run import Run, Trajectory
+
+_OPEN = 1e-5  # of the energies, that the balance of a run may leave open
+_ROUNDING = 1e-12  # of the stored energy
 
 
 def parameter_hash(par: ParameterSet) -> str:
@@ -84,8 +87,30 @@ def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
             f"{trajectory.unsettled} substeps hit the cap of the contact iteration: "
             "take a smaller step"
         )
+    doubts += open_books(recording)
     doubts += run.model.watch(recording, run.par)
     return doubts
+
+
+def open_books(recording: xr.Dataset) -> list[str]:
+    """Return a warning where the energy balance is open by more than the step can explain.
+
+    The scheme closes it to a few parts in 1e8, the remainder of nonlinear elements, and to
+    rounding of what is stored. Where parameters are so extreme that numbers cancel, it does not.
+    """
+    energies = [recording[name] for name in recording if str(name).startswith("E_")]
+    books = actuator_ledger(recording)
+    if not (books.sources and books.sinks):
+        return []
+    largest = max((float(np.abs(energy).max()) for energy in energies), default=0.0)
+    left = abs(books.closing_error)
+    if left <= _OPEN * books.turnover + _ROUNDING * largest:
+        return []
+    return [
+        f"the energy balance is open by {left:.3g} J of {books.turnover:.3g} J that were turned "
+        "over: do not believe this run, take a smaller step, and look for a parameter that is "
+        "extreme"
+    ]
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:
