@@ -98,11 +98,13 @@ def test_margins_are_those_of_the_library(name: str) -> None:
     _, phase, _, _, crossover, _ = control.stability_margins(response, returnall=True)
     k = int(np.argmin(np.abs(crossover - 2.0 * math.pi * found.crossover)))
     assert found.phase == pytest.approx(float(phase[k]), abs=0.2)
+    # The library's own search for crossovers of a state space depends on the machine: it may
+    # return a frequency where the gain is 0.67. It evaluates the state space on our frequencies.
     system = gain.state_space()
-    factor, own, *_ = control.stability_margins(system)
+    factor, margin, *_ = control.stability_margins(control.frd(system, omega))
     if math.isfinite(found.gain):
         assert factor == pytest.approx(found.gain, rel=1e-3)
-    assert own == pytest.approx(found.phase, abs=1.0)  # the library's own grid is coarse
+    assert margin == pytest.approx(found.phase, abs=0.2)
     disk, _, _ = control.disk_margins(system, omega)
     assert found.disk == pytest.approx(float(disk), rel=1e-3)
     assert found.stable

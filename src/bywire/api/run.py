@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from bywire.api.run_remarks import remarks
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
+from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.running import Progress
 from bywire.core.catalog import PARAMETER_SETS
@@ -30,7 +32,7 @@ from bywire.report.document import (
 )
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
-from bywire.report.wording import amount
+from bywire.report.wording import amount, measured_amount
 
 if TYPE_CHECKING:
     from bywire.api.run_over import BenchRange
@@ -46,8 +48,8 @@ class BenchResult(Result, Answer):
 
     @property
     def holds(self) -> bool:
-        """Whether every requirement is met."""
-        return self.status != "failed"
+        """Whether every requirement is met, and none too closely to tell."""
+        return self.status not in ("failed", "undecided")
 
     @property
     def rows(self) -> list[KpiRow]:
@@ -58,7 +60,8 @@ class BenchResult(Result, Answer):
                 kpi.name, kpi.value, kpi.unit,
                 f"{kpi.definition} ({kpi.note})" if kpi.note else kpi.definition,
                 verdicts[kpi.name].limit if kpi.name in verdicts else "",
-                verdicts[kpi.name].met if kpi.name in verdicts else None,
+                verdicts[kpi.name].outcome if kpi.name in verdicts else "",
+                kpi.error,
             )
             for kpi in self.kpis
         ]  # fmt: skip
@@ -101,11 +104,7 @@ class BenchResult(Result, Answer):
                 for label, recording in self.recordings.items()
             ],
             record="result.json",
-            remarks=[
-                f"requirement not met: {v.kpi} is {amount(v.value, v.unit)}, wanted {v.limit}"
-                + (f" ({v.note})" if v.note else "")
-                for v in self.verdicts if not v.met
-            ],
+            remarks=[_remark(v) for v in self.verdicts if not v.met],
             is_paged=self.status != "interrupted",
         )  # fmt: skip
 
@@ -135,16 +134,45 @@ class BenchResult(Result, Answer):
             [
                 Paragraph(f"Source of the parameters: {cited.source}."),
                 Paragraph(f"{kept}."),
+                *self._signal_errors(),
                 Details("Options of the experiment", [TableBlock(options)]),
                 Details("All parameters", [TableBlock(parameters)]),
             ],
         )
+
+    def _signal_errors(self) -> list[Details]:
+        """Return how far each recorded signal is off, where that was estimated."""
+        rows = [
+            (label, name, *(amount(error[key], error["unit"], 2) for key in ("rms", "max")))
+            for label, signals in self._step_errors().items()
+            for name, error in signals.items()
+        ]
+        if not rows:
+            return []
+        table = text_table(["run", "signal", "rms", "largest"], rows)
+        return [Details("Error of recorded signals from the step", [TableBlock(table)])]
+
+    def _step_errors(self) -> dict[str, dict[str, dict[str, Any]]]:
+        """Return the error from the step of every signal, by run and name."""
+        return {
+            label: {
+                str(name): {
+                    "rms": signal.attrs["step_error_rms"],
+                    "max": signal.attrs["step_error_max"],
+                    "unit": signal.attrs.get("units", "1"),
+                }
+                for name, signal in recording.items() if "step_error_rms" in signal.attrs
+            }
+            for label, recording in self.recordings.items()
+        }  # fmt: skip
 
     def _banner(self) -> Banner:
         if not self.verdicts:
             return Banner("done")
         met = sum(v.met for v in self.verdicts)
         text = f"{met} of {len(self.verdicts)} requirements met"
+        if open_ := sum(not v.is_decided for v in self.verdicts):
+            text += f", {open_} undecided"
         return Banner(text, "good" if self.status == "passed" else "bad")
 
     def _data(self) -> dict[str, Any]:
@@ -152,11 +180,19 @@ class BenchResult(Result, Answer):
             "bench": self.bench.name or self.bench.experiment,
             "status": self.status,
             "kpis": {
-                kpi.name: {"value": kpi.value, "unit": kpi.unit, "note": kpi.note}
-                for kpi in self.kpis
+                k.name: {"value": k.value, "unit": k.unit, "note": k.note, "error": k.error}
+                for k in self.kpis
             },
             "requirements": [
-                {"kpi": v.kpi, "limit": v.limit, "value": v.value, "unit": v.unit, "met": v.met}
+                {
+                    "kpi": v.kpi,
+                    "limit": v.limit,
+                    "value": v.value,
+                    "unit": v.unit,
+                    "met": v.met,
+                    "outcome": v.outcome,
+                    "error": v.error,
+                }
                 for v in self.verdicts
             ],
             "energy": {
@@ -168,6 +204,7 @@ class BenchResult(Result, Answer):
                 }
                 for label, books in self.ledgers().items()
             },
+            "step_errors": self._step_errors(),
             "warnings": self.warnings,
         }
 
@@ -179,6 +216,7 @@ def run(
     *,
     progress: Progress | None = None,
     engine: str = "auto",
+    estimate_error: bool = True,
 ) -> BenchResult: ...
 
 
@@ -190,6 +228,7 @@ def run(
     over: str,
     progress: Progress | None = None,
     engine: str = "auto",
+    estimate_error: bool = True,
 ) -> BenchRange: ...
 
 
@@ -201,6 +240,7 @@ def run(
     over: str = "",
     progress: Progress | None = None,
     engine: str = "auto",
+    estimate_error: bool = True,
 ) -> BenchResult | BenchRange:
     """Make all runs of a bench, and judge them; over a range, for each of its values.
 
@@ -218,6 +258,15 @@ def run(
         Called with the run's label and its finished share, 0 to 1.
     engine
         ``auto``, ``compiled`` or ``virtual-machine``.
+    estimate_error
+        Whether all runs are made once more in half steps, for the error from the step of key
+        figures and recorded signals. A requirement that is closer to its limit than this error
+        is undecided, neither met nor missed.
+
+    Returns
+    -------
+    BenchResult
+        Recordings [SI] by label, key figures with unit and error, verdicts.
 
     Returns
     -------
@@ -240,10 +289,30 @@ def run(
     if over:
         from bywire.api.run_over import run_over
 
-        return run_over(bench, over, progress, engine)
-    result = running.run(bench, progress, engine)
+        return run_over(bench, over, progress, engine, estimate_error)
+    result = running.run(bench, progress, engine, estimate_error)
     return BenchResult(
         result.bench, result.recordings, result.kpis, result.verdicts, result.status
+    )
+
+
+def _remark(verdict: Verdict) -> str:
+    """Return what to say of a requirement that is not met, or not for certain."""
+    wanted = f", wanted {verdict.limit}"
+    if not verdict.is_decided and math.isfinite(verdict.error):
+        written = measured_amount(verdict.value, verdict.unit, verdict.error)
+        return (
+            f"requirement undecided: {verdict.kpi} is {written}, give or take "
+            f"{amount(verdict.error, verdict.unit, 2)} from the step{wanted}: take a smaller step"
+        )
+    if not verdict.is_decided:
+        return (
+            f"requirement undecided: {verdict.kpi} is defined with one of the steps and half of "
+            f"it only{wanted}: take a smaller step"
+        )
+    return (
+        f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{wanted}"
+        + (f" ({verdict.note})" if verdict.note else "")
     )
 
 

@@ -35,7 +35,7 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table
-from bywire.report.wording import amount, clean
+from bywire.report.wording import amount, clean, measured_amount
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -125,7 +125,7 @@ class BenchRange(Answer):
                 for label in dict.fromkeys(n for r in self.results for n in r.recordings)
             ],
             record="range.json",
-            remarks=[f"requirement not met: {text}" for text in verdicts if "failed" in text],
+            remarks=[f"requirement not met: {text}" for text in verdicts if ": ok " not in text],
         )
 
     def _write(self, label: str, path: Any) -> Any:
@@ -173,11 +173,12 @@ class BenchRange(Answer):
             if not missed:
                 yield f"{head}: ok {self._at([value for value, _ in pairs])}"
                 continue
+            word = "failed" if any(x.is_decided for _, x in missed) else "undecided"
             sign = -1.0 if pairs[0][1].limit.strip().startswith("<") else 1.0
             known = [(v, x) for v, x in missed if math.isfinite(x.value)]
             worst = min(known, key=lambda pair: sign * pair[1].value, default=missed[0])
             yield (
-                f"{head}: failed {self._at([value for value, _ in missed])}, worst "
+                f"{head}: {word} {self._at([value for value, _ in missed])}, worst "
                 f"{amount(worst[1].value, worst[1].unit)} at {amount(worst[0], self.unit)}"
             )
 
@@ -234,11 +235,15 @@ class BenchRange(Answer):
                 {
                     "value": value,
                     "status": result.status,
-                    "kpis": {k.name: {"value": k.value, "unit": k.unit, "note": k.note}
-                             for k in result.kpis},
+                    "kpis": {
+                        k.name: {
+                            "value": k.value, "unit": k.unit, "note": k.note, "error": k.error,
+                        } for k in result.kpis
+                    },
                     "requirements": [
                         {"kpi": v.kpi, "limit": v.limit, "value": v.value, "unit": v.unit,
-                         "met": v.met} for v in result.verdicts
+                         "met": v.met, "outcome": v.outcome, "error": v.error}
+                        for v in result.verdicts
                     ],
                 }
                 for value, result in zip(self.values, self.results, strict=True)
@@ -247,7 +252,9 @@ class BenchRange(Answer):
         }  # fmt: skip
 
 
-def run_over(bench: Bench, over: str, progress: Progress | None, engine: str) -> BenchRange:
+def run_over(
+    bench: Bench, over: str, progress: Progress | None, engine: str, estimate_error: bool
+) -> BenchRange:
     """Return what a bench gives for every value of ``NAME=LOW:HIGH:COUNT``; see `bywire.run`.
 
     Raises
@@ -270,7 +277,7 @@ def run_over(bench: Bench, over: str, progress: Progress | None, engine: str) ->
     if len({*values}) < 2:
         raise ParameterError(f"over {over!r}: name two different values at least")
     benches = [changed(bench, {name: value}) for value in values]
-    results = run_benches(benches, progress, engine)
+    results = run_benches(benches, progress, engine, estimate_error=estimate_error)
     return BenchRange(bench, name, leaf.unit.symbol, tuple(values), results)
 
 
@@ -279,7 +286,9 @@ def _cell(name: str, result: Result) -> Cell:
     if name not in known:
         return Cell("-")
     kpi = known[name]
-    text = amount(kpi.value, kpi.unit)
-    if any(v.kpi == name and not v.met for v in result.verdicts):
-        return Cell(f"{text} failed", "bad", kpi.value)
+    text = measured_amount(kpi.value, kpi.unit, kpi.error)
+    for verdict in result.verdicts:
+        if verdict.kpi == name and not verdict.met:
+            judged = "failed" if verdict.is_decided else "undecided"
+            return Cell(f"{text} {judged}", "bad", kpi.value)
     return Cell(text, value=kpi.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any, overload
@@ -15,7 +16,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.extent import check_memory
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, run_of, static_recordings
-from bywire.core.errors import InputError, ParameterError, unknown_name
+from bywire.bench.step_error import OTHER_STEPS
+from bywire.core.errors import InputError, ParameterError, StepError, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
@@ -178,6 +180,7 @@ def run_benches(
     progress: Progress | None = None,
     engine: str = "auto",
     threads: int | None = None,
+    estimate_error: bool = False,
 ) -> tuple[Result, ...]:
     """Make all runs of several benches of one experiment, and judge each bench.
 
@@ -194,6 +197,8 @@ def run_benches(
         ``auto``, ``compiled`` or ``virtual-machine``, which has no lanes.
     threads
         Threads to use, >= 1; all cores by default.
+    estimate_error
+        Whether all runs are made again in other steps; see `bywire.bench.running.run`.
 
     Raises
     ------
@@ -204,6 +209,21 @@ def run_benches(
     KeyboardInterrupt
         When interrupted.
     """
+    recordings = _recordings(benches, progress, engine, threads)
+    others: list[dict[float, dict[str, xr.Dataset]]] = [{} for _ in benches]
+    for factor in OTHER_STEPS if estimate_error else ():
+        with suppress(StepError):  # too short, or no divisor of a sample time
+            finer = [replace(bench, step=factor * bench.step) for bench in benches]
+            computed = _recordings(finer, progress, engine, threads)
+            for each, further in zip(others, computed, strict=True):
+                each[factor] = further
+    return tuple(map(judged, benches, recordings, others))
+
+
+def _recordings(
+    benches: Sequence[Bench], progress: Progress | None, engine: str, threads: int | None
+) -> list[dict[str, xr.Dataset]]:
+    """Return the recordings of each bench by label."""
     cases = [bench.cases() for bench in benches]
     recordings = [static_recordings(bench) for bench in benches]
     for number in range(max(len(each) for each in cases)):
@@ -217,7 +237,7 @@ def run_benches(
         ):
             case = cases[k][number]
             recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
-    return tuple(judged(bench, each) for bench, each in zip(benches, recordings, strict=True))
+    return recordings
 
 
 def _trajectories(

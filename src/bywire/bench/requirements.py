@@ -35,9 +35,13 @@ class Verdict:
     value, unit
         What was found; NaN where the KPI is not defined.
     met
-        Whether the requirement is met; an undefined KPI meets none.
+        Whether the value meets the requirement for certain; an undefined KPI meets none.
     note
         Why the KPI is not defined.
+    error
+        Estimated error of the value, in ``unit``; NaN where it was not estimated.
+    is_decided
+        Whether the value is further from the limit than it may be wrong.
     """
 
     kpi: str
@@ -46,6 +50,13 @@ class Verdict:
     unit: str
     met: bool
     note: str
+    error: float = math.nan
+    is_decided: bool = True
+
+    @property
+    def outcome(self) -> str:
+        """``met``, ``missed`` or ``undecided``."""
+        return ("met" if self.met else "missed") if self.is_decided else "undecided"
 
 
 def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
@@ -69,15 +80,32 @@ def check(requirements: Mapping[str, str], kpis: Mapping[str, str]) -> None:
 
 
 def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict, ...]:
-    """Compare KPIs with their limits, which :func:`check` has admitted."""
+    """Compare KPIs with their limits, which :func:`check` has admitted.
+
+    Undecided is what lies no further from its limit than its error; a KPI without an error
+    estimate is taken as it is.
+    """
     by_name = {kpi.name: kpi for kpi in kpis}
     verdicts = []
     for name, text in requirements.items():
         kpi = by_name[name]
         compare, bound = limit_of(name, text, kpi.unit)
-        met = not math.isnan(kpi.value) and _COMPARE[compare](kpi.value, bound)
-        verdicts.append(Verdict(name, text, kpi.value, kpi.unit, met, kpi.note))
+        is_decided = not (abs(kpi.value - bound) <= kpi.error or math.isinf(kpi.error))
+        met = is_decided and not math.isnan(kpi.value) and _COMPARE[compare](kpi.value, bound)
+        verdicts.append(
+            Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.error, is_decided)
+        )
     return tuple(verdicts)
+
+
+def status_of(verdicts: Sequence[Verdict]) -> str:
+    """Return ``done`` where nothing is required, else ``failed``, ``undecided`` or ``passed``."""
+    if not verdicts:
+        return "done"
+    outcomes = {verdict.outcome for verdict in verdicts}
+    if "missed" in outcomes:
+        return "failed"
+    return "undecided" if "undecided" in outcomes else "passed"
 
 
 def limit_of(name: str, text: Any, unit: str) -> tuple[str, float]:

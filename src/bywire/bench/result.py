@@ -22,7 +22,8 @@ class Result:
     recordings
         One dataset per run of the experiment, by label.
     status
-        ``done`` (nothing was required), ``passed``, ``failed`` (a requirement was not met) or
+        ``done`` (nothing was required), ``passed``, ``failed`` (a requirement was not met),
+        ``undecided`` (one is no further from its limit than its error from the step) or
         ``interrupted``.
     """
 

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.extent import check_extent
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record
-from bywire.bench.requirements import judge
+from bywire.bench.requirements import judge, status_of
 from bywire.bench.result import Result
+from bywire.bench.step_error import OTHER_STEPS, note_step_errors, with_step_errors
 from bywire.bench.stimuli.registry import Stimulus
+from bywire.core.errors import StepError
 from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
@@ -24,7 +31,12 @@ from bywire.simulation.run import Run, Trajectory, simulate
 Progress = Callable[[str, float], None]
 
 
-def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") -> Result:
+def run(
+    bench: Bench,
+    progress: Progress | None = None,
+    engine: str = "auto",
+    estimate_error: bool = False,
+) -> Result:
     """Make all runs of a bench, and judge them.
 
     Parameters
@@ -35,6 +47,11 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
         Called with the run's label and its finished share, 0 to 1.
     engine
         ``auto``, ``compiled`` or ``virtual-machine``.
+    estimate_error
+        Whether all runs are made again in half steps, and in double ones where these divide the
+        sample times: key figures and recorded signals then say how large their error from the
+        step is, and a requirement closer to its limit than that is undecided. It takes 2.5 times
+        as many substeps more.
 
     Raises
     ------
@@ -43,23 +60,46 @@ def run(bench: Bench, progress: Progress | None = None, engine: str = "auto") ->
     RunError
         When a run fails.
     """
-    recordings = static_recordings(bench)
+    recordings: dict[str, xr.Dataset] = {}
+    others: dict[float, dict[str, xr.Dataset]] = {}
+    is_complete = False
     try:
-        for number, case in enumerate(bench.cases()):
-            computed = run_of(bench, case, number)
-            report = None if progress is None else partial(progress, case.label)
-            with interrupts_deferred():
-                prepare(computed.model, computed.par).engine(engine)
-            trajectory = simulate(computed, engine=engine, progress=report)
-            is_complete = trajectory.status != "interrupted"
-            if is_complete or trajectory.time.size > 1:
-                recordings[case.label] = recording_of(bench, case, computed, trajectory)
-            if not is_complete:
-                raise KeyboardInterrupt
+        _make_runs(bench, recordings, progress, engine)
+        is_complete = True
+        for factor in OTHER_STEPS if estimate_error else ():
+            with suppress(StepError):  # too short, or no divisor of a sample time
+                other = replace(bench, step=factor * bench.step)
+                made: dict[str, xr.Dataset] = {}
+                _make_runs(other, made, progress, engine, f", {factor:g} of the step")
+                others[factor] = made
     except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
         interrupt_heard()
-        return Result(bench, recordings, (), (), "interrupted")
-    return judged(bench, recordings)
+        kpis = judged(bench, recordings).kpis if is_complete else ()
+        return Result(bench, recordings, kpis, (), "interrupted")
+    return judged(bench, recordings, others)
+
+
+def _make_runs(
+    bench: Bench,
+    recordings: dict[str, xr.Dataset],
+    progress: Progress | None,
+    engine: str,
+    remark: str = "",
+) -> None:
+    """Make all recordings of a bench, each kept as soon as it is there."""
+    recordings |= static_recordings(bench)
+    for number, case in enumerate(bench.cases()):
+        computed = run_of(bench, case, number)
+        report = None if progress is None else partial(progress, case.label + remark)
+        with interrupts_deferred():
+            prepare(computed.model, computed.par).engine(engine)
+        trajectory = simulate(computed, engine=engine, progress=report)
+        is_complete = trajectory.status != "interrupted"
+        begins = case.settle - case.keep
+        if is_complete or np.count_nonzero(trajectory.time >= begins - 1e-9) > 1:
+            recordings[case.label] = recording_of(bench, case, computed, trajectory)
+        if not is_complete:
+            raise KeyboardInterrupt
 
 
 def static_recordings(bench: Bench) -> dict[str, xr.Dataset]:
@@ -96,13 +136,30 @@ def recording_of(bench: Bench, case: Case, computed: Run, trajectory: Trajectory
     return recording if finish is None else finish(recording, bench.chosen_options)
 
 
-def judged(bench: Bench, recordings: Mapping[str, xr.Dataset]) -> Result:
-    """Return recordings with their key figures, and whether these meet the requirements."""
-    kpis = bench.definition.judge(recordings, bench.chosen_options)
+def judged(
+    bench: Bench,
+    recordings: Mapping[str, xr.Dataset],
+    others: Mapping[float, Mapping[str, xr.Dataset]] = MappingProxyType({}),
+) -> Result:
+    """Return recordings with their key figures, and whether these meet the requirements.
+
+    Parameters
+    ----------
+    others
+        The same runs in other steps, by their length over the bench's; figures and signals then
+        get their error.
+    """
+
+    def figures(made: Mapping[str, xr.Dataset]) -> tuple[Kpi, ...]:
+        return bench.definition.judge(made, bench.chosen_options)
+
+    kpis = figures(recordings)
+    if others:
+        in_others = {factor: figures(made) for factor, made in others.items()}
+        kpis = with_step_errors(kpis, in_others, recordings)
+        note_step_errors(recordings, others)
     verdicts = judge(bench.requirements, kpis)
-    status = "passed" if all(v.met for v in verdicts) else "failed"
-    status = status if verdicts else "done"
-    return Result(bench, recordings, kpis, verdicts, status)
+    return Result(bench, recordings, kpis, verdicts, status_of(verdicts))
 
 
 def _bench_notes(bench: Bench) -> dict[str, str]:

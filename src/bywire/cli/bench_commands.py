@@ -41,13 +41,22 @@ def run(
     over: Annotated[
         str, typer.Option(help="Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
     ] = "",
+    error_estimate: Annotated[
+        bool, typer.Option(help="Run in other steps too, for the error of all figures.")
+    ] = True,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
-    """Run a bench file or an experiment; exit status 1 when a requirement is not met."""
+    """Run a bench file or an experiment; exit status 1 unless every requirement is met."""
     from bywire.api.run import run as run_bench
 
-    show(lambda progress: run_bench(bench, changes(set_), over=over, progress=progress), out, json)
+    show(
+        lambda progress: run_bench(
+            bench, changes(set_), over=over, progress=progress, estimate_error=error_estimate
+        ),
+        out,
+        json,
+    )
 
 
 def reproduce_command(

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from bywire.report.wording import amount, clean, unit_text
+from bywire.report.wording import amount, clean, error_text, measured_amount, unit_text
 
 Verdict = Literal["good", "bad", "none"]
 
@@ -60,8 +61,10 @@ class KpiRow:
         How it is computed.
     limit
         The requirement as text, for instance ``"<= 15 %"``; empty for none.
-    ok
-        Whether the requirement holds; ``None`` without one.
+    outcome
+        ``met``, ``missed`` or ``undecided``; empty without a requirement.
+    error
+        How far the value may be off, in ``unit``; NaN where that was not estimated.
     """
 
     name: str
@@ -69,7 +72,8 @@ class KpiRow:
     unit: str
     definition: str = ""
     limit: str = ""
-    ok: bool | None = None
+    outcome: str = ""
+    error: float = math.nan
 
 
 @dataclass(frozen=True)
@@ -135,18 +139,24 @@ class ParameterRow:
 
 
 def kpi_table(rows: Iterable[KpiRow]) -> Table:
-    """Return the table of key figures; the columns for limits only where there is one."""
+    """Return the table of key figures; columns for limits and errors only where there are any.
+
+    A value is written in the digits that its error leaves.
+    """
     listed = list(rows)
-    limited = any(row.limit or row.ok is not None for row in listed)
+    limited = any(row.limit for row in listed)
+    estimated = any(not math.isnan(row.error) for row in listed)
     columns = [Column("name"), Column("value", numeric=True)]
-    columns += [Column("limit", numeric=True), Column("result")] if limited else []
+    columns += [Column("error", numeric=True)] * estimated
+    columns += [Column("limit", numeric=True), Column("result")] * limited
     return Table(
         (*columns, Column("definition")),
         tuple(
             (
                 Cell(clean(row.name)),
-                Cell(amount(row.value, row.unit)),
-                *((Cell(clean(row.limit) or "-"), _judged(row.ok, "ok", "failed")) * limited),
+                Cell(measured_amount(row.value, row.unit, row.error)),
+                *((Cell(error_text(row.value, row.unit, row.error)),) * estimated),
+                *((Cell(clean(row.limit) or "-"), _OUTCOMES[row.outcome]) * limited),
                 Cell(clean(row.definition)),
             )
             for row in listed
@@ -223,6 +233,14 @@ def text_table(heading: Sequence[str], rows: Iterable[Sequence[object]]) -> Tabl
         tuple(Column(clean(name)) for name in heading),
         tuple(tuple(Cell(clean(cell)) for cell in row) for row in rows),
     )
+
+
+_OUTCOMES = {
+    "": Cell("-"),
+    "met": Cell("ok", "good"),
+    "missed": Cell("failed", "bad"),
+    "undecided": Cell("undecided", "bad"),
+}
 
 
 def _judged(holds: bool | None, good: str, bad: str) -> Cell:

@@ -78,6 +78,68 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
     return figures + (f" {written}" if written else "")
 
 
+def measured_amount(value: float | None, symbol: str, error: float, digits: int = 4) -> str:
+    """Return a value with its unit in the digits that its error leaves; times below 1 s in ms.
+
+    The last digit written is that of the error's first one.
+
+    Parameters
+    ----------
+    value
+        Number in ``symbol``; ``None`` where there is none, NaN where it is not defined.
+    symbol
+        Unit in the syntax of pint; SI units are shown in their display unit.
+    error
+        How far the value may be off, in ``symbol``; NaN where that is not known.
+    digits
+        Most significant digits.
+
+    Examples
+    --------
+    >>> measured_amount(0.062195, "s", 3e-4), measured_amount(2.5012e6, "Pa", 4e3)
+    ('62.2 ms', '25.01 bar')
+    >>> measured_amount(5.0823, "percent", 0.2), measured_amount(3.1416, "1", 0.0)
+    ('5.1 %', '3.142')
+    """
+    if value is None or not (math.isfinite(value) and math.isfinite(error)):
+        return amount(value, symbol, digits)
+    number, unit = _readable(value, value, symbol)
+    possible, _ = _readable(error, value, symbol)
+    last = math.floor(math.log10(possible)) if possible > 0 else -400  # no float has that place
+    first = math.floor(math.log10(abs(number))) if number else last
+    if last <= first - digits + 1 or last == -400:
+        figures = f"{number:.{digits}g}"
+        figures = f"{float(figures):g}" if "e+" in figures else figures
+    else:
+        figures = f"{round(number, -last):.{max(0, -last)}f}"
+    written = unit_text(unit)
+    return figures + (f" {written}" if written else "")
+
+
+def error_text(value: float | None, symbol: str, error: float) -> str:
+    """Return an error in one digit, in the unit in which `measured_amount` writes the value.
+
+    Examples
+    --------
+    >>> error_text(0.062195, "s", 2.6e-4), error_text(3.2, "1", 0.0)
+    ('0.3 ms', '0')
+    """
+    if value is None or math.isnan(value) or math.isnan(error):
+        return "-"
+    if math.isinf(error):
+        return "unknown"
+    number, unit = _readable(error, value, symbol)
+    written = unit_text(unit)
+    return f"{float(f'{number:.1g}'):g}" + (f" {written}" if written and number else "")
+
+
+def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
+    """Return a number in the unit in which a value reads best."""
+    if symbol == "s" and abs(value) < 1.0:
+        return 1e3 * number, "ms"
+    return in_display_unit(float(number), symbol)
+
+
 def range_text(leaf: Leaf) -> str:
     """Return the admissible range of a parameter in its display unit, for instance ``> 0 mm``."""
     if leaf.low == leaf.high:

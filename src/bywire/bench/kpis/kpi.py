@@ -36,6 +36,9 @@ class Kpi:
         One line for listings.
     note
         Why it is not defined, or how the data were treated.
+    error
+        Estimated error from the step, in ``unit``; infinite where not even half the step shows
+        how large it is, NaN where it was not estimated.
     """
 
     name: str
@@ -43,6 +46,7 @@ class Kpi:
     unit: str
     definition: str
     note: str = ""
+    error: float = math.nan
 
 
 class Figures:

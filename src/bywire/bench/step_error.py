@@ -1,0 +1,118 @@
+"""How far a run's results are from those of ever shorter steps: the same runs in other steps.
+
+The scheme is of second order: a figure of steps h is off by c h^2, and differs from that of steps
+f h by c h^2 |1 - f^2|. Half the step tells c, and so does twice the step where that divides the
+sample times. Where friction and contacts make c depend on where in a step things happen, one of
+both differences may be small by chance: the larger estimate counts.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Kpi
+from bywire.core.typing import Array
+
+OTHER_STEPS = (0.5, 2.0)
+"""other steps over that of the run"""
+ROUNDING = 1e-11
+"""rounding of many steps, over the largest value of a signal"""
+
+
+def of_difference(factor: float) -> float:
+    """Return the error of steps h over the difference to steps ``factor`` h, at second order.
+
+    Examples
+    --------
+    >>> round(of_difference(0.5), 4), round(of_difference(2.0), 4)
+    (1.3333, 0.3333)
+    """
+    return 1.0 / abs(1.0 - factor**2)
+
+
+def with_step_errors(
+    kpis: Sequence[Kpi],
+    others: Mapping[float, Sequence[Kpi]],
+    recordings: Mapping[str, xr.Dataset],
+) -> tuple[Kpi, ...]:
+    """Return key figures with the error that they have from the step.
+
+    Parameters
+    ----------
+    kpis
+        Figures of the runs.
+    others
+        The same figures in other steps, by their length over that of the runs.
+    recordings
+        The runs: a difference of large forces, all but zero, is no better than their rounding.
+
+    Returns
+    -------
+    tuple of Kpi
+        With ``error`` in the unit of each; infinite where not every step defines a figure.
+    """
+    rounding = {unit: ROUNDING * peak for unit, peak in _peaks(recordings).items()}
+    by_name = {factor: {each.name: each.value for each in made} for factor, made in others.items()}
+
+    def estimated(kpi: Kpi) -> Kpi:
+        errors = [
+            _error(kpi.value, values[kpi.name], factor) for factor, values in by_name.items()
+        ]
+        return replace(kpi, error=max(errors) + rounding.get(kpi.unit, 0.0))
+
+    return tuple(map(estimated, kpis))
+
+
+def note_step_errors(
+    recordings: Mapping[str, xr.Dataset], others: Mapping[float, Mapping[str, xr.Dataset]]
+) -> None:
+    """Write into each recorded signal how large its error from the step is.
+
+    The attributes ``step_error_rms`` and ``step_error_max`` [the signal's unit] are over all rows
+    of the recording. A signal that jumps, such as a duty cycle, may be far off for a row where
+    the jump falls into another one, and right on average.
+
+    Parameters
+    ----------
+    recordings
+        The runs, by label; their signals' attributes are set.
+    others
+        The same in other steps, by their length over that of the runs.
+    """
+    for label, recording in recordings.items():
+        for name, signal in recording.items():
+            if signal.dims != ("time",):
+                continue
+            y = signal.values.astype(float)
+            errors = [
+                of_difference(factor) * (y - made[label][name].values)
+                for factor, made in others.items()
+            ]
+            signal.attrs["step_error_rms"] = max(map(_rms, errors))
+            signal.attrs["step_error_max"] = max(float(np.max(np.abs(e))) for e in errors)
+
+
+def _rms(error: Array) -> float:
+    return float(np.sqrt(np.mean(error**2)))
+
+
+def _peaks(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
+    """Return the largest magnitude of all signals of each unit but the pure number's."""
+    peaks: dict[str, float] = {}
+    for recording in recordings.values():
+        for signal in recording.values():
+            unit = str(signal.attrs.get("units", "1"))
+            if signal.size and unit != "1":
+                peaks[unit] = max(float(np.max(np.abs(signal.values))), peaks.get(unit, 0.0))
+    return peaks
+
+
+def _error(value: float, other: float, factor: float) -> float:
+    if math.isnan(value) or math.isnan(other):
+        return math.nan if math.isnan(value) and math.isnan(other) else math.inf
+    return of_difference(factor) * abs(value - other)

@@ -1,0 +1,103 @@
+"""The error from the step that a run states: the true one, against 1 us, lies within it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from bywire.bench.bench import Bench
+from bywire.bench.bench_file import read
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import judge
+from bywire.bench.running import run
+from bywire.bench.step_error import OTHER_STEPS, with_step_errors
+from bywire.core.errors import BywireError
+
+FINE = 1e-6
+STATIC = ("stribeck", "open-loop")
+"""one is computed without a run, the other needs a stimulus"""
+
+
+def kpi(value: float, error: float = math.nan) -> Kpi:
+    return Kpi("energy", value, "J", "Of this test.", error=error)
+
+
+def test_second_order_error_is_exact():
+    """Of q + c h^2 the error is c h^2; of q + c h it is 1.5 times the estimate."""
+    h, c = 20e-6, 3e7
+    for factor in OTHER_STEPS:
+        other = {factor: [kpi(2.0 + c * (factor * h) ** 2)]}
+        (second,) = with_step_errors([kpi(2.0 + c * h**2)], other, {})
+        assert second.error == pytest.approx(c * h**2, rel=1e-6)
+    others = {factor: [kpi(2.0 + c * factor * h)] for factor in OTHER_STEPS}
+    (first,) = with_step_errors([kpi(2.0 + c * h)], others, {})
+    assert first.error == pytest.approx(c * h / 1.5)
+
+
+def test_small_difference_by_chance_is_seen_by_the_other_step():
+    (figure,) = with_step_errors([kpi(1.0)], {0.5: [kpi(1.0)], 2.0: [kpi(1.3)]}, {})
+    assert figure.error == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "expected"),
+    [
+        (1.0, 0.05, "met"), (1.2, 0.05, "missed"), (1.08, 0.05, "undecided"),
+        (1.12, 0.05, "undecided"), (1.0, math.nan, "met"), (1.0, math.inf, "undecided"),
+        (math.nan, math.nan, "missed"), (math.nan, math.inf, "undecided"),
+    ],
+)  # fmt: skip
+def test_what_is_closer_to_its_limit_than_its_error_is_undecided(value, error, expected):
+    (verdict,) = judge({"energy": "<= 1.1 J"}, [kpi(value, error)])
+    assert verdict.outcome == expected
+    assert verdict.met == (expected == "met")
+
+
+def test_figure_that_one_step_alone_defines_has_no_known_error():
+    errors = [
+        with_step_errors([kpi(coarse)], {0.5: [kpi(fine)]}, {})[0].error
+        for coarse, fine in [(1.0, math.nan), (math.nan, 1.0), (math.nan, math.nan)]
+    ]
+    assert errors[:2] == [math.inf, math.inf]
+    assert math.isnan(errors[2])
+
+
+def random_bench(rng: np.random.Generator) -> Bench:
+    """Return an experiment of one of our brakes with three parameters changed and some step."""
+    names = [name for name in EXPERIMENTS.all() if name not in STATIC]
+    while True:
+        bench = read(str(rng.choice(names)), {})
+        values = {
+            name: value for name, value in bench.par.flat().items()
+            if isinstance(value, float) and value and not name.rpartition(".")[2].startswith("T_")
+        }  # fmt: skip
+        changed = rng.choice(sorted(values), 3, replace=False)
+        overrides = {str(name): values[name] * rng.uniform(0.8, 1.25) for name in changed}
+        try:
+            step = float(rng.choice([10e-6, 20e-6, 50e-6]))
+            return replace(bench, overrides=overrides, step=step)
+        except BywireError:  # out of range, without effect here, or a step that does not divide
+            continue
+
+
+@pytest.mark.parametrize("count", [4, pytest.param(200, marks=pytest.mark.trust)])
+def test_true_error_lies_within_three_times_the_estimate(count):
+    """Of all figures of random benches of both brakes, at least 95 % (Wilson's lower limit)."""
+    rng = np.random.default_rng(20)
+    within = total = 0
+    for _ in range(count):
+        bench = random_bench(rng)
+        estimated = run(bench, estimate_error=True)
+        true = {each.name: each.value for each in run(replace(bench, step=FINE)).kpis}
+        for each in estimated.kpis:
+            if math.isnan(each.error) and math.isnan(true[each.name]):
+                continue
+            total += 1
+            off = abs(each.value - true[each.name])
+            within += off <= 3.0 * each.error + 1e-9 * abs(each.value)
+    assert total > 5 * count
+    assert within >= 0.95 * total
