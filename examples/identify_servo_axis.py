@@ -15,7 +15,6 @@ import bywire
 from bywire.authoring import (
     Angle,
     Duration,
-    Model,
     ParameterError,
     ParameterSet,
     Signal,
@@ -27,6 +26,7 @@ from bywire.authoring import (
 )
 from bywire.core import ops
 from bywire.identification import (
+    Driven,
     Equation,
     differentiated,
     estimate,
@@ -61,18 +61,11 @@ class Voltage(NamedTuple):
     v: Annotated[float, Signal("V", "motor voltage")]
 
 
-class Nothing(NamedTuple):
-    none: Annotated[float, Signal("W", "no power is booked")]
-
-
-class ServoAxis(Model):
+class ServoAxis(Driven):
     """The equation of motion: J d(omega)/dt = v - offset - d omega -+ T."""
 
-    name, State, Memory, Stimulus, Flow, Output = "axis", State, Voltage, Voltage, Nothing, State
+    name, State, Input = "axis", State, Voltage
     frictions = ("omega",)
-
-    def tasks(self, par):
-        return (Task("drive", par.T_s, lambda x, m, u, par: Voltage(u.v)),)
 
     def mass(self, xe, par):
         return State(1.0, par.J)
@@ -83,12 +76,6 @@ class ServoAxis(Model):
 
     def bounds(self, x, xe, m, par, contact):
         return ((-par.T_p, par.T_n),)
-
-    def powers(self, x, xe, rate, m, par, contact, reaction):
-        return Nothing(0.0)
-
-    def output(self, x, m, par, contact, reaction, flow):
-        return x
 
 
 TRUTH = Axis(J=0.02, d_p=0.05, d_n=0.07, T_p=0.6, T_n=0.4, offset=0.1, T_s=1e-3)
@@ -142,7 +129,7 @@ def identified(data):
     no noise has touched.
     """
     rough = Axis(J=0.01, d_p=0, d_n=0, T_p=1, T_n=1, offset=0.1, T_s=1e-3)
-    equation = Equation(ServoAxis(), "omega", "alpha", slowest=1.0)
+    equation = Equation(ServoAxis(), "omega", "alpha", slowest=1.0, unit="V")
     problem = equation, rough, parameters_of(rough, NAMES), filtered(data)
     first = inverse_dynamics(*problem, bandwidth=30.0)
     if "J" in first.names and first["J"] < 0.0:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import runpy
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from types import ModuleType
 
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+import bywire
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.data.writing import write_measurement
 from bywire.identification import (
@@ -20,10 +22,13 @@ from bywire.identification import (
     estimate,
     initial_states,
     inverse_dynamics,
+    multistart,
     output_error,
     parameters_of,
+    predict,
     trial,
 )
+from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 
 FILE = Path(__file__).parents[2] / "examples" / "identify_servo_axis.py"
@@ -207,6 +212,76 @@ def test_uneven_time_is_refused(axis: ModuleType, data: xr.Dataset) -> None:
     holes = data.isel(time=np.r_[0:100, 120:400])
     with pytest.raises(ParameterError, match="not evenly spaced"):
         trial(axis.ServoAxis(), axis.TRUTH, holes, {"v": "v"}, {"theta": 1e-4})
+
+
+def test_a_clock_that_jitters_by_a_few_nanoseconds_is_even(
+    axis: ModuleType, data: xr.Dataset
+) -> None:
+    """24 ns at 1 kHz: the step is 1 ms, which the model's steps divide."""
+    jitter = np.random.default_rng(0).uniform(-24e-9, 24e-9, data.sizes["time"])
+    moved = data.assign_coords(time=data["time"].values + jitter)
+    bench = trial(axis.ServoAxis(), axis.TRUTH, moved, {"v": "v"}, {"theta": 1e-4})
+    assert bench.run.record == 1e-3
+    found = estimate(output_error([bench], parameters_of(axis.TRUTH, ["J"])))
+    assert found["J"] == pytest.approx(axis.TRUTH.J, rel=1e-4)
+    assert even_interval(np.arange(500) / 3000.0) == pytest.approx(1.0 / 3000.0, rel=1e-8)
+    with pytest.raises(ParameterError, match=r"by more than 0\.001 of the step"):
+        even_interval(data["time"].values + 1e3 * jitter)
+
+
+def test_a_voltage_that_was_read_and_not_set_acts_when_it_did(axis: ModuleType) -> None:
+    """A smooth voltage, read every 5 ms: held, it acts 2.5 ms late, which biases the inertia."""
+    fine = axis.TRUTH.replace({"T_s": 1e-4, "T_p": 0.0, "T_n": 0.0, "d_n": 0.05})
+    v = lambda t: 4.0 * np.sin(2 * np.pi * 4.0 * t) + 3.0 * np.sin(2 * np.pi * 1.3 * t)  # noqa: E731
+    rest = axis.State(0.0, 0.0)
+    run = bywire.Run(axis.ServoAxis(), fine, rest, axis.Voltage(0.0), lambda t: v(t)[:, None],
+                     4.0, record=5e-3)  # fmt: skip
+    theta = bywire.simulate(run)["theta"]
+    t = 5e-3 * np.arange(theta.size)
+    data = xr.Dataset({"theta": ("time", theta), "v": ("time", v(t))}, {"time": t})
+    coarse = fine.replace({"T_s": 5e-3})
+    bias = {}
+    for between in ("held", "linear"):
+        bench = trial(axis.ServoAxis(), coarse, data, {"v": "v"}, {"theta": 1e-4}, state=rest,
+                      between=between)  # fmt: skip
+        fit = estimate(output_error([bench], parameters_of(coarse, ["J", "d_p", "d_n"])))
+        bias[between] = abs(fit["J"] / fine.J - 1.0)
+    assert bias["linear"] < 2e-3
+    assert bias["held"] > 5.0 * bias["linear"]
+
+
+def test_what_an_equation_leaves_has_its_unit(axis: ModuleType) -> None:
+    """Noise of the voltage alone: the equation leaves it, in volts."""
+    problem = Equation(axis.ServoAxis(), "omega", "alpha", slowest=0.5, unit="V")
+    motion = moving(axis.measured(noise=0.0))
+    motion["v"] = motion["v"] + np.random.default_rng(2).normal(0.0, 0.05, motion["v"].size)
+    found = inverse_dynamics(problem, axis.TRUTH, parameters_of(axis.TRUTH, axis.NAMES), motion)
+    (left,) = found.leftovers()
+    assert (left.label, left.unit) == ("equation of omega", "V")
+    assert found.rms == pytest.approx(0.05, rel=0.2)
+    assert 90.0 < left.fit < 100.0
+
+
+def test_a_second_record_is_predicted(axis: ModuleType, data: xr.Dataset) -> None:
+    rest = axis.State(0.0, 0.0)
+    first = trial(axis.ServoAxis(), axis.TRUTH, data.isel(time=slice(0, 4000)), {"v": "v"},
+                  {"theta": 1e-4}, label="first", state=rest)  # fmt: skip
+    fit = estimate(output_error([first], parameters_of(axis.TRUTH, ["J", "T_p"])))
+    second = trial(axis.ServoAxis(), axis.TRUTH, axis.measured(seed=9), {"v": "v"},
+                   {"theta": 1e-4}, label="second", state=rest)  # fmt: skip
+    right = predict(second, fit).figures("theta")
+    assert right["rmse"] == pytest.approx(1e-4, rel=0.2)
+    off = replace(fit, values=fit.values * [1.05, 1.0])
+    assert predict(second, off).figures("theta")["rmse"] > 10.0 * right["rmse"]
+
+
+def test_several_starts_of_a_model_of_ones_own(axis: ModuleType, data: xr.Dataset) -> None:
+    part = data.isel(time=slice(0, 2000))
+    bench = trial(axis.ServoAxis(), axis.TRUTH, part, {"v": "v"}, {"theta": 1e-4})
+    problem = output_error([bench], parameters_of(axis.TRUTH, ["J", "T_p"], starts={"J": 0.03}))
+    found = multistart(problem, 4, seed=3)
+    assert found["J"] == pytest.approx(axis.TRUTH.J, rel=1e-3)
+    assert "4 of 4 starts met the lowest minimum" in found.notes
 
 
 @pytest.mark.parametrize(("change", "said"), [

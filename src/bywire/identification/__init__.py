@@ -1,24 +1,36 @@
 """From measurements to parameters: estimators, their confidence, and named methods."""
 
 from bywire.identification.differentiation import differentiated
+from bywire.identification.driven import Driven
 from bywire.identification.equation import Equation
 from bywire.identification.estimate import Estimate
+from bywire.identification.homogeneity import Disagreement, disagreements
+from bywire.identification.identifiability import MisfitWarning
 from bywire.identification.inverse_dynamics import inverse_dynamics
 from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.multistart import multistart
 from bywire.identification.output_error import Trial, initial_states, output_error, trial
+from bywire.identification.prediction import Prediction, predict
 from bywire.identification.unknown import Unknown, parameters_of
 
 __all__ = [
+    "Disagreement",
+    "Driven",
     "Equation",
     "Estimate",
+    "MisfitWarning",
+    "Prediction",
     "Problem",
     "Trial",
     "Unknown",
     "differentiated",
+    "disagreements",
     "estimate",
     "initial_states",
     "inverse_dynamics",
+    "multistart",
     "output_error",
     "parameters_of",
+    "predict",
     "trial",
 ]

@@ -12,6 +12,8 @@ _TOGETHER = (1, 8, 64)  # neighbors summed up
 _BLOCKS = 10  # per unknown, at least
 _KEPT = 0.9  # of the square of the Jacobian, at least
 _LEVEL = 0.01  # of the test whether residuals are white
+_GROUPS = (8, 16, 64)  # blocks of the record, besides samples one by one
+_FEWEST_GROUPS = 6.0  # that tell a variance
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,11 @@ def uncertainty(
     may hide below white noise: the same is asked of sums of neighbors, and the largest answer
     counts.
 
+    Both take the residuals for a noise that has nothing to do with the Jacobian. Where they are
+    larger just where it is (noise that grows with the signal, a model that is wrong in a part of
+    the range), the scores themselves say it, sample by sample (White 1980) or summed over blocks
+    of the record (Bester, Conley and Hansen 2011): deviations that they refute at 1 % are theirs.
+
     Parameters
     ----------
     jacobian
@@ -54,6 +61,12 @@ def uncertainty(
         Of an instrumental-variable estimate, shape (n, p); the Jacobian by default.
     prior_rows
         Last rows that are independent, with a standard deviation of one: prior knowledge.
+
+    References
+    ----------
+    H. White, A heteroskedasticity-consistent covariance matrix estimator, Econometrica 48, 1980;
+    C. A. Bester, T. G. Conley, C. B. Hansen, Inference with dependent data using cluster
+    covariance estimators, Journal of Econometrics 165, 2011.
     """
     n, p = jacobian.shape
     Z = jacobian if instruments is None else instruments
@@ -69,14 +82,48 @@ def uncertainty(
             break
         middle, freedom, colored = _spread(r, rows, p)
         if not candidates or colored:
-            covariance = bread @ (middle + known) @ bread.T
-            candidates.append(Uncertainty(covariance, freedom, colored))
+            candidates.append(Uncertainty(bread @ middle @ bread.T, freedom, colored))
 
     def volume(candidate: Uncertainty) -> float:
         return float(np.sum(np.log(np.maximum(np.diag(candidate.covariance), 1e-300))))
 
-    worst = max(candidates, key=volume)
-    return Uncertainty(worst.covariance / np.outer(scale, scale), worst.freedom, worst.colored)
+    worst = _as_scattered(max(candidates, key=volume), (Z[data] / scale) @ bread.T, residuals[data])
+    covariance = worst.covariance + bread @ known @ bread.T
+    return Uncertainty(covariance / np.outer(scale, scale), worst.freedom, worst.colored)
+
+
+def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
+    """Return an uncertainty with the deviations of the scores, where they refute its own.
+
+    Parameters
+    ----------
+    sure
+        From a noise that has nothing to do with the Jacobian.
+    influence
+        What each residual does to each unknown, shape (n, p).
+    r
+        Shape (n,).
+    """
+    from scipy import stats
+
+    n, p = influence.shape
+    largest, freedom = np.ones(p), sure.freedom
+    for groups in (n, *(count for count in _GROUPS if n >= 10 * count)):
+        begins = np.linspace(0, n, groups, endpoint=False).astype(int)
+        scores = np.add.reduceat(influence * r[:, None], begins, axis=0)
+        shares = np.add.reduceat(influence**2, begins, axis=0)
+        total = shares.sum(axis=0)
+        told = total > 0.0
+        independent = np.zeros(p)  # groups that count, by their shares (Satterthwaite 1946)
+        independent[told] = total[told] ** 2 / (shares[:, told] ** 2).sum(axis=0) - 1.0
+        variance = (scores**2).sum(axis=0) * groups / max(groups - 1.0, 1.0)
+        ratio = variance / np.maximum(np.diag(sure.covariance), 1e-300)
+        for k in np.flatnonzero(told & (independent >= _FEWEST_GROUPS)):
+            level = _LEVEL / (p * (1 + len(_GROUPS)))
+            if ratio[k] > max(stats.f.isf(level, independent[k], sure.freedom), largest[k]):
+                largest[k], freedom = ratio[k], min(freedom, float(independent[k]))
+    wider = np.sqrt(largest)
+    return Uncertainty(sure.covariance * np.outer(wider, wider), freedom, sure.colored)
 
 
 def _blocks(values: Array, together: int) -> Array:

@@ -32,12 +32,15 @@ class Equation:
         Measured signal that is its derivative.
     slowest
         Speed below which a body with dry friction counts as turning round [unit of the state].
+    unit
+        Of the equation, for what it leaves: ``"N*m"`` of a torque balance.
     """
 
     model: Model
     state: str
     rate: str
     slowest: float = 0.0
+    unit: str = "1"
 
 
 class EquationError:

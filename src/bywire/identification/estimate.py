@@ -10,6 +10,7 @@ import numpy as np
 
 from bywire.core.typing import Array
 from bywire.core.units import shown
+from bywire.identification.leftover import Leftover, Part
 from bywire.identification.unknown import Unknown
 
 _AT = 1e-6  # of an unknown's scale: nearer to a bound, it lies at it
@@ -58,6 +59,8 @@ class Estimate:
         Unknowns that the data does not tell, left at their starts.
     notes
         What the user should know.
+    parts
+        Which residuals belong together, in their order, with unit, noise and spread.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -69,6 +72,7 @@ class Estimate:
     colored: bool
     kept: tuple[Kept, ...] = ()
     notes: tuple[str, ...] = ()
+    parts: tuple[Part, ...] = ()
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -164,12 +168,26 @@ class Estimate:
             f"{k.unknown.unit}: {k.reason}"
             for k in self.kept
         ]
-        return "\n".join((*rows, *kept, *self.notes))
+        left = [
+            f"{leftover.label} leaves {shown(float(f'{leftover.rms:.3g}'), leftover.unit)}"
+            + (f", fit {leftover.fit:.1f} %" if math.isfinite(leftover.fit) else "")
+            for leftover in self.leftovers()
+        ]
+        return "\n".join((*rows, *kept, *left, *self.notes))
 
     @property
     def rms(self) -> float:
-        """Root mean square of the residuals over the noise; 1 where that is as assumed."""
+        """Root mean square of the residuals; 1 where they are over a noise that is as assumed."""
         return math.sqrt(float(np.mean(self.residuals**2)))
+
+    def leftovers(self) -> tuple[Leftover, ...]:
+        """Return what the model leaves of each part of the measurement, in its unit."""
+        begin, parts = 0, []
+        for part in self.parts:
+            r = self.residuals[begin : begin + part.count] * (part.noise or 1.0)
+            parts.append(Leftover(part.label, part.unit, r, part.noise, part.spread))
+            begin += part.count
+        return tuple(parts)
 
 
 def as_object(estimate: Estimate) -> dict[str, object]:
@@ -193,6 +211,14 @@ def as_object(estimate: Estimate) -> dict[str, object]:
         "correlation": {"names": list(estimate.names), "matrix": estimate.correlation.tolist()},
         "singular_values": estimate.singular_values.tolist(),
         "residual_rms": estimate.rms,
+        "outputs": {
+            left.label: {
+                "unit": left.unit, "rms": left.rms,
+                "fit_percent": left.fit if math.isfinite(left.fit) else None,
+                "over_noise": left.over_noise if math.isfinite(left.over_noise) else None,
+            }
+            for left in estimate.leftovers()
+        },
         "degrees_of_freedom": float(estimate.freedom),
         "colored_residuals": estimate.colored,
         "notes": list(estimate.notes),

@@ -12,7 +12,36 @@ from bywire.identification.noise import robust_scale
 _TOLD = 1.0  # standard deviation per scale above which nothing is known
 _FLAT = 1e-7  # singular value per the largest one: below it rounding decides
 _FAR = 10.0  # times the noise: residuals that no noise explains
+_MISFIT = 4.0  # times the noise: sensors whose noise is filtered leave up to 3
+_AS_ASSUMED = (0.5, 1.5)  # times the noise that was assumed: it explains what is left
 _CONTRADICTED = 3.0  # standard deviations of a prior
+
+
+class MisfitWarning(UserWarning):
+    """A model leaves more than noise, so that intervals of its parameters do not hold."""
+
+
+def misfit(estimate: Estimate) -> str:
+    """Return what a model leaves that is no noise, in a sentence; empty where it is noise.
+
+    What neighboring residuals differ by is noise; what they have in common above it is the
+    model's. Where a noise was assumed and explains what is left, it is believed.
+    """
+    worst = max(
+        (left for left in estimate.leftovers() if left.over_noise > _MISFIT),
+        key=lambda left: left.over_noise, default=None,
+    )  # fmt: skip
+    if worst is None:
+        return ""
+    low, high = _AS_ASSUMED
+    if worst.noise is not None and low <= worst.rms / worst.noise <= high:
+        return ""
+    size = shown(float(f"{worst.rms:.3g}"), worst.unit)
+    return (
+        f"{worst.label}: the model leaves {size}, {worst.over_noise:.2g} times the noise between "
+        "neighboring samples: something is missing in it or wrong, and the intervals do not hold, "
+        "which take what is left for chance"
+    )
 
 
 def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
@@ -76,4 +105,5 @@ def notes_of(estimate: Estimate) -> tuple[str, ...]:
                 f"of its prior ({shown(mean, u.unit)} ± {shown(deviation, u.unit)}) away: the "
                 "prior or the model is wrong"
             )
-    return tuple(notes)
+    wrong = misfit(estimate)
+    return (*notes, wrong) if wrong else tuple(notes)

@@ -7,6 +7,7 @@ the value that its direction gives it; samples near a reversal tell nothing and 
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,7 +21,8 @@ from bywire.identification.confidence import uncertainty
 from bywire.identification.differentiation import low_passed
 from bywire.identification.equation import Equation, EquationError
 from bywire.identification.estimate import Estimate
-from bywire.identification.identifiability import notes_of
+from bywire.identification.identifiability import MisfitWarning, misfit, notes_of
+from bywire.identification.leftover import Part
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 
@@ -110,9 +112,12 @@ def inverse_dynamics(
         unknowns=tuple(unknowns), values=values,
         covariance=sure.covariance * np.outer(scale, scale),
         singular_values=np.asarray(np.linalg.svd(W, compute_uv=False), dtype=float),
-        residuals=e / np.sqrt(max(float(e @ e), 1e-300) / max(len(e) - len(values), 1)),
-        freedom=sure.freedom, colored=sure.colored,
+        residuals=e / np.where(root > 0.0, root, 1.0), freedom=sure.freedom, colored=sure.colored,
+        parts=(Part(f"equation of {equation.state}", "", len(e), equation.unit,
+                    spread=float(np.std(W @ (values / scale) - e))),),
     )  # fmt: skip
+    if wrong := misfit(estimate):
+        warnings.warn(wrong, MisfitWarning, stacklevel=2)
     return estimate.noted(notes_of(estimate))
 
 

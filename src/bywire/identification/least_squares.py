@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +11,15 @@ from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array
 from bywire.identification.confidence import uncertainty
 from bywire.identification.estimate import Estimate, Kept
-from bywire.identification.identifiability import advice, notes_of, untold
+from bywire.identification.homogeneity import between_records
+from bywire.identification.identifiability import (
+    MisfitWarning,
+    advice,
+    misfit,
+    notes_of,
+    untold,
+)
+from bywire.identification.leftover import Part
 from bywire.identification.loss import Loss, bread, influence, of_data_alone
 from bywire.identification.problem import Problem, cost_of, with_priors
 
@@ -159,7 +168,11 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
         best, J = _at_minimum(problem, _solved(problem, begin, loss), loss)
         worst = untold(best, J)
         if worst is None:
-            return replace(best, kept=kept, notes=notes_of(best))
+            records = between_records(best, J) if loss == "linear" else ()
+            apart = tuple(str(record) for record in records[:1])
+            for wrong in filter(None, (misfit(best), *apart)):
+                warnings.warn(wrong, MisfitWarning, stacklevel=2)
+            return replace(best, kept=kept, notes=(*notes_of(best), *apart))
         index, reason = worst
         unknown = problem.unknowns[index]
         if not J[:, index].any() and unknown.name in problem.silent:
@@ -202,5 +215,6 @@ def _at_minimum(problem: Problem, solution: Solution, loss: Loss) -> tuple[Estim
         residuals=r[:data],
         freedom=sure.freedom,
         colored=sure.colored,
+        parts=problem.parts or (Part("residuals", "", data - problem.apart),),
     )
     return best, J * scale

@@ -14,8 +14,9 @@ import numpy as np
 
 from bywire.core.errors import SolverError
 from bywire.core.typing import Array, Progress
-from bywire.identification.least_squares import Loss, Problem, Solution, solve
-from bywire.identification.unknown import moved
+from bywire.identification.estimate import Estimate
+from bywire.identification.least_squares import Loss, Problem, Solution, estimate, solve
+from bywire.identification.unknown import moved, scattered
 from bywire.simulation.job_store import JobStore
 
 _SAME = 0.01  # of the lowest cost: minima that count as one
@@ -52,6 +53,55 @@ class Search:
         """How many starts came within 1 % of the lowest minimum."""
         lowest = self.best.cost
         return sum(s.cost <= (1.0 + _SAME) * lowest + 1e-12 for s in self.solutions)
+
+
+def multistart(
+    problem: Problem,
+    count: int = 8,
+    *,
+    spread: float = 0.3,
+    seed: int = 1,
+    loss: Loss = "linear",
+    progress: Progress | None = None,
+    store: Path | None = None,
+) -> Estimate:
+    """Return the estimate at the lowest minimum that several starts lead to.
+
+    Parameters
+    ----------
+    problem
+        Of a model of one's own: ``output_error(trials, unknowns)``, or written by hand.
+    count
+        Starts: the unknowns' own, then others around it.
+    spread
+        How far those are away at most, as a share of the start.
+    seed
+        Of their random numbers.
+    loss
+        How large residuals count.
+    progress
+        Called with a label and the finished share.
+    store
+        File that keeps every finished start.
+
+    Returns
+    -------
+    Estimate
+        With a note on how many starts met the lowest minimum.
+
+    Raises
+    ------
+    SolverError
+        When no start led anywhere.
+    ParameterError
+        When the data tells none of the unknowns.
+    """
+    starts = scattered(problem.unknowns, count, spread, seed)
+    led = search(problem, starts, loss, progress, store)
+    note = f"{led.reached} of {count} starts met the lowest minimum"
+    if led.reached == 1 < count:
+        note += ": there may be a lower one; take more starts, narrower bounds or fewer unknowns"
+    return estimate(problem, loss, led.best.values).noted((note,))
 
 
 def search(

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from bywire.core.typing import Array
+from bywire.identification.leftover import Part
 from bywire.identification.loss import Loss, rho
 from bywire.identification.unknown import Unknown
 
@@ -31,6 +32,8 @@ class Problem:
         free of the bias that the least sum of squares has.
     silent
         Why nothing may depend on an unknown, by its name: what is switched off.
+    parts
+        Which residuals belong together, in their order; all of them by default.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -38,6 +41,7 @@ class Problem:
     apart: int = 0
     instrument: bool = False
     silent: Mapping[str, str] = field(default_factory=dict)
+    parts: tuple[Part, ...] = ()
 
     def held(self, index: int) -> Problem:
         """Return the problem with one unknown held at its start."""

@@ -6,6 +6,7 @@ import hashlib
 import multiprocessing
 import os
 import signal
+import warnings
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, replace
@@ -17,6 +18,7 @@ from bywire.core.brake import load_system, loaded_files
 from bywire.core.errors import BywireError, ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Progress
+from bywire.identification.identifiability import MisfitWarning
 from bywire.identification.method import Effort, Method
 from bywire.identification.unknown import parameters_of, scattered
 from bywire.simulation.job_store import JobStore
@@ -107,7 +109,9 @@ def experiment(method: Method, par: Any, options: Any, effort: Effort, seed: int
     try:
         data = method.synthetic(par, options, seed)
         start = par if par is None else displaced(par, method.unknowns, effort.spread, seed)
-        identified = method.identify(data, start, options, replace(effort, seed=seed))
+        with warnings.catch_warnings():  # a check of the method counts it
+            warnings.simplefilter("ignore", MisfitWarning)
+            identified = method.identify(data, start, options, replace(effort, seed=seed))
     except BywireError as error:
         return Outcome(seed, {}, {}, {}, {}, {}, error=str(error))
     values: dict[str, float] = {}

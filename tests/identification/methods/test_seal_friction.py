@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
+import xarray as xr
 
 from bywire.core.errors import ParameterError
 from bywire.identification.measured import measured
@@ -51,6 +53,55 @@ def test_a_zero_of_the_sensor_is_found() -> None:
     k = found.names.index("F_off")
     low, high = found.intervals(0.999)[k]
     assert low < 25.0 < high
+
+
+def notes(data: xr.Dataset, **options: object) -> str:
+    chosen = METHOD.defaults.replace(options)
+    return "\n".join(METHOD.identify(data, None, chosen, Effort()).notes)
+
+
+def test_the_record_that_does_not_fit_and_a_drift_are_named() -> None:
+    data = METHOD.synthetic(None, METHOD.defaults, 1)
+    assert "off what all other" not in notes(data)
+    assert "drifts" not in notes(data)
+    third = data["record"] == 2.0
+    said = notes(data.assign(F=data["F"] + 8.0 * third))
+    assert "level_2 lies" in said
+    assert said.count("off what all other") == 1
+    slow = (data["time"] - data["time"].where(third).min()) / 40.0
+    drift = data.assign(F=data["F"] + 5.0 * third * slow)
+    assert "N over the 4 strokes level_2 outward" in notes(drift)
+
+
+def test_a_value_that_may_be_nothing_is_marked() -> None:
+    flat = METHOD.defaults.replace({"truth.f": 1e-7})
+    assert "f is " in notes(METHOD.synthetic(None, flat, 1))
+    assert "that may be nothing" not in notes(METHOD.synthetic(None, METHOD.defaults, 1))
+
+
+@pytest.mark.parametrize(("signal", "factor"), [("p", 0.0689476), ("F", 1000.0)])
+def test_a_known_bore_shows_a_wrong_unit(signal: str, factor: float) -> None:
+    """Psi taken for bar, kN taken for N."""
+    data = METHOD.synthetic(None, METHOD.defaults, 1)
+    chosen = METHOD.defaults.replace({"bore": 2.0 * (4.9e-4 / np.pi) ** 0.5})
+    wrong = data.assign({signal: data[signal] / factor})
+    for record, holds in ((data, True), (wrong, False)):
+        result = METHOD.identify(record, None, chosen, Effort())
+        (check,) = (c for c in result.checks if c.name == "area_off_bore")
+        assert check.holds is holds
+    assert "units of pressure and force are not checked" in notes(data)
+    assert "not checked" not in notes(data, bore=chosen.bore)
+
+
+def test_force_is_shown_over_travel() -> None:
+    result = METHOD.identify(METHOD.synthetic(None, METHOD.defaults, 1), None, METHOD.defaults,
+                             Effort())  # fmt: skip
+    loops = next(curve for curve in result.curves if curve.name == "loops")
+    there = np.isfinite(loops.data["measured"].values)
+    x = loops.data["x"].values[there]
+    assert METHOD.defaults.x_low < x.min() < x.max() < METHOD.defaults.x_high
+    off = loops.data["measured"].values[there] - loops.data["modeled"].values[there]
+    assert np.sqrt(np.mean(off**2)) < 1.0
 
 
 def test_one_pressure_or_no_stroke_is_refused() -> None:

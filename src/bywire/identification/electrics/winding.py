@@ -9,11 +9,11 @@ import numpy as np
 import xarray as xr
 
 from bywire.core.errors import unknown_name
-from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency
 from bywire.core.signals import Signal, zeros
 from bywire.core.typing import Array
+from bywire.identification.driven import Driven
 from bywire.identification.output_error import Trial, even_interval
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run
@@ -48,13 +48,7 @@ class Inputs(NamedTuple):
     omega: Annotated[float, Signal("rad/s", "motor speed", 20.0)]
 
 
-class Nothing(NamedTuple):
-    """No energy is booked."""
-
-    none: Annotated[float, Signal("W", "no power")]
-
-
-class Winding(Model):
+class Winding(Driven):
     r"""Voltage and speed to measured current.
 
     .. math:: L_m \frac{di}{dt} = v - R_m i - K_e \Omega
@@ -66,14 +60,11 @@ class Winding(Model):
 
     name: ClassVar[str] = "winding"
     State: ClassVar = Currents
-    Memory: ClassVar = Inputs
-    Stimulus: ClassVar = Inputs
-    Flow: ClassVar = Nothing
-    Output: ClassVar = Currents
+    Input: ClassVar = Inputs
 
-    def tasks(self, par: Parameters) -> tuple[Task, ...]:
-        """Return the one that holds a sample."""
-        return (Task("held", par.T, lambda x, m, u, par: u),)
+    def period(self, par: Parameters) -> float:
+        """Return for how long an input is held [s]."""
+        return par.T
 
     def mass(self, xe: Currents, par: Parameters) -> Currents:
         """Return the inductance."""
@@ -89,20 +80,6 @@ class Winding(Model):
             anti_alias_filter.State(x.i_meas), anti_alias_filter.Input(x.i), filtered
         )
         return Currents(voltage.i, seen.y)
-
-    def powers(
-        self, x: Currents, xe: Currents, rate: Currents, m: Inputs, par: Parameters,
-        contact: tuple[float, ...], reaction: tuple[float, ...],
-    ) -> Nothing:  # fmt: skip
-        """Return nothing."""
-        return Nothing(0.0 * x.i)
-
-    def output(
-        self, x: Currents, m: Inputs, par: Parameters, contact: tuple[float, ...],
-        reaction: tuple[float, ...], flow: Nothing,
-    ) -> Currents:  # fmt: skip
-        """Return both currents."""
-        return x
 
 
 def winding_trial(

@@ -29,10 +29,10 @@ from bywire.identification.fitting.unknown_texts import (
     unknowns_of,
 )
 from bywire.identification.fitting.worth import (
-    Compared,
     believable,
     checks_of,
     compared,
+    curves_of,
     figures_of,
     noise_check,
     starts_check,
@@ -42,6 +42,7 @@ from bywire.identification.least_squares import Problem, estimate, solve
 from bywire.identification.method import Effort, Identified
 from bywire.identification.multistart import Search, search
 from bywire.identification.output_error import Trial, initial_states, output_error
+from bywire.identification.prediction import Prediction
 from bywire.identification.records import split
 from bywire.identification.replaying.measured_run import MeasuredRun, case_of, measured_run
 from bywire.identification.unknown import Unknown
@@ -126,8 +127,8 @@ class BenchFit:
                 *(() if held is None else validation_of(held, options)),
             ),
             curves=(
-                *(curve for record in shown for curve in record.curves("fit")),
-                *(() if held is None else held.curves("validation")),
+                *(curve for record in shown for curve in curves_of(record, "fit")),
+                *(() if held is None else curves_of(held, "validation")),
             ),
             notes=(
                 *_said(records, options, coarse=not checks[0].holds), *_smoothed(bench),
@@ -176,7 +177,7 @@ class BenchFit:
                                      trial=trial.label))  # fmt: skip
         return (*unknowns, *initial_states(trial, self.question.states))
 
-    def _held_out(self, bench: Bench, fit: Estimate, options: Options) -> Compared | None:
+    def _held_out(self, bench: Bench, fit: Estimate, options: Options) -> Prediction | None:
         data = self.question.holdout
         if data is None:
             return None

@@ -16,7 +16,7 @@ from bywire.core.quantities import Factor, Unit
 from bywire.core.registry import Kind, instances
 from bywire.identification.least_squares import Loss
 from bywire.identification.method import METHODS, Method
-from bywire.identification.replaying.measured_run import Between
+from bywire.identification.output_error import Between
 
 Texts = Mapping[str, str] | Iterable[str]
 """what is said of each name; or the names alone"""

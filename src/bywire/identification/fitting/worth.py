@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
-import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
@@ -16,15 +14,12 @@ from bywire.identification.estimate import Estimate
 from bywire.identification.fitting.question import Options
 from bywire.identification.fitting.unknown_texts import is_parameter
 from bywire.identification.method import Check, Curve
-from bywire.identification.moved_run import moved_run
 from bywire.identification.noise import FAR, outliers, robust_scale
 from bywire.identification.output_error import Trial
+from bywire.identification.prediction import Prediction, computed
 from bywire.identification.replaying.bench_replay import beside
-from bywire.identification.replaying.fit import fit_figures
 from bywire.identification.replaying.measured_run import MeasuredRun
-from bywire.identification.replaying.segments import Segment
 from bywire.identification.residuals import explained
-from bywire.simulation.run import simulate
 
 _OWN = ("initial.", "start.")  # what each record has for itself
 _EXPLAINED = 0.5  # of the variance: what is explained outweighs what is left
@@ -40,39 +35,19 @@ _CAPTIONS = {
 }
 
 
-@dataclass(frozen=True)
-class Compared:
-    """A record beside the model with the estimates.
-
-    Parameters
-    ----------
-    label
-        Of the record; empty where there is one alone.
-    pairs
-        ``measured`` and ``modeled`` over ``time`` [s], by output.
-    """
-
-    label: str
-    pairs: Mapping[str, xr.Dataset]
-
-    def figures(self, name: str) -> dict[str, float]:
-        """Return the figures of an output over the whole record; see ``fit_figures``."""
-        time = self.pairs[name]["time"].values
-        whole = Segment("all", float(time[0]), float(time[-1]))
-        return {k.name: k.value for k in fit_figures(self.pairs[name], whole)}
-
-    def curves(self, role: str) -> tuple[Curve, ...]:
-        """Return measured beside modeled, a curve for each output."""
-        suffix = f"-{_file_name(self.label)}" if self.label else ""
-        said = f" in {self.label}" if self.label else ""
-        return tuple(
-            Curve(f"{role}-{name}{suffix}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
-            for name, pair in self.pairs.items()
-        )
+def curves_of(prediction: Prediction, role: str) -> tuple[Curve, ...]:
+    """Return measured beside modeled, a curve for each output."""
+    label = prediction.label
+    suffix = f"-{_file_name(label)}" if label else ""
+    said = f" in {label}" if label else ""
+    return tuple(
+        Curve(f"{role}-{name}{suffix}", f"{name}{said}, {_CAPTIONS[role]}.", pair, "time")
+        for name, pair in prediction.pairs.items()
+    )
 
 
-def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Compared:
-    """Return a record beside the model with the estimates.
+def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Prediction:
+    """Return a record beside the model with the estimates; settling is left out.
 
     Parameters
     ----------
@@ -81,25 +56,11 @@ def compared(measured: MeasuredRun, trial: Trial, fit: Estimate) -> Compared:
     fit
         The estimates; what the data does not tell stays where it was.
     """
-    values = {
-        u.name: float(v)
-        for u, v in (
-            *zip(fit.unknowns, fit.values, strict=True),
-            *((k.unknown, k.unknown.start) for k in fit.kept),
-        )
-        if u.trial == trial.label or not (u.trial or u.name.startswith(_OWN))
-    }
-    moving = {name: v for name, v in values.items() if not name.startswith("offset.")}
-    computed = simulate(moved_run(trial.run, moving, trial.start), measured.compared)
-    return Compared(
+    modeled, _ = computed(trial, fit, measured.compared)
+    return Prediction(
         trial.label,
-        {
-            name: beside(
-                measured.data, name,
-                computed[name][measured.settled:] + values.get(f"offset.{name}", 0.0),
-            )
-            for name in measured.compared
-        },
+        {name: beside(measured.data, name, modeled[name][measured.settled:])
+         for name in measured.compared},
     )  # fmt: skip
 
 
@@ -200,7 +161,7 @@ def believable(fit: Estimate) -> dict[str, float]:
     }
 
 
-def validation_of(held: Compared, options: Options) -> tuple[Check, ...]:
+def validation_of(held: Prediction, options: Options) -> tuple[Check, ...]:
     """Return how much of a held-out record is accounted for, signal by signal."""
     checks = []
     for name in held.pairs:
@@ -217,7 +178,7 @@ def validation_of(held: Compared, options: Options) -> tuple[Check, ...]:
 
 
 def figures_of(
-    records: Sequence[Compared], trials: Sequence[Trial]
+    records: Sequence[Prediction], trials: Sequence[Trial]
 ) -> dict[str, tuple[float, str]]:
     """Return noise, variance accounted for and error of every output in every record."""
     values: dict[str, tuple[float, str]] = {}

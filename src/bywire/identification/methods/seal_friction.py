@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 import numpy as np
@@ -14,10 +15,16 @@ from bywire.core.typing import Array
 from bywire.identification.least_squares import Problem, estimate
 from bywire.identification.method import Check, Effort, Identified, Method
 from bywire.identification.records import joined, split
-from bywire.identification.sealing.seal_curves import friction_line, sliding_force
+from bywire.identification.sealing.seal_curves import (
+    force_over_travel,
+    friction_line,
+    sliding_force,
+)
 from bywire.identification.sealing.strokes import (
+    drifting,
     grouped,
     half_widths,
+    misfits,
     pressure_between,
     require_signs,
     require_told,
@@ -27,6 +34,11 @@ from bywire.identification.unknown import Unknown
 ForcePerPressure = Annotated[float, Unit("N/Pa", 1e-5), Field(ge=0, allow_inf_nan=False)]
 
 _MISFIT = 0.1
+_OFF_BORE = 0.1  # of the area: sensors' gains are off by a few hundredths, wrong units by far more
+_UNCHECKED = (
+    "units of pressure and force are not checked: --option bore=25mm compares the area with a "
+    "known bore"
+)
 
 
 class Truth(ParameterSet):
@@ -57,6 +69,8 @@ class Options(ParameterSet):
     """speed above which the piston slides"""
     cutoff: Frequency
     """corner of the low-pass before the travel is differentiated"""
+    bore: Annotated[float, Unit("m", 0.025), Field(ge=0, allow_inf_nan=False)]
+    """diameter of the cylinder, which the area is compared with; 0 where it is not known"""
     zero: Literal["known", "free"]
     """zero of the force sensor: taken as right, or estimated"""
     pressures: Annotated[Nodes, Unit("Pa", 2e6), Field(min_length=2)]
@@ -93,7 +107,7 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
     """
     records = split(data)
     how = ((options.x_low, options.x_high), options.slowest, options.cutoff)
-    groups = [g for record in records.values() for g in grouped(record, *how)]
+    groups = [g for label, record in records.items() for g in grouped(record, *how, label)]
     require_told(groups)
     s, p, F = (np.array([getattr(g, n) for g in groups]) for n in ("direction", "p", "F"))
     columns = {"A": p, "F_0": s.astype(float), "f": s * p}
@@ -122,12 +136,27 @@ def identify(data: xr.Dataset, par: None, options: Options, effort: Effort) -> I
                   note="what the line leaves of the mean forces, over the mean friction"),
             Check("stroke_scatter", float(np.sqrt(np.mean([g.scatter**2 for g in groups]))), "N",
                   note="from stroke to stroke"),
+            *_bore_check(fit["A"], options.bore),
         ),
-        curves=(friction_line(fit, groups), sliding_force(records, fit, *how)),
-        notes=(f"{sum(g.count for g in groups)} strokes in {len(groups)} groups of record and "
-               "direction",
-               "loop half widths leave out that the pressure differs between the directions"),
+        curves=(friction_line(fit, groups), sliding_force(records, fit, *how),
+                force_over_travel(records, fit, *how)),
+        notes=(f"{sum(len(g.strokes) for g in groups)} strokes in {len(groups)} groups of record "
+               "and direction",
+               "loop half widths leave out that the pressure differs between the directions",
+               *(f"{label} {reason}" for label, reason in fit.vague().items()),
+               *drifting(groups, fit["A"]), *misfits(groups, W, F),
+               *(() if options.bore else (_UNCHECKED,))),
     )  # fmt: skip
+
+
+def _bore_check(area: float, bore: float) -> tuple[Check, ...]:
+    """Return whether the area is that of the bore, where that is known: units show in it."""
+    if not bore:
+        return ()
+    known = 0.25 * math.pi * bore**2
+    return (Check("area_off_bore", abs(area / known - 1.0), limit=_OFF_BORE,
+                  note=f"{1e6 * area:.5g} mm^2 found, the bore has {1e6 * known:.5g} mm^2: "
+                  "beyond the limit a unit of pressure or force is wrong"),)  # fmt: skip
 
 
 def _unknown(name: str, start: float, F: Array, p: Array) -> Unknown:
@@ -180,7 +209,7 @@ METHOD = Method(
     signals={"F": "N", "x": "m", "p": "Pa"},
     options=Options,
     defaults=Options(
-        x_low=5e-3, x_high=30e-3, slowest=5e-3, cutoff=5.0, zero="known",
+        x_low=5e-3, x_high=30e-3, slowest=5e-3, cutoff=5.0, bore=0.0, zero="known",
         pressures=(1e5, 3e5, 5e5, 7e5), interval=0.01,
         truth=Truth(A=4.9e-4, F_0=4.0, f=8e-6, sigma_group=0.3, sigma_stroke=0.1, sigma_F=0.05),
     ),

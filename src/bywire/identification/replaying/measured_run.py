@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 import xarray as xr
@@ -21,11 +20,9 @@ from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.identification.measured import as_even
-from bywire.identification.output_error import even_interval
+from bywire.identification.output_error import Between, even_interval
 from bywire.identification.replaying.compared import compared_outputs, require_measured
 from bywire.simulation.run import Run
-
-Between = Literal["held", "linear"]
 
 
 @dataclass(frozen=True)

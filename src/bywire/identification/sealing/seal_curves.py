@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from bywire.core.typing import Array
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Curve
 from bywire.identification.output_error import even_interval
@@ -47,27 +49,52 @@ def sliding_force(
     cutoff: float,
 ) -> Curve:
     """Return the force while it slides, measured and modeled, record after record."""
-    offset = fit["F_off"] if "F_off" in fit.names else 0.0
-    measured, modeled, times = [], [], {}
+    pairs, times = [], {}
     for name, record in records.items():
-        x, p, F = (record[n].values for n in ("x", "p", "F"))
         times[name] = record["time"].values - record["time"].values[0]
-        v = velocity(x, even_interval(record["time"].values), cutoff)
-        model = np.full(F.size, np.nan)
-        for stroke in find_strokes(x, v, *stretch, slowest):
-            k = stroke.rows
-            rubs = fit["F_0"] + fit["f"] * p[k]
-            model[k] = fit["A"] * p[k] + stroke.direction * rubs + offset
-        measured.append(np.where(np.isfinite(model), F, np.nan))
-        modeled.append(model)
-    attrs = {"units": "N", "long_name": "force"}
+        pairs.append(_sliding(record, fit, stretch, slowest, cutoff))
     return Curve(
         "strokes",
         "Force while the piston slides, record after record: measured, and of the model.",
-        xr.Dataset(
-            {"measured": ("time", np.concatenate(measured), attrs),
-             "modeled": ("time", np.concatenate(modeled), attrs)},
-            after_one_another(times),
-        ),
-        "time",
+        _beside(pairs, after_one_another(times)), "time",
     )  # fmt: skip
+
+
+def force_over_travel(
+    records: Mapping[str, xr.Dataset],
+    fit: Estimate,
+    stretch: tuple[float, float],
+    slowest: float,
+    cutoff: float,
+) -> Curve:
+    """Return the loops of force over travel while it slides, measured and modeled."""
+    pairs = [_sliding(record, fit, stretch, slowest, cutoff) for record in records.values()]
+    x = np.concatenate([record["x"].values for record in records.values()])
+    axis = {"x": ("x", x, {"units": "m", "long_name": "travel"})}
+    return Curve(
+        "loops",
+        "Force over travel while the piston slides: the height of a loop is twice the friction.",
+        _beside(pairs, axis, "x"), "x",
+    )  # fmt: skip
+
+
+def _sliding(
+    record: xr.Dataset, fit: Estimate, stretch: tuple[float, float], slowest: float, cutoff: float
+) -> tuple[Array, Array]:
+    """Return measured and modeled force, NaN where the piston does not slide."""
+    offset = fit["F_off"] if "F_off" in fit.names else 0.0
+    x, p, F = (record[n].values for n in ("x", "p", "F"))
+    v = velocity(x, even_interval(record["time"].values), cutoff)
+    model = np.full(F.size, np.nan)
+    for stroke in find_strokes(x, v, *stretch, slowest):
+        k = stroke.rows
+        model[k] = fit["A"] * p[k] + stroke.direction * (fit["F_0"] + fit["f"] * p[k]) + offset
+    return np.where(np.isfinite(model), F, np.nan), model
+
+
+def _beside(pairs: Sequence[tuple[Array, Array]], axis: Any, dim: str = "time") -> xr.Dataset:
+    attrs = {"units": "N", "long_name": "force"}
+    measured, modeled = (np.concatenate(columns) for columns in zip(*pairs, strict=True))
+    return xr.Dataset(
+        {"measured": (dim, measured, attrs), "modeled": (dim, modeled, attrs)}, axis
+    )

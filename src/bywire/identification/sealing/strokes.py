@@ -18,6 +18,8 @@ from bywire.identification.measured import wrong_sign
 from bywire.identification.output_error import even_interval
 
 _CROSSED = 0.8  # of the stretch that a stroke has to cross
+_LEVEL = 0.01  # of a false alarm
+_FEWEST_STROKES = 4  # that tell a drift
 _APART = 1.2  # ratio of the highest pressure to the lowest that tells them apart
 
 
@@ -91,19 +93,28 @@ class Group:
         Means over the strokes [Pa, N].
     scatter
         Standard deviation of F from stroke to stroke [N].
-    count
-        Strokes.
+    strokes
+        Means of each stroke, in their order: time [s], p, F; shape (count, 3).
+    record
+        Label of the record; empty where there is one alone.
     """
 
     direction: int
     p: float
     F: float
     scatter: float
-    count: int
+    strokes: Array
+    record: str = ""
+
+    @property
+    def label(self) -> str:
+        """Record and direction, in words."""
+        way = "outward" if self.direction > 0 else "inward"
+        return f"{self.record} {way}" if self.record else way
 
 
 def grouped(
-    record: xr.Dataset, stretch: tuple[float, float], slowest: float, cutoff: float
+    record: xr.Dataset, stretch: tuple[float, float], slowest: float, cutoff: float, label: str = ""
 ) -> list[Group]:
     """Return the groups of a record, outward first.
 
@@ -117,20 +128,23 @@ def grouped(
         Speed above which the piston slides [m/s].
     cutoff
         Corner of the low-pass before the travel is differentiated [Hz].
+    label
+        Of the record.
     """
+    time = record["time"].values
     x, p, F = (record[name].values for name in ("x", "p", "F"))
-    v = velocity(x, even_interval(record["time"].values), cutoff)
+    v = velocity(x, even_interval(time), cutoff)
     strokes = find_strokes(x, v, *stretch, slowest)
     groups = []
     for direction in (1, -1):
         means = np.array([
-            (np.nanmean(p[s.rows]), np.nanmean(F[s.rows]))
+            (time[s.rows].mean(), np.nanmean(p[s.rows]), np.nanmean(F[s.rows]))
             for s in strokes if s.direction == direction and np.isfinite(F[s.rows]).any()
         ])  # fmt: skip
         if means.size:
-            scatter = float(means[:, 1].std(ddof=1)) if len(means) > 1 else 0.0
-            p_mean, F_mean = means.mean(axis=0).tolist()
-            groups.append(Group(direction, p_mean, F_mean, scatter, len(means)))
+            scatter = float(means[:, 2].std(ddof=1)) if len(means) > 1 else 0.0
+            _, p_mean, F_mean = means.mean(axis=0).tolist()
+            groups.append(Group(direction, p_mean, F_mean, scatter, means, label))
     return groups
 
 
@@ -191,3 +205,67 @@ def pressure_between(groups: Sequence[Group]) -> float:
     """Return by how much the pressure is higher outward than inward [Pa]."""
     up, down = (np.mean([g.p for g in groups if g.direction == d]) for d in (1, -1))
     return float(up - down)
+
+
+def drifting(groups: Sequence[Group], area: float) -> tuple[str, ...]:
+    """Return which groups' force drifts from stroke to stroke, with how much.
+
+    Parameters
+    ----------
+    groups
+        Of all records.
+    area
+        Force over pressure [m^2]: what the pressure's own drift adds is no drift.
+    """
+    from scipy import stats
+
+    texts = []
+    for group in groups:
+        time, p, F = group.strokes.T
+        if time.size < _FEWEST_STROKES:
+            continue
+        line = stats.linregress(time, F - area * p)
+        if line.pvalue < _LEVEL / len(groups):
+            change = float(line.slope * np.ptp(time))
+            texts.append(
+                f"the force drifts by {change:.2g} N over the {time.size} strokes {group.label}: "
+                "let it run in, or cut the record"
+            )
+    return tuple(texts)
+
+
+def misfits(groups: Sequence[Group], W: Array, F: Array) -> tuple[str, ...]:
+    """Return which records lie off what all others tell, with how far.
+
+    The mean forces of each record are compared with what the fit without it predicts.
+
+    Parameters
+    ----------
+    groups
+        In the order of the rows.
+    W, F
+        The regression: shapes (n, p) and (n,).
+    """
+    from scipy import stats
+
+    texts, (n, p) = [], W.shape
+    labels = np.array([group.record for group in groups])
+    for label in dict.fromkeys(labels.tolist()):
+        held = labels == label
+        rest, count = ~held, int(held.sum())
+        freedom = n - count - p
+        if freedom < 1 or np.linalg.matrix_rank(W[rest] / np.linalg.norm(W, axis=0)) < p:
+            continue
+        values = np.linalg.lstsq(W[rest], F[rest], rcond=None)[0]
+        left = F[rest] - W[rest] @ values
+        off = F[held] - W[held] @ values
+        inverse = np.linalg.pinv(W[rest]) @ np.linalg.pinv(W[rest]).T
+        spread = np.eye(count) + W[held] @ inverse @ W[held].T
+        variance = max(float(left @ left) / freedom, 1e-300)
+        ratio = float(off @ np.linalg.solve(spread, off)) / count / variance
+        if ratio > stats.f.isf(_LEVEL / len(groups), count, freedom):
+            texts.append(
+                f"{label or 'the record'} lies {float(np.abs(off).max()):.2g} N off what all other "
+                "records tell: look at its zeros, its pressure and its run-in"
+            )
+    return tuple(texts)
