@@ -24,6 +24,7 @@ def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path)
     assert first.status == 0
     assert {Path(f).name for f in first.object["files"]} == {
         "measurement.nc", "report.html", "estimate.json", "friction.png", "strokes.png",
+        "loops.png",
         "residuals.png", "correlation.png",
     }  # fmt: skip
     assert all(Path(f).stat().st_size > 500 for f in first.object["files"])

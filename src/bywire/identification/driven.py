@@ -24,16 +24,16 @@ class Driven(Model):
     """
 
     Flow: ClassVar = NoPower
+    Memory: ClassVar[Any] = NoPower  # these three are set where a subclass names its own types
+    Stimulus: ClassVar[Any] = NoPower
+    Output: ClassVar[Any] = NoPower
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Take the inputs for stimuli and for what is held, and the states for outputs."""
         super().__init_subclass__(**options)
-        if hasattr(cls, "Input"):
-            for kind in ("Memory", "Stimulus"):
-                if kind not in vars(cls):
-                    setattr(cls, kind, cls.Input)
-        if "State" in vars(cls) and "Output" not in vars(cls):
-            cls.Output = cls.State  # type: ignore[method-assign]
+        for kind, source in (("Memory", "Input"), ("Stimulus", "Input"), ("Output", "State")):
+            if source in vars(cls) and kind not in vars(cls):
+                setattr(cls, kind, vars(cls)[source])
 
     def period(self, par: Any) -> float:
         """Return for how long an input is held [s]."""
