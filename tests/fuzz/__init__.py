@@ -1,0 +1,1 @@
+"""Generated input for every road into bywire, and what must hold of it: see ``__main__``."""

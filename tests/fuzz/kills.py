@@ -1,0 +1,96 @@
+"""Commands that write, ended anywhere: one whole result, or a word that it is not."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+from random import Random
+
+from bywire.core.scratch import PREFIX, UNFINISHED
+from bywire.report.result_folder import earlier_files
+
+WRITERS = {
+    "run": ["run", "hard-braking", "--set", "options.duration=40 ms", "--out", "{out}"],
+    "ramp": ["run", "friction-ramp", "--set", "options.slope=2 A/s",
+             "--set", "options.i_max=0.1 A", "--out", "{out}"],
+    "stribeck": ["run", "stribeck", "--out", "{out}"],
+    "identify": ["identify", "seal-friction", "--synthetic", "1", "--out", "{out}"],
+    "study": ["identify", "seal-friction", "--study", "3", "--out", "{out}"],
+    "margins": ["margins", "pressure", "--out", "{out}"],
+    "linearize": ["linearize", "motorcycle-plant", "--out", "{out}"],
+    "new": ["new", "{name}"],
+    "stability": ["study", "stability", "--out", "{out}"],
+}  # fmt: skip
+_LONGEST = 120.0
+
+
+def command(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.Popen[str]:
+    """Start a command in a folder."""
+    return subprocess.Popen(
+        [sys.executable, "-m", "bywire.cli", *words], cwd=folder, env=env, text=True,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE,
+    )  # fmt: skip
+
+
+def case(rng: Random, folder: Path) -> str:
+    """Write a result, end the writing of another midway, and say what is wrong with the folder."""
+    out, temporary = folder / "out", folder / "tmp"
+    temporary.mkdir()
+    paths = os.pathsep.join(filter(None, sys.path))
+    env = {**os.environ, "TMPDIR": str(temporary), "PYTHONPATH": paths}
+    names = rng.sample(["run", "ramp", "stribeck", "margins"], 2)
+    second = rng.choice([names[1], *WRITERS]) if rng.random() < 0.5 else names[1]
+    if rng.random() < 0.7:
+        _finished(command(_words(names[0], out), folder, env))
+    before = _listing(out)
+    sign = rng.choice((signal.SIGINT, signal.SIGKILL))
+    with command(_words(second, out), folder, env) as process:
+        time.sleep(rng.uniform(0.1, 6.0))
+        process.send_signal(sign)
+        try:
+            _, said = process.communicate(timeout=_LONGEST)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            return f"{second}: does not end after {sign.name}"
+    is_late = process.returncode in (0, 1)
+    is_refused = process.returncode == 2 and "name another folder" in said
+    if sign == signal.SIGINT and not is_late and not is_refused:
+        # Before Python has come to the command, it ends by the signal itself.
+        is_early = process.returncode == -signal.SIGINT and "bywire" not in said
+        if not is_early and (process.returncode != 130 or "Traceback" in said):
+            return f"{second}: status {process.returncode} after Ctrl-C: {said[-800:]}"
+    wrong = _half(out, before)
+    if wrong:
+        return f"{second} after {names[0]}, {sign.name}: {wrong}"
+    _finished(command(_words("stribeck", out), folder, env))
+    left = [p.name for p in (*temporary.iterdir(), *out.rglob("*")) if p.name.startswith(PREFIX)]
+    return f"{second}: {left} stay after the next run" if left else _half(out, before)
+
+
+def _words(name: str, out: Path) -> list[str]:
+    return [word.format(out=out, name="drum") for word in WRITERS[name]]
+
+
+def _finished(process: subprocess.Popen[str]) -> None:
+    _, said = process.communicate(timeout=_LONGEST)
+    assert process.returncode in (0, 1, 2), said
+
+
+def _listing(out: Path) -> set[str]:
+    return {p.name for p in out.iterdir() if p.is_file()} if out.exists() else set()
+
+
+def _half(out: Path, before: set[str]) -> str:
+    """Return why a folder is neither one result nor marked as none."""
+    names = _listing(out)
+    if not out.exists() or UNFINISHED in names or names == before:
+        return ""
+    ours = earlier_files(out)
+    stored = {name for name in names if name.endswith(".jsonl")}  # finished parts of a search
+    return (
+        f"{sorted(names)}, of which {sorted(ours)} are one result" if names - stored != ours else ""
+    )

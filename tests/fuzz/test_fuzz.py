@@ -1,0 +1,61 @@
+"""A short round of generated input; the long ones are run by hand, see ``fuzz/__main__.py``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from random import Random
+
+import pytest
+
+from bywire.data import limited_source
+from fuzz import inputs, kills
+from fuzz.__main__ import KINDS, tried
+from fuzz.judge import judged
+
+SEED = 20261122
+SECONDS = 2.0
+"""of a processor, for each kind"""
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_goes_wrong_with_generated_input(
+    kind: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if kind == "measurement":
+        for name in ("h5py", "asammdf", "pyarrow"):
+            pytest.importorskip(name)
+    monkeypatch.setattr(limited_source, "SECONDS", 20.0)
+    assert tried(kind, SEED, 0, 40, SECONDS) == []
+
+
+REPLAYED = {
+    "a divisor is searched": ["run", "hard-braking", "--set", "simulation.step=1 ns",
+                              "--set", "simulation.record=0.1234567891234567 s"],
+    "a period far from any": ["run", "moment-pulses", "--set",
+                              "control.T_fast=365.9670339332694s"],
+    "a period of ages": ["run", "moment-pulses", "--set", "control.T_fast=1.3e19s"],
+    "and its loop": ["margins", "position", "--set", "control.T_fast=1.3e19s"],
+    "an open balance": ["run", "hard-braking", "--set", "pipeline.k_lf=3.2e-19",
+                        "--set", "options.duration=40 ms"],
+    "a long name": ["run", "hard-braking", "--set", "x" * 400 + "=1"],
+}  # fmt: skip
+
+
+@pytest.mark.filterwarnings("ignore")
+@pytest.mark.parametrize("case", REPLAYED)
+def test_what_went_wrong_once(case: str) -> None:
+    assert judged(REPLAYED[case]).wrong == ""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Path) -> None:
+    assert kills.case(Random(SEED), tmp_path) == ""
+
+
+def test_a_case_comes_again() -> None:
+    texts = [
+        inputs.bench_text(rng) for _, rng in zip(range(2), [Random(3), Random(3)], strict=True)
+    ]
+    assert texts[0] == texts[1]
