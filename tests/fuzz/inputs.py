@@ -48,8 +48,8 @@ def leaves(name: str) -> dict[str, tuple[float, str]]:
 
 def number(rng: Random) -> str:
     """Return a number, or what stands in its place."""
-    if rng.random() < 0.3:
-        return rng.choice(_NUMBERS)
+    if rng.random() < 0.2:
+        return rng.choice(_NUMBERS).replace('"', "")
     return f"{rng.choice((-1, 1, 1, 1)) * 10 ** rng.uniform(-20, 20):.{rng.randrange(1, 17)}g}"
 
 
@@ -86,7 +86,7 @@ def bench_text(rng: Random) -> str:
     lines = [f'experiment = "{experiment}"', f'parameters = "{name}"', "[set]"]
     for each in changes(rng, name):
         key, _, text = each.partition("=")
-        shown = text if rng.random() < 0.1 else f'"{text.strip()}"'
+        shown = text if rng.random() < 0.02 else f'"{text.strip()}"'
         lines.append(
             f'"{key}" = {shown}' if "." in key or rng.random() < 0.9 else f"{key} = {shown}"
         )
@@ -97,7 +97,7 @@ def bench_text(rng: Random) -> str:
             f'{rng.choice(("step", "record", "seed", "stpe"))} = "{value(rng)}"',
         ]
     text = "\n".join(lines) + "\n"
-    if rng.random() < 0.2:  # what an editor or a disk may do to it
+    if rng.random() < 0.1:  # what an editor or a disk may do to it
         place = rng.randrange(len(text))
         text = text[:place] + rng.choice(("", '"', "]", "\n", "\x00", "=", "é")) + text[place + 1 :]
     return text
