@@ -111,6 +111,18 @@ def open_books(recording: xr.Dataset) -> list[str]:
     ]
 
 
+def energy_signals(run: Run) -> tuple[str, ...]:
+    """Return the outputs of a run's model that stand in the books of its energy."""
+    return tuple(name for name in run.model.Output._fields if name.startswith(("E_", "W_")))
+
+
+def open_books_of(run: Run, trajectory: Trajectory) -> list[str]:
+    """Return what `open_books` says of a run of which the `energy_signals` were computed."""
+    signals = signals_of(run.model.Output)
+    rows = {n: ("time", trajectory[n], _attributes(signals[n])) for n in energy_signals(run)}
+    return open_books(xr.Dataset(rows)) if rows and trajectory.time.size else []
+
+
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:
     """Return energy in, less losses, less the change of stored energy [J]; 0 but for the step."""
     losses = sum(

@@ -202,3 +202,12 @@ def test_what_does_not_fit_is_refused(ramp: xr.Dataset) -> None:
     gap["i"][40] = np.nan
     with pytest.raises(ParameterError, match="i drives the model and misses 1 samples"):
         replay(bench, gap, {"i_set": "i"})
+
+
+def test_a_replay_whose_energy_balance_is_open_says_so(ramp: xr.Dataset) -> None:
+    bench = bywire.Bench(
+        "open-loop", "dardanelli2010", overrides={"pipeline.k_lf": 3.2e-19},
+        stimulus={"kind": "step", "start": 0, "end": 0, "t_step": 0},
+    )  # fmt: skip
+    replayed = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
+    assert any("energy balance is open" in note for note in replayed.notes)

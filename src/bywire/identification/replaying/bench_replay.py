@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import xarray as xr
 
 from bywire.bench.bench import Bench
+from bywire.bench.recording import energy_signals, open_books_of
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
@@ -63,12 +64,15 @@ def replay(
     if RECORD in data:
         raise ParameterError("replay takes one record, and this measurement has several")
     measured = measured_run(bench, data, inputs, outputs, case)
-    modeled = simulate(measured.run, measured.compared)
+    wanted = dict.fromkeys((*measured.compared, *energy_signals(measured.run)))
+    modeled = simulate(measured.run, tuple(wanted))
     return Replayed(
         _driving(measured),
         {name: beside(measured.data, name, modeled[name][measured.settled:])
          for name in measured.compared},
-        measured.run, (*measured.notes, *missed_samples(measured.data, measured.compared)),
+        measured.run,
+        (*measured.notes, *missed_samples(measured.data, measured.compared),
+         *open_books_of(measured.run, modeled)),
     )  # fmt: skip
 
 
