@@ -17,6 +17,7 @@ from bywire.data.file_format import Progress, no_progress
 from bywire.identification.fitting.question import Question
 from bywire.identification.measured import Measured, measured, name_of
 from bywire.identification.method import Effort, Identified
+from bywire.identification.records import require_signals
 from bywire.identification.simulated_experiments import displaced
 from bywire.identification.trust import put_in
 from bywire.report.answer import use_case
@@ -200,7 +201,7 @@ def _start(chosen: ChosenMethod, synthetic: int | None) -> ParameterSet | None:
 def _identified(
     chosen: ChosenMethod, start: ParameterSet | None, data: xr.Dataset, effort: Effort
 ) -> Identified:
-    chosen.method.require_signals(data)
+    require_signals(data, chosen.method.signals)
     try:
         return chosen.method.identify(data, start, chosen.options, effort)
     except KeyboardInterrupt:

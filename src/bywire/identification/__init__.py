@@ -8,12 +8,14 @@ from bywire.identification.homogeneity import Disagreement, disagreements
 from bywire.identification.identifiability import MisfitWarning
 from bywire.identification.inverse_dynamics import inverse_dynamics
 from bywire.identification.least_squares import Problem, estimate
+from bywire.identification.model_choice import Candidate, choose
 from bywire.identification.multistart import multistart
 from bywire.identification.output_error import Trial, initial_states, output_error, trial
 from bywire.identification.prediction import Prediction, predict
 from bywire.identification.unknown import Unknown, parameters_of
 
 __all__ = [
+    "Candidate",
     "Disagreement",
     "Driven",
     "Equation",
@@ -23,6 +25,7 @@ __all__ = [
     "Problem",
     "Trial",
     "Unknown",
+    "choose",
     "differentiated",
     "disagreements",
     "estimate",

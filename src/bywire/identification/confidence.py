@@ -113,12 +113,12 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
         scores = np.add.reduceat(influence * r[:, None], begins, axis=0)
         shares = np.add.reduceat(influence**2, begins, axis=0)
         total = shares.sum(axis=0)
-        told = total > 0.0
+        known = total > 0.0
         independent = np.zeros(p)  # groups that count, by their shares (Satterthwaite 1946)
-        independent[told] = total[told] ** 2 / (shares[:, told] ** 2).sum(axis=0) - 1.0
+        independent[known] = total[known] ** 2 / (shares[:, known] ** 2).sum(axis=0) - 1.0
         variance = (scores**2).sum(axis=0) * groups / max(groups - 1.0, 1.0)
         ratio = variance / np.maximum(np.diag(sure.covariance), 1e-300)
-        for k in np.flatnonzero(told & (independent >= _FEWEST_GROUPS)):
+        for k in np.flatnonzero(known & (independent >= _FEWEST_GROUPS)):
             level = _LEVEL / (p * (1 + len(_GROUPS)))
             if ratio[k] > max(stats.f.isf(level, independent[k], sure.freedom), largest[k]):
                 largest[k], freedom = ratio[k], min(freedom, float(independent[k]))

@@ -7,9 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.identification.output_error import even_interval
+from bywire.identification.records import require_signals
 
 _ORDER = 4
 _STENCIL = np.array([1.0, -9.0, 45.0, 0.0, -45.0, 9.0, -1.0]) / 60.0  # as convolve turns it
@@ -105,9 +106,7 @@ def differentiated(
     ParameterError
         When time is not evenly spaced, or the cutoff is out of range.
     """
-    for name in (signal, *held):
-        if name not in data:
-            raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    require_signals(data, (signal, *held))
     interval = even_interval(data["time"].values)
     data = data.assign({name: ("time", _centered(data[name].values)) for name in held})
     smooth = data.map(

@@ -14,6 +14,7 @@ from bywire.core.errors import ModelError, unknown_name
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
+from bywire.identification.records import require_signals
 from bywire.identification.unknown import Unknown
 from bywire.simulation.symbols import SX, column, scalars
 
@@ -83,9 +84,7 @@ class EquationError:
 
     def columns(self, data: xr.Dataset) -> Array:
         """Return the measured inputs of the equation, shape (inputs, n); zero where unread."""
-        for name in self._needed:
-            if name not in data:
-                raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+        require_signals(data, self._needed)
         count = data.sizes["time"]
         rows = [data[n].values if n in self._needed else np.zeros(count) for n in self._names]
         return np.array(rows)

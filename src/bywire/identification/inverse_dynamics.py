@@ -101,7 +101,10 @@ def inverse_dynamics(
             )
         Z = W if other is None else rows(other)[1]
         _require_told(W, unknowns)
-        change = np.linalg.lstsq(W, e, rcond=None)[0] if other is None else _iv(Z, W, e)
+        if other is None:
+            change = np.linalg.lstsq(W, e, rcond=None)[0]
+        else:
+            change = np.linalg.solve(Z.T @ W, Z.T @ e)
         values = values - change * scale
         if np.abs(change).max() < _SETTLED * max(1.0, np.abs(values / scale).max()):
             break
@@ -119,10 +122,6 @@ def inverse_dynamics(
     if wrong := misfit(estimate):
         warnings.warn(wrong, MisfitWarning, stacklevel=2)
     return estimate.noted(notes_of(estimate))
-
-
-def _iv(Z: Array, W: Array, e: Array) -> Array:
-    return np.asarray(np.linalg.solve(Z.T @ W, Z.T @ e))
 
 
 def _require_told(W: Array, unknowns: Sequence[Unknown]) -> None:

@@ -10,7 +10,6 @@ from typing import Any
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Progress
@@ -198,12 +197,6 @@ class Method:
     bench_note: str = ""
     bench: Bench | None = None
     key: str = ""
-
-    def require_signals(self, data: xr.Dataset) -> None:
-        """Raise ``UnknownNameError`` when a signal is missing, with the nearest ones."""
-        for name in self.signals:
-            if name not in data:
-                raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
 
 
 METHODS = Kind("method", ("methods",), instances(Method), "bywire.identification.methods",

@@ -24,6 +24,7 @@ from bywire.core.typing import Array
 from bywire.identification.leftover import Part
 from bywire.identification.moved_run import Start, moved_run, start_slopes
 from bywire.identification.problem import Problem
+from bywire.identification.records import require_signals
 from bywire.identification.unknown import Unknown
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
@@ -112,9 +113,7 @@ def trial(
     ParameterError
         When time is not evenly spaced.
     """
-    for name in (*inputs.values(), *outputs):
-        if name not in data:
-            raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    require_signals(data, (*inputs.values(), *outputs))
     for name in inputs:
         if name not in model.Stimulus._fields:
             raise unknown_name("stimulus", name, model.Stimulus._fields)

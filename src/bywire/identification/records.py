@@ -7,18 +7,25 @@ they are in memory. Time goes on from one record to the next, so that any file c
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 import pandas as pd
 import xarray as xr
 
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 
 RECORD = "record"
 """the signal that numbers the records"""
+
+
+def require_signals(data: xr.Dataset, names: Iterable[str]) -> None:
+    """Raise ``UnknownNameError`` when a signal is not measured, with the nearest ones."""
+    for name in names:
+        if name not in data:
+            raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
 
 
 def joined(records: Mapping[str, xr.Dataset]) -> xr.Dataset:

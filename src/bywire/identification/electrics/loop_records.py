@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.core.typing import Array
@@ -20,6 +20,7 @@ from bywire.identification.measured import wrong_sign
 from bywire.identification.method import Check, Curve, Identified
 from bywire.identification.moved_run import moved_run
 from bywire.identification.output_error import Trial, output_error
+from bywire.identification.records import require_signals
 from bywire.identification.residuals import explained
 from bywire.identification.unknown import parameters_of
 from bywire.simulation.run import simulate
@@ -90,8 +91,7 @@ def require_steps(data: xr.Dataset, name: str, answer: str, label: str) -> None:
     ParameterError
         When it does not step, or the current has the wrong sign.
     """
-    if name not in data:
-        raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    require_signals(data, [name])
     demand, current = data[name].values, data[answer].values
     if not float(np.ptp(demand)) > 0.0:
         raise ParameterError(

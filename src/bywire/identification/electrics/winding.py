@@ -8,13 +8,13 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 import xarray as xr
 
-from bywire.core.errors import unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Frequency
 from bywire.core.signals import Signal, zeros
 from bywire.core.typing import Array
 from bywire.identification.driven import Driven
 from bywire.identification.output_error import Trial, even_interval
+from bywire.identification.records import require_signals
 from bywire.plant import anti_alias_filter, dc_motor
 from bywire.simulation.run import Run
 
@@ -110,9 +110,7 @@ def winding_trial(
     """
     from scipy import interpolate
 
-    for name in names.values():
-        if name not in data:
-            raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    require_signals(data, names.values())
     t = data["time"].values - data["time"].values[0]
     T = even_interval(t)
     step = T / max(_SUBSTEPS, int(np.ceil(T / _LONGEST - 1e-9)))

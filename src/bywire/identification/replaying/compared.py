@@ -12,6 +12,7 @@ from bywire.core.errors import ParameterError, UnitError, nearest_first, unknown
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.data.column_units import measures, unit_of_symbol
+from bywire.identification.records import require_signals
 
 _ACCUMULATED = ("J", "s")  # errors of which say when something went wrong, not how well it fits
 
@@ -77,8 +78,7 @@ def missed_samples(data: xr.Dataset, compared: Sequence[str]) -> list[str]:
 
 def require_measured(data: xr.Dataset, name: str, signal: Signal) -> None:
     """Refuse a signal that is not measured, or in a unit of something else."""
-    if name not in data:
-        raise unknown_name("measured signal", name, [str(k) for k in data.data_vars])
+    require_signals(data, [name])
     unit = str(data[name].attrs.get("units", "1"))
     if unit != signal.unit and not measures(unit_of_symbol(unit), signal.unit):
         raise UnitError(f"{name} is measured in {unit}, but {signal.unit} is wanted: check the map")
