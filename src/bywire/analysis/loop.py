@@ -101,6 +101,10 @@ class Loop:
         ``whole(par)``: other frequencies [Hz] of which a window must hold whole periods.
     tunables
         What a design may choose: dotted name -> lowest and highest value [SI] worth a try.
+    realizable
+        ``realizable(par)``: spans [SI] in place of those of ``tunables`` that a controller with
+        these sample times can run as designed, by dotted name; lowest and highest alike where it
+        has to have that value. A design keeps to them unless it is asked not to.
     sustained
         Parameters with which the loop can be shaken for as long as it takes, for instance a disc
         that does not slow down; applied by a design's trial with sines.
@@ -138,6 +142,9 @@ class Loop:
     amplitudes: tuple[float, ...]
     whole: Callable[[ParameterSet], Sequence[float]] = field(default=lambda _: ())
     tunables: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    realizable: Callable[[ParameterSet], Mapping[str, tuple[float, float]]] = field(
+        default=lambda _: {}
+    )
     sustained: Mapping[str, Any] = field(default_factory=dict)
     proof: str = ""
     laws: Callable[[ParameterSet, float, Array], tuple[Complex, Complex]] | None = None

@@ -17,7 +17,15 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_curves import loop_curve
 from bywire.analysis.margins import figures_at
 from bywire.api import design_parts, schedule_parts
-from bywire.api.design_inputs import left_to_choose, requirements_of, trial_of, tunables_of
+from bywire.api.design_inputs import (
+    Spans,
+    for_ecu,
+    left_to_choose,
+    narrowed,
+    requirements_of,
+    trial_of,
+    tunables_of,
+)
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.api.verification_parts import Part
 from bywire.bench.running import Progress
@@ -28,7 +36,6 @@ from bywire.report.document import (
     Banner,
     Document,
     FigureBlock,
-    Flat,
     Listing,
     Section,
     TableBlock,
@@ -66,6 +73,8 @@ class DesignAnswer(Answer):
         Parameters that were set beforehand.
     requirements
         What was required.
+    limits
+        Spans [SI] that were kept to so that an ECU can run the gains; none of ``free_derivative``.
     tried
         The design on the nonlinear bench; None where that was left out, or nothing is feasible.
     """
@@ -73,6 +82,7 @@ class DesignAnswer(Answer):
     case: LoopCase
     overrides: Mapping[str, Any]
     requirements: tuple[Requirement, ...]
+    limits: Spans
     tried: Verification | None
 
     @property
@@ -117,7 +127,7 @@ class DesignAnswer(Answer):
     def document(self) -> Document:
         """Return result, figures, and the gains as a bench file."""
         loop, status, tried = self.case.loop, self.linear.status, self.tried
-        parts = self.parts()
+        parts = [*self.parts(), *design_parts.limit_lines(self.case, self.limits)]
         state = status if status != "met" or tried is None or tried.met else "not met"
         where = "on the linear model" if tried is None else "on the nonlinear bench"
         required = Listing([requirement.text for requirement in self.requirements])
@@ -126,12 +136,12 @@ class DesignAnswer(Answer):
             self.case.subject.line,
             sections=lambda: [
                 Section("Requirements", [required]),
-                Section("Result", _blocks(parts)),
+                Section("Result", design_parts.as_blocks(parts)),
                 Section("Figures", self._figures()),
                 self.case.subject.provenance("Parameters as they were before the design."),
             ],
             brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
-            data=self.data(),
+            data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
             banner=Banner(f"requirements {state} {where}", "good" if self.holds else "bad"),
             attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
             remarks=self._remarks(),
@@ -259,6 +269,7 @@ def design(
     amplitudes: str = "",
     schedule: bool = False,
     linear_only: bool = False,
+    free_derivative: bool = False,
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LoopDesign | LoopScheduleDesign:
@@ -281,6 +292,9 @@ def design(
         Whether the gains are chosen by region.
     linear_only
         Whether the nonlinear bench is left out.
+    free_derivative
+        Whether the derivative's filter may be faster than the sampling and the set point be
+        differentiated: better figures of gains that one would hardly put into an ECU.
     seed
         Of the searches.
     progress
@@ -300,11 +314,12 @@ def design(
     if schedule:
         return _scheduled(
             loop, parameters, at, overrides, requirements_of(requirements, require), over,
-            None if linear_only else amplitudes, seed, progress,
+            None if linear_only else amplitudes, free_derivative, seed, progress,
         )  # fmt: skip
     case = loop_case(loop, parameters, at, overrides)
     wanted = requirements_of(requirements, require)
-    tunables = left_to_choose(loop, tunables_of(case), overrides)
+    case, overrides, limits = for_ecu(case, overrides, free_derivative)
+    tunables = left_to_choose(loop, narrowed(tunables_of(case), limits), overrides)
     ranges = dict(over_range(text, case)[::2] for text in over)
     cases = cases_of(case.loop, case.par, case.value, ranges)
     trial = None if linear_only else trial_of(case, overrides, amplitudes)
@@ -313,7 +328,7 @@ def design(
     designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
     if trial is not None and designed.status == "met":
         tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
-    return LoopDesign(case, overrides, wanted, tried, designed)
+    return LoopDesign(case, overrides, wanted, limits, tried, designed)
 
 
 def _scheduled(
@@ -324,6 +339,7 @@ def _scheduled(
     wanted: tuple[Requirement, ...],
     over: Sequence[str],
     amplitudes: str | None,
+    free_derivative: bool,
     seed: int,
     progress: Progress | None,
 ) -> LoopScheduleDesign:
@@ -331,11 +347,12 @@ def _scheduled(
     schedule = scheduled(loop)
     overrides = {**overrides, **schedule.changes}
     case = loop_case(name, parameters, "", overrides)
+    case, overrides, limits = for_ecu(case, overrides, free_derivative)
     given = spread(at, loop.at.unit, loop.at.name) if at else []
     points = points_by_region(loop, case.par, given)
     case = replace(case, value=points[schedule.main][0])
     tunables = {
-        region: {name: span for name, span in spans.items() if name not in overrides}
+        region: {n: span for n, span in narrowed(spans, limits).items() if n not in overrides}
         for region, spans in schedule.regions.items()
     }
     ranges = dict(over_range(text, case)[::2] for text in over)
@@ -350,7 +367,7 @@ def _scheduled(
     if tried is not None and tried.tuning is not None:
         every = [value for values in points.values() for value in values]
         retuned = frozen(loop, case.par, every, tried.final.gains, wanted)
-    return LoopScheduleDesign(case, overrides, wanted, tried, designed, retuned)
+    return LoopScheduleDesign(case, overrides, wanted, limits, tried, designed, retuned)
 
 
 def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:
@@ -364,19 +381,3 @@ def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurv
         span = max(_STEPS / figures.bandwidth, _SETTLED * settling if settling < np.inf else 0.0)
     time = np.arange(step.size, dtype=float) * figures.closed.period
     return DesignCurve(label, loop_curve(case.loop, figures), time, step, span)
-
-
-def _blocks(parts: Sequence[Part]) -> list[Flat]:
-    """Return tables, and the sentences between them as lists."""
-    blocks: list[Flat] = []
-    lines: list[str] = []
-    for part in [*parts, None]:
-        if isinstance(part, str):
-            lines.append(part.strip())
-            continue
-        if lines:
-            blocks.append(Listing(lines))
-            lines = []
-        if part is not None:
-            blocks.append(TableBlock(part))
-    return blocks

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from bywire.api.loop_case import LoopCase, spread
 from bywire.bench.bench import Bench
 from bywire.core.errors import ParameterError
+from bywire.core.parameters import leaf_fields
 from bywire.data.toml_file import read_toml
 from bywire.synthesis.requirement import Requirement, read
 from bywire.synthesis.trial import Trial
@@ -39,6 +41,28 @@ def left_to_choose(
             f"--set fixes all of {', '.join(spans)}: leave out what is to be chosen"
         )
     return left
+
+
+def for_ecu(
+    case: LoopCase, changes: Mapping[str, Any], free: bool
+) -> tuple[LoopCase, dict[str, Any], Spans]:
+    """Return a case, its changes, and the spans that an ECU can run, but for what the user has set.
+
+    What they leave one value has it in the case, and among the changes as a text with its unit.
+    With ``free``, nothing is kept.
+    """
+    if free:
+        return case, dict(changes), {}
+    limits = {n: span for n, span in case.loop.realizable(case.par).items() if n not in changes}
+    fixed = {name: low for name, (low, high) in limits.items() if low == high}
+    units = leaf_fields(type(case.par))
+    texts = {n: f"{v:.9g} {units[n].unit.symbol}".removesuffix(" 1") for n, v in fixed.items()}
+    return replace(case, par=case.par.replace(fixed)), {**changes, **texts}, limits
+
+
+def narrowed(spans: Spans, limits: Spans) -> Spans:
+    """Return spans with the limits in their place where there are any."""
+    return {name: limits.get(name, span) for name, span in spans.items()}
 
 
 def tunables_of(case: LoopCase) -> Spans:

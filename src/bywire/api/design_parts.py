@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bywire.api.loop_case import LoopCase
@@ -13,6 +13,7 @@ from bywire.api.verification_parts import (
     verification_parts,
 )
 from bywire.core.parameters import leaf_fields
+from bywire.report.document import Flat, Listing, TableBlock
 from bywire.report.tables import text_table
 from bywire.report.wording import amount
 from bywire.synthesis.outcome import Design
@@ -113,6 +114,18 @@ def kept_lines(design: Design) -> list[str]:
     return [f"kept besides: {texts} (require another limit of the same figure to change it)"]
 
 
+def limit_lines(case: LoopCase, limits: Mapping[str, tuple[float, float]]) -> list[str]:
+    """Return what was kept so that an ECU can run the gains, a sentence or none."""
+    if not limits:
+        return []
+    texts = [
+        f"{name} = {gain_text(case, name, low)}" if low == high
+        else f"{name} >= {gain_text(case, name, low)}"
+        for name, (low, high) in limits.items()
+    ]  # fmt: skip
+    return [f"kept for an ECU: {', '.join(texts)} (--free-derivative does not)"]
+
+
 def unit_of(case: LoopCase, name: str) -> str:
     """Return the unit of a gain."""
     return leaf_fields(type(case.par))[name].unit.symbol
@@ -121,3 +134,19 @@ def unit_of(case: LoopCase, name: str) -> str:
 def gain_text(case: LoopCase, name: str, value: float) -> str:
     """Return a gain with its unit."""
     return amount(value, unit_of(case, name))
+
+
+def as_blocks(parts: Sequence[Part]) -> list[Flat]:
+    """Return tables, and the sentences between them as lists."""
+    blocks: list[Flat] = []
+    lines: list[str] = []
+    for part in [*parts, None]:
+        if isinstance(part, str):
+            lines.append(part.strip())
+            continue
+        if lines:
+            blocks.append(Listing(lines))
+            lines = []
+        if part is not None:
+            blocks.append(TableBlock(part))
+    return blocks

@@ -65,6 +65,14 @@ def design_command(
     linear_only: Annotated[
         bool, typer.Option("--linear-only", help="Leave out the nonlinear bench.")
     ] = False,
+    free_derivative: Annotated[
+        bool,
+        typer.Option(
+            "--free-derivative",
+            help="Let the derivative's filter be faster than the sampling, and differentiate the "
+            "set point.",
+        ),
+    ] = False,
     seed: Annotated[int, typer.Option(help="Seed of the searches.", min=0)] = 0,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -76,7 +84,7 @@ def design_command(
         lambda progress: design(
             loop, parameters, at, changes(set_), require=require or (), requirements=requirements,
             over=over or (), amplitudes=amplitudes, schedule=schedule, linear_only=linear_only,
-            seed=seed, progress=progress,
+            free_derivative=free_derivative, seed=seed, progress=progress,
         ),
         out, json,
     )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from itertools import permutations
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from bywire.synthesis.linear_case import LinearCase, room, slack, values_of
 from bywire.synthesis.optimizer import KEPT_MISSED, UNSTABLE, Problem, Search, starts_of
 from bywire.synthesis.outcome import MISSED, Binding, Conflict, Design, Status
 from bywire.synthesis.requirement import FIGURES, Requirement
+from bywire.synthesis.stages import piece, stage
 
 _FINE = 4000  # points of the grid for what is reported
 _BINDS = 0.01  # slacks this close to the worst one bind
@@ -107,7 +109,9 @@ def _over_all(
     problem, everything = search.problem, range(len(search.problem.cases))
     begin = starts_of(problem, starts, seed)
     for _ in range(_ROUNDS):
-        search.run(begin, progress)
+        count = len(search.cases)
+        models = "" if count == 1 else f", {count} models"
+        search.run(begin, stage(progress, f"linear design{models}"))
         if search.best is None:
             return
         slacks = problem.slacks(search.best, everything).min(axis=1)
@@ -123,7 +127,7 @@ def _by_figures(search: Search, progress: Progress | None) -> Search:
     by_room = Search(search.problem, search.cases, plain=True)
     best = by_room.recall()
     if best is not None:
-        by_room.run([best], progress)
+        by_room.run([best], stage(progress, "linear design, nearest to all limits"))
     return by_room
 
 
@@ -203,19 +207,19 @@ def _conflicts(search: Search, progress: Progress | None) -> tuple[Conflict, ...
     slacks = problem.slacks(search.best, search.cases, plain=True).min(axis=0)
     bound = [int(k) for k in np.argsort(slacks) if slacks[k] <= slacks.min() + 5 * _BINDS]
     conflicts = []
-    for a in bound[:_PAIRED]:
-        for b in bound[:_PAIRED]:
-            if a == b:
-                continue
-            pushed = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
-            seen = pushed.recall()
-            pushed.run([search.best if seen is None else seen], progress)
-            wanted, kept = problem.requirements[a], problem.requirements[b]
-            best = _confirmed_by_figures(pushed, wanted, kept)
-            if best is not None:
-                gains = problem.gains(best)
-                value = _extreme(problem, gains, wanted, search.cases)
-                conflicts.append(Conflict(wanted, kept, value, gains))
+    report = stage(progress, "what excludes what")
+    pairs = list(permutations(bound[:_PAIRED], 2))
+    for k, (a, b) in enumerate(pairs):
+        pushed = Search(problem, search.cases, wanted=[a], kept=[b], plain=True)
+        seen = pushed.recall()
+        start = search.best if seen is None else seen
+        pushed.run([start], piece(report, k, len(pairs)))
+        wanted, kept = problem.requirements[a], problem.requirements[b]
+        best = _confirmed_by_figures(pushed, wanted, kept)
+        if best is not None:
+            gains = problem.gains(best)
+            value = _extreme(problem, gains, wanted, search.cases)
+            conflicts.append(Conflict(wanted, kept, value, gains))
     return tuple(conflicts)
 
 

@@ -18,9 +18,10 @@ import numpy as np
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
-from bywire.core.typing import Array, Progress
+from bywire.core.typing import Array
 from bywire.synthesis.linear_case import LinearCase, room, slack
 from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.stages import Report, piece
 
 UNSTABLE = -12.0
 """slack of an unstable loop, before its growth is counted"""
@@ -140,13 +141,21 @@ class Search:
             self._judged(z)
         return self.best
 
-    def run(self, starts: Sequence[Array], progress: Progress | None = None) -> None:
-        """Climb from each start, then from the best with a simplex and once more."""
+    def run(self, starts: Sequence[Array], report: Report = lambda share: None) -> None:
+        """Climb from each start, then from the best with a simplex and once more.
+
+        Parameters
+        ----------
+        starts
+            Points of the unit cube.
+        report
+            Called with the share that is done, at every iteration.
+        """
+        parts = len(starts) + 2
         for k, start in enumerate(starts):
-            self._climb(start)
-            if progress is not None:
-                progress("design", (k + 1) / (len(starts) + 2))
+            self._climb(start, piece(report, k, parts))
         if self.best is None:
+            report(1.0)
             return
         # A figure such as an overshoot has kinks of its own: SQP stops there, a simplex goes on.
         n = self.best.size
@@ -154,13 +163,14 @@ class Search:
                              * np.eye(n)])  # fmt: skip
         options: Any = {"maxfev": _SIMPLEX * n, "initial_simplex": corners, "fatol": 1e-5}
         climb: Any = minimize  # its stubs tell the methods' starting points apart
+        known, simplex = len(self.seen), piece(report, len(starts), parts)
         climb(
             lambda z: -self._judged(z), self.best, method="Nelder-Mead", bounds=[(0.0, 1.0)] * n,
             options=options,
+            callback=lambda z: simplex((len(self.seen) - known) / (_SIMPLEX * n)),
         )  # fmt: skip
-        self._climb(self.best)
-        if progress is not None:
-            progress("design", 1.0)
+        self._climb(self.best, piece(report, len(starts) + 1, parts))
+        report(1.0)
 
     def _chosen(self) -> list[int]:
         count = len(self.problem.requirements)
@@ -182,8 +192,12 @@ class Search:
             self.slack, self.best = self.seen[-1]
         return value
 
-    def _climb(self, start: Array) -> None:
-        n = start.size
+    def _climb(self, start: Array, report: Report) -> None:
+        n, count = start.size, [0]
+
+        def passed(_: Array) -> None:
+            count[0] += 1
+            report(count[0] / _ITERATIONS)
 
         def excess(v: Array) -> Array:
             self._judged(v[:n])
@@ -212,8 +226,9 @@ class Search:
             lambda v: -float(v[n]), np.append(start, max(first, UNSTABLE)), method="SLSQP",
             jac=lambda v: np.append(np.zeros(n), -1.0),
             bounds=[*[(0.0, 1.0)] * n, (None, None)],
-            constraints=constraints, options=options,
+            constraints=constraints, options=options, callback=passed,
         )  # fmt: skip
+        report(1.0)
 
 
 def starts_of(problem: Problem, given: Sequence[Array], seed: int) -> list[Array]:

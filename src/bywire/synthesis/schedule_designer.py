@@ -19,6 +19,7 @@ from bywire.synthesis.designer import design
 from bywire.synthesis.linear_case import LinearCase, cases_of, room, values_of
 from bywire.synthesis.outcome import Across, Design, ScheduleDesign
 from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.stages import suffixed
 
 _FINE = 4000  # points of the grid for what is reported
 _ACROSS = 15
@@ -121,7 +122,7 @@ def design_schedule(
         start = _start(tuned, schedule, region, tunables[region])
         designs[region] = design(
             tunables[region], requirements, cases, start, seed=seed,
-            progress=_named(progress, region),
+            progress=suffixed(progress, region),
         )  # fmt: skip
         gains |= designs[region].gains
         if designs[region].status == "interrupted":
@@ -221,9 +222,3 @@ def _start(
     leaves = par.leaves()
     main = {name.rpartition(".")[2]: leaves[name] for name in schedule.regions[schedule.main]}
     return {name: main[name.rpartition(".")[2]] for name in tunables}
-
-
-def _named(progress: Progress | None, region: str) -> Progress | None:
-    if progress is None:
-        return None
-    return lambda label, share: progress(f"{label}, {region}", share)

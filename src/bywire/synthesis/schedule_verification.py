@@ -11,6 +11,7 @@ from bywire.synthesis.linear_case import LinearCase
 from bywire.synthesis.outcome import ScheduleDesign
 from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.schedule_designer import scheduled, slack_of
+from bywire.synthesis.stages import suffixed
 from bywire.synthesis.trial import Trial
 from bywire.synthesis.verification import Verification, verify
 
@@ -69,7 +70,7 @@ def verify_schedule(
         retuned = verify(
             start, requirements, tunables[region], models, regional,
             corners=[c for c in models[1:] if c.at != regional.value or c.changes], kept=first.kept,
-            seed=seed, generations=generations, progress=progress,
+            seed=seed, generations=generations, progress=suffixed(progress, region),
         )  # fmt: skip
         gains |= retuned.final.gains
         if retuned.tuning is not None:

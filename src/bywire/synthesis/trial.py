@@ -12,6 +12,7 @@ from bywire.synthesis.bench_figures import BenchFigures, bench_figures, has_step
 from bywire.synthesis.candidate import judged
 from bywire.synthesis.linear_case import NOMINAL, LinearCase
 from bywire.synthesis.optimizer import Problem
+from bywire.synthesis.stages import Report
 
 MOST = 8
 """corners that are tried, at most"""
@@ -68,9 +69,13 @@ def measured(
     target: float,
     *,
     rough: bool = False,
+    report: Report = lambda share: None,
 ) -> list[dict[str, BenchFigures]]:
     """Return the figures of every set of gains, by the label of each trial."""
-    figures = [trial.measure(gains, target, rough=rough) for trial in trials]
+    figures = []
+    for k, trial in enumerate(trials):
+        figures.append(trial.measure(gains, target, rough=rough))
+        report((k + 1) / len(trials))
     return [
         dict(zip((trial.label for trial in trials), row, strict=True))
         for row in zip(*figures, strict=True)
@@ -112,6 +117,7 @@ def worst_of(
     gains: Mapping[str, float],
     linear: Mapping[str, float],
     target: float,
+    report: Report = lambda share: None,
 ) -> list[Trial]:
     """Return the trial, at one of several corners, in which gains are worst off; none of none.
 
@@ -127,11 +133,14 @@ def worst_of(
         Slack in the linear models, see `candidate.linear_slacks`.
     target
         Frequency around which is measured [Hz].
+    report
+        Called with the share that is done.
     """
     trials = [trial.at(corner) for corner in corners]
     if not trials:
         return []
-    (row,) = measured([trial, *trials], {name: [value] for name, value in gains.items()}, target)
+    sets = {name: [value] for name, value in gains.items()}
+    (row,) = measured([trial, *trials], sets, target, report=report)
     nominal = row[trial.label]
     slacks = []
     for corner in trials:

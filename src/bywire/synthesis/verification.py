@@ -17,6 +17,7 @@ from bywire.synthesis.floors import bench_floors, linear_floors
 from bywire.synthesis.linear_case import LinearCase, values_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.stages import stage
 from bywire.synthesis.trial import Trial, corners_of, measured, worst_of
 
 
@@ -118,24 +119,28 @@ def verify(
     trials = [trial, *(trial.at(corner) for corner in corners)]
     unseen = () if corners else corners_of(problem, gains)
 
-    def on_bench(chosen: Mapping[str, float]) -> dict[str, BenchFigures]:
+    def on_bench(chosen: Mapping[str, float], label: str) -> dict[str, BenchFigures]:
+        report = stage(progress, label)
+        report(0.0)
+        share = len(unseen) / (len(unseen) + len(trials) + 1)  # of what looks for the worst corner
         linear = linear_slacks(problem, chosen)
         known = {trial.label for trial in trials}
-        worst = worst_of(trial, unseen, problem, chosen, linear, target)
+        worst = worst_of(
+            trial, unseen, problem, chosen, linear, target, lambda part: report(share * part)
+        )
         trials.extend(corner for corner in worst if corner.label not in known)
-        (row,) = measured(trials, {name: [value] for name, value in chosen.items()}, target)
+        (row,) = measured(
+            trials, {name: [value] for name, value in chosen.items()}, target,
+            report=lambda part: report(share + (1.0 - share) * part),
+        )  # fmt: skip
         return row
 
-    if progress is not None:
-        progress("trial on the bench", 0.0)
-    figures = on_bench(gains)
+    figures = on_bench(gains, "trial on the bench")
     if kept is None:
         linear = linear_floors(requirements, largest_error(cases, gains))
         floors = bench_floors(requirements, linear, figures.values())
     problem = Problem(tunables, (*requirements, *floors), tuple(cases))
     first = judged(problem.requirements, gains, figures, linear_slacks(problem, gains))
-    if progress is not None:
-        progress("trial on the bench", 1.0)
     tuning = None
     if first.slack < 0.0 and generations > 0:
         tuning = tune(
@@ -143,7 +148,10 @@ def verify(
             generations=generations, progress=progress,
         )  # fmt: skip
         best = tuning.best.gains
-        again = judged(problem.requirements, best, on_bench(best), linear_slacks(problem, best))
+        again = judged(
+            problem.requirements, best, on_bench(best, "the retuned gains on the bench"),
+            linear_slacks(problem, best),
+        )  # fmt: skip
         tuning = replace(tuning, best=max(first, again, key=standing))
     final = gains if tuning is None else tuning.best.gains
     kpis: tuple[Kpi, ...] = ()

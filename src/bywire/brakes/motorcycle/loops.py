@@ -76,10 +76,23 @@ def pressure_laws(par: ParameterSet, value: float, frequencies: Array) -> tuple[
     return demand, feedback / (1.0 + 1j * frequencies / brake.anti_alias.f_aa)
 
 
+_SLOWEST = 1e-2  # time constant of the derivative's filter [s]
 _GAINS = {"k_p": (5e-7, 1e-4), "k_i": (1e-6, 3e-3), "k_d": (1e-9, 3e-6)}
 _OWN = {f"ecu.pressure.{name}": span for name, span in _GAINS.items()} | {
-    "ecu.pressure.tau_d": (5e-5, 1e-2), "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
+    "ecu.pressure.tau_d": (5e-5, _SLOWEST),
+    "ecu.pressure.b": (0.0, 1.0), "ecu.pressure.c": (0.0, 1.0),
 }  # fmt: skip
+
+def in_ecu(par: ParameterSet) -> Mapping[str, tuple[float, float]]:
+    """Return what a design of the pressure PID keeps to, so that an ECU can run it.
+
+    A filter faster than the sampling is none: backward differences then hand on every step of
+    the converter at full size. The derivative of a set point that jumps asks for more current
+    than there is, for one sample.
+    """
+    T_s = cast(MotorcycleParameters, par).ecu.T_s
+    return {"ecu.pressure.tau_d": (T_s, max(_SLOWEST, 10.0 * T_s)), "ecu.pressure.c": (0.0, 0.0)}
+
 
 CURRENT = Loop(
     name="current",
@@ -112,6 +125,7 @@ PRESSURE = Loop(
     amplitudes=(1e4, 1e5, 3e5),
     whole=dither_frequency,
     tunables=_OWN,
+    realizable=in_ecu,
     proof="hard-braking",
     laws=pressure_laws,
     schedule=LoopSchedule(
