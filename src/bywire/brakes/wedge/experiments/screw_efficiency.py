@@ -2,6 +2,10 @@
 
 Two such motors cannot back-drive each other at full current: of the torque of one, 0.65 x 0.46
 arrive at the other. So the one in position control moves, and the other follows or is pushed back.
+
+The bearings' friction grows with the square of the force. The torque without load does not show
+that: taken off alone it leaves an efficiency too low by F C_2 / k, a percent or more. So each
+motion runs under two forces, and what a torque per force has left without force is the screw's.
 """
 
 from __future__ import annotations
@@ -32,19 +36,24 @@ from bywire.core.typing import Array
 SlowSpeed = Annotated[float, Unit("rad/s", 10.0), Field(gt=0, allow_inf_nan=False)]
 
 _SETTLED = 0.3  # of the time in motion: what comes before is left out of the means
+_LESS = 0.5  # of the currents, in the motions under less force
 _SPEED = 0.05  # by which mean speeds may differ from what is demanded
 FIGURES = Figures(
-    eta_f=("1", "Torque by the force over motor torque less bearing torque, motor 1 driving."),
+    eta_f=("1", "Torque by the force over motor torque less the bearings', motor 1 driving."),
+    eta_f_no_load=("1", "The same with the bearing torque without load alone taken off."),
     eta_f_raw=("1", "Torque by the force over motor torque, motor 1 driving."),
-    eta_f_reverse=("1", "The same with the bearing torque taken off, motor 2 driving."),
+    eta_f_reverse=("1", "As eta_f, motor 2 driving."),
     eta_f_true=("1", "What was put in."),
-    eta_b=("1", "Holding torque and bearing torque over torque by the force, motor 2 driven."),
+    eta_b=("1", "Holding torque and the bearings' over torque by the force, motor 2 driven."),
+    eta_b_no_load=("1", "The same with the bearing torque without load alone added."),
     eta_b_raw=("1", "Holding torque over torque by the force, motor 2 driven."),
-    eta_b_reverse=("1", "The same with the bearing torque added, motor 1 driven."),
+    eta_b_reverse=("1", "As eta_b, motor 1 driven."),
     eta_b_true=("1", "What was put in."),
     force=("N", "Mean force while motor 1 drives."),
     force_reverse=("N", "Mean force while motor 1 is driven back."),
     bearing_torque=("N*m", "Motor torque without load at the same speed."),
+    bearing_growth=("N*m/N**2", "Growth of it with the square of the force, motor 1 driving."),
+    bearing_growth_true=("N*m/N**2", "What was put in."),
     undefined="no steady motion under compression: a motor cannot do its part",
 )
 
@@ -74,7 +83,7 @@ class Reading(NamedTuple):
 
 
 def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Case, ...]:
-    """Return the motion without load, with motor 1 driving, and with motor 1 driven back."""
+    """Return the motion without load, and motor 1 driving and driven back under two forces each."""
     for name in ("i_drive", "i_back"):
         check_current(name, getattr(options, name), par)
     modes = {"rig.mode_1": "current", "rig.mode_2": "position"}
@@ -85,36 +94,52 @@ def cases(par: WedgeParameters, options: Options, _: object = None) -> tuple[Cas
     def turning(t: Array) -> dict[str, Array]:
         return {"theta_1_set": slow * np.maximum(t, 0.0)}
 
+    pushed = {
+        f"{label}{suffix}": _pushed(share * i, speed, options)
+        for label, i, speed in (
+            ("driving", options.i_drive, slow), ("driven_back", options.i_back, -slow),
+        )
+        for suffix, share in (("", 1.0), ("_less", _LESS))
+    }  # fmt: skip
     return (
         shaft_case("no_load", par, turning, options.duration, alone, **timing),
-        screw_case(
-            "driving", par, _pushed(options.i_drive, slow, options), options.duration, modes,
-            **timing,
+        *(
+            screw_case(label, par, stimulus, options.duration, modes, **timing)
+            for label, stimulus in pushed.items()
         ),
-        screw_case(
-            "driven_back", par, _pushed(options.i_back, -slow, options), options.duration, modes,
-            **timing,
-        ),
-    )  # fmt: skip
+    )
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the efficiencies in both directions, raw and with the bearing torque taken off."""
+    """Return the efficiencies in both directions, with and without what the bearings take."""
     no_load = recordings["no_load"]
     par = parameters_of(no_load)
     k = slope_of(par)
     T_b = torque_constant_of(par) * _mean(no_load, "i_1", options)
-    there = _read(recordings["driving"], options.omega_slow, options)
-    back = _read(recordings["driven_back"], -options.omega_slow, options)
+    slow = options.omega_slow
+    there, there_less = (
+        _read(recordings[f"driving{suffix}"], slow, options) for suffix in ("", "_less")
+    )
+    back, back_less = (
+        _read(recordings[f"driven_back{suffix}"], -slow, options) for suffix in ("", "_less")
+    )
+    drive, growth = _without_force((there, there.T_1 - T_b), (there_less, there_less.T_1 - T_b))
+    driven, _ = _without_force((there, T_b - there.T_2), (there_less, T_b - there_less.T_2))
+    drive_2, _ = _without_force((back, -back.T_2 - T_b), (back_less, -back_less.T_2 - T_b))
+    driven_1, _ = _without_force((back, back.T_1 + T_b), (back_less, back_less.T_1 + T_b))
     return FIGURES(
-        eta_f=there.steady * _ratio(k * there.F, there.T_1 - T_b),
+        eta_f=_ratio(k, drive),
+        eta_f_no_load=there.steady * _ratio(k * there.F, there.T_1 - T_b),
         eta_f_raw=there.steady * _ratio(k * there.F, there.T_1),
-        eta_f_reverse=back.steady * _ratio(k * back.F, -back.T_2 - T_b),
+        eta_f_reverse=_ratio(k, drive_2),
         eta_f_true=par.screw.eta_f,
-        eta_b=there.steady * _ratio(-there.T_2 + T_b, k * there.F),
+        eta_b=driven / k,
+        eta_b_no_load=there.steady * _ratio(-there.T_2 + T_b, k * there.F),
         eta_b_raw=there.steady * _ratio(-there.T_2, k * there.F),
-        eta_b_reverse=back.steady * _ratio(back.T_1 + T_b, k * back.F),
+        eta_b_reverse=driven_1 / k,
         eta_b_true=par.screw.eta_b,
+        bearing_growth=growth,
+        bearing_growth_true=par.bearing.C_2,
         force=there.F,
         force_reverse=back.F,
         bearing_torque=T_b,
@@ -148,6 +173,16 @@ def _speed(run: xr.Dataset, name: str, options: Options) -> float:
 
 def _mean(run: xr.Dataset, name: str, options: Options) -> float:
     return mean(run, name, _SETTLED * options.duration, options.duration)
+
+
+def _without_force(
+    full: tuple[Reading, float], less: tuple[Reading, float]
+) -> tuple[float, float]:
+    """Return a torque per force as it is without force, and its growth; NaN where not steady."""
+    (there, T), (below, T_less) = full, less
+    steady = there.steady * below.steady
+    growth = (T / there.F - T_less / below.F) / (there.F - below.F)
+    return steady * (T / there.F - growth * there.F), steady * growth
 
 
 def _ratio(above: float, below: float) -> float:

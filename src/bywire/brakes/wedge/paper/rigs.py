@@ -38,7 +38,7 @@ def current_loop(runs: Runs) -> Part:
 def efficiency(runs: Runs) -> Part:
     """Return the screw's efficiency as the rig measures it."""
     result = runs.bench("screw-efficiency", MAIN)
-    values = {name: 100.0 * value for name, value in kpis(result).items()}
+    values = {name: 100.0 * value for name, value in kpis(result).items() if "eta" in name}
     put_in = reading(values["eta_f_true"], "%", facts.MEASURABLE)
     allowed = RECOVERED
     bearing = f"{kpis(result)['bearing_torque']:.3g} N m"
@@ -46,11 +46,16 @@ def efficiency(runs: Runs) -> Part:
         compared("efficiency.driving", facts.ETA, values["eta_f"], None,
                  "as the rig measures it", tuned="an input"),
         compared("efficiency.recovered", put_in, values["eta_f"], allowed,
-                 f"with the bearing's torque without load, {bearing}, taken off"),
+                 f"with the bearings' torque, {bearing} without load and its growth with the "
+                 "force, taken off"),
+        compared("efficiency.no_load", put_in, values["eta_f_no_load"], allowed,
+                 "with the torque without load alone taken off: what grows with the square of the "
+                 "force counts as loss of the screw"),
         compared("efficiency.raw", put_in, values["eta_f_raw"], allowed,
                  "motor torque and force alone"),
         found("efficiency.back_driven", "%", values["eta_b"],
-              f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in"),
+              f"the same for a screw that is driven back; {values['eta_b_true']:.3g} % put in, "
+              f"{values['eta_b_no_load']:.3g} % with the torque without load alone"),
         found("efficiency.back_driven.raw", "%", values["eta_b_raw"],
               "motor torque and force alone"),
         found("efficiency.both", "%", values["eta_f_true"] * values["eta_b_true"] / 100.0,
