@@ -9,10 +9,12 @@ import pytest
 import xarray as xr
 
 from bywire.core.errors import ParameterError
+from bywire.identification.confidence import uncertainty
 from bywire.identification.measured import measured
 from bywire.identification.method import Effort
 from bywire.identification.methods.seal_friction import METHOD
 from bywire.identification.records import joined, split
+from bywire.identification.sealing.strokes import velocity
 from bywire.identification.trust import trust
 
 MEASURED = Path(__file__).parents[4] / "shared" / "data" / "seal_friction"
@@ -131,3 +133,30 @@ def test_measured_o_ring(tmp_path: Path) -> None:
     assert found["F_0"] + found["f"] * 4e5 == pytest.approx(4.8 + 0.87 * 4.0 - between, abs=0.15)
     low, high = found.intervals()[found.names.index("f")] * 1e5
     assert 0.3 < low < high < 1.0
+
+
+@pytest.mark.skipif(not MEASURED.is_dir(), reason="the measured data lies elsewhere")
+@pytest.mark.parametrize("pressure", [1, 3, 5, 7])
+def test_intervals_hold_for_blocks_of_measured_friction(pressure: int, tmp_path: Path) -> None:
+    """What is claimed of a whole record is how far its blocks scatter, sample by sample fitted.
+
+    At 1 and 7 bar the friction changes over the record, and a noise of the residuals alone would
+    claim half of that.
+    """
+    mapping = tmp_path / "map.toml"
+    mapping.write_text(MAP)
+    file = MEASURED / f"O-ring_{pressure}bar.csv"
+    record = measured([file], mapping, METHOD.signals, gaps=True).data
+    x, p, F = (record[name].values for name in ("x", "p", "F"))
+    v = velocity(x, 0.01, 5.0)
+    slides = np.isfinite(F) & np.isfinite(p) & (np.abs(v) > 5e-3) & (x > 5e-3) & (x < 30e-3)
+    W, y = np.column_stack((p / 1e5, np.sign(v)))[slides], F[slides]
+
+    def friction(rows: np.ndarray) -> float:
+        return float(np.linalg.lstsq(W[rows], y[rows], rcond=None)[0][1])
+
+    values = np.linalg.lstsq(W, y, rcond=None)[0]
+    claimed = float(np.sqrt(uncertainty(W, W @ values - y).covariance[1, 1]))
+    blocks = np.array_split(np.arange(y.size), 12)
+    scattered = np.std([friction(rows) for rows in blocks], ddof=1) / np.sqrt(len(blocks))
+    assert 0.7 < claimed / scattered < 1.4
