@@ -18,7 +18,7 @@ from bywire.brakes.wedge.sizing.design import answer, closing_speed, redesigned
 from bywire.brakes.wedge.studies import drive_train
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
-from bywire.plant import seal_friction
+from bywire.plant import roller_screw, seal_friction
 from bywire.report.contour import contour, levels_between
 from bywire.synthesis.study import STUDIES, Map, Mark
 
@@ -66,6 +66,31 @@ def test_a_redesign_keeps_the_pads_speed_and_tells_the_controller() -> None:
     assert same.leaves() == pytest.approx(before)
 
 
+@pytest.mark.parametrize("lead", [1.5e-3, 4e-3, 8e-3])
+def test_the_screws_friction_angle_stays_over_the_lead(lead) -> None:
+    """The torque of its friction by the axial force does not know the lead, either way."""
+    screw = redesigned(WEDGE, 0.3, lead).screw
+    for force in (-1000.0, 1000.0):
+        load = roller_screw.Input(force=force, torque=0.0)
+        assert tuple(roller_screw.friction(load, screw)) == pytest.approx(
+            tuple(roller_screw.friction(load, WEDGE.screw))
+        )
+    # The law of sliding friction in a thread of 16 mm, without the approximation of small angles.
+    lead_angle = lambda length: math.atan(length / (math.pi * 16e-3))  # noqa: E731
+    given = lead_angle(WEDGE.screw.lead)
+    friction_angle = math.atan(math.tan(given) / WEDGE.screw.eta_f) - given
+    here = lead_angle(lead)
+    assert screw.eta_f == pytest.approx(
+        math.tan(here) / math.tan(here + friction_angle), rel=0.03
+    )  # fmt: skip
+
+
+def test_a_screw_of_little_lead_locks_itself_and_the_efficiency_may_stay() -> None:
+    assert redesigned(WEDGE, 0.3, 1e-3).screw.eta_b == 0.0
+    kept = redesigned(WEDGE, 0.3, 1e-3, "as-given").screw
+    assert (kept.eta_f, kept.eta_b) == (WEDGE.screw.eta_f, WEDGE.screw.eta_b)
+
+
 @pytest.mark.parametrize(("tan_alpha", "lead"), [(0.364, 2e-3), (0.3, 4e-3)])
 def test_the_slowest_case_meets_the_time_and_not_more(tan_alpha, lead) -> None:
     found = answer(redesigned(WEDGE, tan_alpha, lead), Demand(950.0, 0.1, 0.2, 0.2, MU, True, True))
@@ -78,14 +103,14 @@ def test_the_slowest_case_meets_the_time_and_not_more(tan_alpha, lead) -> None:
 
 def test_a_small_drive_train_study_marks_what_is_infeasible() -> None:
     options = drive_train.STUDY.defaults.replace(
-        {"slopes": 3, "leads": 3, "tan_alpha_max": 0.4, "mu_B": MU}
+        {"slopes": 3, "leads": 3, "tan_alpha_max": 0.45, "mu_B": MU}
     )
     found = drive_train.compute(WEDGE, options, silent)
     kpis = {one.name: one.value for one in found.kpis}
     data, worst = found.data, found.data["worst_filtered"]
     assert (np.isnan(worst) == (data["infeasible"] == 1)).all()
-    # 2280 N on one screw of 8 mm lead and 65 % efficiency would take 45 A.
-    weak = data.sel(tan_alpha=0.4, lead=8e-3)
+    # 3040 N on one screw of 8 mm lead and 88 % efficiency would take 44 A.
+    weak = data.sel(tan_alpha=0.45, lead=8e-3)
     assert float(weak["infeasible"]) == 1
     assert float(weak["held"].min()) < 0.9 * options.moment
     assert float(weak["current"].max()) == pytest.approx(WEDGE.control.position.i_max)

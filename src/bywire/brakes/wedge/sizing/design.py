@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ from bywire.plant import roller_screw
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run
 
+Efficiency = Literal["friction-angle", "as-given"]
+"""what stays of the screw over the lead: the friction angle, or the efficiency"""
 SPEEDS = ("omega_gap", "a_gap", "omega_creep", "rate_max")
 """parameters of the moment control that set how fast the reference moves"""
 SIGNALS = (
@@ -43,11 +46,17 @@ def closing_speed(par: WedgeParameters) -> float:
     return par.control.moment.rate_max * travel
 
 
-def redesigned(par: WedgeParameters, tan_alpha: float, lead: float) -> WedgeParameters:
+def redesigned(
+    par: WedgeParameters,
+    tan_alpha: float,
+    lead: float,
+    efficiency: Efficiency = "friction-angle",
+) -> WedgeParameters:
     """Return the brake with another wedge slope and screw lead [m].
 
     The pads move as before for the same time: the speeds of the reference and the travel of the
     end stops change with the ratio of pad to shaft travel, and the controller knows the design.
+    The screw's efficiency follows the lead, see `efficiencies`, or is ``"as-given"``.
     """
     travel = roller_screw.slope(par.screw) * wedge.slope(par.wedge)
     k = lead / (2.0 * math.pi)
@@ -61,7 +70,28 @@ def redesigned(par: WedgeParameters, tan_alpha: float, lead: float) -> WedgePara
         "control.moment.slope_hat": control.slope_hat / ratio,
     }
     speeds = {f"control.moment.{name}": getattr(control, name) * ratio for name in SPEEDS}
+    if efficiency == "friction-angle":
+        changes |= efficiencies(par, lead)
     return par.replace(changes | speeds)
+
+
+def efficiencies(par: WedgeParameters, lead: float) -> dict[str, float]:
+    r"""Return the efficiencies of a screw of another lead [m] with the same friction angle.
+
+    With the lead angle :math:`\lambda` and the friction angle :math:`\rho`, small both, as they are
+    in a screw that can be driven back:
+
+    .. math::
+        1/\eta_f - 1 = \tan(\lambda + \rho) / \tan\lambda - 1 \approx \rho / \lambda, \quad
+        1 - \eta_b = 1 - \tan(\lambda - \rho) / \tan\lambda \approx \rho / \lambda
+
+    so that both fall with 1/lead: the friction torque by the axial force stays. A screw of so
+    small a lead that it locks itself has :math:`\eta_b = 0`.
+    """
+    ratio = par.screw.lead / lead
+    eta_f = 1.0 / (1.0 + (1.0 / par.screw.eta_f - 1.0) * ratio)
+    eta_b = 1.0 - (1.0 - par.screw.eta_b) * ratio
+    return {"screw.eta_f": eta_f, "screw.eta_b": max(eta_b, 0.0)}
 
 
 def answer(par: WedgeParameters, demand: Demand) -> Answer:

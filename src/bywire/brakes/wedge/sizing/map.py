@@ -11,7 +11,7 @@ import xarray as xr
 
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.sizing.answer import Answer, Demand
-from bywire.brakes.wedge.sizing.design import answer, redesigned
+from bywire.brakes.wedge.sizing.design import Efficiency, answer, redesigned
 from bywire.core.typing import Array
 from bywire.synthesis.study import variable, variables
 
@@ -44,11 +44,12 @@ def mapped(
     slopes: Array,
     leads: Array,
     progress: Callable[[float], None] = lambda share: None,
+    efficiency: Efficiency = "friction-angle",
 ) -> xr.Dataset:
     """Return what all designs on a grid do; on all cores, stopped by an interrupt.
 
     ``slopes``, ``leads``: slopes of the wedge, shape (n,), and leads of the screws [m], shape (m,);
-    ``progress``: called with the finished share, 0 to 1.
+    ``progress``: called with the finished share, 0 to 1; ``efficiency``: see `redesigned`.
 
     Returns
     -------
@@ -62,7 +63,10 @@ def mapped(
     answers: list[Answer] = []
     pool = ThreadPoolExecutor(os.cpu_count() or 1)
     try:
-        every = pool.map(lambda design: answer(redesigned(par, *design), demand), designs)
+        every = pool.map(
+            lambda design: answer(redesigned(par, design[0], design[1], efficiency), demand),
+            designs,
+        )
         for k, judged in enumerate(every):
             answers.append(judged)
             progress((k + 1) / len(designs))

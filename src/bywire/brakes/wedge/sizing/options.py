@@ -8,6 +8,7 @@ from pydantic import Field, model_validator
 
 from bywire.brakes.wedge.laws.moment_control import SomeMoment, SpeedLimit
 from bywire.brakes.wedge.series import Coefficients
+from bywire.brakes.wedge.sizing.design import Efficiency
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.synthesis.study import require_ranges
@@ -16,8 +17,10 @@ Slope = Annotated[float, Unit("1", 0.3), Field(gt=0, le=2, allow_inf_nan=False)]
 Count = Annotated[int, Unit("1", 11.0), Field(ge=3, le=101)]
 
 ASSUMPTIONS = (
-    "The wedge's slope and the screws' lead vary; motors, drives, bearings, screw efficiency, "
-    "stiffnesses, clearance and the travel that preloads the screws stay.",
+    "The wedge's slope and the screws' lead vary; motors, drives, bearings, stiffnesses, clearance "
+    "and the travel that preloads the screws stay.",
+    "The screws' friction angle stays, so that their efficiency grows with the lead and a small "
+    "lead locks itself; with efficiency 'as-given' the efficiency stays.",
     "The controllers know the design: travel per shaft angle and moment per angle follow it.",
     "Equal response: all speeds and accelerations of the reference are scaled so that the pads "
     "close equally fast; with response 'enforced' they get a common factor, the smallest at which "
@@ -54,6 +57,8 @@ class Options(ParameterSet):
     """whether the moment controller knows them, or believes in that of the parameter set"""
     response: Literal["enforced", "as-scaled"]
     """whether the time is enforced, or the pads close as fast as with the given drive train"""
+    efficiency: Efficiency
+    """what stays of the screw over the lead: its friction angle, or its efficiency"""
     power: Literal["filtered", "instantaneous"]
     """which power is minimized: as the rig measures it, or as it is"""
     tan_alpha_min: Slope
@@ -86,6 +91,7 @@ DEFAULTS = Options(
     mu_B=(0.25, 0.3, 0.35, 0.4, 0.45),
     believed="known",
     response="enforced",
+    efficiency="friction-angle",
     power="filtered",
     tan_alpha_min=0.2,
     tan_alpha_max=0.45,

@@ -55,7 +55,7 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     given = answer(par, demand)  # first and alone: it also builds the kernels
     slopes = np.linspace(options.tan_alpha_min, options.tan_alpha_max, options.slopes)
     leads = np.linspace(options.lead_min, options.lead_max, options.leads)
-    data = mapped(par, demand, slopes, leads, partial(progress, "designs"))
+    data = mapped(par, demand, slopes, leads, partial(progress, "designs"), options.efficiency)
     warnings = _warnings(data)
     if data["infeasible"].values.all():
         warnings += (NONE_FEASIBLE,)
@@ -64,7 +64,8 @@ def compute(par: WedgeParameters, options: Options, progress: Progress) -> Findi
     grids, best = [data], coarse
     for n in range(1, _ROUNDS + 1):
         near = (_around(slopes, best.tan_alpha, n), _around(leads, best.lead, n))
-        grids.append(mapped(par, demand, *near, partial(progress, f"optimum, round {n}")))
+        report = partial(progress, f"optimum, round {n}")
+        grids.append(mapped(par, demand, *near, report, options.efficiency))
         best = min(best, smallest(grids[-1], options.power), key=lambda design: design.power)
     here = Mark("given drive train", par.screw.lead, wedge.slope(par.wedge))
     marks = (Mark("optimum", best.lead, best.tan_alpha), here)
