@@ -74,7 +74,21 @@ def test_verdicts_stand_beside_each_other(folders):
     frame = bywire.compare(*folders).tables()["Requirements"].set_index("requirement")
     assert frame.loc["overshoot", "limit"] == "<= 15 %"
     assert frame.loc["peak_current", "base"] == "-"
-    assert not frame.loc["peak_current", "warm"]
+    assert frame.loc["peak_current", "warm"] == "missed"
+
+
+def test_a_verdict_that_the_step_leaves_open_stays_open(folders, tmp_path):
+    """A folder says what its run could not decide; so does the comparison."""
+    near = tmp_path / "near"
+    near.mkdir()
+    record = json.loads((folders[1] / "result.json").read_text(encoding="utf-8"))
+    for each in record["requirements"]:
+        each |= {"outcome": "undecided", "met": False, "error": 0.5}
+    (near / "result.json").write_text(json.dumps(record), encoding="utf-8")
+    (near / "run.nc").write_bytes((folders[1] / "run.nc").read_bytes())
+    frame = bywire.compare(folders[0], near).tables()["Requirements"].set_index("requirement")
+    assert frame.loc["peak_current", "near"] == "undecided"
+    assert frame.loc["overshoot", "base"] in ("met", "undecided")
 
 
 def test_folder_results_and_benches_give_the_same(results, folders):

@@ -100,8 +100,8 @@ def verdict_table(runs: Sequence[ComparedRun]) -> Table:
             if verdict is None:
                 cells.append(Cell("-"))
                 continue
-            text = f"{amount(verdict.value, verdict.unit)} {'ok' if verdict.met else 'failed'}"
-            cells.append(Cell(text, "good" if verdict.met else "bad", verdict.met))
+            text = f"{amount(verdict.value, verdict.unit)} {verdict.outcome}"
+            cells.append(Cell(text, "good" if verdict.met else "bad", verdict.outcome))
         rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
     columns = (Column("requirement"), Column("limit", numeric=True))
     return Table((*columns, *(Column(each.label, numeric=True) for each in runs)), tuple(rows))

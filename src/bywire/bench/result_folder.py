@@ -108,7 +108,10 @@ def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
 
 def _verdict(record: Mapping[str, Any]) -> Verdict:
     value, unit = _number(record["value"]), str(record["unit"])
-    return Verdict(str(record["kpi"]), str(record["limit"]), value, unit, bool(record["met"]), "")
+    return Verdict(
+        str(record["kpi"]), str(record["limit"]), value, unit, bool(record["met"]), "",
+        error=_number(record.get("error")), is_decided=record.get("outcome") != "undecided",
+    )  # fmt: skip
 
 
 def _number(value: Any) -> float:
