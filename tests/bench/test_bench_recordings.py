@@ -63,7 +63,8 @@ def test_signals_are_those_of_the_model(recording):
     assert set(recording.data_vars) == set(declared)
     for name, signal in declared.items():
         said = {"units": signal.unit, "long_name": signal.label}
-        assert recording[name].attrs == said | role_attributes(signal.role)
+        attrs = {k: v for k, v in recording[name].attrs.items() if not k.startswith("step_error")}
+        assert attrs == said | role_attributes(signal.role)
         assert np.all(np.isfinite(recording[name].values))
 
 
