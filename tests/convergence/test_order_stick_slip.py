@@ -1,4 +1,4 @@
-"""Second order through stick and slip; first where friction reverses without holding."""
+"""Second order through stick and slip, and where friction reverses without holding."""
 
 from __future__ import annotations
 
@@ -56,13 +56,11 @@ def _released(x_0: float, duration: float, record: float) -> Run:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(("x_0", "order"), [(0.010, 2.0), (0.040, 1.0)])
-def test_rubbing_oscillator(x_0: float, order: float) -> None:
+@pytest.mark.parametrize("x_0", [0.010, 0.040])
+def test_rubbing_oscillator(x_0: float) -> None:
     """A swing that friction stops within its first half cycle, and one that turns back.
 
-    Turning back within a substep, friction takes the direction of the substep's end for all of
-    it: the velocity is off by as much as friction changes it in a substep. Averaged over
-    stiffnesses, because the turn's place in the substep decides.
+    Averaged over stiffnesses, because the place of the turn in its substep moves with them.
     """
     run, stiffness = _released(x_0, 0.06, 5e-3), np.linspace(1.9e4, 2.1e4, 32)
     cases = [run.par.replace({"k": float(k)}) for k in stiffness]
@@ -71,7 +69,7 @@ def test_rubbing_oscillator(x_0: float, order: float) -> None:
         result = simulate_ensemble(replace(run, step=step), {"k": stiffness}, ["x", "v"])
         exact = [[oscillator.rubbing(t, x_0, case)[0] for t in result.time] for case in cases]
         errors.append(np.abs(result["x"] - np.array(exact)).max(axis=1).mean())
-        if order == 2.0:
+        if x_0 == 0.010:
             assert np.all(result["v"][:, -1] == 0.0)
-    assert_order(STEPS, errors, order, f"release from {x_0} m")
-    assert errors[3] < 1e-3 * x_0
+    assert_order(STEPS, errors, 2.0, f"release from {x_0} m")
+    assert errors[3] < 1e-5 * x_0

@@ -73,8 +73,7 @@ class TangentKernel:
         stages = build_stages(program, directions)
         self.layout: Layout = layout_of(stages)
         self.label = f"compiled C with tangents, {compiler.label}"
-        velocities = [program.model.State._fields.index(n) for n in program.model.frictions]
-        source = emit_tangents(stages, DIRECTIONS, velocities)
+        source = emit_tangents(stages, DIRECTIONS)
         entry = "bw_run_tangents"
         library, _ = load_library(source, vector_flags(compiler), compiler, entry)
         self._run = library[entry]
