@@ -126,13 +126,19 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     if not exact:
         doubts += [-x[model.State._fields.index(name)] for name in model.limits]
     # A maximum and no logical or: compilers do not vectorize selections between truth values.
-    doubt, turn = SX(0), SX(0)
+    doubt = SX(0)
     for one in doubts:
         doubt = ca.fmax(doubt, one)
+    return Pass(x, d, reaction, column(flow), doubt, _turn(model, s.x, x))
+
+
+def _turn(model: Model, start: Any, end: Any) -> Any:
+    """Return what is positive where a velocity with dry friction changes its sign."""
+    turn = SX(0)
     for name in model.frictions:
         k = model.State._fields.index(name)
-        turn = ca.fmax(turn, -s.x[k] * x[k])
-    return Pass(x, d, reaction, column(flow), doubt, turn)
+        turn = ca.fmax(turn, -start[k] * end[k])
+    return turn
 
 
 def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
