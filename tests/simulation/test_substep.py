@@ -99,8 +99,8 @@ def substep(
     """Return what a pass gives for a state, a predicted half increment and a memory."""
     leaves = [par.leaves()[name] for name in program.parameter_names]
     values = (program.exact if exact else program.fast)(x, d, m, leaves, H)
-    *vectors, _, doubt = (np.array(value).ravel() for value in values)
-    return Result(*vectors, float(doubt[0]))
+    *vectors, flag = (np.array(value).ravel() for value in values)
+    return Result(*vectors, float(flag[0]))
 
 
 @pytest.fixture(scope="module")

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
     branching_statements,
+    exact_pass,
     indented,
     layout_of,
     leaf_count,
@@ -14,7 +15,6 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
-from bywire.simulation.emit_rare import rare_substep
 from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
 from bywire.simulation.layout import Layout
 from bywire.simulation.modes import modes
@@ -127,7 +127,7 @@ def emit_lanes(stages: Stages) -> str:
         for j, pairs in enumerate(stages.quadrature.combinations)
     ]
     parameters, stimuli = leaf_count(stages, "p"), leaf_count(stages, "u")
-    return f"""{LANES}{rare_substep(stages)}
+    return f"""{LANES}{exact_pass(stages)}
 {_settle_lanes(t, parameters)}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
@@ -212,18 +212,15 @@ def _settle_lanes(t: _Lanes, parameters: int) -> str:
             elif f"{kind}{k}" in targets:
                 lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
             at += 1
-    velocities = [f"o[{k}] = n[{targets[f'x{k}']}][l];" for k in t.stages.velocities]
-    return f"""static RARE void settle_lanes(B flagged, V doubt, const M *P, double h, const V *m,
-    const V *old, V *n, V *q, V *counters) {{
+    return f"""static __attribute__((noinline, cold)) void settle_lanes(B flagged, const M *P,
+    double h, const V *m, const V *old, V *n, V *q, V *counters) {{
   double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[{at + 1}];
   for (int l = 0; l < W; ++l) {{
     if (!LANE(flagged, l)) continue;
     for (int k = 0; k < {parameters}; ++k) ps[k] = P[k][l];
     for (int k = 0; k < {nm}; ++k) ms[k] = m[k][l];
     for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
-    cuts c;
-    {indented(velocities, 4)}
-    counters[0][l] += located(ps, h, ms, xs, ds, doubt[l] == 0.0, o, &c);
+    counters[0][l] += settle(ps, h, ms, xs, ds, o);
     counters[1][l] += 1.0;
     for (int k = 0; k < {nz}; ++k) n[{len(targets)} + k][l] = 0.0;
     {indented(lines, 4)}
@@ -239,12 +236,11 @@ def _repeat(t: _Lanes) -> list[str]:
     new = [*(f"{target}_" for target in t.results), *(f"z{k}" for k in range(len(t.products)))]
     flow = [f"q{k}" for k in range(length["q"])]
     memory = [f"m{k}" for k in range(length["m"])]
-    doubt = t.number(t.stages.fast["doubt"][0])
     arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
     return [
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
         "V count[] = {failures, repeats};",
-        f"settle_lanes(flagged, {doubt}, P, h_, memory, old, n, flow, count);",
+        "settle_lanes(flagged, P, h_, memory, old, n, flow, count);",
         *(f"{name} = n[{k}];" for k, name in enumerate(new)),
         *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
         "failures = count[0];",

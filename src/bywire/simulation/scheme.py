@@ -50,19 +50,16 @@ class Pass:
         Forces of the frictions, then of the limits.
     flow
         Rates of the integrals at the midpoint.
-    doubt
+    flag
         Positive where the pass must be repeated: a contact set changed, a limit was crossed, or the
         projection of the frictions failed.
-    turn
-        Positive where a velocity with dry friction changes its sign: the substep must be cut.
     """
 
     x: Any
     d: Any
     reaction: Any
     flow: Any
-    doubt: Any
-    turn: Any
+    flag: Any
 
 
 @dataclass(frozen=True)
@@ -90,8 +87,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         Arguments of the pass.
     exact
         False: the pass of nearly every substep, which leaves one-sided limits alone and only
-        checks them, and keeps at rest what rests. True: the repeated pass, with limits and every
-        combination of signs.
+        checks them. True: the repeated pass, with limits and every combination of signs.
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
@@ -126,19 +122,10 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     if not exact:
         doubts += [-x[model.State._fields.index(name)] for name in model.limits]
     # A maximum and no logical or: compilers do not vectorize selections between truth values.
-    doubt = SX(0)
-    for one in doubts:
-        doubt = ca.fmax(doubt, one)
-    return Pass(x, d, reaction, column(flow), doubt, _turn(model, s.x, x))
-
-
-def _turn(model: Model, start: Any, end: Any) -> Any:
-    """Return what is positive where a velocity with dry friction changes its sign."""
-    turn = SX(0)
-    for name in model.frictions:
-        k = model.State._fields.index(name)
-        turn = ca.fmax(turn, -start[k] * end[k])
-    return turn
+    flag = SX(0)
+    for doubt in doubts:
+        flag = ca.fmax(flag, doubt)
+    return Pass(x, d, reaction, column(flow), flag)
 
 
 def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
@@ -174,19 +161,10 @@ def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _
 
 
 def _bounds(model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any) -> list[Any]:
-    """Return (low, high) of every friction: at rest what it can hold, else twice what acts.
-
-    A velocity keeps the sign that it begins with; where it does not, the substep is cut.
-    """
     state = symbol_tuple(model.State, y)
     memory = symbol_tuple(model.Memory, s.m)
     pairs = model.bounds(state, state, memory, par, scalars(contact))
-    found = []
-    for name, (low, high) in zip(model.frictions, pairs, strict=True):
-        v = s.x[model.State._fields.index(name)]
-        back, ahead = ca.fmax(SX(high), 0), ca.fmin(SX(low), 0)
-        found.append((ca.if_else(v < 0, back, ahead), ca.if_else(v > 0, ahead, back)))
-    return found
+    return [(ca.fmin(SX(low), 0), ca.fmax(SX(high), 0)) for low, high in pairs]
 
 
 def _set_valued_states(model: Model, exact: bool) -> tuple[int, ...]:
@@ -204,12 +182,8 @@ def _project(
     # The unknowns are d = (w - x) / 2, so that S d = c + force is (S/2) w = c + (S/2) x + force.
     half = 0.5 * reduced.matrix
     c = column([reduced.start(row, half) for row in range(len(reduced.kept))])
-    if exact:
-        projection = project_exact(half, c, low, high)
-    else:
-        resting = [s.x[k] == 0 for k in reduced.kept]
-        projection = project_fast(half, c, low, high, resting)
-    reaction = ca.SX(projection.force)
+    projection = (project_exact if exact else project_fast)(half, c, low, high)
+    reaction = half @ projection.w - c
     first = len(model.frictions)
     for k in range(first, reaction.shape[0]):  # away from its limit a state feels nothing of it
         reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))
