@@ -235,16 +235,16 @@ def test_ranges_priors_and_starts() -> None:
 @pytest.mark.parametrize(
     ("changes", "said"),
     [
-        ({"outputs": {}}, "no output is measured: give --output"),
+        ({"outputs": {}}, "no output is measured: give outputs"),
         ({"outputs": {"p_mcc": ""}}, "unknown output 'p_mcc': did you mean 'p_mc'"),
         ({"outputs": {"p_mc": "0.02 A"}}, "noise of p_mc"),
         ({"inputs": {"v_st": "u"}}, "unknown stimulus 'v_st'"),
         ({"states": ("omeg",)}, "omega"),
-        ({"unknowns": {}}, "nothing is unknown: give --unknown"),
+        ({"unknowns": {}}, "nothing is unknown: give unknowns"),
         ({"unknowns": {"motor.Rm": ""}}, "unknown parameter 'motor.Rm': did you mean 'motor.R_m'"),
         ({"unknowns": {"adc.law": ""}}, "it is a choice, here 'quantized', and no number"),
         ({"unknowns": {"ecu.pedal_map.V_nodes": ""}}, "it is a table"),
-        ({"unknowns": {"initial.omega": ""}}, "write --estimate-start omega"),
+        ({"unknowns": {"initial.omega": ""}}, "write states omega"),
         ({"unknowns": {"stimulus.v": ""}}, "stimulus.v_set"),
         ({"unknowns": {"offset.omega": ""}}, "offset.p_mc"),
         ({"unknowns": {"motor.R_m": "0.1..1"}}, "range of motor.R_m = '0.1' has the wrong unit"),
@@ -253,7 +253,7 @@ def test_ranges_priors_and_starts() -> None:
         ({"unknowns": {"motor.R_m": "-1..1 ohm"}}, "motor.R_m must be > 0 ohm"),
         ({"priors": {"motor.R_m": "0.3"}}, "prior of motor.R_m"),
         ({"priors": {"motor.R_m": "0.3 +- 0 ohm"}}, "wants a deviation > 0"),
-        ({"priors": {"motor.L_m": "1 +- 1 mH"}}, "unknown in --prior"),
+        ({"priors": {"motor.L_m": "1 +- 1 mH"}}, "unknown in priors"),
         ({"case": "runn"}, "'run'"),
     ],
 )

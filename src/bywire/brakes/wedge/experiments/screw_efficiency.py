@@ -181,8 +181,10 @@ def _without_force(
     """Return a torque per force as it is without force, and its growth; NaN where not steady."""
     (there, T), (below, T_less) = full, less
     steady = there.steady * below.steady
+    if not steady > 0 or there.F == below.F:
+        return math.nan, math.nan
     growth = (T / there.F - T_less / below.F) / (there.F - below.F)
-    return steady * (T / there.F - growth * there.F), steady * growth
+    return T / there.F - growth * there.F, growth
 
 
 def _ratio(above: float, below: float) -> float:
