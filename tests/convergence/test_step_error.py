@@ -15,7 +15,8 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import judge
 from bywire.bench.running import run
 from bywire.bench.step_error import OTHER_STEPS, with_step_errors
-from bywire.core.errors import BywireError
+from bywire.core.errors import BywireError, RunError
+from bywire.simulation.run import simulate
 
 FINE = 1e-6
 STATIC = ("stribeck", "open-loop")
@@ -64,6 +65,22 @@ def test_figure_that_one_step_alone_defines_has_no_known_error():
     ]
     assert errors[:2] == [math.inf, math.inf]
     assert math.isnan(errors[2])
+
+
+def test_coarser_steps_that_fail_cost_no_result(monkeypatch):
+    """The estimate is then that of half the step."""
+
+    def fragile(each, **options):
+        if each.step > 30e-6:
+            raise RunError("left the numbers")
+        return simulate(each, **options)
+
+    bench = read("hard-braking", {})
+    monkeypatch.setattr("bywire.bench.running.simulate", fragile)
+    kpis = run(bench, estimate_error=True).kpis
+    fine = {each.name: each.value for each in run(replace(bench, step=0.5 * bench.step)).kpis}
+    (energy,) = (each for each in kpis if each.name == "energy")
+    assert energy.error == pytest.approx(abs(energy.value - fine["energy"]) / 0.75, rel=1e-3)
 
 
 def random_bench(rng: np.random.Generator) -> Bench:

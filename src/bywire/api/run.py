@@ -259,7 +259,7 @@ def run(
     engine
         ``auto``, ``compiled`` or ``virtual-machine``.
     estimate_error
-        Whether all runs are made once more in half steps, for the error from the step of key
+        Whether all runs are made in half and double steps too, for the error from the step of key
         figures and recorded signals. A requirement that is closer to its limit than this error
         is undecided, neither met nor missed.
 

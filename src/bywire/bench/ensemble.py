@@ -17,7 +17,7 @@ from bywire.bench.extent import check_memory
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, run_of, static_recordings
 from bywire.bench.step_error import OTHER_STEPS
-from bywire.core.errors import InputError, ParameterError, StepError, unknown_name
+from bywire.core.errors import InputError, ParameterError, RunError, StepError, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
@@ -212,7 +212,7 @@ def run_benches(
     recordings = _recordings(benches, progress, engine, threads)
     others: list[dict[float, dict[str, xr.Dataset]]] = [{} for _ in benches]
     for factor in OTHER_STEPS if estimate_error else ():
-        with suppress(StepError):  # too short, or no divisor of a sample time
+        with suppress(StepError, RunError):  # no divisor of a sample time, or too coarse
             finer = [replace(bench, step=factor * bench.step) for bench in benches]
             computed = _recordings(finer, progress, engine, threads)
             for each, further in zip(others, computed, strict=True):

@@ -22,7 +22,7 @@ from bywire.bench.requirements import judge, status_of
 from bywire.bench.result import Result
 from bywire.bench.step_error import OTHER_STEPS, note_step_errors, with_step_errors
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.errors import StepError
+from bywire.core.errors import RunError, StepError
 from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
@@ -51,7 +51,7 @@ def run(
         Whether all runs are made again in half steps, and in double ones where these divide the
         sample times: key figures and recorded signals then say how large their error from the
         step is, and a requirement closer to its limit than that is undecided. It takes 2.5 times
-        as many substeps more.
+        as many substeps more. Steps in which a run fails are left out.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def run(
         _make_runs(bench, recordings, progress, engine)
         is_complete = True
         for factor in OTHER_STEPS if estimate_error else ():
-            with suppress(StepError):  # too short, or no divisor of a sample time
+            with suppress(StepError, RunError):  # no divisor of a sample time, or too coarse
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
                 _make_runs(other, made, progress, engine, f", {factor:g} of the step")
