@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import bywire
+from bywire.bench.result_folder import read_result
 from bywire.core.errors import FileError, ParameterError
 from bywire.core.scratch import UNFINISHED
 from bywire.report.answer import AnswerWarning
@@ -68,6 +70,38 @@ def test_key_figures_are_those_of_the_runs_with_their_change(results, folders):
     undefined = [e for e in comparison.figures if all(math.isnan(v) for v in e.values)]
     assert undefined
     assert not any(each.differs for each in undefined)
+
+
+def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders, tmp_path):
+    """By what is in memory, and by what a folder says; without an estimate nothing is claimed."""
+    changed = {**QUICK, "requirements.overshoot": "<= 15 %", "motor.R_m": "0.3500002 ohm"}
+    near = bywire.run("hard-braking", changed)
+    near.write(tmp_path / "near")
+    energies = [each.kpi("energy") for each in (results[0], near)]
+    assert 0.0 < abs(energies[1].value - energies[0].value) < sum(e.error for e in energies)
+    pairs = (results[0], near), (folders[0], tmp_path / "near")
+    for comparison in (bywire.compare(*pair) for pair in pairs):
+        assert "not distinct" in next(
+            line for line in str(comparison).splitlines() if line.startswith("energy")
+        )
+        record = {each["name"]: each for each in comparison.as_object()["kpis"]}
+        assert record["energy"]["distinct"] is False
+        assert record["energy"]["errors"] == [each.error for each in energies]
+    far = {each.name: each.is_distinct for each in bywire.compare(*folders).figures}
+    assert far["energy"]
+    without = bywire.run("hard-braking", changed, estimate_error=False)
+    plain = bywire.run("hard-braking", QUICK, estimate_error=False)
+    assert "not distinct" not in str(bywire.compare(plain, without))
+
+
+def test_an_error_that_no_step_shows_is_kept_in_a_folder(results, tmp_path):
+    """An infinite error is null in JSON, as one that was not estimated: the record tells which."""
+    unknown = replace(results[0], kpis=tuple(replace(k, error=math.inf) for k in results[0].kpis))
+    unknown.write(tmp_path / "unknown")
+    read = read_result(tmp_path / "unknown")
+    assert all(math.isinf(each.error) for each in read.kpis)
+    comparison = bywire.compare(tmp_path / "unknown", results[1])
+    assert not any(each.is_distinct for each in comparison.figures)
 
 
 def test_verdicts_stand_beside_each_other(folders):

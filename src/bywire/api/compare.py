@@ -21,7 +21,7 @@ from bywire.api.compared_tables import (
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.result import Result
-from bywire.bench.result_folder import is_result_folder
+from bywire.bench.result_folder import is_result_folder, verdict_record
 from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError
 from bywire.report.answer import Answer, use_case
@@ -212,7 +212,10 @@ class Comparison(Answer):
     def _data(self) -> dict[str, Any]:
         def rows(shown: Sequence[Compared]) -> list[dict[str, Any]]:
             return [
-                {"name": s.name, "unit": s.unit, "values": list(s.values), "differs": s.differs}
+                {
+                    "name": s.name, "unit": s.unit, "values": list(s.values), "differs": s.differs,
+                    **({"errors": list(s.errors), "distinct": s.is_distinct} if s.errors else {}),
+                }
                 for s in shown if s.differs or self.is_full
             ]  # fmt: skip
 
@@ -221,10 +224,7 @@ class Comparison(Answer):
                 {
                     "label": each.label, "source": each.source, "assembly": each.model,
                     "holds": all(v.met for v in each.verdicts),
-                    "requirements": [
-                        {"kpi": v.kpi, "limit": v.limit, "value": v.value, "unit": v.unit,
-                         "met": v.met} for v in each.verdicts
-                    ],
+                    "requirements": [verdict_record(verdict) for verdict in each.verdicts],
                 }
                 for each in self.runs
             ],
@@ -243,6 +243,7 @@ def compare(
     overrides: Mapping[str, str] = MappingProxyType({}),
     is_full: bool = False,
     progress: Progress | None = None,
+    estimate_error: bool = True,
 ) -> Comparison:
     """Lay benches beside each other: what differs, key figures, verdicts, curves.
 
@@ -258,6 +259,9 @@ def compare(
         Whether settings and key figures that are the same are shown as well.
     progress
         Called with a label and the finished share, 0 to 1.
+    estimate_error
+        Whether what is run now is run in half and double steps too; see `bywire.run`. Key figures
+        that differ by less than both are off, as estimated or as a folder says, are not distinct.
 
     Returns
     -------
@@ -286,7 +290,10 @@ def compare(
         )
     # Folders first: what they lack is said before anything is computed.
     read = {k: kept(Path(str(runs[k]))) for k in places}
-    shown = [read.get(k) or _resolved(each, overrides, progress) for k, each in enumerate(runs)]
+    shown = [
+        read.get(k) or _resolved(each, overrides, progress, estimate_error)
+        for k, each in enumerate(runs)
+    ]
     return Comparison(tuple(_told_apart(shown)), is_full)
 
 
@@ -301,25 +308,29 @@ def _is_folder(source: Comparable) -> bool:
 
 
 def _resolved(
-    source: Comparable, overrides: Mapping[str, str], progress: Progress | None
+    source: Comparable,
+    overrides: Mapping[str, str],
+    progress: Progress | None,
+    estimate_error: bool,
 ) -> ComparedRun:
     """Return what a bench gives, run now unless it was."""
     if isinstance(source, Result):
         result, text = source, "given"
     elif isinstance(source, Bench):
         bench = source.with_overrides(overrides) if overrides else source
-        result, text = _run(bench, progress), "a bench, run now"
+        result, text = _run(bench, progress, estimate_error), "a bench, run now"
     else:
-        result, text = _run(bench_file.read(source, overrides), progress), f"{source}, run now"
+        bench = bench_file.read(source, overrides)
+        result, text = _run(bench, progress, estimate_error), f"{source}, run now"
     if result.status == "interrupted":
         raise KeyboardInterrupt
     return ran(result, result.bench.name or result.bench.experiment, text)
 
 
-def _run(bench: Bench, progress: Progress | None) -> Result:
+def _run(bench: Bench, progress: Progress | None, estimate_error: bool) -> Result:
     name = bench.name or bench.experiment
     report = None if progress is None else partial(_reported, progress, name)
-    return running.run(bench, report)
+    return running.run(bench, report, estimate_error=estimate_error)
 
 
 def _reported(progress: Progress, name: str, label: str, share: float) -> None:

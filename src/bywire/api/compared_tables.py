@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.api.compared_run import ComparedRun, Setting
+from bywire.bench.step_error import are_distinct
 from bywire.report.tables import Cell, Column, Table, value_text
-from bywire.report.wording import amount, clean
+from bywire.report.wording import clean, measured_amount
 
 _LONGEST = 48  # characters of a value in a table
 
@@ -24,17 +25,26 @@ class Compared:
         What it is called, and its SI unit or ``"%"``.
     values
         Its value in each run; None where a run has no such thing, NaN where it is not defined.
+    errors
+        How far each value of a key figure may be off by the step, NaN where that was not estimated.
     """
 
     name: str
     unit: str
     values: tuple[Any, ...]
+    errors: tuple[float, ...] = ()
 
     @property
     def differs(self) -> bool:
         """Whether not all runs have the same value; what is not defined equals itself."""
         first, *others = (_comparable(value) for value in self.values)
         return any(value != first for value in others)
+
+    @property
+    def is_distinct(self) -> bool:
+        """Whether a key figure differs by more than its errors; they count as independent."""
+        values = [math.nan if value is None else value for value in self.values]
+        return are_distinct(values, self.errors)
 
 
 def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tuple[Compared, ...]:
@@ -53,11 +63,12 @@ def compared_settings(runs: Sequence[ComparedRun], *, shared_only: bool) -> tupl
 def compared_figures(runs: Sequence[ComparedRun]) -> tuple[Compared, ...]:
     """Return every key figure that some run has; those of another unit stay apart."""
     keys = dict.fromkeys((kpi.name, kpi.unit) for each in runs for kpi in each.kpis)
-    each_run = [{(k.name, k.unit): k.value for k in each.kpis} for each in runs]
-    return tuple(
-        Compared(name, unit, tuple(known.get((name, unit)) for known in each_run))
-        for name, unit in keys
-    )
+    each_run = [{(k.name, k.unit): (k.value, k.error) for k in each.kpis} for each in runs]
+    rows = []
+    for name, unit in keys:
+        pairs = [known.get((name, unit), (None, math.nan)) for known in each_run]
+        rows.append(Compared(name, unit, tuple(v for v, _ in pairs), tuple(e for _, e in pairs)))
+    return tuple(rows)
 
 
 def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
@@ -70,18 +81,19 @@ def settings_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
 
 
 def kpi_table(labels: Sequence[str], rows: Sequence[Compared]) -> Table:
-    """Return key figures of all runs, a column each; of two runs, with the change."""
-    pair = len(labels) == 2
+    """Return key figures of all runs, a column each, and their change; of many, the spread."""
+    change = "change" if len(labels) == 2 else "spread"
     return Table(
         (
             Column("name"), *(Column(label, numeric=True) for label in labels),
-            *([Column("change", numeric=True)] if pair else []),
+            Column(change, numeric=True),
         ),
         tuple(
             (
                 Cell(clean(each.name)),
-                *(Cell(amount(v, each.unit), value=v) for v in each.values),
-                *([_change(each.values[0], each.values[1], each.unit)] if pair else []),
+                *(Cell(measured_amount(v, each.unit, e), value=v)
+                  for v, e in zip(each.values, each.errors, strict=True)),
+                _change(each),
             )
             for each in rows
         ),
@@ -100,20 +112,29 @@ def verdict_table(runs: Sequence[ComparedRun]) -> Table:
             if verdict is None:
                 cells.append(Cell("-"))
                 continue
-            text = f"{amount(verdict.value, verdict.unit)} {verdict.outcome}"
+            shown = measured_amount(verdict.value, verdict.unit, verdict.error)
+            text = f"{shown} {verdict.outcome}"
             cells.append(Cell(text, "good" if verdict.met else "bad", verdict.outcome))
         rows.append((Cell(clean(name)), Cell(clean(limit)), *cells))
     columns = (Column("requirement"), Column("limit", numeric=True))
     return Table((*columns, *(Column(each.label, numeric=True) for each in runs)), tuple(rows))
 
 
-def _change(first: Any, second: Any, unit: str) -> Cell:
-    if first is None or second is None or not math.isfinite(second - first):
+def _change(row: Compared) -> Cell:
+    """Return how far two values are apart, or several at most; or that they need not be."""
+    known = [value for value in row.values if value is not None and math.isfinite(value)]
+    if len(known) < len(row.values):
         return Cell("-")
-    change = second - first
-    share = f" ({100 * change / abs(first):+.3g} %)" if first and unit != "%" else ""
-    sign = "+" if change > 0 else ""
-    return Cell(f"{sign}{amount(change, unit, 3)}{share}", value=change)
+    is_pair = len(known) == 2
+    low, high = (0, 1) if is_pair else (known.index(min(known)), known.index(max(known)))
+    first, change = known[low], known[high] - known[low]
+    if not row.is_distinct:
+        return Cell("not distinct", value=change)
+    written = measured_amount(change, row.unit, row.errors[low] + row.errors[high], 3)
+    is_share = is_pair and first and row.unit != "%"
+    share = f" ({100 * change / abs(first):+.3g} %)" if is_share else ""
+    sign = "+" if is_pair and change > 0 else ""
+    return Cell(f"{sign}{written}{share}", value=change)
 
 
 def _setting(value: Any, unit: str) -> Cell:

@@ -15,6 +15,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
+from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.answer import Answer, use_case
@@ -179,22 +180,8 @@ class BenchResult(Result, Answer):
         return {
             "bench": self.bench.name or self.bench.experiment,
             "status": self.status,
-            "kpis": {
-                k.name: {"value": k.value, "unit": k.unit, "note": k.note, "error": k.error}
-                for k in self.kpis
-            },
-            "requirements": [
-                {
-                    "kpi": v.kpi,
-                    "limit": v.limit,
-                    "value": v.value,
-                    "unit": v.unit,
-                    "met": v.met,
-                    "outcome": v.outcome,
-                    "error": v.error,
-                }
-                for v in self.verdicts
-            ],
+            "kpis": {kpi.name: kpi_record(kpi) for kpi in self.kpis},
+            "requirements": [verdict_record(verdict) for verdict in self.verdicts],
             "energy": {
                 label: {
                     "unit": "J",

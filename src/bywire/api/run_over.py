@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,7 +17,9 @@ from bywire.bench.ensemble import changed, run_benches, varied_leaf
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
+from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
+from bywire.bench.step_error import are_distinct
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.report.answer import Answer
@@ -109,6 +111,7 @@ class BenchRange(Answer):
         tables = [TableBlock(self._table(piece), width=110) for piece in pieces]
         verdicts = list(self._verdict_texts())
         listing = [Listing(verdicts, "Requirements:")] if verdicts else []
+        listing += [Listing(said)] if (said := self._indistinct()) else []
         return Document(
             f"{title} over {self.name}",
             subject.line,
@@ -145,6 +148,28 @@ class BenchRange(Answer):
     def _kpis(self) -> list[Kpi]:
         """Return the key figures that any value has, as the first one that has it gives it."""
         return list({kpi.name: kpi for r in reversed(self.results) for kpi in r.kpis}.values())
+
+    @cached_property
+    def _distinct(self) -> dict[str, bool]:
+        """Whether each key figure differs anywhere by more than its error from the step."""
+        by_name: dict[str, list[Kpi]] = {}
+        for result in self.results:
+            for kpi in result.kpis:
+                by_name.setdefault(kpi.name, []).append(kpi)
+        return {
+            name: are_distinct([kpi.value for kpi in each], [kpi.error for kpi in each])
+            for name, each in by_name.items()
+        }
+
+    def _indistinct(self) -> list[str]:
+        """Return a sentence on figures whose changes may be the step's; none where none is."""
+        names = [
+            kpi.name for kpi in self._kpis()
+            if not self._distinct[kpi.name] and np.ptp(self.kpi(kpi.name)) > 0.0  # NaN is not
+        ]  # fmt: skip
+        if not names:
+            return []
+        return [f"not distinct over {self.name}, by their error from the step: {', '.join(names)}"]
 
     def _table(self, kpis: Sequence[Kpi]) -> Table:
         """Return some key figures, one row for each value; a missed limit is marked."""
@@ -195,7 +220,8 @@ class BenchRange(Answer):
 
         captions = {
             "curves": "The values on top of each other, in the color that the scale shows.",
-            "kpis": "Key figures over the value; dotted, the limit; crosses miss it. What is the "
+            "kpis": "Key figures over the value, with their error from the step where it is seen; "
+            "dotted, the limit; crosses miss it. What is the "
             "same for all values, or nowhere defined, is left out.",
         }
         blocks: list[Block] = [
@@ -235,19 +261,12 @@ class BenchRange(Answer):
                 {
                     "value": value,
                     "status": result.status,
-                    "kpis": {
-                        k.name: {
-                            "value": k.value, "unit": k.unit, "note": k.note, "error": k.error,
-                        } for k in result.kpis
-                    },
-                    "requirements": [
-                        {"kpi": v.kpi, "limit": v.limit, "value": v.value, "unit": v.unit,
-                         "met": v.met, "outcome": v.outcome, "error": v.error}
-                        for v in result.verdicts
-                    ],
+                    "kpis": {kpi.name: kpi_record(kpi) for kpi in result.kpis},
+                    "requirements": [verdict_record(verdict) for verdict in result.verdicts],
                 }
                 for value, result in zip(self.values, self.results, strict=True)
             ],
+            "distinct": self._distinct,
             "warnings": self.warnings,
         }  # fmt: skip
 

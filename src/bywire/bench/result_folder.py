@@ -78,6 +78,22 @@ def read_result(folder: Path) -> FolderResult:
     return FolderResult(name, recordings, kpis, verdicts, status)
 
 
+def kpi_record(kpi: Kpi) -> dict[str, Any]:
+    """Return what JSON says of a key figure, which has null for infinite and unknown errors."""
+    return {
+        "value": kpi.value, "unit": kpi.unit, "note": kpi.note,
+        "error": kpi.error, "error_estimated": not math.isnan(kpi.error),
+    }  # fmt: skip
+
+
+def verdict_record(verdict: Verdict) -> dict[str, Any]:
+    """Return what a JSON object says of a requirement."""
+    return {
+        "kpi": verdict.kpi, "limit": verdict.limit, "value": verdict.value, "unit": verdict.unit,
+        "met": verdict.met, "outcome": verdict.outcome, "error": verdict.error,
+    }  # fmt: skip
+
+
 def _record(folder: Path) -> dict[str, Any]:
     path = folder / RECORD
     if not folder.is_dir():
@@ -103,7 +119,11 @@ def _recording(path: Path) -> xr.Dataset:
 
 
 def _kpi(name: str, record: Mapping[str, Any]) -> Kpi:
-    return Kpi(name, _number(record["value"]), str(record["unit"]), "", str(record.get("note", "")))
+    error = _number(record.get("error"))
+    if math.isnan(error) and record.get("error_estimated"):
+        error = math.inf
+    value, unit = _number(record["value"]), str(record["unit"])
+    return Kpi(name, value, unit, "", str(record.get("note", "")), error)
 
 
 def _verdict(record: Mapping[str, Any]) -> Verdict:

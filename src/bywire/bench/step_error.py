@@ -35,6 +35,24 @@ def of_difference(factor: float) -> float:
     return 1.0 / abs(1.0 - factor**2)
 
 
+def are_distinct(values: Sequence[float], errors: Sequence[float]) -> bool:
+    """Return whether values differ by more than they may be off: any two of them are enough.
+
+    Errors that were not estimated (NaN) count as none. What is not defined (NaN) differs from what
+    is, unless an error is infinite.
+
+    Examples
+    --------
+    >>> are_distinct([1.0, 1.1], [0.06, 0.06]), are_distinct([1.0, 1.1], [0.06, 0.01])
+    (False, True)
+    """
+    each = np.asarray(values, dtype=float)
+    off = np.nan_to_num(np.asarray(errors, dtype=float), nan=0.0, posinf=np.inf)
+    if np.isnan(each).any():
+        return not np.isnan(each).all() and bool(np.isfinite(off).all())
+    return bool(np.max(each - off) > np.min(each + off))
+
+
 def with_step_errors(
     kpis: Sequence[Kpi],
     others: Mapping[float, Sequence[Kpi]],

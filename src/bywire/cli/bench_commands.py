@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
+from bywire.cli.options import BenchChanges, ErrorEstimate, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
 
 
@@ -41,9 +41,7 @@ def run(
     over: Annotated[
         str, typer.Option(help="Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
     ] = "",
-    error_estimate: Annotated[
-        bool, typer.Option(help="Run in other steps too, for the error of all figures.")
-    ] = True,
+    error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
+from bywire.cli.options import BenchChanges, ErrorEstimate, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
 
 
@@ -24,6 +24,7 @@ def compare(
     full: Annotated[
         bool, typer.Option("--full", help="Show settings and key figures that are the same, too.")
     ] = False,
+    error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -32,7 +33,8 @@ def compare(
 
     show(
         lambda progress: compare_runs(
-            *runs, overrides=changes(set_), is_full=full, progress=progress
+            *runs, overrides=changes(set_), is_full=full, progress=progress,
+            estimate_error=error_estimate,
         ),
         out, json,
     )  # fmt: skip

@@ -31,6 +31,9 @@ BenchChanges = Annotated[
     list[str] | None,
     typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
 ]
+ErrorEstimate = Annotated[
+    bool, typer.Option(help="Run in other steps too, for the error of all figures.")
+]
 Frequencies = Annotated[
     str, typer.Option(help="Frequencies, e.g. '1 Hz:150 Hz:20', or a list.")
 ]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -65,8 +65,11 @@ def kpi_curves(varied: Varied) -> Figure:
     abscissa = np.array([in_display_unit(v, varied.unit)[0] for v in varied.values])
     for axes, name in zip(grid.flat, shown, strict=False):
         style.dress(axes)
-        values, unit = shown[name]
+        values, errors, unit = shown[name]
         factor = in_display_unit(1.0, unit)[0]
+        known = np.isfinite(errors)
+        axes.errorbar(abscissa[known], factor * values[known], factor * errors[known],
+                      fmt="none", ecolor=style.BLUE, elinewidth=0.8, capsize=2.0)  # fmt: skip
         axes.plot(abscissa, factor * values, color=style.BLUE, linewidth=1.0, marker="o",
                   markersize=3.0)  # fmt: skip
         if name in varied.bench.requirements:
@@ -87,14 +90,13 @@ def kpi_curves(varied: Varied) -> Figure:
     return figure
 
 
-def _curves(varied: Varied) -> dict[str, tuple[Array, str]]:
-    """Return value by case, and unit, of every key figure by name."""
+def _curves(varied: Varied) -> dict[str, tuple[Array, Array, str]]:
+    """Return value and error by case, and unit, of every key figure by name."""
     units = {kpi.name: kpi.unit for result in varied.results for kpi in result.kpis}
-    each: Sequence[Mapping[str, float]] = [
-        {kpi.name: kpi.value for kpi in result.kpis} for result in varied.results
-    ]
+    each = [{kpi.name: (kpi.value, kpi.error) for kpi in r.kpis} for r in varied.results]
+    lacking = (math.nan, math.nan)
     return {
-        name: (np.array([known.get(name, math.nan) for known in each]), unit)
+        name: (*np.array([known.get(name, lacking) for known in each]).T, unit)
         for name, unit in units.items()
     }
 

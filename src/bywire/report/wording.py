@@ -100,6 +100,8 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     ('62.2 ms', '25.01 bar')
     >>> measured_amount(5.0823, "percent", 0.2), measured_amount(3.1416, "1", 0.0)
     ('5.1 %', '3.142')
+    >>> measured_amount(0.0, "bar", 1e-10), measured_amount(0.004, "1", 0.02)
+    ('0 bar', '0.00')
     """
     if value is None or not (math.isfinite(value) and math.isfinite(error)):
         return amount(value, symbol, digits)
@@ -111,7 +113,9 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
         figures = f"{number:.{digits}g}"
         figures = f"{float(figures):g}" if "e+" in figures else figures
     else:
-        figures = f"{round(number, -last):.{max(0, -last)}f}"
+        rounded = round(number, -last)
+        is_nothing = rounded == 0 and -last >= digits  # many zeros tell no more than a single digit
+        figures = "0" if is_nothing else f"{rounded:.{max(0, -last)}f}"
     written = unit_text(unit)
     return figures + (f" {written}" if written else "")
 
