@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import read
+from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import judge
@@ -81,6 +83,74 @@ def test_coarser_steps_that_fail_cost_no_result(monkeypatch):
     fine = {each.name: each.value for each in run(replace(bench, step=0.5 * bench.step)).kpis}
     (energy,) = (each for each in kpis if each.name == "energy")
     assert energy.error == pytest.approx(abs(energy.value - fine["energy"]) / 0.75, rel=1e-3)
+
+
+@pytest.mark.parametrize("is_range", [False, True])
+def test_that_no_other_step_runs_is_said(monkeypatch, is_range):
+    """Neither half nor double: the figures stand, without an error, and the reason is a warning."""
+    bench = read("hard-braking", {"options.duration": "40 ms", "options.settle": "10 ms"})
+
+    def stubborn(each, **options):
+        if each.step != bench.step:
+            raise RunError("left the numbers")
+        return simulate(each, **options)
+
+    monkeypatch.setattr("bywire.bench.running.simulate", stubborn)
+    monkeypatch.setattr("bywire.bench.ensemble.simulate", stubborn)
+    monkeypatch.setattr("bywire.bench.ensemble.fit_lanes", lambda runs: False)
+    results = run_benches([bench, bench], estimate_error=True) if is_range else (
+        run(bench, estimate_error=True),
+    )  # fmt: skip
+    for result in results:
+        (said,) = (text for text in result.warnings if "not known" in text)
+        assert "neither half nor double steps (0.5 of the step: left the numbers; 2 " in said
+        assert all(math.isnan(kpi.error) for kpi in result.kpis)
+        assert not math.isnan(result.kpi("energy").value)
+
+
+def test_that_a_case_of_a_range_has_no_other_step_costs_the_others_nothing(monkeypatch):
+    benches = [
+        read("hard-braking", {"options.duration": "40 ms", "options.settle": "10 ms",
+                              "motor.R_m": f"{R_m} ohm"}) for R_m in (0.3, 0.4)
+    ]  # fmt: skip
+
+    def fragile(each, **options):
+        if each.step != benches[0].step and each.par.motor.R_m == 0.3:
+            raise RunError("left the numbers")
+        return simulate(each, **options)
+
+    monkeypatch.setattr("bywire.bench.ensemble.simulate", fragile)
+    monkeypatch.setattr("bywire.bench.ensemble.fit_lanes", lambda runs: False)
+    first, second = run_benches(benches, estimate_error=True)
+    assert first.unestimated
+    assert not second.unestimated
+    assert second.kpi("energy").error > 0.0
+
+
+def test_a_time_read_at_a_row_is_no_sharper_than_the_rows():
+    t = 1e-3 * np.arange(200)
+    rows = {"run": xr.Dataset(coords={"time": ("time", t)})}
+
+    def error(value: float) -> float:
+        figure = Kpi("stop", value, "s", "Of this test.")
+        return with_step_errors([figure], {0.5: [figure]}, rows)[0].error
+
+    assert error(0.057) == pytest.approx(1e-3)
+    assert error(float(t[150] - t[31])) == pytest.approx(1e-3)
+    assert error(0.0573) == 0.0  # interpolated
+    assert error(0.0) == 0.0
+    power = Kpi("power", 0.057, "W", "Of this test.")
+    assert with_step_errors([power], {0.5: [power]}, rows)[0].error == 0.0
+
+
+def test_standing_wedge_brake_says_how_far_rows_leave_its_times_open():
+    result = run(read("power-off-hold", {}), estimate_error=True)
+    rest = result.kpi("time_to_rest")
+    t = result.recording["time"].values
+    assert rest.value > 0.0
+    assert rest.error >= t[-1] - t[-2]
+    fine = run(read("power-off-hold", {"simulation.record": "100 us"})).kpi("time_to_rest")
+    assert abs(fine.value - rest.value) <= rest.error
 
 
 def random_bench(rng: np.random.Generator) -> Bench:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
@@ -278,9 +278,7 @@ def run(
 
         return run_over(bench, over, progress, engine, estimate_error)
     result = running.run(bench, progress, engine, estimate_error)
-    return BenchResult(
-        result.bench, result.recordings, result.kpis, result.verdicts, result.status
-    )
+    return BenchResult(**{each.name: getattr(result, each.name) for each in fields(result)})
 
 
 def _remark(verdict: Verdict) -> str:

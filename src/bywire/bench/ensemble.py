@@ -16,8 +16,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.extent import check_memory
 from bywire.bench.result import Result
 from bywire.bench.running import Progress, judged, recording_of, run_of, static_recordings
-from bywire.bench.step_error import OTHER_STEPS
-from bywire.core.errors import InputError, ParameterError, RunError, StepError, unknown_name
+from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
+from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
@@ -211,13 +211,25 @@ def run_benches(
     """
     recordings = _recordings(benches, progress, engine, threads)
     others: list[dict[float, dict[str, xr.Dataset]]] = [{} for _ in benches]
+    failures: list[dict[float, Exception]] = [{} for _ in benches]
     for factor in OTHER_STEPS if estimate_error else ():
-        with suppress(StepError, RunError):  # no divisor of a sample time, or too coarse
+        with suppress(*NO_ESTIMATE):
             finer = [replace(bench, step=factor * bench.step) for bench in benches]
             computed = _recordings(finer, progress, engine, threads)
             for each, further in zip(others, computed, strict=True):
                 each[factor] = further
-    return tuple(map(judged, benches, recordings, others))
+            continue
+        for bench, each, failed in zip(benches, others, failures, strict=True):
+            try:  # a single case may be what keeps them from running side by side
+                other = replace(bench, step=factor * bench.step)
+                (each[factor],) = _recordings([other], progress, engine, threads)
+            except NO_ESTIMATE as error:
+                failed[factor] = error
+    results = map(judged, benches, recordings, others)
+    return tuple(
+        replace(result, unestimated=unestimated(failed)) if failed and not each else result
+        for result, each, failed in zip(results, others, failures, strict=True)
+    )
 
 
 def _recordings(

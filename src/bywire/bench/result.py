@@ -25,6 +25,8 @@ class Result:
         ``done`` (nothing was required), ``passed``, ``failed`` (a requirement was not met),
         ``undecided`` (one is no further from its limit than its error from the step) or
         ``interrupted``.
+    unestimated
+        Why the error from the step is not known although it was asked for; empty where it is.
     """
 
     bench: Bench
@@ -32,6 +34,7 @@ class Result:
     kpis: tuple[Kpi, ...]
     verdicts: tuple[Verdict, ...]
     status: str
+    unestimated: str = ""
 
     @property
     def recording(self) -> xr.Dataset:
@@ -57,9 +60,10 @@ class Result:
     @property
     def warnings(self) -> list[str]:
         """What the user should know of the runs."""
-        return [
+        said = [
             f"{label}: {text}" if len(self.recordings) > 1 else text
             for label, recording in self.recordings.items()
             for text in str(recording.attrs.get("warnings", "")).split("; ")
             if text
         ]
+        return said + ([self.unestimated] if self.unestimated else [])

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
@@ -20,9 +19,14 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.recording import record
 from bywire.bench.requirements import judge, status_of
 from bywire.bench.result import Result
-from bywire.bench.step_error import OTHER_STEPS, note_step_errors, with_step_errors
+from bywire.bench.step_error import (
+    NO_ESTIMATE,
+    OTHER_STEPS,
+    note_step_errors,
+    unestimated,
+    with_step_errors,
+)
 from bywire.bench.stimuli.registry import Stimulus
-from bywire.core.errors import RunError, StepError
 from bywire.core.interrupts import interrupt_heard, interrupts_deferred
 from bywire.core.signals import signals_of
 from bywire.simulation.engine import prepare
@@ -51,7 +55,8 @@ def run(
         Whether all runs are made again in half steps, and in double ones where these divide the
         sample times: key figures and recorded signals then say how large their error from the
         step is, and a requirement closer to its limit than that is undecided. It takes 2.5 times
-        as many substeps more. Steps in which a run fails are left out.
+        as many substeps more. Steps in which a run fails are left out; where none is left, the
+        result warns of it.
 
     Raises
     ------
@@ -62,21 +67,25 @@ def run(
     """
     recordings: dict[str, xr.Dataset] = {}
     others: dict[float, dict[str, xr.Dataset]] = {}
+    failures: dict[float, Exception] = {}
     is_complete = False
     try:
         _make_runs(bench, recordings, progress, engine)
         is_complete = True
         for factor in OTHER_STEPS if estimate_error else ():
-            with suppress(StepError, RunError):  # no divisor of a sample time, or too coarse
+            try:
                 other = replace(bench, step=factor * bench.step)
                 made: dict[str, xr.Dataset] = {}
                 _make_runs(other, made, progress, engine, f", {factor:g} of the step")
                 others[factor] = made
+            except NO_ESTIMATE as error:
+                failures[factor] = error
     except KeyboardInterrupt:  # also from outside the engine, which keeps what it has
         interrupt_heard()
         kpis = judged(bench, recordings).kpis if is_complete else ()
         return Result(bench, recordings, kpis, (), "interrupted")
-    return judged(bench, recordings, others)
+    result = judged(bench, recordings, others)
+    return result if others or not failures else replace(result, unestimated=unestimated(failures))
 
 
 def _make_runs(

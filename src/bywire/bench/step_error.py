@@ -9,19 +9,23 @@ both differences may be small by chance: the larger estimate counts.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from bywire.bench.kpis.kpi import Kpi
+from bywire.core.errors import RunError, StepError
 from bywire.core.typing import Array
 
 OTHER_STEPS = (0.5, 2.0)
 """other steps over that of the run"""
+NO_ESTIMATE = (StepError, RunError)
+"""what runs in other steps may end with: no divisor of a sample time, or too coarse"""
 ROUNDING = 1e-11
 """rounding of many steps, over the largest value of a signal"""
+_SAME = 1e-10  # s, between a time and that of the row where it was read
 
 
 def of_difference(factor: float) -> float:
@@ -33,6 +37,15 @@ def of_difference(factor: float) -> float:
     (1.3333, 0.3333)
     """
     return 1.0 / abs(1.0 - factor**2)
+
+
+def unestimated(failures: Mapping[float, Exception]) -> str:
+    """Return the warning that no other step ran, by why each, over that of the run, did not."""
+    because = "; ".join(f"{factor:g} of the step: {e}" for factor, e in failures.items())
+    return (
+        "how far the figures are off by the step is not known: the bench runs in neither half nor "
+        f"double steps ({because})"
+    )
 
 
 def are_distinct(values: Sequence[float], errors: Sequence[float]) -> bool:
@@ -67,13 +80,15 @@ def with_step_errors(
     others
         The same figures in other steps, by their length over that of the runs.
     recordings
-        The runs: a difference of large forces, all but zero, is no better than their rounding.
+        The runs: a difference of large forces, all but zero, is no better than their rounding, and
+        a time that is one of a row was read there, at most an interval away from its event.
 
     Returns
     -------
     tuple of Kpi
         With ``error`` in the unit of each; infinite where not every step defines a figure.
     """
+    intervals = _intervals(recordings)
     rounding = {unit: ROUNDING * peak for unit, peak in _peaks(recordings).items()}
     by_name = {factor: {each.name: each.value for each in made} for factor, made in others.items()}
 
@@ -81,7 +96,8 @@ def with_step_errors(
         errors = [
             _error(kpi.value, values[kpi.name], factor) for factor, values in by_name.items()
         ]
-        return replace(kpi, error=max(errors) + rounding.get(kpi.unit, 0.0))
+        reading = _reading(kpi.value, intervals) if kpi.unit == "s" else 0.0
+        return replace(kpi, error=max(errors) + rounding.get(kpi.unit, 0.0) + reading)
 
     return tuple(map(estimated, kpis))
 
@@ -128,6 +144,20 @@ def _peaks(recordings: Mapping[str, xr.Dataset]) -> dict[str, float]:
             if signal.size and unit != "1":
                 peaks[unit] = max(float(np.max(np.abs(signal.values))), peaks.get(unit, 0.0))
     return peaks
+
+
+def _intervals(recordings: Mapping[str, xr.Dataset]) -> set[float]:
+    """Return the intervals of the rows [s]."""
+    times = [r["time"].values for r in recordings.values() if r.sizes.get("time", 0) > 1]
+    return {float(t[-1] - t[0]) / (t.size - 1) for t in times}
+
+
+def _reading(time: float, intervals: Iterable[float]) -> float:
+    """Return how far an event may be from its time [s]: zero unless that is one of a row."""
+    if not math.isfinite(time) or abs(time) < _SAME:  # what begins with the run is exact
+        return 0.0
+    at_rows = (each for each in intervals if abs(math.remainder(time, each)) < _SAME)
+    return max(at_rows, default=0.0)
 
 
 def _error(value: float, other: float, factor: float) -> float:

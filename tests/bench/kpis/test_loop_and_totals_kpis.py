@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.kpis import effort, hysteresis, occupation, registry
+from bywire.bench.kpis import effort, hysteresis, occupation, registry, release
 from bywire.bench.kpis.smoothing import smoothed
 
 LAG = 0.3
@@ -119,3 +119,14 @@ def test_every_figure_is_declared_for_listings():
     for figure in found.values():
         assert figure.definition.endswith(".")
         assert figure.unit
+
+
+def test_time_to_empty_lies_between_the_rows():
+    """Of exp(-t / T) below a level: T ln(1 / level), though rows are 10 ms apart."""
+    t = np.arange(0.0, 2.0, 1e-2)
+    p = ("time", np.exp(-t / 0.4), {"units": "Pa"})
+    recording = xr.Dataset({"p": p}, {"time": ("time", t)})
+    found = registry.evaluate("release", recording, release.Setting("p", 0.1))
+    exact = 0.4 * math.log(10.0)
+    assert found["time_to_empty"].value == pytest.approx(exact, abs=1e-2**2 / 8 / 0.4)
+    assert abs(np.min(np.abs(t - exact))) > 1e-3

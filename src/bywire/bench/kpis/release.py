@@ -71,14 +71,16 @@ def select(recording: xr.Dataset, setting: Setting) -> Release:
 def time_to_empty(data: Release) -> float | Undefined:
     """Time from the release until the output stays below the level that counts as empty.
 
-    The first sample below it counts, after the last one above.
+    Interpolated between the last sample above it and the next one.
     """
     above = np.flatnonzero(data.y > data.empty)
     if not above.size:
         return 0.0
-    if above[-1] + 1 == data.t.size:
+    k = int(above[-1])
+    if k + 1 == data.t.size:
         return Undefined("it does not empty in the recorded time")
-    return float(data.t[above[-1] + 1])
+    share = (data.y[k] - data.empty) / (data.y[k] - data.y[k + 1])
+    return float(data.t[k] + share * (data.t[k + 1] - data.t[k]))
 
 
 @measure("level")
