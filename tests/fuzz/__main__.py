@@ -1,19 +1,26 @@
 """Try generated input: ``python tests/fuzz --seed 1 --cases 400`` (from the repository's root).
 
-Of each kind as many cases, or those of ``--kind``; ``--first 17 --cases 1`` repeats one. What is
-wrong is listed with kind and number, and the status is 1. Kills take seconds each: ``--kills 30``.
+Of each kind as many cases, or those of ``--kind``, all in one process; ``--first 17 --cases 1``
+repeats one. Benches and commands are admissible but for a quarter, which has a defect; how many of
+the others gave a result is said. What is wrong is listed with kind and number, and the status is 1.
+Seconds each take commands that are killed or interrupted (``--kills 30 --interrupts 30``), and
+those that are compared with the same in a process of its own (``--alone 30``).
 """
 
 from __future__ import annotations
 
 import argparse
 import faulthandler
+import math
+import signal
 import sys
 import tempfile
 import time
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from itertools import islice
 from pathlib import Path
 from random import Random
@@ -22,31 +29,30 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from fuzz import inputs, kills
-from fuzz.judge import Verdict, judged
+from fuzz import inputs, kills, sound
+from fuzz.judge import Verdict, judged, judged_alone
 
 
 def bench(rng: Random, folder: Path) -> Verdict:
     """Run a generated bench file."""
     path = folder / "bench.toml"
-    path.write_text(inputs.bench_text(rng), encoding="utf-8")
-    return judged(["run", str(path)])
+    text, is_sound = inputs.bench_text(rng)
+    path.write_text(text, encoding="utf-8")
+    return replace(judged(["run", str(path)]), is_sound=is_sound)
 
 
 def command(rng: Random, folder: Path) -> Verdict:
     """Run a generated command line."""
-    return judged(inputs.command_line(rng, folder))
+    words, is_sound = inputs.command_line(rng, folder)
+    return replace(judged(words), is_sound=is_sound)
 
 
 def extreme(rng: Random, folder: Path) -> Verdict:
     """Run an experiment with parameters that are off by many powers of ten."""
-    name = rng.choice(list(inputs.SETS))
+    trial, name, entries = sound.quick(rng)
     path = folder / "bench.toml"
-    experiment = inputs.SETS[name]
-    lines = [f'experiment = "{experiment}"', f'parameters = "{name}"', "[options]"]
-    path.write_text("\n".join([*lines, inputs.QUICK[experiment]]), encoding="utf-8")
-    sets = [word for each in inputs.extreme(rng, name) for word in ("--set", each)]
-    return judged(["run", str(path), *sets])
+    path.write_text(sound.as_toml(rng, trial.experiment, name, entries), encoding="utf-8")
+    return judged(["run", str(path), *inputs.extreme(rng, name)])
 
 
 def measurement(rng: Random, folder: Path) -> Verdict:
@@ -56,7 +62,8 @@ def measurement(rng: Random, folder: Path) -> Verdict:
     if ending in (".csv", ".tsv") and rng.random() < 0.5:
         path.write_bytes(inputs.table(rng))
     else:
-        path.write_bytes(inputs.damaged(rng, inputs.sound_file(ending, folder)))
+        content = inputs.sound_file(ending, folder)
+        path.write_bytes(content if rng.random() < 0.3 else inputs.damaged(rng, content))
     target = folder / "out.csv"
     target.unlink(missing_ok=True)
     if rng.random() < 0.8:
@@ -71,9 +78,9 @@ KINDS: dict[str, Callable[[Random, Path], Verdict]] = {
 }  # fmt: skip
 
 
-def tried(kind: str, seed: int, first: int, cases: int, seconds: float) -> list[str]:
-    """Try cases of a kind and return what is wrong."""
-    wrong, statuses = [], Counter[int]()
+def tried(kind: str, seed: int, first: int, cases: int, seconds: float) -> tuple[list[str], float]:
+    """Try cases of a kind and return what is wrong, and the share of sound ones with a result."""
+    wrong, statuses, through = [], Counter[int](), Counter[bool]()
     give_up = time.process_time() + seconds
     with tempfile.TemporaryDirectory() as folder:
         for k, rng in islice(inputs.numbered(seed, kind), first, first + cases):
@@ -83,25 +90,43 @@ def tried(kind: str, seed: int, first: int, cases: int, seconds: float) -> list[
             verdict = KINDS[kind](rng, Path(folder))
             faulthandler.cancel_dump_traceback_later()
             statuses[verdict.status] += 1
+            if verdict.is_sound:
+                through[verdict.status in (0, 1)] += 1
             if verdict.wrong:
                 wrong.append(f"{kind} {k} of seed {seed}: {verdict.wrong}")
                 print(wrong[-1], flush=True)
     counts = ", ".join(f"{n} with status {s}" for s, n in sorted(statuses.items()))
+    if through:
+        counts += f"; {through[True]} of {through.total()} sound ones gave a result"
     print(f"{kind}: {statuses.total()} cases: {counts}; wrong: {len(wrong)}", flush=True)
-    return wrong
+    return wrong, through[True] / through.total() if through else math.nan
 
 
-def killed(seed: int, first: int, cases: int) -> list[str]:
-    """Kill and interrupt commands and return what is wrong."""
+def each_in(
+    kind: str, seed: int, first: int, cases: int, case: Callable[[Random, Path], str]
+) -> list[str]:
+    """Try cases in a folder each, and return what is wrong."""
     wrong = []
-    for k, rng in islice(inputs.numbered(seed, "kill"), first, first + cases):
+    for k, rng in islice(inputs.numbered(seed, kind), first, first + cases):
         with tempfile.TemporaryDirectory() as folder:
-            found = kills.case(rng, Path(folder))
+            found = case(rng, Path(folder))
         if found:
-            wrong.append(f"kill {k} of seed {seed}: {found}")
+            wrong.append(f"{kind} {k} of seed {seed}: {found}")
             print(wrong[-1], flush=True)
-    print(f"kill: {cases} cases; wrong: {len(wrong)}", flush=True)
+    print(f"{kind}: {cases} cases; wrong: {len(wrong)}", flush=True)
     return wrong
+
+
+def alone(rng: Random, folder: Path) -> str:
+    """Run a command here and in a process of its own."""
+    return judged_alone(inputs.command_line(rng, folder)[0])
+
+
+ONE_BY_ONE: dict[str, Callable[[Random, Path], str]] = {
+    "kills": partial(kills.case, sign=signal.SIGKILL),
+    "interrupts": partial(kills.case, sign=signal.SIGINT),
+    "alone": alone,
+}
 
 
 def main() -> int:
@@ -112,15 +137,17 @@ def main() -> int:
     parser.add_argument("--cases", type=int, default=100, help="of each kind")
     parser.add_argument("--seconds", type=float, default=1e9, help="of a processor, each kind")
     parser.add_argument("--kind", choices=list(KINDS), action="append")
-    parser.add_argument("--kills", type=int, default=0)
+    for kind in ONE_BY_ONE:
+        parser.add_argument(f"--{kind}", type=int, default=0)
     asked = parser.parse_args()
     warnings.simplefilter("ignore")
     limited_source.SECONDS = 5.0
     wrong: list[str] = []
     for kind in asked.kind or KINDS:
-        wrong += tried(kind, asked.seed, asked.first, asked.cases, asked.seconds)
-    if asked.kills:
-        wrong += killed(asked.seed, asked.first, asked.kills)
+        wrong += tried(kind, asked.seed, asked.first, asked.cases, asked.seconds)[0]
+    for kind, case in ONE_BY_ONE.items():
+        if count := getattr(asked, kind):
+            wrong += each_in(kind, asked.seed, asked.first, count, case)
     return 1 if wrong else 0
 
 

@@ -14,11 +14,8 @@ import xarray as xr
 from bywire.core.catalog import parameters
 from bywire.core.parameters import leaf_fields
 from bywire.data.writing import write_measurement
+from fuzz import commands, sound
 
-SETS = {"dardanelli2010": "hard-braking", "roberts2003": "moment-pulses"}
-"""parameter sets, and an experiment that is quick with each"""
-
-QUICK = {"hard-braking": 'duration = "40 ms"\nsettle = "10 ms"\n', "moment-pulses": ""}
 ENDINGS = (".csv", ".tsv", ".nc", ".mat", ".h5", ".parquet", ".mf4")
 _NUMBERS = (
     "0", "-1", "1", "1e-300", "1e300", "5e-324", "1.7e308", "1e400", "nan", "inf", "-inf",
@@ -31,7 +28,8 @@ _UNITS = ("", " s", " mm", " bar", " Pa", " ohm", " V", " A", " %", " N*m", " kg
 _NAMES = ("x" * 400, "", " ", "a.b.c", "motor.R_m ", "motor.r_m", "../../x", "\u202e", "\x1b[31m",
           "options.duration", "simulation.step", "simulation.record", "simulation.seed",
           "requirements.overshoot", "stimulus.kind", "parameters", "experiment")  # fmt: skip
-_LOOPS = ("current", "pressure", "position", "moment", "drive-current", "nowhere")
+DEFECTS = 0.25
+"""share of benches and commands with a defect"""
 
 
 @cache
@@ -58,74 +56,65 @@ def value(rng: Random) -> str:
     return number(rng) + rng.choice(_UNITS)
 
 
-def changes(rng: Random, name: str) -> list[str]:
-    """Return changes of a bench as ``--set`` takes them, most of them of the right unit."""
-    texts = []
-    for _ in range(rng.randrange(1, 4)):
-        key = rng.choice(list(leaves(name))) if rng.random() < 0.8 else rng.choice(_NAMES)
-        unit = leaves(name).get(key, (0.0, ""))[1]
-        right = f"{number(rng)} {'' if unit == '1' else unit}"
-        texts.append(f"{key}={right if rng.random() < 0.7 else value(rng)}")
-    return texts
-
-
 def extreme(rng: Random, name: str) -> list[str]:
-    """Return changes that scale parameters by many powers of ten."""
+    """Return words of a command that scale parameters by many powers of ten."""
     texts = []
     for key in rng.sample(sorted(leaves(name)), rng.randrange(1, 4)):
         size, unit = leaves(name)[key]
         scaled = size * 10 ** rng.uniform(-12, 12)
-        texts.append(f"{key}={scaled:.6g} {'' if unit == '1' else unit}")
+        texts += ["--set", f"{key}={scaled:.6g} {'' if unit == '1' else unit}"]
     return texts
 
 
-def bench_text(rng: Random) -> str:
-    """Return a bench file, in order or not."""
-    name = rng.choice(list(SETS))
-    experiment = SETS[name]
-    lines = [f'experiment = "{experiment}"', f'parameters = "{name}"', "[set]"]
-    for each in changes(rng, name):
-        key, _, text = each.partition("=")
-        shown = text if rng.random() < 0.02 else f'"{text.strip()}"'
-        lines.append(
-            f'"{key}" = {shown}' if "." in key or rng.random() < 0.9 else f"{key} = {shown}"
-        )
-    lines += ["[options]", QUICK[experiment]]
-    if rng.random() < 0.3:
-        lines += [
-            "[simulation]",
-            f'{rng.choice(("step", "record", "seed", "stpe"))} = "{value(rng)}"',
-        ]
-    text = "\n".join(lines) + "\n"
-    if rng.random() < 0.1:  # what an editor or a disk may do to it
-        place = rng.randrange(len(text))
-        text = text[:place] + rng.choice(("", '"', "]", "\n", "\x00", "=", "é")) + text[place + 1 :]
-    return text
+def with_defect(rng: Random, entries: sound.Entries) -> sound.Entries:
+    """Return entries of a bench of which a key or a value is wrong, or nearly so."""
+    key = rng.choice(list(entries))
+    kept = {name: text for name, text in entries.items() if name != key}
+    text, unit = entries[key], rng.choice(_UNITS)
+    quantity = text.partition(" ")[0]
+    return kept | rng.choice((
+        {key: value(rng)},
+        {key: number(rng) + text.removeprefix(quantity)},
+        {key: quantity + unit},
+        {key: f"-{text}"},
+        {key: text[: rng.randrange(len(text))]},
+        {key: f"{text}, {text}"},
+        {rng.choice(_NAMES): text},
+        {key[: rng.randrange(len(key))] + rng.choice("xR.") + key[rng.randrange(len(key)) :]: text},
+        {key: text, f"simulation.{rng.choice(('step', 'record', 'seed', 'stpe'))}": value(rng)},
+    ))  # fmt: skip
 
 
-def command_line(rng: Random, folder: Path) -> list[str]:
-    """Return a command with arguments that are right, nearly right, or wrong."""
-    name = rng.choice(list(SETS))
-    sets = list(itertools.chain.from_iterable(("--set", each) for each in changes(rng, name)))
-    word = rng.choice([*_NAMES, *leaves(name), *_LOOPS, SETS[name], name])
-    loop, key = rng.choice(_LOOPS), rng.choice(("step", "record", "seed"))
-    choices = [
-        ["list", word],
-        ["run", SETS[name], *sets],
-        ["run", word, *sets],
-        ["margins", loop, *sets],
-        ["linearize", rng.choice(("motorcycle-plant", "wedge-plant", loop)), *sets],
-        ["run", SETS[name], "--set", f"options.duration={value(rng)}"],
-        ["run", SETS[name], "--set", f"simulation.{key}={value(rng)}"],
-        ["convert", str(folder / word[:80]), str(folder / "out.csv")],
-        ["replay", str(folder / "none.csv"), "--bench", word[:80] or "x"],
-        ["identify", word, "--synthetic", value(rng)],
-        [word, *sets],
-    ]  # fmt: skip
-    words = rng.choice(choices)
-    if rng.random() < 0.1:
-        words.insert(rng.randrange(len(words) + 1), rng.choice(("--", "--out", "--json", "-x", "")))
-    return [word.replace("\x00", "") for word in words]
+def bench_text(rng: Random) -> tuple[str, bool]:
+    """Return a bench file, and whether it is one without a defect."""
+    experiment, name, entries = sound.bench(rng)
+    if rng.random() > DEFECTS:
+        return sound.as_toml(rng, experiment, name, entries), True
+    if rng.random() < 0.7:
+        return sound.as_toml(rng, experiment, name, with_defect(rng, entries)), False
+    text = sound.as_toml(rng, experiment, name, entries)
+    place = rng.randrange(len(text))  # what an editor or a disk may do to it
+    damage = rng.choice(("", '"', "]", "\n", "\x00", "=", "é", "[set]\n"))
+    return text[:place] + damage + text[place + 1 :], False
+
+
+def command_line(rng: Random, folder: Path) -> tuple[list[str], bool]:
+    """Return a command, and whether its arguments are right; a file that it reads is written."""
+    words = commands.command(rng, folder)
+    if rng.random() > DEFECTS:
+        return words, True
+    k = rng.randrange(len(words))
+    other = rng.choice((
+        rng.choice(_NAMES), value(rng), "--", "--out", "--json", "-x", "", words[k] + "x",
+        words[k][: len(words[k]) // 2], rng.choice(words),
+    ))  # fmt: skip
+    kind = rng.randrange(4)
+    words = (
+        [*words[:k], other, *words[k + 1 :]] if kind < 2
+        else [*words[:k], other, *words[k:]] if kind == 2
+        else [*words[:k], *words[k + 1 :]]
+    )  # fmt: skip
+    return [word.replace("\x00", "") for word in words], False
 
 
 @cache

@@ -5,14 +5,18 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import signal
+import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import cache
 from types import FrameType
 from typing import Any
 
 import numpy as np
+import typer.main
 
 import bywire.api.run as run_module
 from bywire.bench.energy_ledger import actuator_ledger
@@ -25,16 +29,21 @@ LONGEST = 5000
 """characters of what is said on standard error"""
 
 
+# The commands' parameters are looked up once a process, and not in every case.
+typer.main.get_command = cache(typer.main.get_command)
+
+
 class Hang(BaseException):
     """A case that takes too long."""
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """Exit status, and what is wrong; nothing where all is well."""
+    """Exit status, what is wrong (nothing where all is well), and whether the input had defects."""
 
     status: int
     wrong: str
+    is_sound: bool = False
 
 
 @contextlib.contextmanager
@@ -92,6 +101,20 @@ def judged(words: Sequence[str]) -> Verdict:
     return Verdict(status if isinstance(status, int) else -1, _wrong(status, out, err, results))
 
 
+def judged_alone(words: Sequence[str]) -> str:
+    """Run a command in a process of its own too, and return what is not the same there."""
+    here = judged(words)
+    process = subprocess.run(
+        [sys.executable, "-m", "bywire.cli", *words, "--json"], capture_output=True, text=True,
+        timeout=10 * SECONDS, check=False,
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))},
+    )  # fmt: skip
+    out, err = io.StringIO(process.stdout), io.StringIO(process.stderr)
+    if process.returncode != here.status:
+        return f"status {here.status} here, {process.returncode} in its process: {words}"
+    return here.wrong or _wrong(process.returncode, out, err, [])
+
+
 def _wrong(status: Any, out: io.StringIO, err: io.StringIO, results: list[Any]) -> str:
     said, shown = err.getvalue(), out.getvalue()
     if "Hang" in said:
@@ -111,7 +134,8 @@ def _wrong(status: Any, out: io.StringIO, err: io.StringIO, results: list[Any]) 
             return f"standard output is no JSON: {error}"
     elif status in (2, 3) and shown.strip().startswith("{"):
         return "a result and an error"
-    return "; ".join(filter(None, (_blown_up(result, said) for result in results)))
+    benches = [each for result in results for each in getattr(result, "results", [result])]
+    return "; ".join(filter(None, (_blown_up(each, said) for each in benches)))
 
 
 def _refused(text: str) -> None:

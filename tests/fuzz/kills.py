@@ -36,8 +36,9 @@ def command(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.P
     )  # fmt: skip
 
 
-def case(rng: Random, folder: Path) -> str:
+def case(rng: Random, folder: Path, sign: signal.Signals | None = None) -> str:
     """Write a result, end the writing of another midway, and say what is wrong with the folder."""
+    sign = sign or rng.choice((signal.SIGINT, signal.SIGKILL))
     out, temporary = folder / "out", folder / "tmp"
     temporary.mkdir()
     paths = os.pathsep.join(filter(None, sys.path))
@@ -47,7 +48,6 @@ def case(rng: Random, folder: Path) -> str:
     if rng.random() < 0.7:
         _finished(command(_words(names[0], out), folder, env))
     before = _listing(out)
-    sign = rng.choice((signal.SIGINT, signal.SIGKILL))
     with command(_words(second, out), folder, env) as process:
         time.sleep(rng.uniform(0.1, 6.0))
         process.send_signal(sign)

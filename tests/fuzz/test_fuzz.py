@@ -27,7 +27,10 @@ def test_nothing_goes_wrong_with_generated_input(
         for name in ("h5py", "asammdf", "pyarrow"):
             pytest.importorskip(name)
     monkeypatch.setattr(limited_source, "SECONDS", 20.0)
-    assert tried(kind, SEED, 0, 40, SECONDS) == []
+    wrong, through = tried(kind, SEED, 0, 40, SECONDS)
+    assert wrong == []
+    if kind in ("bench", "command"):
+        assert through > 0.7  # what is to be admissible is carried through, but for contradictions
 
 
 REPLAYED = {
@@ -55,7 +58,5 @@ def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Pa
 
 
 def test_a_case_comes_again() -> None:
-    texts = [
-        inputs.bench_text(rng) for _, rng in zip(range(2), [Random(3), Random(3)], strict=True)
-    ]
-    assert texts[0] == texts[1]
+    first, again, other = (inputs.bench_text(Random(k)) for k in (3, 3, 4))
+    assert first == again != other
