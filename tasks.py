@@ -24,14 +24,16 @@ PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 LOCKS = {"demo": ["requirements.lock"], "test": ["requirements-dev.lock"]}
 LOCKS["trust"] = LOCKS["test"]
 
-PYTEST = ["pytest", "-n", "auto", "--dist", "worksteal", "-q"]
+PYTEST = ["pytest", "-n", "auto", "-q"]
+# A file's tests share runs and kernels, so one process has them all; the longest files come first.
+BY_FILE = ["--dist", "loadfile", "--no-loadscope-reorder"]
 CHECKS = {
     "format and lint": ["ruff", "check", "."],
     "layers": ["lint-imports"],
-    "tests": [*PYTEST, "-m", "not trust"],
+    "tests": [*PYTEST, *BY_FILE, "-m", "not trust"],
 }
 TYPES = ["mypy"]  # on one core alone, for most of a minute: beside the others
-TRUST = {"trust": [*PYTEST, "-m", "trust"]}
+TRUST = {"trust": [*PYTEST, "--dist", "worksteal", "-m", "trust"]}
 
 HARD_BRAKING = (
     "output-error --bench hard-braking --parameters dardanelli2010 --output p_mc --output i "
