@@ -8,9 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from bywire.analysis.linear.closed_loop import closed_loop
+from bywire.analysis.linear.closed_loop import closed_again, closed_loop
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.open_loop import analog_gain, open_loop
+from bywire.analysis.linear.open_loop import analog_gain, cut_open, open_loop
+from bywire.analysis.linear.sampled_system import sampled_system
 from bywire.analysis.loop_schedule import LoopSchedule
 from bywire.analysis.response.saturation import Saturation
 from bywire.core.errors import unknown_name
@@ -221,6 +222,16 @@ class Loop:
             p.model, p.par, p.state, p.memory,
             cut=self.cut, stimulus=p.stimulus, locked=self.locked,
         )  # fmt: skip
+
+    def gain_and_closed(self, par: ParameterSet, value: float) -> tuple[LinearModel, LinearModel]:
+        """Return `gain` and `closed` at an operating point, from one model of its plant."""
+        if self.analog:
+            return self.gain(par, value), self.closed(par, value)
+        p = self.point(self.smooth(par), value)
+        at, outputs = (p.state, p.memory, p.stimulus), (self.output,)
+        system = sampled_system(p.model, p.par, at, self.inputs, outputs, self.locked)
+        closed = closed_again(p.model, system, self.inputs)
+        return cut_open(p.model, system, self.cut), closed.together(self.inputs)
 
 
 LOOPS = Kind("loop", ("loops",), instances(Loop), declared="a Loop")

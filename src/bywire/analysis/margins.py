@@ -74,7 +74,7 @@ def figures_at(loop: Loop, par: ParameterSet, value: float) -> LoopFigures:
     InputError
         When the operating point does not exist.
     """
-    return LoopFigures(loop.gain(par, value), loop.closed(par, value), _POINTS, exact=True)
+    return LoopFigures(*loop.gain_and_closed(par, value), _POINTS, exact=True)
 
 
 def margins_of(figures: LoopFigures) -> LoopMargins:

@@ -77,7 +77,8 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     In such a book a source stands in the place of one of the actuator's, and what it gives more is
     taken by a sink: of a disc that is braked, the heat of the pads.
     """
-    names = dict.fromkeys(role.book for role in _roles(recording).values() if role.book)
+    roles = _roles(recording, _changes(recording)).values()
+    names = dict.fromkeys(role.book for role in roles if role.book)
     return {name: _ledger(recording, name) for name in names}
 
 
@@ -103,7 +104,8 @@ def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str
 
 
 def _ledger(recording: xr.Dataset, book: str) -> Ledger:
-    changes, roles = _changes(recording), _roles(recording)
+    changes = _changes(recording)
+    roles = _roles(recording, changes)
     known = {name: role for name, role in roles.items() if role.book in ("", book)}
     sources = {name: role for name, role in known.items() if role.side == "source"}
     instead = {role.whole: name for name, role in sources.items() if role.whole in sources}
@@ -127,21 +129,20 @@ def _ledger(recording: xr.Dataset, book: str) -> Ledger:
     return Ledger(tuple(given), tuple(taken))
 
 
-def _roles(recording: xr.Dataset) -> dict[str, Role]:
+def _roles(recording: xr.Dataset, changes: Mapping[str, float]) -> dict[str, Role]:
     """Return what every energy is in the books: what is declared first, then what names say."""
-    changes = _changes(recording)
-    said = {name: _role_of(recording[name]) for name in changes}
+    said = {name: _role_of(recording.variables[name]) for name in changes}
     roles = {name: role for name, role in said.items() if role is not None}
     if "E_source" in changes and not any(role.side == "source" for role in roles.values()):
         roles["E_source"] = Role("source", "source")
     for name in sorted(changes, key=lambda name: name != "E_stored"):
         if name.startswith("E_") and name != "E_source" and name not in roles:
-            label = str(recording[name].attrs.get("long_name", name))
+            label = str(recording.variables[name].attrs.get("long_name", name))
             roles[name] = Role("sink", "stored" if name == "E_stored" else label)
     return roles
 
 
-def _role_of(variable: xr.DataArray) -> Role | None:
+def _role_of(variable: xr.Variable) -> Role | None:
     said = {
         each.name: variable.attrs[_PREFIX + each.name]
         for each in fields(Role)
@@ -154,9 +155,10 @@ def _changes(recording: xr.Dataset) -> dict[str, float]:
     """Return what every energy grew by [J]."""
     changes = {}
     for key in recording.data_vars:
-        name, values = str(key), recording[key].values
-        if name.startswith(("E_", "W_")) and values.ndim == 1:
-            changes[name] = float(values[-1] - values[0])
+        # Its variables: to give an array its coordinates costs more than all the books.
+        name, variable = str(key), recording.variables[key]
+        if name.startswith(("E_", "W_")) and variable.ndim == 1:
+            changes[name] = float(variable.values[-1] - variable.values[0])
     return changes
 
 
@@ -165,13 +167,14 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
 
     Holding is what an energy grew by while all stood still: evenly within each recorded interval.
     """
-    every = {str(key): _role_of(recording[key]) for key in recording.data_vars}
+    every = {str(key): _role_of(recording.variables[key]) for key in recording.data_vars}
     still = next((name for name, role in every.items() if role and role.side == "standstill"), "")
     changes: dict[str, float] = {}
     for name in (name for name, role in every.items() if role and role.split and still):
         names = (name, still, "time")
-        energy, stuck, time = (np.diff(recording[each].values) for each in names)
+        energy, stuck, time = (np.diff(recording.variables[each].values) for each in names)
         holding = float(np.sum(energy * np.clip(stuck / time, 0.0, 1.0)))
-        whole = float(recording[name].values[-1] - recording[name].values[0])
+        ends = recording.variables[name].values[[0, -1]]
+        whole = float(ends[1] - ends[0])
         changes |= {f"{name}_moving": whole - holding, f"{name}_holding": holding}
     return changes

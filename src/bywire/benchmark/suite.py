@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 from bywire.benchmark.result import Result, machine
@@ -69,19 +69,37 @@ class Benchmark(Answer):
         return text_table(("figure", "value", "goal", "holds", "how"), rows)
 
 
-def measure(progress: Callable[[str, float], None] | None = None) -> Benchmark:
-    """Measure everything; takes a minute or two.
+def measure(
+    progress: Callable[[str, float], None] | None = None, parts: Sequence[str] = ()
+) -> Benchmark:
+    """Measure everything, which takes several minutes, or parts of it.
+
+    Parameters
+    ----------
+    progress
+        Called with the name of a part and its finished share, 0 to 1.
+    parts
+        Names of the parts to measure, for instance ``["commands"]``; all where empty.
+
+    Returns
+    -------
+    Benchmark
+        Every figure in its own unit, with its goal.
 
     Raises
+    ------
+    UnknownNameError
+        When there is no such part.
     ------
     CompilerError
         Without a C compiler there is nothing to compare.
     """
     if find_compiler() is None:
         raise CompilerError("the benchmark compares compiled C: install a C compiler")
+    wanted = {name: PARTS.find(name) for name in parts} or PARTS.all()
     here = machine()
     results: list[Result] = []
-    for label, part in PARTS.all().items():
+    for label, part in wanted.items():
         if progress is not None:
             progress(f"benchmark: {label}", 0.0)
         results += part.measure()

@@ -68,8 +68,14 @@ def reproduce_command(
     show(lambda progress: reproduce(source, progress=progress), out, json)
 
 
-def benchmark_command(json: JsonFlag = False) -> None:
+def benchmark_command(
+    parts: Annotated[
+        list[str] | None,
+        typer.Argument(metavar="[PART]...", help="What to measure, e.g. commands; else all."),
+    ] = None,
+    json: JsonFlag = False,
+) -> None:
     """Measure speed against hand-written C and what users would pick instead."""
     from bywire.benchmark.suite import measure
 
-    show(measure, as_json=json)
+    show(lambda progress: measure(progress, parts or ()), as_json=json)

@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     import pint
 
 
-# The common units, so that most bench files need no pint, whose loading takes 0.3 s.
+# The common units, and all that the edges show: most commands then need no pint, whose loading
+# takes half as long as a run.
 _COMMON: dict[str, tuple[float, str]] = {
     "bar": (1e5, "Pa"),
     "Pa": (1.0, "Pa"),
@@ -35,6 +36,11 @@ _COMMON: dict[str, tuple[float, str]] = {
     "rad": (1.0, "rad"),
     "deg": (math.pi / 180.0, "rad"),
     "mm/rad": (1e-3, "m/rad"),
+    "mm**2": (1e-6, "m**2"),
+    "ml": (1e-6, "m**3"),
+    "bar/A": (1e5, "Pa/A"),
+    "A*bar": (1e5, "A*Pa"),
+    "N/bar": (1e-5, "N/Pa"),
     "%": (1e-2, "1"),
     "": (1.0, "1"),
 }

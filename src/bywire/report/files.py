@@ -48,10 +48,15 @@ def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
 
 
 def _settle(figure: Figure) -> None:
-    """Compute the layout of a figure once and for all."""
-    if figure.get_layout_engine() is not None:
-        figure.draw_without_rendering()
-        figure.set_layout_engine("none")
+    """Compute the layout of a figure once and for all.
+
+    No engine is left: "none" would leave a placeholder for which savefig draws everything twice.
+    """
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        engine.execute(figure)
+        with mpl.rc_context({"figure.autolayout": False, "figure.constrained_layout.use": False}):
+            figure.set_layout_engine(None)
 
 
 def save_figure(figure: Figure, path: str | os.PathLike[str]) -> Path:

@@ -137,8 +137,9 @@ def bench_figures(
     rows = []
     for k in range(sets):
         tuned = par.replace({name: float(values[k]) for name, values in gains.items()})
+        laws = _laws(loop, tuned, value, responses["frequency"].values)
         small = tuple(
-            _small(loop, tuned, value, responses.isel(variant=k, amplitude=j), target)
+            _small(laws, responses.isel(variant=k, amplitude=j), target)
             for j in range(responses.sizes["amplitude"])
         )  # fmt: skip
         rows.append(BenchFigures(small, *(({},) if steps is None else steps[k])))
@@ -172,15 +173,15 @@ def has_step(bench: Bench) -> bool:
 
 
 def _small(
-    loop: Loop, par: ParameterSet, value: float, response: xr.Dataset, target: float
+    laws: tuple[Complex, Complex] | None, response: xr.Dataset, target: float
 ) -> Small:
     """Return the figures of the response to one amplitude."""
     closed, f = complex_values(response), response["frequency"].values
     moves = np.isfinite(closed)
-    margin, gain = Margin(math.nan, math.nan), None
-    if moves.any():
-        gain = loop_gain(loop, par, value, closed[moves], f[moves])
-    if gain is not None:
+    margin = Margin(math.nan, math.nan)
+    if laws is not None and moves.any():
+        demand, feedback = laws
+        gain = _behind(closed[moves], demand[moves], feedback[moves])
         margin = measured_margin(f[moves], gain)
     size = np.nan_to_num(response["gain"].values)  # what sticks answers with nothing
     before = np.append(size[f < target], np.interp(target, f, size))
@@ -212,9 +213,18 @@ def loop_gain(
     numpy.ndarray or None
         Shape (n,); None for a loop whose laws are not known.
     """
-    if loop.laws is None:
-        return None
-    demand, feedback = loop.laws(par, value, frequencies)
+    laws = _laws(loop, par, value, frequencies)
+    return None if laws is None else _behind(closed, *laws)
+
+
+def _laws(
+    loop: Loop, par: ParameterSet, value: float, frequencies: Array
+) -> tuple[Complex, Complex] | None:
+    """Return what a loop's laws make of set point and measured value; None where not known."""
+    return None if loop.laws is None else loop.laws(par, value, frequencies)
+
+
+def _behind(closed: Complex, demand: Complex, feedback: Complex) -> Complex:
     return np.asarray(feedback * closed / (demand - feedback * closed))
 
 

@@ -133,7 +133,6 @@ def _case(
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        tuned = base.replace(gains)
-        return loop.gain(tuned, value), loop.closed(tuned, value)
+        return loop.gain_and_closed(base.replace(gains), value)
 
     return LinearCase(label, build, changes, value)

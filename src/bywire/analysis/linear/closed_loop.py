@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.analysis.linear.linear_model import LinearModel
-from bywire.analysis.linear.sampled_system import sampled_system
+from bywire.analysis.linear.sampled_system import SampledSystem, sampled_system
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
@@ -64,6 +64,11 @@ def closed_loop(
         When a name is unknown.
     """
     system = sampled_system(model, par, (state, memory, stimulus), inputs, outputs, locked, step)
+    return closed_again(model, system, inputs)
+
+
+def closed_again(model: Model, system: SampledSystem, inputs: Sequence[str]) -> LinearModel:
+    """Return `closed_loop` of a system that was made for the same inputs."""
     plant, fields = system.plant, model.Memory._fields
     size = len(plant.states) + len(fields)
     A, B = np.eye(size), np.zeros((size, len(inputs)))

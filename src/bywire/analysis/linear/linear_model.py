@@ -277,8 +277,11 @@ class LinearModel:
         forward, backward = self.B.any(axis=1), self.C.any(axis=0)
         coupled = self.A != 0
         for _ in range(len(self.states)):
+            reached = np.count_nonzero(forward) + np.count_nonzero(backward)
             forward = forward | coupled[:, forward].any(axis=1)
             backward = backward | coupled[backward].any(axis=0)
+            if np.count_nonzero(forward) + np.count_nonzero(backward) == reached:
+                break
         return np.flatnonzero(forward & backward).tolist()
 
 

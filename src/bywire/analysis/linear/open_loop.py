@@ -54,9 +54,13 @@ def open_loop(
         When no controller reads or writes the field, several do, another one runs more slowly,
         or nobody takes what is handed on.
     """
-    fields = model.Memory._fields
     system = sampled_system(model, par, (state, memory, stimulus), (), (), locked)
-    states = system.plant.states
+    return cut_open(model, system, cut)
+
+
+def cut_open(model: Model, system: SampledSystem, cut: str) -> LinearModel:
+    """Return `open_loop` of a system that was made for any inputs and outputs."""
+    fields, states = model.Memory._fields, system.plant.states
     if cut not in (*states, *fields):
         raise unknown_name("field of state and memory", cut, (*states, *fields))
     if cut in states:

@@ -126,7 +126,7 @@ def controlled(par: WedgeParameters, moment: float) -> Controlled:
     All NaN where the brake cannot be held at the moment.
     """
     try:
-        gain, closed = LOOP.gain(par, moment), LOOP.closed(par, moment)
+        gain, closed = LOOP.gain_and_closed(par, moment)
     except InputError:
         return Controlled(math.nan, math.nan)
     if not closed.is_stable:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
 import sys
 import tempfile
@@ -10,6 +9,7 @@ import time
 from pathlib import Path
 from statistics import median
 
+from bywire.benchmark.commands import environment
 from bywire.benchmark.result import Result, at_most
 from bywire.benchmark.suite import Part
 
@@ -52,14 +52,8 @@ def processes() -> list[Result]:
 def _seconds(bench: Path, changes: dict[str, str]) -> float:
     command = [sys.executable, "-m", "bywire.cli", "run", str(bench), "--json"]
     begin = time.perf_counter()
-    subprocess.run(command, env=_environment(changes), stdout=subprocess.DEVNULL, check=True)
+    subprocess.run(command, env=environment() | changes, stdout=subprocess.DEVNULL, check=True)
     return time.perf_counter() - begin
-
-
-def _environment(changes: dict[str, str]) -> dict[str, str]:
-    """Return the environment of a user, whose Python keeps what it compiled of the sources."""
-    kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    return kept | changes
 
 
 def _memory(bench: Path, changes: dict[str, str]) -> Result:
@@ -67,7 +61,7 @@ def _memory(bench: Path, changes: dict[str, str]) -> Result:
                "--set", "options.duration=60 s"]  # fmt: skip
     done = subprocess.run(
         command,
-        env=_environment(changes),
+        env=environment() | changes,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,

@@ -1,0 +1,28 @@
+"""Whole commands are timed in multiples of loading the libraries, and what fails says why."""
+
+import pytest
+
+from bywire.benchmark.commands import COMMANDS, Command, measured
+from bywire.benchmark.suite import measure
+from bywire.core.errors import UnknownNameError
+
+
+def test_a_command_is_timed_after_what_it_needs():
+    made, first = "{folder}/ride.csv", ("convert", "benches/pedal_ride.csv", "{folder}/ride.csv")
+    command = Command("command.convert", ("convert", made, "{folder}/again.csv"), 9.0, first)
+    (result,) = measured([command])
+    assert result.value > 0.1, result.note
+    assert result.holds == (result.value <= 9.0)
+    assert "run once" in result.note
+
+
+def test_a_command_that_fails_has_no_time():
+    (result,) = measured([Command("command.wrong", ("run", "no-such-bench"), 1.0)])
+    assert (result.value, result.holds) == (None, None)
+    assert "no-such-bench" in result.note
+
+
+def test_names_of_commands_are_rows_and_parts_can_be_chosen():
+    assert all("command." in name for name in COMMANDS.all())
+    with pytest.raises(UnknownNameError, match=r"part of the benchmark 'comands'.*commands"):
+        measure(parts=["comands"])
