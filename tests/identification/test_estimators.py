@@ -18,6 +18,8 @@ from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.data.writing import write_measurement
 from bywire.identification import (
     Equation,
+    Estimate,
+    MisfitWarning,
     differentiated,
     estimate,
     initial_states,
@@ -28,6 +30,8 @@ from bywire.identification import (
     predict,
     trial,
 )
+from bywire.identification.estimate import as_object
+from bywire.identification.loss import Loss
 from bywire.identification.output_error import even_interval
 from bywire.identification.unknown import Unknown
 
@@ -177,6 +181,41 @@ def test_output_error_recovers_parameters_and_the_start(
     truth = np.array([getattr(axis.TRUTH, n) for n in axis.NAMES] + [0.0])
     assert np.all(np.abs(found.values - truth) < 4.0 * found.deviations)
     assert found.rms == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("loss", ["linear", "soft_l1"])
+def test_the_share_of_the_step_is_what_smaller_steps_change(
+    axis: ModuleType, data: xr.Dataset, loss: Loss
+) -> None:
+    """To first order: 1 ms, against 20 us."""
+
+    def fit(step: float) -> Estimate:
+        record = data.isel(time=slice(0, 3000))
+        bench = trial(axis.ServoAxis(), axis.TRUTH, record, {"v": "v"}, {"theta": 1e-4}, step=step)
+        return estimate(output_error([bench], parameters_of(axis.TRUTH, axis.NAMES)), loss)
+
+    with pytest.warns(MisfitWarning, match="the model leaves"):
+        coarse = fit(1e-3)
+    fine = fit(20e-6)
+    assert coarse.step_errors is not None
+    assert fine.step_errors is not None
+    changed = np.abs(coarse.values - fine.values)
+    clear = changed > 0.2 * coarse.deviations
+    assert clear.sum() >= 2
+    ratios = coarse.step_errors[clear] / changed[clear]
+    assert np.all((ratios > 0.6) & (ratios < 1.6)), ratios
+    assert np.all(fine.step_errors < 0.2 * fine.deviations)
+    rows = as_object(coarse)["parameters"]
+    assert rows["J"]["step_error"] == coarse.step_errors[coarse.names.index("J")]
+
+
+def test_where_nothing_is_simulated_no_share_of_a_step_is_given(
+    axis: ModuleType, data: xr.Dataset
+) -> None:
+    unknowns = parameters_of(axis.TRUTH, ["J", "T_p"])
+    found = inverse_dynamics(equation(axis), axis.TRUTH, unknowns, moving(data))
+    assert found.step_errors is None
+    assert "step_error" not in as_object(found)["parameters"]["J"]
 
 
 def test_trials_share_parameters_and_keep_their_own_offsets(

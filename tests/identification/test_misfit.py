@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import tracemalloc
 import warnings
+from functools import partial
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
+from bywire.core.errors import SolverError
 from bywire.identification import Estimate, MisfitWarning, Problem, Unknown, estimate
 from bywire.identification.confidence import uncertainty
 from bywire.identification.inverse_dynamics import _require_told
@@ -129,3 +131,36 @@ def test_what_the_data_tells_is_asked_in_memory_that_grows_with_it() -> None:
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert peak < 20 * W.nbytes
+
+
+def slope_of(shift: float, off: float = 0.0) -> Estimate:
+    """Return a slope under noise that half steps move by ``shift``; further off, they fail."""
+    y = 2.0 * T + noise(4)
+
+    def evaluate(moved: float, values: Array) -> tuple[Array, Array]:
+        return ((values[0] + moved) * T - y) / NOISE, T[:, None] / NOISE
+
+    def finer(values: Array) -> tuple[Array, Array]:
+        if off:
+            raise SolverError("left the numbers")
+        return evaluate(shift, values)
+
+    unknown = Unknown("a", 1.0, scale=1.0, unit="m/s")
+    return estimate(Problem((unknown,), partial(evaluate, 0.0), finer=finer))
+
+
+def test_an_error_from_the_step_beyond_the_interval_is_warned_of() -> None:
+    with pytest.warns(MisfitWarning, match=r"a is off by about 0\.0013 m/s from the step"):
+        coarse = slope_of(1e-3)
+    assert coarse.step_errors == pytest.approx([4e-3 / 3.0])
+    assert "take a smaller step" in coarse.notes[-1]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", MisfitWarning)
+        fine = slope_of(1e-7)
+    assert fine.step_errors == pytest.approx([4e-7 / 3.0])
+
+
+def test_half_steps_that_fail_are_said_to() -> None:
+    with pytest.warns(MisfitWarning, match="is not known: left the numbers"):
+        fit = slope_of(0.0, off=1.0)
+    assert fit.step_errors is None

@@ -61,6 +61,9 @@ class Estimate:
         What the user should know.
     parts
         Which residuals belong together, in their order, with unit, noise and spread.
+    step_errors
+        How far each value is off by the step of the simulation, shape (p,), SI; None where nothing
+        is simulated. Noise, of which intervals speak, and what a model leaves out come on top.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -73,6 +76,7 @@ class Estimate:
     kept: tuple[Kept, ...] = ()
     notes: tuple[str, ...] = ()
     parts: tuple[Part, ...] = ()
+    step_errors: Array | None = None
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -192,7 +196,7 @@ class Estimate:
 
 def as_object(estimate: Estimate) -> dict[str, object]:
     """Return what JSON holds of an estimate."""
-    rows: Mapping[str, object] = {
+    rows: Mapping[str, dict[str, object]] = {
         name: {
             "value": float(v), "unit": u.unit, "standard_deviation": float(d),
             "interval_95": [float(lo), float(hi)],
@@ -202,6 +206,9 @@ def as_object(estimate: Estimate) -> dict[str, object]:
             estimate.intervals(), strict=True,
         )
     }  # fmt: skip
+    if estimate.step_errors is not None:
+        for row, error in zip(rows.values(), estimate.step_errors, strict=True):
+            row["step_error"] = float(error)
     return {
         "parameters": rows,
         "not_identifiable": {

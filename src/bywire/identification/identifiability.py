@@ -18,7 +18,7 @@ _CONTRADICTED = 3.0  # standard deviations of a prior
 
 
 class MisfitWarning(UserWarning):
-    """A model leaves more than noise, so that intervals of its parameters do not hold."""
+    """A model leaves more than noise, or its step is too coarse: intervals do not hold."""
 
 
 def misfit(estimate: Estimate) -> str:

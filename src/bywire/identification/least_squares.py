@@ -22,6 +22,7 @@ from bywire.identification.identifiability import (
 from bywire.identification.leftover import Part
 from bywire.identification.loss import Loss, bread, influence, of_data_alone
 from bywire.identification.problem import Problem, cost_of, with_priors
+from bywire.identification.step_share import with_step_share
 
 __all__ = ["Loss", "Problem", "Solution", "estimate", "solve", "with_priors"]
 
@@ -170,9 +171,10 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
         if worst is None:
             records = between_records(best, J) if loss == "linear" else ()
             apart = tuple(str(record) for record in records[:1])
-            for wrong in filter(None, (misfit(best), *apart)):
+            best, coarse = with_step_share(problem, best, J, loss)
+            for wrong in filter(None, (misfit(best), *apart, *coarse)):
                 warnings.warn(wrong, MisfitWarning, stacklevel=2)
-            return replace(best, kept=kept, notes=(*notes_of(best), *apart))
+            return replace(best, kept=kept, notes=(*notes_of(best), *apart, *coarse))
         index, reason = worst
         unknown = problem.unknowns[index]
         if not J[:, index].any() and unknown.name in problem.silent:

@@ -8,7 +8,7 @@ are the exact ones of the run, friction and contacts included.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any, Literal
 
@@ -226,11 +226,15 @@ def output_error(trials: Sequence[Trial], unknowns: Sequence[Unknown]) -> Proble
         if unknown.trial and unknown.trial not in labels:
             raise unknown_name("trial", unknown.trial, labels)
 
-    def evaluate(values: Array) -> tuple[Array, Array]:
-        parts = [_residuals(trial, unknowns, values) for trial in trials]
+    def evaluate(share: float, values: Array) -> tuple[Array, Array]:
+        runs = [replace(t, run=replace(t.run, step=share * t.run.step)) for t in trials]
+        parts = [_residuals(trial, unknowns, values) for trial in runs]
         return np.concatenate([r for r, _ in parts]), np.vstack([J for _, J in parts])
 
-    return Problem(tuple(unknowns), evaluate, parts=tuple(_parts(trials)))
+    return Problem(
+        tuple(unknowns), partial(evaluate, 1.0), parts=tuple(_parts(trials)),
+        finer=partial(evaluate, 0.5),
+    )  # fmt: skip
 
 
 def _parts(trials: Sequence[Trial]) -> Iterator[Part]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from bywire.core.typing import Array
 from bywire.identification.leftover import Part
 from bywire.identification.loss import Loss, rho
 from bywire.identification.unknown import Unknown
+
+Evaluate = Callable[[Array], tuple[Array, Array]]
 
 
 @dataclass(frozen=True)
@@ -34,25 +37,31 @@ class Problem:
         Why nothing may depend on an unknown, by its name: what is switched off.
     parts
         Which residuals belong together, in their order; all of them by default.
+    finer
+        The same as ``evaluate`` in half the steps of a simulation; None where nothing is simulated.
     """
 
     unknowns: tuple[Unknown, ...]
-    evaluate: Callable[[Array], tuple[Array, Array]]
+    evaluate: Evaluate
     apart: int = 0
     instrument: bool = False
     silent: Mapping[str, str] = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
+    finer: Evaluate | None = None
 
     def held(self, index: int) -> Problem:
         """Return the problem with one unknown held at its start."""
         value = self.unknowns[index].start
         rest = self.unknowns[:index] + self.unknowns[index + 1 :]
 
-        def evaluate(values: Array) -> tuple[Array, Array]:
-            r, J = self.evaluate(np.insert(values, index, value))
+        def without(whole: Evaluate, values: Array) -> tuple[Array, Array]:
+            r, J = whole(np.insert(values, index, value))
             return r, np.delete(J, index, axis=1)
 
-        return replace(self, unknowns=rest, evaluate=evaluate)
+        finer = None if self.finer is None else partial(without, self.finer)
+        return replace(
+            self, unknowns=rest, evaluate=partial(without, self.evaluate), finer=finer
+        )
 
 
 def with_priors(problem: Problem, values: Array) -> tuple[Array, Array]:

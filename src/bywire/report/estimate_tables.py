@@ -23,7 +23,8 @@ def estimate_table(
     Parameters
     ----------
     estimate
-        What was found; what the data does not tell stands below it.
+        What was found; what the data does not tell stands below it. Where its model is simulated,
+        a column says how far the step of that moves it.
     start
         Values from which the search began, by label.
     put_in
@@ -35,21 +36,31 @@ def estimate_table(
         if any(u.label in known for u in estimate.all_unknowns)
     }  # fmt: skip
     rows = []
-    for unknown, value, (low, high) in zip(
-        estimate.unknowns, estimate.values, estimate.intervals(), strict=True
-    ):
+    steps = estimate.step_errors
+    unknown_errors = [math.nan] * len(estimate.unknowns)
+    for unknown, value, (low, high), error in zip(
+        estimate.unknowns, estimate.values, estimate.intervals(),
+        unknown_errors if steps is None else steps, strict=True,
+    ):  # fmt: skip
         number, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
         share = _percent(50.0 * float(high - low) / abs(value)) if value else "-"
         shown = in_display_unit(float(value), unknown.unit)[0]
         reach = in_display_unit(0.5 * float(high - low), unknown.unit)[0]
+        off = abs(in_display_unit(float(error), unknown.unit)[0])
+        by_step = [] if steps is None else [Cell(f"{off:.1g}", value=off)]
         rows.append(
-            (unknown, (Cell(number, value=shown), Cell(half, value=reach), Cell(share), Cell(unit)))
-        )
+            (unknown, [Cell(number, value=shown), Cell(half, value=reach), *by_step, Cell(share),
+                       Cell(unit)])
+        )  # fmt: skip
     for u in (kept.unknown for kept in estimate.kept):
         number, _, unit = with_interval(u.start, 0.0, u.unit)
-        rows.append((u, (Cell(number), Cell("not told", "bad"), Cell("-"), Cell(unit))))
+        by_step = [] if steps is None else [Cell("-")]
+        rows.append(
+            (u, [Cell(number), Cell("not told", "bad"), *by_step, Cell("-"), Cell(unit)])
+        )
     return Table(
         (Column("parameter"), Column("estimate", numeric=True), Column("± (95 %)", numeric=True),
+         *([] if steps is None else [Column("by the step", numeric=True)]),
          Column("share", numeric=True), Column("unit"),
          *(Column(title, numeric=True) for title in beside)),
         tuple(

@@ -172,9 +172,14 @@ def _problem(
     noise = Noise(
         max(noise_of(data["p_mc"].values), 1.0), noise_of(data["i"].values), options.scatter
     )
-    shooting = Shooting(par, unknowns[: len(_NAMES)], options.step)
-    loss = SlipLoss(shooting, shots, noise, weighted_at)
-    return Problem(unknowns, loss, apart=len(shots), instrument=weighted_at is not None)
+    loss, finer = (
+        SlipLoss(Shooting(par, unknowns[: len(_NAMES)], step), shots, noise, weighted_at)
+        for step in (options.step, 0.5 * options.step)
+    )
+    is_final = weighted_at is not None
+    return Problem(
+        unknowns, loss, apart=len(shots), instrument=is_final, finer=finer if is_final else None
+    )
 
 
 def shots_of(data: xr.Dataset, options: Options) -> list[Shot]:
