@@ -21,6 +21,7 @@ def test_the_dithered_loop_stands_beside_the_one_without_friction(bywire, tmp_pa
     assert found["mean"] == pytest.approx(20e5, rel=1e-4)
     assert found["steady_gain"] == pytest.approx(1.0, abs=1e-3)
     assert 0.0 < found["stuck"] < 0.2
+    assert 0.0 < found["gain_step_error"] < 0.1
     assert "pressure-dithered-model.json" in {path.name for path in out.iterdir()}
     no_half_files(out)
 

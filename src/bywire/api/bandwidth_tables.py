@@ -12,12 +12,15 @@ from numpy.typing import NDArray
 
 from bywire.analysis.response.large_signal import Variant, narrowest
 from bywire.report.tables import Table, text_table
-from bywire.report.wording import amount
+from bywire.report.wording import amount, measured_amount
 
 NOTE = (
     "bandwidth: -3 dB; crossover and phase margin of the loop gain's describing function; shares "
     "of the time: the largest of all frequencies"
 )
+
+
+_WIDTHS = ("bandwidth", "crossover", "phase_margin")
 
 
 def shares(response: xr.Dataset) -> dict[str, str]:
@@ -41,7 +44,9 @@ def figures_table(response: xr.Dataset, unit: str) -> Table:
     for j, size in enumerate(response["amplitude"].values):
         case = response.isel(variant=0, amplitude=j)
         most = [f"{100.0 * float(case[name].max()):.3g} %" for name in known]
-        margin = amount(float(case["phase_margin"]), "deg", 3)
+        margin = measured_amount(
+            float(case["phase_margin"]), "deg", _step_error(case, "phase_margin"), 3
+        )
         rows.append([amount(float(size), unit, 3), _frequency(case, "bandwidth"),
                      _frequency(case, "crossover"), margin, *most])  # fmt: skip
     return text_table(heading, rows)
@@ -94,6 +99,10 @@ def figures_object(response: xr.Dataset, variant: int) -> list[dict[str, Any]]:
         row: dict[str, Any] = {"amplitude": float(size)}
         row |= _bounded(case, "bandwidth") | _bounded(case, "crossover")
         row["phase_margin"] = _or_none(float(case["phase_margin"]))
+        row |= {
+            key: _or_none(float(case[key])) for key in map("{}_step_error".format, _WIDTHS)
+            if key in case
+        }  # fmt: skip
         row |= {f"largest_{name}": float(case[name].max()) for name in shares(response)}
         rows.append(row)
     return rows
@@ -120,7 +129,14 @@ def _frequency(case: xr.Dataset, name: str) -> str:
         return "-"
     if math.isinf(value):
         return f"> {amount(float(f[-1]), 'Hz', 3)}"
-    return f"< {amount(float(f[0]), 'Hz', 3)}" if value == 0.0 else amount(value, "Hz", 3)
+    if value == 0.0:
+        return f"< {amount(float(f[0]), 'Hz', 3)}"
+    return measured_amount(value, "Hz", _step_error(case, name), 3)
+
+
+def _step_error(case: xr.Dataset, name: str) -> float:
+    key = f"{name}_step_error"
+    return float(case[key]) if key in case else math.nan
 
 
 def _bounded(case: xr.Dataset, name: str) -> dict[str, float | None]:

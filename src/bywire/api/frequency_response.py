@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, cast
 
@@ -22,6 +22,7 @@ from bywire.analysis.response.large_signal import (
     widths,
     with_widths,
 )
+from bywire.analysis.response.step_share import largest, with_step_errors
 from bywire.api.bandwidth_tables import (
     NOTE,
     figures_object,
@@ -33,6 +34,7 @@ from bywire.api.bandwidth_tables import (
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.api.response_warnings import purity, response_warnings
 from bywire.bench.running import Progress
+from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import silent
@@ -110,7 +112,8 @@ class FrequencyResponse(Answer):
             "Closed loop: the exact linear response without friction, and the nonlinear ones.",
             f"{loop.name}-frequency-response",
         )
-        method = f"Excitation: {response.attrs['excitation']}. {purity(response)}."
+        found = ". ".join(filter(None, [purity(response), largest(response)]))
+        method = f"Excitation: {response.attrs['excitation']}. {found}."
         return Document(
             f"Frequency response of loop {loop.name}",
             self.case.subject.line,
@@ -139,7 +142,8 @@ class FrequencyResponse(Answer):
         peaks = [f"excitation: {excitation}, amplitudes are its peaks"]
         return [
             f"{head}: gain and phase by amplitude", *(peaks if excitation != "sine" else []),
-            table, purity(response), "", TableBlock(figures_table(response, self.unit)), NOTE,
+            table, *filter(None, [purity(response), largest(response)]), "",
+            TableBlock(figures_table(response, self.unit)), NOTE,
         ]  # fmt: skip
 
     def _bandwidths(self) -> list[Block]:
@@ -214,6 +218,7 @@ def frequency_response(
     excitation: str = "sine",
     over: str = "",
     progress: Progress | None = None,
+    estimate_error: bool = True,
 ) -> FrequencyResponse:
     """Measure a closed loop's response by amplitude on the nonlinear model.
 
@@ -231,6 +236,9 @@ def frequency_response(
         Range for bandwidths, ``"NAME=LOW:HIGH:COUNT"``.
     progress
         Called with a label and the finished share, 0 to 1.
+    estimate_error
+        Whether the response is measured in half steps too: gain, phase and bandwidths then say
+        how large their error from the step is (``NAME_step_error`` in ``data``).
 
     Returns
     -------
@@ -258,6 +266,8 @@ def frequency_response(
     )  # fmt: skip
     response = _measured(variants, sweep, excitation, progress or silent)
     response = with_widths(response, widths(variants, response))
+    if estimate_error:
+        response = _with_step_errors(response, variants, sweep, excitation, progress or silent)
     linear = variants[0].linear(response["frequency"].values)
     return FrequencyResponse(
         case, response, linear, tuple(variants), varied, unit, note, sweep.tolerance
@@ -305,14 +315,36 @@ def _variants(
     return variants, (name, unit)
 
 
-def _measured(
+def _with_step_errors(
+    response: xr.Dataset,
     variants: Sequence[Variant],
     sweep: Sweep,
     excitation: str,
     progress: Progress,
 ) -> xr.Dataset:
-    """Return the response of all cases, each around its own operating point."""
-    points = [variant.point.run() for variant in variants]
+    """Return a response with its errors from the step, or with why these are not known."""
+    share = OTHER_STEPS[0]
+    try:
+        finer = _measured(variants, sweep, excitation, progress, share)
+    except NO_ESTIMATE as error:
+        return response.assign_attrs(unestimated=str(error))
+    finer = with_widths(finer, widths(variants, finer))
+    return with_step_errors(response, finer, of_difference(share))
+
+
+def _measured(
+    variants: Sequence[Variant],
+    sweep: Sweep,
+    excitation: str,
+    progress: Progress,
+    share: float = 1.0,
+) -> xr.Dataset:
+    """Return the response of all cases, each around its own operating point.
+
+    ``share``: of the loop's step, in which they run.
+    """
+    runs = [variant.point.run() for variant in variants]
+    points = [replace(run, step=share * run.step) for run in runs]
     if excitation == "sine":
         response = by_sines.frequency_response(points[0], sweep, progress, points=points)
         return response.assign_attrs(excitation=excitation)

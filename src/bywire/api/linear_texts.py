@@ -20,6 +20,7 @@ from bywire.analysis.reduction.reduce import TOLERANCE, Reduced, reduce
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.signals import signals_of
+from bywire.core.typing import Array
 from bywire.report.document import Attachment, Flat, Paragraph, TableBlock
 from bywire.report.rate_table import left_out, rate_table
 from bywire.report.wording import amount
@@ -219,12 +220,20 @@ def dithered_line(model: PeriodicModel) -> str:
     )
 
 
-def small_gains_line(model: PeriodicModel, band: tuple[float, float]) -> str:
-    """Return the gain to small sines at five frequencies of a band [Hz] as a line."""
-    highest = min(band[1], 0.5 / model.averaged.period)
-    frequencies = np.geomspace(band[0], highest, 5)
+def small_sines(model: PeriodicModel, band: tuple[float, float]) -> Array:
+    """Return five frequencies of a band [Hz], below the Nyquist frequency."""
+    return np.geomspace(band[0], min(band[1], 0.5 / model.averaged.period), 5)
+
+
+def small_gains_line(model: PeriodicModel, band: tuple[float, float], error: float) -> str:
+    """Return the gain to small sines at five frequencies of a band [Hz] as a line.
+
+    ``error``: the largest of these gains from the step, as a share.
+    """
+    frequencies = small_sines(model, band)
+    known = f"{100 * error:.1g} %" if math.isfinite(error) else "unknown, no motion repeats there"
     gains = ", ".join(
         f"{abs(h):.3g} at {f:.3g} Hz"
         for f, h in zip(frequencies, model.response(frequencies), strict=True)
     )
-    return f"gain to small sines: {gains}"
+    return f"gain to small sines: {gains} (error from the step, by half steps: {known})"

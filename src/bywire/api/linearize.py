@@ -22,6 +22,7 @@ from bywire.analysis.reduction.reduce import Reduced
 from bywire.api import linear_texts as texts
 from bywire.api.linearize_plant import LinearizedPlant, PlantLocus, linearize_plant, plant_locus
 from bywire.api.loop_case import LoopCase, loop_case, over_range
+from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, of_difference
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError
 from bywire.report.answer import Answer, use_case
@@ -63,6 +64,9 @@ class LinearizedLoop(Answer):
         The model with fewer states; None where none was asked for.
     dithered
         The loop about its motion under dither; None where it was not asked for.
+    dithered_error
+        Largest error of its gains to small sines from the step, as a share; infinite where the
+        motion does not repeat itself in half steps.
     """
 
     case: LoopCase
@@ -70,6 +74,7 @@ class LinearizedLoop(Answer):
     locus: Locus | None = None
     reduced: Reduced | None = None
     dithered: PeriodicModel | None = None
+    dithered_error: float = math.nan
 
     def document(self) -> Document:
         """Return poles, responses, locus, reduction and motion under dither."""
@@ -109,7 +114,7 @@ class LinearizedLoop(Answer):
     def _brief_dithered(self) -> list[str | Flat]:
         if self.dithered is None:
             return []
-        gains = texts.small_gains_line(self.dithered, self.case.loop.band)
+        gains = texts.small_gains_line(self.dithered, self.case.loop.band, self.dithered_error)
         poles = texts.poles_block(self.dithered.averaged)
         return [texts.dithered_line(self.dithered), *poles, gains]
 
@@ -176,6 +181,7 @@ class LinearizedLoop(Answer):
             shown["reduced"] = texts.reduced_object(self.reduced)
         if self.dithered is not None:
             shown["dithered"] = texts.dithered_object(self.dithered)
+            shown["dithered"]["gain_step_error"] = self.dithered_error
         return shown
 
 
@@ -243,12 +249,14 @@ def linearize(
             )
     case = loop_case(name, parameters, at, overrides)
     model = case.loop.closed(case.par, case.value)
+    dithered = _dithered(case) if dither else None
     return LinearizedLoop(
         case,
         model,
         _followed(case, locus) if locus else None,
         texts.reduced(model, reduce, case.loop.band[1]) if reduce else None,
-        _dithered(case) if dither else None,
+        dithered,
+        math.nan if dithered is None else _gain_error(case, dithered),
     )
 
 
@@ -271,6 +279,17 @@ def _dithered(case: LoopCase) -> PeriodicModel:
             f"which a dither runs ({_dithered_loops()}), switched on in the parameters of its ECU"
         )
     return dithered_loop(case.loop, case.par, case.value)
+
+
+def _gain_error(case: LoopCase, model: PeriodicModel) -> float:
+    """Return how far gains to small sines are off by the step, as a share: half steps beside it."""
+    share, frequencies = OTHER_STEPS[0], texts.small_sines(model, case.loop.band)
+    try:
+        finer = dithered_loop(case.loop, case.par, case.value, share * model.run.step)
+    except NO_ESTIMATE:
+        return math.inf
+    gains, others = (np.abs(each.response(frequencies)) for each in (model, finer))
+    return of_difference(share) * float(np.max(np.abs(others / gains - 1.0)))
 
 
 def _dithered_loops() -> str:

@@ -42,7 +42,7 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject
 from bywire.report.tables import Cell, Column, Table
-from bywire.report.wording import amount, clean, duration
+from bywire.report.wording import amount, clean, duration, measured_amount
 
 _NONE: Mapping[str, Any] = MappingProxyType({})
 _SHOWN = ("nrmse", "vaf", "max_error", "bias", "lag")
@@ -165,9 +165,12 @@ class Replay(Answer):
     def _banner(self) -> Banner | None:
         if not any(fit.verdicts for fit in self.fits):
             return None
-        missed = sum(not v.met for fit in self.fits for v in fit.verdicts)
-        text = f"{missed} tolerances are missed." if missed else "All tolerances are met."
-        return Banner(text, "bad" if missed else "good")
+        outcomes = [v.outcome for fit in self.fits for v in fit.verdicts]
+        counted = ((outcomes.count(word), word) for word in ("missed", "undecided"))
+        said = " and ".join(f"{count} {word}" for count, word in counted if count)
+        if not said:
+            return Banner("All tolerances are met.", "good")
+        return Banner(f"Of {len(outcomes)} tolerances, {said}.", "bad")
 
     def _data(self) -> dict[str, Any]:
         return {
@@ -180,10 +183,13 @@ class Replay(Answer):
                 {
                     "name": fit.segment.name, "signal": fit.signal,
                     "start": fit.segment.start, "stop": fit.segment.stop,
-                    "figures": {k.name: {"value": k.value, "unit": k.unit} for k in fit.kpis},
+                    "figures": {
+                        k.name: {"value": k.value, "unit": k.unit, "error": k.error}
+                        for k in fit.kpis
+                    },
                     "tolerances": [
-                        {"figure": v.kpi, "limit": v.limit, "value": v.value, "met": v.met}
-                        for v in fit.verdicts
+                        {"figure": v.kpi, "limit": v.limit, "value": v.value, "met": v.met,
+                         "outcome": v.outcome, "error": v.error} for v in fit.verdicts
                     ],
                 }
                 for fit in self.fits
@@ -211,6 +217,7 @@ def replay(
     segments: str | Path = "",
     track: Sequence[str] = (),
     progress: Progress | None = None,
+    estimate_error: bool = True,
 ) -> Replay:
     """Drive a bench's model with a measured demand, and compare.
 
@@ -238,6 +245,9 @@ def replay(
         Parameters that drift and are tracked, for instance ``"mu_B"``.
     progress
         Called with a label and the finished share, 0 to 1.
+    estimate_error
+        Whether the model runs in half and double steps too, for the error of the figures from the
+        step. A tolerance that is closer than this error is undecided, neither met nor missed.
 
     Returns
     -------
@@ -254,9 +264,12 @@ def replay(
     limits = read_tolerances(tolerances)
     read = measured([measurement], mapping, gaps=True, progress=shown)
     shown("replay", 0.0)
-    replayed = bench_replay.replay(driven, read.data, inputs or None, outputs or None, case)
+    replayed = bench_replay.replay(
+        driven, read.data, inputs or None, outputs or None, case, estimate_error=estimate_error
+    )
     shown("replay", 1.0)
-    fits = judged(replayed.outputs, _segments(segments, replayed.inputs, limits))
+    stretches = _segments(segments, replayed.inputs, limits)
+    fits = judged(replayed.outputs, stretches, replayed.others)
     tracks = [tracking.track(name, read.data, replayed.run.par) for name in track]
     return Replay(driven, name_of(measurement), replayed, fits, tuple(tracks), tuple(read.notes))
 
@@ -292,13 +305,16 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
     rows = []
     for fit in fits:
         by_name = {k.name: k for k in fit.kpis}
-        missed = [
-            f"{v.kpi} {v.limit}{' (not defined)' if math.isnan(v.value) else ''}"
-            for v in fit.verdicts if not v.met
-        ]  # fmt: skip
+        failed = {
+            word: [
+                f"{v.kpi} {v.limit}{' (not defined)' if math.isnan(v.value) else ''}"
+                for v in fit.verdicts if v.outcome == word
+            ] for word in ("missed", "undecided")
+        }  # fmt: skip
+        said = "; ".join(f"{word}: {', '.join(each)}" for word, each in failed.items() if each)
         verdict = Cell("-")
         if fit.verdicts:
-            verdict = Cell(f"missed: {', '.join(missed)}", "bad") if missed else Cell("ok", "good")
+            verdict = Cell(said, "bad") if said else Cell("ok", "good")
         rows.append(
             (Cell(clean(fit.segment.name)), Cell(clean(fit.signal)),
              *(_figure(by_name[n]) for n in _SHOWN), verdict)
@@ -310,9 +326,9 @@ def fit_table(fits: Sequence[SegmentFit]) -> Table:
 
 
 def _figure(kpi: Kpi) -> Cell:
-    if kpi.unit == "s" and math.isfinite(kpi.value):
+    if kpi.unit == "s" and math.isfinite(kpi.value) and not kpi.error > 0.0:
         return Cell(duration(kpi.value), value=kpi.value)
-    return Cell(amount(kpi.value, kpi.unit, 3), value=kpi.value)
+    return Cell(measured_amount(kpi.value, kpi.unit, kpi.error, 3), value=kpi.value)
 
 
 def _segments(

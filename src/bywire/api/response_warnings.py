@@ -48,6 +48,11 @@ def response_warnings(
                 "shown are means of the last windows; their root mean square distance from the "
                 f"mean is up to {amount(100 * scatter, 'percent', 2)}"
             )
+    if response.attrs.get("unestimated"):
+        texts.append(
+            "how far the response is off by the step is not known: it cannot be measured in half "
+            f"steps ({response.attrs['unestimated']})"
+        )
     if response["unsettled_substeps"].values.any():
         texts.append("some substeps hit the cap of the contact iteration: take a smaller step")
     return texts

@@ -11,6 +11,7 @@ from bywire.cli.options import (
     BenchChanges,
     CaseName,
     Changes,
+    ErrorEstimate,
     Inputs,
     JsonFlag,
     Map,
@@ -162,6 +163,7 @@ def replay(
         list[str] | None,
         typer.Option(help="Track a drifting parameter as well, e.g. mu_B."),
     ] = None,
+    error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -172,7 +174,7 @@ def replay(
         lambda progress: replay_measurement(
             measurement, bench, changes(set_), mapping=map_, inputs=changes(input_, "--input"),
             outputs=output or [], case=case, tolerances=tolerance or [], segments=segments,
-            track=track or [], progress=progress,
+            track=track or [], progress=progress, estimate_error=error_estimate,
         ),
         out, json,
     )  # fmt: skip

@@ -9,6 +9,7 @@ import typer
 from bywire.cli.options import (
     At,
     Changes,
+    ErrorEstimate,
     Frequencies,
     JsonFlag,
     LoopName,
@@ -69,6 +70,7 @@ def frequency_response_command(
     over: Annotated[
         str, typer.Option(help="Range, for bandwidths, e.g. motor.R_m=0.2ohm:0.6ohm:5.")
     ] = "",
+    error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
@@ -78,7 +80,7 @@ def frequency_response_command(
     show(
         lambda progress: frequency_response(
             loop, parameters, at, changes(set_), frequencies=frequencies, amplitudes=amplitudes,
-            excitation=excitation, over=over, progress=progress,
+            excitation=excitation, over=over, progress=progress, estimate_error=error_estimate,
         ),
         out, json,
     )  # fmt: skip

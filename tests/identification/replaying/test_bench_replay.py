@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from bywire.core.errors import ParameterError, UnitError, UnknownNameError
 from bywire.identification.replaying.bench_replay import replay
 from bywire.identification.replaying.fit import fit_figures, judged, undefined
 from bywire.identification.replaying.segments import Segment, found_in, read_segments
+from bywire.identification.replaying.tolerances import judge_fit
 
 STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})
 
@@ -62,6 +64,29 @@ def test_wrong_parameters_show(ramp: xr.Dataset) -> None:
     found = replay(bench, ramp[["i", "p_mc"]], {"i_set": "i"})
     (fit,) = judged(found.outputs, [Segment("all", 0.0, 0.6, {"nrmse": "<= 5 %"})])
     assert not fit.verdicts[0].met
+
+
+def test_figures_know_their_error_from_the_step(ramp: xr.Dataset) -> None:
+    """True errors, against steps of 2 us; and a tolerance that is closer is undecided."""
+    coarse, fine = (
+        bywire.replay(ramp, "open-loop", {"simulation.step": step, "motor.R_m": "0.4 ohm"},
+                      inputs={"i_set": "i"}, outputs=["p_mc"])
+        for step in ("100 us", "2 us")
+    )  # fmt: skip
+    figures = {k.name: k for k in coarse.fits[0].kpis}
+    true = {k.name: k.value for k in fine.fits[0].kpis}
+    for name in ("rmse", "nrmse", "bias"):
+        assert figures[name].error > 0.0
+        assert abs(figures[name].value - true[name]) <= 3.0 * figures[name].error
+    rmse = figures["rmse"]
+    for limit, outcome in ((rmse.value + 0.5 * rmse.error, "undecided"),
+                           (rmse.value + 2.0 * rmse.error, "met")):  # fmt: skip
+        (verdict,) = judge_fit({"rmse": f"<= {limit!r} Pa"}, "p_mc", [rmse])
+        assert verdict.outcome == outcome
+    plain = bywire.replay(
+        ramp, "open-loop", inputs={"i_set": "i"}, outputs=["p_mc"], estimate_error=False
+    )
+    assert all(math.isnan(k.error) for k in plain.fits[0].kpis)
 
 
 def test_figures_by_hand() -> None:

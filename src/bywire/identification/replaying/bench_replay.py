@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import xarray as xr
 
 from bywire.bench.bench import Bench
 from bywire.bench.recording import energy_signals, open_books_of
+from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
 from bywire.core.errors import ParameterError
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
 from bywire.identification.records import RECORD
 from bywire.identification.replaying.compared import missed_samples
 from bywire.identification.replaying.measured_run import MeasuredRun, measured_run
-from bywire.simulation.run import Run, simulate
+from bywire.simulation.run import Run, Trajectory, simulate
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,15 @@ class Replayed:
         The run of the model.
     notes
         What the user should know.
+    others
+        ``outputs`` in other steps, by their length over that of the run; empty unless wanted.
     """
 
     inputs: xr.Dataset
     outputs: Mapping[str, xr.Dataset]
     run: Run
     notes: tuple[str, ...]
+    others: Mapping[float, Mapping[str, xr.Dataset]] = field(default_factory=dict)
 
 
 def replay(
@@ -46,6 +51,8 @@ def replay(
     inputs: Mapping[str, str] | None = None,
     outputs: Sequence[str] | None = None,
     case: str = "",
+    *,
+    estimate_error: bool = False,
 ) -> Replayed:
     """Run a bench's model over measured demands.
 
@@ -53,6 +60,8 @@ def replay(
     ----------
     bench, data, inputs, outputs, case
         See ``bywire.identification.replaying.measured_run``.
+    estimate_error
+        Whether the model runs in half and double steps too; see `bywire.bench.running.run`.
 
     Raises
     ------
@@ -66,14 +75,28 @@ def replay(
     measured = measured_run(bench, data, inputs, outputs, case)
     wanted = dict.fromkeys((*measured.compared, *energy_signals(measured.run)))
     modeled = simulate(measured.run, tuple(wanted))
+    others: dict[float, Mapping[str, xr.Dataset]] = {}
+    failures: dict[float, Exception] = {}
+    for factor in OTHER_STEPS if estimate_error else ():
+        try:
+            other = dataclasses.replace(measured.run, step=factor * measured.run.step)
+            others[factor] = _beside_all(measured, simulate(other, tuple(measured.compared)))
+        except NO_ESTIMATE as error:
+            failures[factor] = error
     return Replayed(
-        _driving(measured),
-        {name: beside(measured.data, name, modeled[name][measured.settled:])
-         for name in measured.compared},
-        measured.run,
+        _driving(measured), _beside_all(measured, modeled), measured.run,
         (*measured.notes, *missed_samples(measured.data, measured.compared),
-         *open_books_of(measured.run, modeled)),
+         *open_books_of(measured.run, modeled),
+         *([unestimated(failures)] if failures and not others else [])),
+        others,
     )  # fmt: skip
+
+
+def _beside_all(measured: MeasuredRun, modeled: Trajectory) -> dict[str, xr.Dataset]:
+    return {
+        name: beside(measured.data, name, modeled[name][measured.settled :])
+        for name in measured.compared
+    }
 
 
 def _driving(measured: MeasuredRun) -> xr.Dataset:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 import xarray as xr
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import Verdict
+from bywire.bench.step_error import with_step_errors
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.data.lag import estimate_lag
@@ -128,9 +130,14 @@ def _lag(part: xr.Dataset, there: NDArray[np.bool_]) -> tuple[float, str]:
 
 
 def judged(
-    outputs: Mapping[str, xr.Dataset], segments: Sequence[Segment]
+    outputs: Mapping[str, xr.Dataset],
+    segments: Sequence[Segment],
+    others: Mapping[float, Mapping[str, xr.Dataset]] = MappingProxyType({}),
 ) -> tuple[SegmentFit, ...]:
     """Return the figures of all signals over all stretches, with the verdicts.
+
+    With ``others``, the same in other steps by their length over the run's, figures have their
+    error from the step, and a tolerance that is closer than that is undecided.
 
     A tolerance named ``nrmse`` holds for every signal, ``p_mc.nrmse`` for one; its limits are
     read by `bywire.identification.replaying.tolerances.judge_fit`.
@@ -147,6 +154,9 @@ def judged(
         figures = {name: fit_figures(pair, segment) for name, pair in outputs.items()}
         require_known(segment.tolerances, figures)
         for name, kpis in figures.items():
+            if others:
+                in_others = {f: fit_figures(made[name], segment) for f, made in others.items()}
+                kpis = with_step_errors(kpis, in_others, {})
             verdicts = judge_fit(segment.tolerances, name, kpis)
             fits.append(SegmentFit(segment, name, kpis, verdicts))
     return tuple(fits)

@@ -113,8 +113,11 @@ def _verdicts(key: str, text: str, kpi: Kpi) -> list[Verdict]:
                 f"lower limit as well, such as '{key} >= ...', and both are taken with their sign"
             )
         met = {"<=": value <= bound, ">=": value >= bound, "<": value < bound, ">": value > bound}
-        holds = met[sign] and not math.isnan(value)
-        verdicts.append(Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note))
+        is_decided = not (abs(value - bound) <= kpi.error or math.isinf(kpi.error))
+        holds = is_decided and met[sign] and not math.isnan(value)
+        verdicts.append(
+            Verdict(key, written, kpi.value, kpi.unit, holds, kpi.note, kpi.error, is_decided)
+        )
     return verdicts
 
 
