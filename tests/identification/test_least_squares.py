@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -308,3 +309,27 @@ def test_an_instrument_takes_off_the_bias_of_a_noisy_input() -> None:
     assert found(seen, False) == pytest.approx(biased, abs=0.005)
     assert found(clean, False) == pytest.approx(biased, abs=0.005)
     assert found(clean, True) == pytest.approx(2.0, abs=0.005)
+
+
+def test_a_search_ends_where_the_residuals_are_rough() -> None:
+    """Beyond what is resolved, it would follow the roughness for many more evaluations."""
+    counts = []
+    for resolved in (0.0, 1e-4):
+        problem, seen = decay(np.random.default_rng(1).normal(0.0, 0.01, T.size)), []
+
+        def rough(values: Array, problem: Problem = problem, seen: list[Array] = seen) -> Any:
+            seen.append(values)
+            r, J = problem.evaluate(values)
+            return r + 1e-4 * np.sin(1e9 * values.sum() + 40.0 * T), J
+
+        solution = solve(replace(problem, evaluate=rough, resolved=resolved), np.array([1.5, 1.0]))
+        assert solution.values == pytest.approx(TRUTH, rel=0.02)
+        counts.append(len(seen))
+    assert counts[1] < counts[0]
+
+
+def test_values_are_taken_as_they_are_without_a_search() -> None:
+    problem = decay(np.random.default_rng(1).normal(0.0, 0.01, T.size))
+    beside = TRUTH + 0.01
+    assert estimate(problem, start=beside, search=False).values == pytest.approx(beside, rel=1e-15)
+    assert estimate(problem, start=beside).values != pytest.approx(beside, rel=1e-3)

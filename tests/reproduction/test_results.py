@@ -2,6 +2,7 @@
 
 import json
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -116,3 +117,16 @@ def test_sources_are_found_by_name() -> None:
     assert set(SOURCES.all()) >= {"dardanelli2010"}
     with pytest.raises(UnknownNameError, match="dardanelli2010"):
         SOURCES.find("dardaneli2010")
+
+
+def test_a_parts_own_table_takes_the_place_of_its_verdicts(
+    made_up: Reproduction, tmp_path: Path
+) -> None:
+    (part,) = made_up.parts
+    own = replace(part, title="Own", tables={"Side by side": text_table(("here",), [("there",)])})
+    both = replace(made_up, parts=(replace(part, items=part.items[:1]), own))
+    brief = str(both)
+    assert brief.index("t.K") < brief.index("Side by side") < brief.index("there")
+    assert "t.n" not in brief
+    both.write(tmp_path)
+    assert "Side by side" in (tmp_path / "report.html").read_text(encoding="utf-8")

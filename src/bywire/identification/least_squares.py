@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from dataclasses import dataclass, replace
 
@@ -101,7 +102,8 @@ def solve(
     ended = optimize.least_squares(
         residuals, inner, jacobian, bounds=(low, high),
         loss=of_data_alone(loss, priors), x_scale="jac",
-        xtol=1e-9, ftol=share, gtol=1e-9, max_nfev=most,
+        xtol=max(1e-9, problem.resolved), ftol=max(share, problem.resolved), gtol=1e-9,
+        max_nfev=most,
     )  # fmt: skip
     solution = Solution(np.asarray(ended.x) * scale, float(ended.cost))
     return _at_bounds(problem, solution, loss)
@@ -145,7 +147,9 @@ def _solved(problem: Problem, begin: Array, loss: Loss) -> Solution:
     return Solution(values, cost)
 
 
-def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None) -> Estimate:
+def estimate(
+    problem: Problem, loss: Loss = "linear", start: Array | None = None, *, search: bool = True
+) -> Estimate:
     """Return the estimate with its uncertainty; what the data does not tell is kept and named.
 
     Parameters
@@ -156,6 +160,8 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
         How large residuals count.
     start
         Where to begin; the unknowns' starts by default.
+    search
+        False: these values are a minimum already, and are taken as they are.
 
     Raises
     ------
@@ -166,7 +172,8 @@ def estimate(problem: Problem, loss: Loss = "linear", start: Array | None = None
     origin = problem
     begin = np.array([u.start for u in problem.unknowns]) if start is None else start
     while True:
-        best, J = _at_minimum(problem, _solved(problem, begin, loss), loss)
+        solution = _solved(problem, begin, loss) if search else Solution(begin, math.nan)
+        best, J = _at_minimum(problem, solution, loss)
         worst = untold(best, J)
         if worst is None:
             records = between_records(best, J) if loss == "linear" else ()

@@ -39,6 +39,9 @@ class Problem:
         Which residuals belong together, in their order; all of them by default.
     finer
         The same as ``evaluate`` in half the steps of a simulation; None where nothing is simulated.
+    resolved
+        Share of the cost, and of the unknowns, below which a search only follows the roughness of
+        the residuals or of a Jacobian by differences.
     """
 
     unknowns: tuple[Unknown, ...]
@@ -48,6 +51,7 @@ class Problem:
     silent: Mapping[str, str] = field(default_factory=dict)
     parts: tuple[Part, ...] = ()
     finer: Evaluate | None = None
+    resolved: float = 0.0
 
     def held(self, index: int) -> Problem:
         """Return the problem with one unknown held at its start."""

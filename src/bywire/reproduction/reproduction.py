@@ -18,6 +18,7 @@ from bywire.report.document import (
     Details,
     Document,
     FigureBlock,
+    Flat,
     Listing,
     Paragraph,
     Section,
@@ -32,6 +33,8 @@ from bywire.reproduction.statements import KINDS, statements, tallies, tally, to
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+_WIDTH = 150  # characters of a line of a part's own table
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,8 @@ class Part:
         Runs worth keeping, by the name of their file.
     appendix
         Tables that stay folded in the report, by title.
+    tables
+        Tables that report and terminal show, by title: there in place of the items' verdicts.
     """
 
     title: str
@@ -69,6 +74,7 @@ class Part:
     exhibits: tuple[Exhibit, ...] = ()
     recordings: Mapping[str, xr.Dataset] = field(default_factory=dict)
     appendix: Mapping[str, Table] = field(default_factory=dict)
+    tables: Mapping[str, Table] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +141,7 @@ class Reproduction(Answer):
             self.citation,
             sections=lambda: self._sections(short),
             brief=[
-                TableBlock(verdicts(self.items), width=0), "", "In short", short, "",
+                *self._tables(), "In short", short, "",
                 f"Report with notes, tolerances and figures: {hint}",
             ],
             data=self._data(),
@@ -147,6 +153,14 @@ class Reproduction(Answer):
             record="results.json",
         )  # fmt: skip
 
+    def _tables(self) -> list[str | Flat]:
+        """Return what a terminal shows: parts' own tables, and the verdicts of all others."""
+        rest = [item for part in self.parts if not part.tables for item in part.items]
+        lines: list[str | Flat] = [TableBlock(verdicts(rest), width=0), ""] if rest else []
+        for title, table in (pair for part in self.parts for pair in part.tables.items()):
+            lines += [title, TableBlock(table, width=_WIDTH), ""]
+        return lines
+
     def _sections(self, short: Listing) -> list[Section]:
         apart = [item for item in self.items if item.agrees is False]
         sections = [Section("In short", [short, Paragraph(KINDS)])]
@@ -154,6 +168,7 @@ class Reproduction(Answer):
         for part in self.parts:
             blocks: list[Block] = [Paragraph(part.text)]
             blocks += [FigureBlock(e.figure, e.caption, _stem(e.name)) for e in part.exhibits]
+            blocks += [TableBlock(table, f"{title}.") for title, table in part.tables.items()]
             blocks += [TableBlock(statements(part.items))] if part.items else []
             blocks += [Details(title, [TableBlock(t)]) for title, t in part.appendix.items()]
             sections.append(Section(part.title, blocks))

@@ -1,0 +1,214 @@
+"""The paper's experiments on many brakes at once: steps, sines, ramps and hard braking in lanes.
+
+The converter counts as ideal, so that what is computed changes smoothly with the parameters.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
+
+import numpy as np
+
+from bywire.bench.experiment import Case, as_run
+from bywire.bench.kpis.hysteresis import Loop, loop_area
+from bywire.bench.kpis.smoothing import smoothed
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.brakes.motorcycle.experiments import friction_ramp, hard_braking
+from bywire.brakes.motorcycle.methods.braking.fit import over_frequency, unknowns_of
+from bywire.brakes.motorcycle.methods.braking.records import Region
+from bywire.brakes.motorcycle.methods.braking.sine_lines import Points
+from bywire.brakes.motorcycle.methods.braking.two_step import restricted
+from bywire.brakes.motorcycle.paper import facts
+from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.brakes.motorcycle.trim import holding_current
+from bywire.core.typing import Array, Complex
+from bywire.identification.least_squares import solve
+from bywire.simulation.run import Run, Trajectory, simulate
+from bywire.simulation.run_group import fit_lanes, simulate_group
+
+Par = MotorcycleParameters
+
+FREQUENCIES = (1.0, 2.0, 4.0, 8.0, 15.0)
+"""sines [Hz]; the paper's second step reaches from 1 to 15 Hz"""
+AMPLITUDE = 0.1
+"""of the sines [A]"""
+
+_BAR, _SUBSTEP = 1e5, 20e-6
+_SETTLE, _ROUNDS, _AWAY = 3.0, 3, 1.15  # s; corrections of the current; where they begin
+_WINDOW, _AFTER, _LATE = 2.0, 4.0, 0.6  # s: of a sine, of a step, over which levels are means
+_FIRST, _SECOND = 1.0, 10.0  # Hz: where the search for T1 and T2 begins
+_END = 0.24  # s: over which the end of hard braking is taken
+
+
+def computed(brakes: Sequence[Par]) -> list[dict[str, float]]:
+    """Return what each brake gives for every statement but Table 3's, in the statement's unit.
+
+    Parameters
+    ----------
+    brakes
+        Parameter sets of one structure: they may differ in numbers alone.
+
+    Raises
+    ------
+    SolverError
+        When a trajectory leaves the numbers.
+    """
+    ideal = [par.replace({"adc.law": "ideal"}) for par in brakes]
+    parts = (*(_region(ideal, name) for name in facts.REGIONS), _ramps(ideal), _braking(ideal))
+    return [{k: v for part in parts for k, v in part[n].items()} for n in range(len(ideal))]
+
+
+def _together(runs: Sequence[Run], signals: Sequence[str]) -> Sequence[Trajectory]:
+    """Return runs side by side where that is possible."""
+    if fit_lanes(runs):
+        return simulate_group(runs, signals)
+    return [simulate(run, signals) for run in runs]
+
+
+def _sine(i: float, f: float, t: Array) -> Array:
+    return np.asarray(i + AMPLITUDE * np.sin(2.0 * math.pi * f * t))
+
+
+def _step(before: float, after: float, t: Array) -> Array:
+    return np.where(t < -1e-9, before, after)
+
+
+def _driven(
+    par: Par, p: float, demand: Callable[[Array], Array], duration: float, settle: float
+) -> Run:
+    """Return a run from rest at ``p`` [Pa] under a current demand [A]."""
+    case = case_from_rest("run", par, "current", p, lambda t: {"i_set": demand(t)}, duration,
+                          settle=settle, keep=settle)  # fmt: skip
+    return as_run(case, _SUBSTEP)
+
+
+def _settled(brakes: Sequence[Par], p: float) -> list[float]:
+    """Return the equilibria [Pa] without friction whose currents let each brake settle at p.
+
+    A fixed number of corrections, unlike ``settled_start``: what follows is smooth.
+    """
+    starts = np.full(len(brakes), _AWAY * p)
+    for _ in range(_ROUNDS):
+        holds = [holding_current(start, par) for par, start in zip(brakes, starts, strict=True)]
+        runs = [
+            _driven(par, start, partial(_sine, i, 0.0), _SETTLE, 0.0)
+            for par, start, i in zip(brakes, starts, holds, strict=True)
+        ]  # fmt: skip
+        means = [run["p_mc"][run.time >= _SETTLE - _LATE - 1e-9][:-1].mean()
+                 for run in _together(runs, ("p_mc",))]  # fmt: skip
+        starts = starts * p / np.array(means)
+    return [float(start) for start in starts]
+
+
+def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
+    """Return gain, time constants and overshoot of a pressure region; Fig. 6's peak."""
+    p, height = facts.REGIONS[name], facts.FIG6_STEP.value
+    starts = _settled(brakes, p)
+    holds = [holding_current(start, par) for par, start in zip(brakes, starts, strict=True)]
+    every = list(zip(brakes, starts, holds, strict=True))
+    steps = _together(
+        [_driven(par, start, partial(_step, i, i + height), _AFTER, _SETTLE)
+         for par, start, i in every], ("p_mc",),
+    )  # fmt: skip
+    sines = _together(
+        [_driven(par, start, partial(_sine, i, f), _WINDOW, _WINDOW)
+         for par, start, i in every for f in FREQUENCIES], ("i", "p_mc"),
+    )  # fmt: skip
+    rows = []
+    for k, (par, step) in enumerate(zip(brakes, steps, strict=True)):
+        mine = zip(sines[k * len(FREQUENCIES) :], FREQUENCIES, strict=False)
+        before, after, peak = _levels(step, par)
+        K = (after - before) / height
+        T1, T2 = _time_constants(K, np.array([_line(sine, f) for sine, f in mine]))
+        row = {"K": K / _BAR, "T1": 1e3 * T1, "T2": 1e3 * T2,
+               "overshoot": 100.0 * (peak - after) / (after - before)}  # fmt: skip
+        rows.append({f"table4.{name}.{key}": float(value) for key, value in row.items()})
+        if name == "medium":
+            rows[-1]["fig6.peak"] = float(facts.FIG6_START.value + (peak - before) / _BAR)
+    return rows
+
+
+def _levels(step: Trajectory, par: Par) -> tuple[float, float, float]:
+    """Return the pressure [Pa] before a step, at its end, and its highest, dither averaged."""
+    t = step.time - _SETTLE
+    p = _averaged(step, par)
+    before, after = (t >= -_LATE) & (t < -0.02), t >= _AFTER - _LATE
+    return float(p[before].mean()), float(p[after].mean()), float(p[t > 0.0].max())
+
+
+def _averaged(run: Trajectory, par: Par) -> Array:
+    return smoothed(run.time, run["p_mc"], 1.0 / par.ecu.dither.f_dit)
+
+
+def _line(sine: Trajectory, f: float) -> complex:
+    """Return pressure over current at the sine's frequency [Pa/A]."""
+    inside = np.flatnonzero(sine.time >= _WINDOW - 1e-9)[:-1]
+    wave = np.exp(-2j * math.pi * f * sine.time[inside])
+    pressure, current = (sine[name][inside] @ wave for name in ("p_mc", "i"))
+    return complex(pressure / current)
+
+
+def _time_constants(K: float, lines: Complex) -> tuple[float, float]:
+    """Return T1 and T2 of eq. (21) [s] by magnitude and phase at the sines, the gain given.
+
+    The paper's second step: the gain is the step's.
+    """
+    slow, fast = (1.0 / (2.0 * math.pi * f) for f in (_FIRST, _SECOND))
+    log_gain = np.log(np.abs(lines)) + 1j * np.unwrap(np.angle(lines))
+    points = Points(np.array(FREQUENCIES), log_gain, np.ones(len(FREQUENCIES)))
+    region = Region("", (), points, 0.0)
+    unknowns = unknowns_of(region, {"K": K, "tau_L": 1.0, "T1": slow, "T2": fast, "T_L": 1.0})
+    whole = over_frequency(region, unknowns)
+    problem = restricted(whole, (2, 3), np.array([u.start for u in unknowns]))
+    T = np.sort(solve(problem, np.array([slow, fast])).values)
+    return float(T[1]), float(T[0])
+
+
+def _ramps(brakes: Sequence[Par]) -> list[dict[str, float]]:
+    """Return what Fig. 5 shows of the ramp (17)."""
+    options = friction_ramp.Options.model_validate(friction_ramp.EXPERIMENT.defaults.model_dump())
+    pairs = [friction_ramp.cases(par, options) for par in brakes]
+    both = [_runs((pair[k] for pair in pairs), ("i_meas", "p_mc")) for k in (0, 1)]
+    rows = []
+    for par, *runs in zip(brakes, *both, strict=True):
+        currents = [_low_passed(run, options.f_filter) for run in runs]
+        without, dithered = (
+            loop_area(Loop(run.time, smoothed(run.time, i, 1.0 / par.ecu.dither.f_dit),
+                           _averaged(run, par))).value
+            for run, i in zip(runs, currents, strict=True)
+        )  # fmt: skip
+        rows.append({
+            "fig5.p_max": max(float(run["p_mc"].max()) for run in runs) / _BAR,
+            "fig5.i_max": max(float(i.max()) for i in currents),
+            "fig5.loop_area_ratio": 100.0 * dithered / without,
+        })  # fmt: skip
+    return rows
+
+
+def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]:
+    return _together([as_run(case, _SUBSTEP) for case in cases], signals)
+
+
+def _low_passed(run: Trajectory, f: float) -> Array:
+    """Return the measured current behind the first-order low-pass of Fig. 5."""
+    from scipy import signal
+
+    decay = math.exp(-2.0 * math.pi * f * float(run.time[1] - run.time[0]))
+    raw = run["i_meas"]
+    return np.asarray(signal.lfilter([1.0 - decay], [1.0, -decay], raw, zi=[decay * raw[0]])[0])
+
+
+def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
+    """Return what Fig. 7a shows of hard braking."""
+    options = hard_braking.Options.model_validate(hard_braking.EXPERIMENT.defaults.model_dump())
+    runs = _runs((hard_braking.cases(par, options)[0] for par in brakes), ("p_mc",))
+    rows = []
+    for par, run in zip(brakes, runs, strict=True):
+        late = run.time >= run.time[-1] - _END + 1e-9
+        rows.append({
+            "fig7.peak": float(_averaged(run, par).max()) / _BAR,
+            "fig7.steady_state_error": float(run["p_mc"][late].mean() - options.p_to) / _BAR,
+        })  # fmt: skip
+    return rows

@@ -1,0 +1,142 @@
+"""The set estimated from what the paper measured: its residuals, its minimum, its honesty."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from bywire.brakes.motorcycle.linear.brake import coefficients
+from bywire.brakes.motorcycle.paper.dardanelli2010_measured import (
+    NAME,
+    Appraisal,
+    _best,
+    reproduce,
+)
+from bywire.brakes.motorcycle.paper.measured.estimation import LOSS, estimated
+from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, allowances
+from bywire.brakes.motorcycle.paper.measured.unknowns import FREE, HELD, TIED, brake, prior
+from bywire.brakes.motorcycle.paper.runs import parameters
+from bywire.brakes.motorcycle.sets.dardanelli2010_measured import ESTIMATED, NOT_TOLD
+from bywire.brakes.motorcycle.trim import travel_at
+from bywire.core.errors import ParameterError
+from bywire.identification.loss import rho
+from bywire.reproduction.reproduction import Reproduction
+
+UNEXPLAINED = {
+    *(f"table4.{region}.{key}" for region in ("low", "medium", "high")
+      for key in ("T2", "overshoot")),
+    "fig5.p_max", "fig5.i_max", "fig5.loop_area_ratio",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def page() -> Reproduction:
+    return reproduce(None)
+
+
+@pytest.fixture(scope="module")
+def best(page) -> Appraisal:
+    return _best()
+
+
+def test_gains_and_first_poles_of_table4_are_explained_and_the_rest_is_said(page):
+    left = {item.id for item in page.items if item.parameter_set == "" and item.agrees is False}
+    assert left == UNEXPLAINED
+    explained = set().union(*({i.id for i in cause.explained(page.items)} for cause in page.causes))
+    assert left <= explained
+
+
+def test_what_was_fitted_is_no_evidence(page):
+    own = [item for item in page.items if item.parameter_set == "" and item.stated is not None]
+    assert len(own) == len(STATEMENTS)
+    assert all(item.agrees is not True for item in own)
+
+
+def test_the_stored_set_is_a_minimum(best):
+    assert best.gain() < 0.002
+    firm = np.abs(best.jacobian).max(axis=0) > 10.0  # a tolerance for 10 % of the parameter
+    assert firm.sum() > 5
+    worse = 0.5 * rho(best.beside[:, firm] ** 2, LOSS)[0].sum(axis=2) - best.misfit
+    assert (worse.max(axis=0) > 1e-4 * best.misfit).all()
+
+
+def test_intervals_and_tellers_stand_beside_every_estimated_value(best):
+    ends = dict(zip(best.estimate.names, best.estimate.intervals(), strict=True))
+    assert set(ends) == set(ESTIMATED)
+    for name, cited in ESTIMATED.items():
+        low, high = map(float, re.findall(r"interval (\S+) to (\S+);", cited.where)[0])
+        assert (low, high) == pytest.approx(tuple(ends[name]), rel=0.1, abs=0.02 * (high - low))
+        assert best.tellers(name)[0] in cited.where
+
+
+def test_what_nothing_tells_stays_where_table1_has_it(best):
+    kept = {k.unknown.name: k for k in best.estimate.kept}
+    assert set(kept) == set(NOT_TOLD)
+    assert set(kept) | set(ESTIMATED) == set(FREE)
+    own, before = parameters(NAME).leaves(), prior().leaves()
+    for name in (*kept, *HELD):
+        assert own[name] == before[name]
+
+
+def test_the_terminal_shows_statements_beside_both_sets_and_what_is_left(page):
+    brief = str(page)
+    row = next(line for line in brief.splitlines() if line.startswith("table4.medium.K "))
+    assert re.search(r"10\.2 bar/A +0\.51 bar/A +7\.78\d* bar/A +10\.\d+ bar/A", row)
+    assert row.rstrip().endswith(" explained")
+    for text in ("table4.low.overshoot", "unexplained", "95 % interval", "Not told"):
+        assert text in brief
+
+
+def test_every_tolerance_has_its_reason():
+    assert len({s.name for s in STATEMENTS}) == len(STATEMENTS)
+    assert all(s.tolerance > 0.0 and s.allowance.reason for s in STATEMENTS)
+    assert {s.allowance for s in STATEMENTS} == set(allowances())
+
+
+def test_the_ecu_knows_the_estimated_friction_and_the_nominal_position_is_kept():
+    par = parameters(NAME)
+    own = par.leaves()
+    assert all(own[name] == own[source] for name, source in TIED.items())
+    assert travel_at(20e5, par) == pytest.approx(par.master_cylinder.x_nominal, rel=1e-4)
+    assert brake({}, par).master_cylinder.x_rest == pytest.approx(par.master_cylinder.x_rest,
+                                                                   rel=1e-4)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "together",
+    [
+        {"gear.k_g": 2.0, "master_cylinder.A_mc": 0.5, "master_cylinder.k_damp": 0.25,
+         "gear.M_mc": 0.25, "fluid.beta": 0.5},
+        {"caliper.A_pd": 2.0, "caliper.K_pd": 4.0},
+        {"fluid.nu": 16.0, "pipeline.d_pl": 2.0},
+        {"fluid.rho": 16.0, "pipeline.d_pl": 2.0},
+        {"pipeline.L_pl": 16.0, "pipeline.d_pl": 2.0},
+        {"pipeline.k_lf": 16.0, "pipeline.d_pl": 2.0},
+    ],
+)  # fmt: skip
+def test_what_is_held_shows_in_a_product_alone(together):
+    par = parameters("dardanelli2010-table1")
+    other = par.replace({name: share * par.leaves()[name] for name, share in together.items()})
+    assert set(together) & set(HELD)
+    assert coefficients(other) == pytest_approx(coefficients(par))
+
+
+def pytest_approx(expected):
+    return type(expected)(**{k: pytest.approx(v, rel=1e-12) for k, v in vars(expected).items()})
+
+
+def test_air_that_leaves_no_stroke_is_refused():
+    with pytest.raises(ParameterError, match=r"longer than the nominal travel of 7 mm: less air"):
+        brake({"fluid.V_air": 1e-6})
+
+
+@pytest.mark.trust
+def test_other_starts_lead_to_the_stored_set(best):
+    again = estimated(starts=4, seed=7)
+    ends = dict(zip(best.estimate.names, best.estimate.intervals(), strict=True))
+    assert set(again.names) == set(ends)
+    for name, value in zip(again.names, again.values, strict=True):
+        low, high = ends[name]
+        assert abs(value - best.estimate[name]) < 0.25 * (high - low)
