@@ -67,6 +67,10 @@ def test_floors_on_the_bench_are_the_linear_designs_figures() -> None:
     assert "settling_time" not in kept(0.05, 0.6, asked)
 
 
+SAMPLED = control.c2d(control.tf([1.0], [1e-3, 0.11, 1.0]), 5e-3)
+PLANT = SAMPLED.num[0][0], SAMPLED.den[0][0]
+
+
 def motor(gains: Any) -> tuple[LinearModel, LinearModel]:
     """Return loop gain and closed loop of a PI with a set-point weight, sampled with 5 ms.
 
@@ -74,16 +78,11 @@ def motor(gains: Any) -> tuple[LinearModel, LinearModel]:
     """
     k_p, k_i, b = gains["k_p"], gains["k_i"], gains["b"]
     T = 5e-3
-    plant = control.c2d(control.tf([1.0], [1e-3, 0.11, 1.0]), T)
-    (num,), (den,) = plant.num, plant.den
-    late = control.tf(num[0], np.append(den[0], 0.0), T)
-    feedback, demand = (
-        control.tf([p, k_i * T - p], [1.0, -1.0], T) for p in (k_p, b * k_p)
-    )  # fmt: skip
-    (over,), (under,) = (late * feedback).num, (late * feedback).den
-    (top,) = (late * demand).num
-    closed = control.tf(top[0], np.polyadd(under[0], over[0]), T)
-    return plain(control.ss(late * feedback)), plain(control.ss(closed))
+    num, den = PLANT
+    over, ahead = (np.polymul(num, [p, k_i * T - p]) for p in (k_p, b * k_p))
+    under = np.polymul(np.append(den, 0.0), [1.0, -1.0])
+    gain, closed = control.tf(over, under, T), control.tf(ahead, np.polyadd(under, over), T)
+    return plain(control.ss(gain)), plain(control.ss(closed))
 
 
 def plain(one: Any) -> LinearModel:

@@ -81,9 +81,11 @@ def hides_no_friction(trial: Trial) -> Iterator[Evidence]:
     for name in trial.model.frictions:
         yield _same_at_rest(trial, name)
     place = trial.place("balance", "wire")
+    contact = _forces(trial, SX(ca.DM(list(trial.start.state))))
     for name in speeds:
-        far = _change(trial, name, state[name].nominal)
-        shares = [_change(trial, name, r * state[name].nominal) / far if far else 0.0 for r in SLOW]
+        nominal = state[name].nominal
+        far = _change(trial, contact, name, nominal)
+        shares = [_change(trial, contact, name, r * nominal) / far if far else 0.0 for r in SLOW]
         sooner = max(share - r for share, r in zip(shares, SLOW, strict=True))
         text = f"the smooth force against {name} comes {sooner:.2g} sooner than with its speed"
         if sooner > HIDDEN:
@@ -107,9 +109,8 @@ def _contain_zero(trial: Trial) -> Iterator[Evidence]:
 def _same_at_rest(trial: Trial, name: str) -> Evidence:
     """Return whether bounds come up with speed that are not there at rest."""
     nominal = signals_of(trial.model.State)[name].nominal
-    k = trial.model.frictions.index(name)
-    rest, far = (_bounds_at(trial, r * nominal)[k] for r in (0.0, 1.0))
-    slow = {r: _bounds_at(trial, r * nominal)[k] for r in (*SLOW, 0.1)}
+    rest, far = (_bounds_at(trial, name, r * nominal) for r in (0.0, 1.0))
+    slow = {r: _bounds_at(trial, name, r * nominal) for r in (*SLOW, 0.1)}
     sooner = max((width - rest) / far - r if far else 0.0 for r, width in slow.items())
     text = f"the bounds of {name} grow by {sooner:.2g} more than with its speed"
     if sooner > GROWN:
@@ -117,25 +118,21 @@ def _same_at_rest(trial: Trial, name: str) -> Evidence:
     return measured(sooner, GROWN, text, trial.place("bounds", "friction"))
 
 
-def _bounds_at(trial: Trial, speed: float) -> list[float]:
-    """Return the width between the bounds of every friction, each at a speed in turn."""
+def _bounds_at(trial: Trial, name: str, speed: float) -> float:
+    """Return the width between the bounds of a friction at a speed of its own velocity."""
     start, model = trial.start, trial.model
-    widths = []
-    for k, name in enumerate(model.frictions):
-        x = start.state._replace(**{name: speed})
-        column = SX(ca.DM(list(x)))
-        contact = _forces(trial, column)
-        low, high = model.bounds(x, x, start.memory, start.par, contact)[k]
-        widths.append(float(ca.evalf(SX(high) - SX(low))))
-    return widths
+    x = start.state._replace(**{name: speed})
+    contact = _forces(trial, SX(ca.DM(list(x))))
+    bounds = model.bounds(x, x, start.memory, start.par, contact)
+    low, high = bounds[model.frictions.index(name)]
+    return float(ca.evalf(SX(high) - SX(low)))
 
 
-def _change(trial: Trial, name: str, speed: float) -> float:
+def _change(trial: Trial, contact: tuple[float, ...], name: str, speed: float) -> float:
     """Return by how much the balance of a velocity differs between both directions."""
     start, forces = trial.start, []
     for sign in (1.0, -1.0):
         x = start.state._replace(**{name: sign * speed})
-        contact = _forces(trial, SX(ca.DM(list(start.state))))
         balance = trial.model.balance(x, x, start.memory, start.par, contact)
         forces.append(float(ca.evalf(SX(getattr(balance, name)))))
     change = abs(forces[0] - forces[1])
