@@ -194,3 +194,12 @@ def test_a_stimulus_says_its_defaults(bywire: Bywire) -> None:
     (sine,) = bywire("list", "sine", "--json").object["found"]
     values = {row["name"]: row["value"] for row in sine["parameters"]}
     assert (values["phase"], values["t_start"], values["f"]) == ("0 rad", "0 s", None)
+
+
+def test_every_value_of_a_set_says_where_it_comes_from(bywire: Bywire) -> None:
+    one = only(bywire("list", "dardanelli2010-measured", "--json"), "parameter set")
+    told = {row["name"]: row["provenance"] for row in one["parameters"]}
+    assert all(told.values())
+    assert told["motor.K_e"] == "paper: Table 1"
+    assert told["caliper.K_pd"].startswith("calibrated: estimated, 95 % interval ")
+    assert "provenance" in bywire("list", "dardanelli2010-measured").out

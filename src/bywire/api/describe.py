@@ -251,8 +251,12 @@ def _study(study: Study) -> Object:
 
 
 def _set(cited: Set) -> Object:
-    return {**_in_short(cited), "source": cited.source,
-            "parameters": option_rows(cited.parameter_class, cited.parameters()),
+    rows = option_rows(cited.parameter_class, cited.parameters())
+    for row in rows:
+        known = cited.values.get(row["name"])
+        parts = () if known is None else (known.kind, known.where)
+        row["provenance"] = ": ".join(part for part in parts if part)
+    return {**_in_short(cited), "source": cited.source, "parameters": rows,
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
 
 

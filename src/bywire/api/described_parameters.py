@@ -146,8 +146,10 @@ def option_table(rows: Sequence[Mapping[str, Any]], heading: str) -> Table:
     columns = ["name", "value", "range", "meaning"]
     if all(row["value"] is None for row in rows):
         columns.remove("value")
+    if any(row.get("provenance") for row in rows):
+        columns.append("provenance")
     titles = [heading if name == "value" else name for name in columns]
-    return text_table(titles, [[row[name] or "-" for name in columns] for row in rows])
+    return text_table(titles, [[row.get(name) or "-" for name in columns] for row in rows])
 
 
 def _range(leaf: Leaf) -> str:
