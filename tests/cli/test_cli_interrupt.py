@@ -196,6 +196,25 @@ def test_interrupt_while_the_command_is_loaded():
     assert (done.returncode, done.stderr) == (130, "bywire: interrupted\n")
 
 
+@posix
+def test_interrupt_within_text_that_is_executed_ends_with_130_too(tmp_path):
+    """As where a data class is made: Python then ends a module by the signal, unless it forgets."""
+    (tmp_path / "interrupted.py").write_text(
+        "import sys, types\n"
+        "import bywire.core.brake, bywire.core.callers, bywire.core.sources\n"
+        "import bywire.report.wording\n"
+        "from bywire.cli.main import main\n"
+        "text = 'import signal; signal.raise_signal(signal.SIGINT)'\n"
+        "sys.modules['bywire.cli.app'] = types.SimpleNamespace(app=lambda words: exec(text))\n"
+        "main()"
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "interrupted"], cwd=tmp_path, capture_output=True, text=True,
+        check=False,
+    )  # fmt: skip
+    assert (done.returncode, done.stderr) == (130, "bywire: interrupted\n")
+
+
 def test_interrupt_while_graphs_are_built_is_not_lost(
     bywire, bench, tmp_path, machine, monkeypatch
 ):

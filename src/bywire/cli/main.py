@@ -36,6 +36,9 @@ def main() -> None:
         except KeyboardInterrupt:  # while the last words were said
             message("interrupted")
             status = INTERRUPTED
+    # In text that is executed, as where a data class is made, CPython notes a KeyboardInterrupt as
+    # unhandled, and ends ``python -m`` by the signal whatever becomes of it: more text resets it.
+    exec("")
     raise SystemExit(status)
 
 
