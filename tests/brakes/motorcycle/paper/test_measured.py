@@ -14,13 +14,13 @@ from bywire.brakes.motorcycle.paper.dardanelli2010_measured import (
     _best,
     reproduce,
 )
-from bywire.brakes.motorcycle.paper.measured.estimation import LOSS, estimated
+from bywire.brakes.motorcycle.paper.measured.estimation import LOSS, estimated, problem
 from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, allowances
 from bywire.brakes.motorcycle.paper.measured.unknowns import FREE, HELD, TIED, brake, prior
 from bywire.brakes.motorcycle.paper.runs import parameters
 from bywire.brakes.motorcycle.sets.dardanelli2010_measured import ESTIMATED, NOT_TOLD
 from bywire.brakes.motorcycle.trim import travel_at
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, SolverError
 from bywire.identification.loss import rho
 from bywire.reproduction.reproduction import Reproduction
 
@@ -130,6 +130,13 @@ def pytest_approx(expected):
 def test_air_that_leaves_no_stroke_is_refused():
     with pytest.raises(ParameterError, match=r"longer than the nominal travel of 7 mm: less air"):
         brake({"fluid.V_air": 1e-6})
+
+
+def test_a_trial_step_to_no_brake_is_one_that_cannot_be_computed():
+    misfit = problem()
+    soft = [1e5 if u.name == "caliper.K_pd" else u.start for u in misfit.unknowns]
+    with pytest.raises(SolverError, match="stiffer pads"):
+        misfit.evaluate(np.array(soft))
 
 
 @pytest.mark.trust

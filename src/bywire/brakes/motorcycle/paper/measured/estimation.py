@@ -12,6 +12,7 @@ from bywire.brakes.motorcycle.paper.measured.experiments import computed
 from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS
 from bywire.brakes.motorcycle.paper.measured.unknowns import brake, unknowns
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
+from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array, Progress
 from bywire.identification.estimate import Estimate
 from bywire.identification.least_squares import estimate
@@ -81,7 +82,10 @@ def problem(free: tuple[Unknown, ...] | None = None, step: float = _STEP) -> Pro
         return last[key]
 
     def fresh(values: Array) -> tuple[Array, Array]:
-        r, lower, upper, width = _around(free, values, step)
+        try:
+            r, lower, upper, width = _around(free, values, step)
+        except ParameterError as error:  # a trial step too far: a shorter one follows
+            raise SolverError(str(error)) from error
         return r, np.asarray(((upper - lower) / width[:, None]).T)
 
     parts = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
