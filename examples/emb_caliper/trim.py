@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from scipy.optimize import brentq
-
 from bywire.authoring import ParameterError, zeros
 from bywire.plant import dc_motor
 from emb_caliper.ecu import Memory, travel_per_angle
@@ -28,6 +26,8 @@ def overlap_at(F: float, par: Par) -> float:
             f"a clamp force of {F / 1e3:g} kN is not admissible: it must be >= 0 kN and <= "
             f"{most / 1e3:.4g} kN, where the caliper's measured curve ends (caliper.n_max)"
         )
+
+    from scipy.optimize import brentq  # here: a run from rest does without it
 
     def missing(n: float) -> float:
         return float(floating_caliper.elastic(n, par.caliper)) - F

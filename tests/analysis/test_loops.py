@@ -174,3 +174,14 @@ def test_an_unstable_loop_has_no_margins_and_is_the_worst_case() -> None:
     assert [one.stable for one in found] == [True, False]
     assert all(math.isnan(v) for v in astuple(found[1]) if not isinstance(v, bool))
     assert all(at == 400.0 for _, at in worst(found, values).values())
+
+
+@pytest.mark.parametrize("name", ["pressure", "moment", "screw-position"])
+def test_gain_and_closed_loop_of_one_plant_are_those_of_two(name):
+    loop = LOOPS.find(name)
+    par = parameters(main_set(loop.assembly))
+    pair = loop.gain_and_closed(par, loop.at.default)
+    apart = loop.gain(par, loop.at.default), loop.closed(par, loop.at.default)
+    for one, two in zip(pair, apart, strict=True):
+        assert one.name == two.name
+        assert all(np.array_equal(getattr(one, m), getattr(two, m)) for m in "ABCD")

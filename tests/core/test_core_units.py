@@ -216,3 +216,20 @@ def test_home_that_cannot_be_written_is_no_obstacle(home):
         [sys.executable, "-c", code], capture_output=True, text=True, check=False, env=environment
     )
     assert (done.stdout, done.stderr) == ("9000.0\n", "")
+
+
+def test_what_the_edges_show_takes_no_library_of_units():
+    code = (
+        "import sys; from bywire.core.quantities import DISPLAY_UNITS; "
+        "from bywire.core.units import convert, parse\n"
+        "for symbol, unit in DISPLAY_UNITS.items():\n"
+        "    convert(1.0, symbol, unit), parse(f'1 {unit}', symbol, 'x')\n"
+        "assert 'pint' not in sys.modules"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+@pytest.mark.parametrize(("symbol", "unit"), quantities.DISPLAY_UNITS.items())
+def test_what_the_edges_show_is_as_the_library_of_units_has_it(symbol, unit):
+    factor = units.registry().Quantity(1.0, symbol).to(unit).magnitude
+    assert units.convert(3.7, symbol, unit) == pytest.approx(3.7 * factor, rel=1e-14)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 from bywire.core.errors import FileError
 from bywire.report.files import figure_bytes, save_figure, write_bytes
@@ -22,6 +23,18 @@ def test_the_same_figure_gives_the_same_bytes(recording: xr.Dataset, kind: str) 
     first = figure_bytes(figure, kind)
     assert figure_bytes(figure, kind) == first
     assert figure_bytes(step_figure(recording), kind) == first
+
+
+def test_a_figure_is_drawn_once_for_each_format(
+    recording: xr.Dataset, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: list[object] = []
+    draw = Figure.draw
+    monkeypatch.setattr(Figure, "draw", lambda *args: (drawn.append(args), draw(*args))[1])
+    figure = step_figure(recording)
+    figure_bytes(figure, "png")
+    figure_bytes(figure, "svg")
+    assert len(drawn) == 2
 
 
 def test_order_of_formats_does_not_matter(recording: xr.Dataset) -> None:

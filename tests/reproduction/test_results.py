@@ -56,6 +56,22 @@ def test_json_has_the_promised_keys_and_no_nan(made_up: Reproduction) -> None:
     assert content["items"][2]["note"] == "ours; kind: ours"
 
 
+def test_a_figure_is_drawn_where_it_is_shown_alone(tmp_path: Path) -> None:
+    drawn: list[str] = []
+
+    def draw() -> Figure:
+        drawn.append("fig")
+        return Figure(figsize=(4.0, 2.0))
+
+    part = Part("Table 2", "text", (), (Exhibit("fig", draw, "A figure."),))
+    source = Reproduction("made-up", "Nobody, 2010", (part,))
+    source.as_object()
+    str(source)
+    assert drawn == []
+    source.write(tmp_path)
+    assert drawn == ["fig"]
+
+
 def test_table_has_a_row_per_item(made_up: Reproduction) -> None:
     assert [row[0].text for row in verdicts(made_up.items).rows] == ["t.K", "t.n", "t.x"]
 

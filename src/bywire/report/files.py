@@ -6,6 +6,7 @@ import io
 import os
 import warnings
 from pathlib import Path
+from typing import Any
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -16,6 +17,8 @@ from bywire.core.scratch import replacing
 PNG_DPI = 160
 """pixels per inch of a PNG"""
 
+_PIL = {"compress_level": 4}
+"""zlib's default of 6 takes a third longer for a whole figure, to save 3 %"""
 _METADATA: dict[str, dict[str, str | None]] = {
     "png": {"Software": None},
     "svg": {"Date": None, "Creator": None, "Format": None, "Type": None},
@@ -43,7 +46,8 @@ def figure_bytes(figure: Figure, kind: str = "png") -> bytes:
         # A character that the font lacks is drawn as a box; that is no reason to fail.
         warnings.filterwarnings("ignore", message="Glyph .* missing from")
         _settle(figure)
-        figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata=_METADATA[kind])
+        packed: Any = {"pil_kwargs": _PIL} if kind == "png" else {}
+        figure.savefig(buffer, format=kind, dpi=PNG_DPI, metadata=_METADATA[kind], **packed)
     return buffer.getvalue()
 
 

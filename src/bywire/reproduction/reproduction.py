@@ -39,10 +39,10 @@ _WIDTH = 150  # characters of a line of a part's own table
 
 @dataclass(frozen=True, eq=False)
 class Exhibit:
-    """A figure with a name for its file and a caption."""
+    """A figure, or what draws it once it is shown, with a name for its file and a caption."""
 
     name: str
-    figure: Figure
+    figure: Figure | Callable[[], Figure]
     caption: str
 
 

@@ -34,7 +34,7 @@ def part(runs: Runs) -> Part:
     }
     exhibit = Exhibit(
         "dither-waveforms",
-        hysteresis_loop(loops, "p_mc", "i_filtered", "i_star", average=0.02),
+        lambda: hysteresis_loop(loops, "p_mc", "i_filtered", "i_star", average=0.02),
         "The ramp of eq. (17) with dither of three waveforms, averaged over one dither period.",
     )
     return Part("Section 4.2: waveform of the dither", text, tuple(items), (exhibit,))

@@ -56,9 +56,9 @@ def part(runs: Runs) -> Part:
         "on which the paper's identification rests, holds only for a locked or heavy rotor."
     )
     exhibits = (
-        Exhibit("fig3", step_response(locked.recordings["run"], "i", "i_ref"),
+        Exhibit("fig3", lambda: step_response(locked.recordings["run"], "i", "i_ref"),
                 "Fig. 3: current after a step of its set point to 0.73 A, rotor locked."),
-        Exhibit("fig3-free", step_response(step.recordings["run"], "i", "i_ref"),
+        Exhibit("fig3-free", lambda: step_response(step.recordings["run"], "i", "i_ref"),
                 "The same with the piston free to move from its rest position, calibrated set."),
     )  # fmt: skip
     return Part(

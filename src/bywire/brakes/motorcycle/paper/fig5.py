@@ -114,7 +114,8 @@ def _exhibit(runs: Runs, name: str, suffix: str) -> Exhibit:
     """Return Fig. 5 for one parameter set."""
     recordings = runs.bench("friction-ramp", name).recordings
     return Exhibit(f"fig5{suffix.replace('@', '-')}",
-                   hysteresis_loop(recordings, "p_mc", "i_filtered", "i_star", average=0.02),
+                   lambda: hysteresis_loop(
+                       recordings, "p_mc", "i_filtered", "i_star", average=0.02),
                    "Fig. 5: measured current (low-passed at 20 Hz) over pressure during the slow "
                    "ramp, averaged over one dither period; pale: with its ripple. Parameter set "
                    f"{name}.")  # fmt: skip

@@ -151,6 +151,6 @@ def _exhibit(step: Result, name: str, label: str) -> Exhibit:
     )
     return Exhibit(
         label,
-        time_traces(shown, panels=(panel,)),
+        lambda: time_traces(shown, panels=(panel,)),
         f"Fig. 6: step of the current demand by 0.35 A from 25 bar, parameter set {name}.",
     )

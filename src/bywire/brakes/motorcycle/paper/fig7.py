@@ -144,7 +144,7 @@ def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
     return (
         Exhibit(
             "fig7a",
-            step_response(
+            lambda: step_response(
                 hard.recordings["run"],
                 "p_mc",
                 "p_ref",
@@ -155,10 +155,12 @@ def _exhibits(runs: Runs, tests: dict[str, xr.Dataset]) -> tuple[Exhibit, ...]:
             "Fig. 7a: hard braking from 6 to 37 bar, calibrated set.",
         ),
         Exhibit("fig7b",
-                tracking(runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
+                lambda: tracking(
+                    runs.bench("pedal-tracking", MAIN).recordings["run"], "p_mc", "p_ref"),
                 "Fig. 7b: the pressure follows the pedal; the ride is ours, the range the "
                 "paper's."),
-        Exhibit("fig7-bode", bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value}),
+        Exhibit("fig7-bode",
+                lambda: bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value}),
                 "Closed loop from set point to pressure: linear with Table 4's medium model, and "
                 "the nonlinear brake with dither (points: sines of 1 bar at 25 bar)."),
     )  # fmt: skip

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import xarray as xr
 
 from bywire.brakes.motorcycle.paper.runs import FRICTIONLESS, MAIN, SETS, Runs, parameters
@@ -52,7 +54,7 @@ def part(runs: Runs) -> Part:
     )
     exhibits = tuple(
         Exhibit(
-            f"gear-{law}", energy_balance(release, source="W_shaft", sinks=MECHANICAL),
+            f"gear-{law}", partial(energy_balance, release, source="W_shaft", sinks=MECHANICAL),
             caption.format(law),
         )
         for law, release in releases.items()

@@ -63,7 +63,7 @@ def part(runs: Runs) -> Part:
         "for exactly that, so its agreement proves only that such a set exists."
     )
     figure = Exhibit("requirements",
-                     bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value}),
+                     lambda: bode(responses, marks={"required bandwidth": facts.BANDWIDTH.value}),
                      "Pressure over its set point around 20 bar, friction, dither and converter "
                      "on.")  # fmt: skip
     return Part("Requirements of section 6 on the nonlinear bench", text, tuple(items), (figure,))

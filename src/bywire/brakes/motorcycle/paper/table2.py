@@ -75,7 +75,7 @@ def _figure() -> Exhibit:
             "Table 2 as printed", sparse, facts.table2_model().response(sparse) / BAR, measured=True
         )
     )  # fmt: skip
-    return Exhibit("table2-bode", bode(responses, gain_unit="bar/A"),
+    return Exhibit("table2-bode", lambda: bode(responses, gain_unit="bar/A"),
                    "Pressure over motor current: eq. (15) from the two parameter sets, the "
                    "transfer function that Table 2 prints (points), and Table 4's model."
     )  # fmt: skip

@@ -51,7 +51,7 @@ def part(runs: Runs) -> Part:
         "Table 3 is used as published; only the preload T_pr, which it omits, is ours. Where the "
         "curves are vertical the piston sticks: the torque is anything between both ends."
     ) + _untold()
-    exhibit = Exhibit("fig4", stribeck_curve(curve),
+    exhibit = Exhibit("fig4", lambda: stribeck_curve(curve),
                       "Fig. 4: friction torque at the motor shaft over speed.")  # fmt: skip
     return Part("Table 3 and Figure 4: friction", text, tuple(items),
                 (exhibit, _identified_exhibit()))  # fmt: skip
@@ -119,6 +119,6 @@ def _identified_exhibit() -> Exhibit:
     """Return Fig. 4 as identified, with the band that noise leaves."""
     curve = next(c for c in _identified().curves if c.name == "stribeck")
     widest = float((curve.data["high"] - curve.data["value"]).max())
-    return Exhibit("fig4-identified", method_curve(curve), "Fig. 4 as identified on our own brake "
-                   f"from one ramp with sensors' noise; bands: 95 % confidence, {widest:.1g} N m "
-                   "to either side at most.")  # fmt: skip
+    return Exhibit("fig4-identified", lambda: method_curve(curve),
+                   "Fig. 4 as identified on our own brake from one ramp with sensors' noise; "
+                   f"bands: 95 % confidence, {widest:.1g} N m to either side at most.")  # fmt: skip

@@ -160,7 +160,7 @@ def _figure(measured: dict[str, xr.Dataset]) -> Exhibit:
             for name, test in measured.items()
         ),
     ]
-    return Exhibit("table4-bode", bode(responses, gain_unit="bar/A"),
+    return Exhibit("table4-bode", lambda: bode(responses, gain_unit="bar/A"),
                    "Pressure over current demand at 25 bar: Table 4's medium model, eq. (15), and "
                    "the nonlinear brake with friction and dither (points: sines of 0.1 A through "
                    "the 80 Hz filter and the current loop).")  # fmt: skip

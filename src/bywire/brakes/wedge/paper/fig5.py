@@ -41,9 +41,9 @@ def part(runs: Runs) -> Part:
         "bandwidth, are our choice. 0.25 rad sticks at all frequencies."
     )
     exhibits = (
-        Exhibit("fig5", frequency.figure(_LOW),
+        Exhibit("fig5", lambda: frequency.figure(_LOW),
                 "Fig. 5: position frequency response, low bandwidth controller."),
-        Exhibit("fig5-wedge", frequency.beside(_LOW),
+        Exhibit("fig5-wedge", lambda: frequency.beside(_LOW),
                 "The assembled wedge beside the screw, low bandwidth controller."),
     )  # fmt: skip
     return Part("Figure 5: position response, low bandwidth", text, tuple(items), exhibits,

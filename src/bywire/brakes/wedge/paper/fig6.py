@@ -55,9 +55,9 @@ def part(runs: Runs) -> Part:
         "practice match cannot be judged: the measured curves are not at hand."
     )
     exhibits = (
-        Exhibit("fig6", frequency.figure(_HIGH),
+        Exhibit("fig6", lambda: frequency.figure(_HIGH),
                 "Fig. 6: position frequency response, high bandwidth controller."),
-        Exhibit("fig6-wedge", frequency.beside(_HIGH),
+        Exhibit("fig6-wedge", lambda: frequency.beside(_HIGH),
                 "The assembled wedge beside the screw, high bandwidth controller."),
     )  # fmt: skip
     return Part("Figure 6: position response, high bandwidth", text, tuple(items), exhibits,

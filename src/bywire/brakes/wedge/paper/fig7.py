@@ -39,7 +39,7 @@ def part(runs: Runs) -> Part:
         "a measured recording can be drawn on it. Shaded: shafts and wedge stick, so that the "
         "run-out passes on to the moment unhindered until the controller has broken them away."
     )
-    exhibit = Exhibit("fig7", stacked(result.recordings["run"]),
+    exhibit = Exhibit("fig7", lambda: stacked(result.recordings["run"]),
                       "Fig. 7: 200 Nm step in moment, with pulses: demand and simulation."
     )  # fmt: skip
     return Part(

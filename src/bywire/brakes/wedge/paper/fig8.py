@@ -24,7 +24,7 @@ def part(runs: Runs) -> Part:
         "Length and slope of the ramp are ours; 'slow' was read as 1 s. Means over a revolution of "
         "the disc are judged, because the run-out's oscillation passes through any of them."
     )
-    exhibit = Exhibit("fig8", stacked(result.recordings["run"]),
+    exhibit = Exhibit("fig8", lambda: stacked(result.recordings["run"]),
                       "Fig. 8: 200 Nm step in moment, with ramp: demand and simulation."
     )  # fmt: skip
     return Part(

@@ -40,7 +40,7 @@ def part(runs: Runs) -> Part:
         "The disc gives nearly all of the energy that the caliper stores."
     )
     run = result.recordings["run"]
-    exhibit = Exhibit("fig9", stacked(run),
+    exhibit = Exhibit("fig9", lambda: stacked(run),
                       "Fig. 9: 950 Nm step pulse in moment: demand and simulation.")  # fmt: skip
     return Part("Figure 9: large pulse", text, tuple(items), (exhibit,), {"fig9": run})
 

@@ -36,7 +36,7 @@ def part(runs: Runs) -> Part:
         "below the neutral point the wedge pushes the motors back until friction holds it."
     )
     run = off.recordings["run"]
-    exhibit = Exhibit("power-off-hold", stacked(run),
+    exhibit = Exhibit("power-off-hold", lambda: stacked(run),
                       "Power off at 500 Nm: what is left is the run-out's ripple.")  # fmt: skip
     return Part("Holding", text, tuple(items), (exhibit,), {"power-off-hold": run})
 

@@ -66,7 +66,7 @@ def force_fight(runs: Runs) -> Part:
         "no forces. The rate limit's reason, higher speeds widen the angle between the motors, is "
         "looked for in Fig. 9's pulse with a weaker second motor."
     )
-    exhibit = Exhibit("force-fight", time_traces(result.recordings["step_unequal"]),
+    exhibit = Exhibit("force-fight", lambda: time_traces(result.recordings["step_unequal"]),
                       "Force fight: step of both motors, of which the second one differs."
     )  # fmt: skip
     return Part("Force fight", text, tuple(items), (exhibit,))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 from bywire.brakes.wedge.paper import facts
 from bywire.brakes.wedge.paper.runs import MAIN, parameters
 from bywire.brakes.wedge.paper.tolerances import RECOVERED
@@ -65,7 +67,7 @@ def efficiency(runs: Runs) -> Part:
         "One motor in current control against the other in position control, a force sensor "
         "between their screws, in slow motion."
     )
-    exhibit = Exhibit("screw-efficiency", time_traces(result.recordings["driving"]),
+    exhibit = Exhibit("screw-efficiency", lambda: time_traces(result.recordings["driving"]),
                       "Screw efficiency: motor 1 drives with constant current while motor 2 gives "
                       "way.")  # fmt: skip
     return Part("Roller-screw efficiency", text, tuple(items), (exhibit,))
@@ -87,7 +89,7 @@ def stiffness(runs: Runs) -> Part:
         "through the wedge. What the test finds is compared with what was put into the model."
     )
     exhibits = tuple(
-        Exhibit(f"stiffness-{label}", time_traces(result.recordings[label]), caption)
+        Exhibit(f"stiffness-{label}", partial(time_traces, result.recordings[label]), caption)
         for label, caption in (
             ("sensor", "Stiffness, first stage: a force sensor between the screws."),
             ("heart", "Stiffness, second stage: the screws in the brake heart."),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from bywire.brakes.wedge.start import memory_at, travel_for
 from bywire.reproduction.item import Fact, Item, compared, found, reading
 from bywire.reproduction.reproduction import Exhibit, Part
 from bywire.reproduction.runs import Runs, kpis
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 COEFFICIENTS = (0.2, 0.35, 0.6)
 """below, near and above the neutral point: brake factors that are judged"""
@@ -50,8 +53,10 @@ def part(runs: Runs) -> Part:
         "friction the model obeys both. With it the neutral point is a band: what friction holds "
         "does not run away, and the more load the less of it."
     )
-    run = runs.bench("moment-pulses", MAIN, _at(0.6, {})).recordings["run"]
-    exhibit = Exhibit("unstable-region", stacked(run), "Fig. 7's test in the unstable region, at "
+    def pulses() -> Figure:
+        return stacked(runs.bench("moment-pulses", MAIN, _at(0.6, {})).recordings["run"])
+
+    exhibit = Exhibit("unstable-region", pulses, "Fig. 7's test in the unstable region, at "
                       "mu_B = 0.6: the motors pull the wedge back.")  # fmt: skip
     return Part("Neutral point and stability", text, tuple(items), (_figure(runs), exhibit))
 
@@ -101,7 +106,8 @@ def _figure(runs: Runs) -> Exhibit:
         name: [values[f"{name}_{tag(m)}"] / F for m, F in zip(tried, pressed, strict=True)]
         for name in ("F_M", "F_M_rising", "F_M_falling")
     }
-    return Exhibit("brake-factor", brake_factor(WedgeForces(tried, *ratios.values()), tan_alpha()),
+    forces = WedgeForces(tried, *ratios.values())
+    return Exhibit("brake-factor", lambda: brake_factor(forces, tan_alpha()),
                    "Actuation force and brake factor at 500 Nm over the pads' friction "
                    "coefficient.")  # fmt: skip
 
