@@ -215,6 +215,21 @@ def test_interrupt_within_text_that_is_executed_ends_with_130_too(tmp_path):
     assert (done.returncode, done.stderr) == (130, "bywire: interrupted\n")
 
 
+@posix
+def test_interrupt_after_all_is_said_changes_nothing():
+    """While Python tidies up: what was registered first comes last."""
+    code = (
+        "import atexit, signal, sys\n"
+        "atexit.register(signal.raise_signal, signal.SIGINT)\n"
+        "from bywire.cli.main import main\n"
+        "sys.argv = ['bywire', '--version']\n"
+        "main()"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.strip()
+
+
 def test_interrupt_while_graphs_are_built_is_not_lost(
     bywire, bench, tmp_path, machine, monkeypatch
 ):

@@ -5,8 +5,10 @@ Light to load, so that Ctrl-C is heard from the start: what commands need comes 
 
 from __future__ import annotations
 
+import atexit
 import errno
 import gc
+import signal
 import sys
 import traceback
 import warnings
@@ -27,6 +29,8 @@ def main() -> None:
     from bywire.core.callers import command_line
     from bywire.core.sources import command
 
+    # All is written and said when Python tidies up: Ctrl-C then would end it by the signal.
+    atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
     with interrupts_noted() as was_interrupted, command(), command_line():
