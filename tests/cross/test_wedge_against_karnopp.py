@@ -4,12 +4,12 @@ Root mean squares of the wedge's position [nm], package at 20 us less reference 
 
     moment pulses 0.23, power-off hold 0.14, release 0.42, other direction 0.17, uneven motors
     0.18, screw friction by torque 0.14, driven disc 0.16, weak pads 0.93, beyond the neutral
-    point 0.31, scheduled offset 2.7, disc stops 64 (pads dropped) and 0.16 (pads stick),
-    runaway to the end stop 21
+    point 0.31, scheduled offset 2.7, disc stops 10.5 (pads dropped) and 0.16 (pads stick),
+    runaway to the end stop 7.2
 
-They fall with the square of the step, but for contacts that begin or end and for a disc that
-stops: the package does not locate these within a substep. Where the pads' pull on the wedge
-drops out with the disc's rotation, by 1.1 kN, some 10 us of delay ring with up to 1.1 um.
+They fall with the square of the step, but for contacts that begin or end: the package does not
+locate these within a substep. Where the pads' pull on the wedge drops out with the disc's
+rotation, by 1.1 kN, the substep is cut.
 """
 
 from __future__ import annotations
@@ -39,9 +39,9 @@ LIMITS = {
     "weak pads": (1.2, 0.03),
     "beyond the neutral point": (0.4, 0.01),
     "scheduled offset": (4.0, 0.1),
-    "disc stops, pads dropped": (80.0, 2.0),
+    "disc stops, pads dropped": (12.0, 2.0),
     "disc stops, pads stick": (0.25, 0.01),
-    "runaway to the end stop": (30.0, 0.6),
+    "runaway to the end stop": (10.0, 0.6),
 }
 """of the root mean squares of the position [nm] and of the heart's forces [N] at 20 us"""
 SMOOTH = (

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 Array = NDArray[np.float64]
 Matrix = tuple[tuple[float, ...], ...]
@@ -125,7 +126,10 @@ def solve_contacts(C: Matrix, d: Array) -> tuple[tuple[int, ...], Array]:
 
 
 def solve_signs(S: Array, c: Array, low: Array, high: Array) -> tuple[Array, Array]:
-    """Return (w, b) of ``S w = c + b``: b is low where w > 0, high where w < 0, else between."""
+    """Return (w, b) of ``S w = c + b``: b is low where w > 0, high where w < 0, else between.
+
+    Where both bounds are one, b is that.
+    """
     found, least = (np.zeros(c.size), -c), math.inf
     for signs in product((0, 1, -1), repeat=c.size):
         sign = np.array(signs)
@@ -135,7 +139,8 @@ def solve_signs(S: Array, c: Array, low: Array, high: Array) -> tuple[Array, Arr
             continue
         w[moving] = np.linalg.solve(S[np.ix_(moving, moving)], (c + b)[moving])
         b = np.where(sign == 0, S @ w - c, b)
-        wrong = np.maximum(-sign * w, 0.0) * np.diag(S)
+        # Where both bounds are one, that is the force, whatever the sign.
+        wrong = np.where(low < high, np.maximum(-sign * w, 0.0) * np.diag(S), 0.0)
         wrong += np.where(sign == 0, np.maximum(low - b, 0.0) + np.maximum(b - high, 0.0), 0.0)
         if np.max(wrong, initial=0.0) < least:
             found, least = (w, b), np.max(wrong, initial=0.0)
@@ -157,10 +162,54 @@ class Point:
     repeated: int = 0
 
 
+@dataclass
+class Part:
+    """What a step of any length gives: as in ``Point``, and the rates of the integrals."""
+
+    x: Array
+    d: Array
+    r: Array
+    flow: Array
+    passes: int
+    settled: bool
+
+
 def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
-    """Advance by one substep, in place; ``cap`` = 1 leaves out the check of the contact sets."""
+    """Advance by one substep, in place; ``cap`` = 1 leaves out the check of the contact sets.
+
+    It is cut where a velocity with dry friction passes zero.
+    """
+    rubs = [model.State._fields.index(n) for n in model.frictions]
+    rate, left, cuts, passes, settled = at.d / h, h, 0, 0, True
+    while True:
+        new = _part(model, par, at, rate * left, left, cap)
+        passes += new.passes
+        if cuts:
+            new = _part(model, par, at, new.d, left, cap)
+        turned = [k for k in rubs if at.x[k] * new.x[k] < 0.0]
+        if not turned:
+            break
+
+        def velocity(t: float, k: int, rate: Array = rate) -> float:
+            return float(_part(model, par, at, rate * t, t, cap).x[k] if t else at.x[k])
+
+        roots = [brentq(velocity, 0.0, left, (k,), xtol=1e-20, rtol=1e-15) for k in turned]
+        t, k = min(zip(roots, turned, strict=True))
+        new = _part(model, par, at, rate * t, t, cap)
+        at.x, rate, at.q = new.x, new.d / t, at.q + t / h * new.flow
+        at.x[k] = rate[k] = 0.0
+        left, cuts = left - t, cuts + 1
+        settled &= new.settled
+    at.unsettled += int(cap > 1 and not (settled and new.settled))
+    # The engine's ordinary pass keeps at rest what rests, but for a friction that is alone.
+    freed = len(rubs) > 1 and any(at.x[k] == 0.0 != new.x[k] for k in rubs)
+    at.repeated += int(passes > 1 or cuts > 0 or freed)
+    at.x, at.d, at.r, at.q = new.x, new.d * (h / left), new.r, at.q + left / h * new.flow
+
+
+def _part(model: Any, par: Any, at: Point, predicted: Array, h: float, cap: int) -> Part:
     held = [model.State._fields.index(n) for n in (*model.frictions, *model.limits)]
-    predicted, passes = at.d, 0
+    passes = 0
     while True:
         passes += 1
         y = at.x + 0.5 * predicted
@@ -180,6 +229,9 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
         r = h * (f - 0.5 * J @ predicted)
         bounds = model.bounds(state, state, at.m, par, tuple(map(float, force(y))))
         bounds = [(min(lo, 0.0), max(hi, 0.0)) for lo, hi in bounds]
+        for n, k in enumerate(held[: len(bounds)]):  # a velocity keeps the sign that it has
+            lo, hi = bounds[n]
+            bounds[n] = (hi if at.x[k] < 0.0 else lo, lo if at.x[k] > 0.0 else hi)
         low, high = np.array([*bounds, *((0.0, math.inf) for _ in model.limits)]).reshape(-1, 2).T
         inverse = np.linalg.inv(A)
         S = np.linalg.inv(inverse[np.ix_(held, held)])
@@ -190,16 +242,16 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
         d += inverse[:, held] @ (h * reaction)
         d[held] = w - at.x[held]
         middle = at.x + 0.5 * d
-        if passes == cap or _contacts(model, par, middle)[0] == before:
+        settled = _contacts(model, par, middle)[0] == before
+        if passes == cap or settled:
             break
         predicted = d
-    at.unsettled += int(cap > 1 and _contacts(model, par, middle)[0] != before)
-    at.repeated += int(passes > 1)
     F = np.array(force(middle), dtype=float)
     args = [model.State(*map(float, v)) for v in (middle, y, d / h)]
-    at.q = at.q + np.array(model.powers(*args, at.m, par, tuple(F), tuple(reaction)), dtype=float)
-    at.x, at.d, at.r = at.x + d, d, reaction
-    at.x[held] = w
+    flow = np.array(model.powers(*args, at.m, par, tuple(F), tuple(reaction)), dtype=float)
+    x = at.x + d
+    x[held] = w
+    return Part(x, d, reaction, flow, passes, settled)
 
 
 def _contacts(model: Any, par: Any, x: Array) -> tuple[tuple[tuple[int, ...], ...], Array]:

@@ -14,6 +14,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.signals import Signal
 from bywire.simulation.program import Program, build_program
+from bywire.simulation.run import Run, simulate
 from systems import nonlinear_drive, oscillator
 
 Array = NDArray[np.float64]
@@ -90,7 +91,9 @@ class Result(NamedTuple):
     d: Array
     reaction: Array
     flow: Array
+    jump: Array
     flag: float
+    doubt: float
 
 
 def substep(
@@ -99,8 +102,8 @@ def substep(
     """Return what a pass gives for a state, a predicted half increment and a memory."""
     leaves = [par.leaves()[name] for name in program.parameter_names]
     values = (program.exact if exact else program.fast)(x, d, m, leaves, H)
-    *vectors, flag = (np.array(value).ravel() for value in values)
-    return Result(*vectors, float(flag[0]))
+    *vectors, flag, doubt = (np.array(value).ravel() for value in values)
+    return Result(*vectors, float(flag[0]), float(doubt[0]))
 
 
 @pytest.fixture(scope="module")
@@ -152,27 +155,43 @@ def test_nonlinear_rows_get_one_newton_step_from_the_predicted_midpoint(exact: b
     assert errors[2] / errors[1] == pytest.approx(4.0, rel=0.05)
 
 
-RESTS = [(0.0, 0.0), (0.0, 2.9), (0.0, -3.9), (0.01, 0.0), (0.01, -4.0), (-0.01, 3.0)]
+RESTS = [(0.0, 0.0), (0.0, 2.9), (0.0, -3.9)]
 SLIDES = [(0.0, 3.1), (0.0, -4.1), (0.1, 0.0), (-0.1, 0.0), (2.0, 9.0), (2.0, -9.0), (-2.0, -9.0)]
+TURNS = [(0.01, 0.0), (0.01, -4.0), (-0.01, 3.0), (0.01, -9.0), (-0.02, 12.0)]
 
 
 @both
-@pytest.mark.parametrize(("v", "F"), [*RESTS, *SLIDES])
-def test_friction_holds_exactly_or_lies_at_its_bound(
+@pytest.mark.parametrize(("v", "F"), [*RESTS, *SLIDES, *TURNS])
+def test_friction_holds_exactly_or_opposes_the_motion_at_its_bound(
     body: Program, v: float, F: float, exact: bool
 ) -> None:
-    """The soft threshold, where no substep turns the motion: a body that is held has speed zero."""
+    """What moves keeps the friction that it begins with, and says where its motion turns."""
     m, (low, high) = PARAMETERS.m, (PARAMETERS.low, PARAMETERS.high)
-    free = v + H * F / m
-    wanted = max(free + H * low / m, 0.0) + min(free + H * high / m, 0.0)
-    assert (wanted == 0.0) == ((v, F) in RESTS)
+    pushed = min(F + high, 0.0) + max(F + low, 0.0)  # at rest
+    friction = low if v > 0.0 else high if v < 0.0 else pushed - F
+    wanted = v + H * (F + friction) / m
     result = substep(body, PARAMETERS, [1.0, v], [0.0, 0.3], [F, 0.0], exact)
     assert result.x[1] == pytest.approx(wanted, rel=1e-12, abs=0.0)
     assert result.d[1] == pytest.approx(0.5 * (wanted - v), rel=1e-12, abs=1e-17)
-    friction = m * (wanted - v) / H - F
     assert result.reaction[0] == pytest.approx(friction, rel=1e-12, abs=1e-12)
-    assert friction == pytest.approx(low if wanted > 0.0 else high) or wanted == 0.0
-    assert result.flag == 0.0
+    assert (result.x[1] == 0.0) == ((v, F) in RESTS)
+    assert (result.flag > 0.0) == ((v, F) in TURNS)
+    assert (result.jump.tolist(), result.doubt) == ([high - low], 0.0)
+
+
+@pytest.mark.parametrize("engine", ["auto", "virtual-machine"])
+@pytest.mark.parametrize(("v", "F"), TURNS)
+def test_a_substep_is_cut_where_the_motion_turns(v: float, F: float, engine: str) -> None:
+    """Uniform deceleration to rest, and on from there if friction cannot hold: a closed form."""
+    m, (low, high) = PARAMETERS.m, (PARAMETERS.low, PARAMETERS.high)
+    before = low if v > 0.0 else high
+    stops = -v * m / (F + before)
+    pushed = min(F + high, 0.0) + max(F + low, 0.0)
+    model, held = RubbingAndLimited(), Held(F, 0.0)
+    run = Run(model, PARAMETERS, State(1.0, v), held, lambda t: np.tile(held, (t.size, 1)), H, H, H)
+    result = simulate(run, engine=engine)
+    end = pushed * (H - stops) / m
+    assert result["v"][-1] == pytest.approx(end, rel=1e-9, abs=0.0)
 
 
 @both

@@ -90,7 +90,7 @@ RIG = (("x_1", "x_2"), ("F_c1", "m_1", "k_wall", "mu", "damping"))
 @pytest.mark.parametrize(
     ("run", "signals", "names"),
     [(heart(0.012, record=1e-3), *HEART),
-     (heart(0.013, record=1e-3, stiffer=300.0, tau=0.0), HEART[0], ("F_S0", "loss", "K_S", "M_S")),
+     (heart(0.008, record=1e-3, stiffer=300.0, tau=0.0), HEART[0], ("F_S0", "K_S", "M_S")),
      (rig(0.005, record=1e-3), *RIG),
      (rig(0.005, record=1e-3, rare=True, k_wall=1.5e9), *RIG)],
     ids=["heart", "repeated passes", "rig", "rare contact"],

@@ -39,15 +39,14 @@ _VIRTUAL = 0.02  # length [s] of the run that is repeated without a compiler
 def is_of_second_order(trial: Trial) -> Iterator[Evidence]:
     """Find whether every state of the plant converges with the square of the substep.
 
-    That is what it does without dry friction. Where a velocity with dry friction turns round, the
-    instant falls somewhere within a substep: there at least the first order is wanted.
+    Without dry friction, and with it: a substep in which a velocity turns round is cut there.
     """
     orders = list(_orders(trial, False, ORDER))
     if not orders:
         raise NotCheckedError(f"from {trial.start.known} no state moves enough to tell it")
     yield from orders
     if trial.model.frictions:
-        yield from _orders(trial, True, 1.0)
+        yield from _orders(trial, True, ORDER)
 
 
 def _orders(trial: Trial, frictions: bool, wanted: float) -> Iterator[Evidence]:

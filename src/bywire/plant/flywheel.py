@@ -34,7 +34,7 @@ class Parameters(ParameterSet):
     K_drive: SpeedGain
     """gain of the speed controller (law "driven")"""
     Omega_still: StillSpeed
-    """speed below which the disc counts as stopped, a few hundredths of a revolution per minute"""
+    """speed up to which the disc counts as stopped"""
     runout: RunOut
     """amplitude of the run-out that the floating caliper does not follow"""
 

@@ -1,13 +1,13 @@
-"""Common parts of kernel emission: the plan, names of values, statements, the exact pass."""
+"""Common parts of kernel emission: the plan, names of values, statements."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 
-from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, as_number, needed, text
+from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, text
 from bywire.simulation.graph import Graph
-from bywire.simulation.layout import CAP, Layout
+from bywire.simulation.layout import Layout
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
@@ -114,39 +114,6 @@ def branching_statements(
 
     rest = [node for node in order if node not in inside]
     return statements(graph, rest, inlined, declare, dialect)
-
-
-def exact_pass(stages: Stages) -> str:
-    """Return the C functions of the rare, exact pass and of its repetition until it settles.
-
-    They stand alone and compute everything anew: what is rare need not be hoisted.
-    """
-    graph = stages.graph
-    roots = [node for kind in (*STATE, "flag") for node in stages.exact[kind]]
-
-    def leaf(kind: str, index: int) -> str:
-        return "h" if kind == "h" else f"{kind}[{index}]"
-
-    name = leaf_namer(graph, leaf, lambda node: f"v{node}")
-    body = statements(graph, needed(graph, roots, lambda _: False), name, "const double ")
-    body += [f"o[{k}] = {as_number(graph, node, name)};" for k, node in enumerate(roots)]
-    nx, flag = len(stages.exact["x"]), len(roots) - 1
-    return f"""
-static __attribute__((noinline, cold)) void exact_pass(const double *p, double h,
-    const double *m, const double *x, const double *d, double *o) {{
-  {indented(body, 2)}
-}}
-
-static __attribute__((noinline, cold)) int settle(const double *p, double h, const double *m,
-    const double *x, double *d, double *o) {{
-  for (int pass = 0; pass < {CAP}; ++pass) {{
-    exact_pass(p, h, m, x, d, o);
-    if (o[{flag}] == 0.0) return 0;
-    memcpy(d, o + {nx}, {nx} * sizeof(double));
-  }}
-  return 1;
-}}
-"""
 
 
 def indented(lines: Iterable[str], spaces: int) -> str:

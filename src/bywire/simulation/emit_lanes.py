@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import (
     branching_statements,
-    exact_pass,
     indented,
     layout_of,
     leaf_count,
@@ -15,6 +14,7 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
+from bywire.simulation.emit_rare import rare_substep
 from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
 from bywire.simulation.layout import Layout
 from bywire.simulation.modes import modes
@@ -127,7 +127,7 @@ def emit_lanes(stages: Stages) -> str:
         for j, pairs in enumerate(stages.quadrature.combinations)
     ]
     parameters, stimuli = leaf_count(stages, "p"), leaf_count(stages, "u")
-    return f"""{LANES}{exact_pass(stages)}
+    return f"""{LANES}{rare_substep(stages)}
 {_settle_lanes(t, parameters)}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
@@ -212,15 +212,19 @@ def _settle_lanes(t: _Lanes, parameters: int) -> str:
             elif f"{kind}{k}" in targets:
                 lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
             at += 1
-    return f"""static __attribute__((noinline, cold)) void settle_lanes(B flagged, const M *P,
-    double h, const V *m, const V *old, V *n, V *q, V *counters) {{
-  double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[{at + 1}];
+    velocities = [f"o[{k}] = n[{targets[f'x{k}']}][l];" for k in t.stages.velocities]
+    return f"""static RARE void settle_lanes(B flagged, const V *last, const M *P, double h, const V *m,
+    const V *old, V *n, V *q, V *counters) {{
+  double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
   for (int l = 0; l < W; ++l) {{
     if (!LANE(flagged, l)) continue;
     for (int k = 0; k < {parameters}; ++k) ps[k] = P[k][l];
     for (int k = 0; k < {nm}; ++k) ms[k] = m[k][l];
     for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
-    counters[0][l] += settle(ps, h, ms, xs, ds, o);
+    cuts c;
+    {indented(velocities, 4)}
+    for (int k = JUMP; k < RESULTS; ++k) o[k] = last[k - JUMP][l];
+    counters[0][l] += located(ps, h, ms, xs, ds, o[DOUBT] == 0.0, o, &c);
     counters[1][l] += 1.0;
     for (int k = 0; k < {nz}; ++k) n[{len(targets)} + k][l] = 0.0;
     {indented(lines, 4)}
@@ -237,10 +241,11 @@ def _repeat(t: _Lanes) -> list[str]:
     flow = [f"q{k}" for k in range(length["q"])]
     memory = [f"m{k}" for k in range(length["m"])]
     arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
+    arrays["doubts"] = [t.number(node) for kind in ("jump", "doubt") for node in t.stages.fast[kind]]
     return [
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
         "V count[] = {failures, repeats};",
-        "settle_lanes(flagged, P, h_, memory, old, n, flow, count);",
+        "settle_lanes(flagged, doubts, P, h_, memory, old, n, flow, count);",
         *(f"{name} = n[{k}];" for k, name in enumerate(new)),
         *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
         "failures = count[0];",

@@ -6,7 +6,6 @@ from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     PLAN,
     branching_statements,
-    exact_pass,
     indented,
     layout_of,
     leaf_count,
@@ -14,6 +13,7 @@ from bywire.simulation.emission import (
     statements,
     unread,
 )
+from bywire.simulation.emit_rare import rare_substep
 from bywire.simulation.expressions import Namer, as_number, condition, needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.layout import Layout
@@ -73,7 +73,7 @@ def emit_single(stages: Stages) -> str:
     outputs = block(needed(graph, stages.output, lambda n: level[n] == 0))
     outputs += [f"o[{j}] = {as_number(graph, n, name)};" for j, n in enumerate(stages.output)]
     counters = layout.start["counters"]
-    return f"""{SCALAR}{exact_pass(stages)}
+    return f"""{SCALAR}{rare_substep(stages)}
 {SIGNATURE} {{
   {PLAN}
   double failures = state[{counters}], repeats = state[{counters + 1}];
@@ -98,7 +98,7 @@ def emit_single(stages: Stages) -> str:
       {indented(_mode_change(mode, graph, name), 6)}
       {indented(block(mode.rest), 6)}
       if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
-        {indented(_repeat(layout), 8)}
+        {indented(_repeat(stages, layout, name), 8)}
       }} else {{
         {indented(_commit(results, products, name), 8)}
       }}
@@ -165,17 +165,20 @@ def _integrals(stages: Stages, name: Namer) -> list[str]:
     return lines
 
 
-def _repeat(layout: Layout) -> list[str]:
+def _repeat(stages: Stages, layout: Layout, name: Namer) -> list[str]:
     nx, nm = layout.length["x"], layout.length["m"]
-    size = layout.start["m"] + 1
     xs = ", ".join(f"x{k}" for k in range(nx))
     ds = ", ".join(f"d{k}" for k in range(nx))
     ms = ", ".join(f"m{k}" for k in range(nm)) or "0.0"
     lines = [
-        f"double o[{size}];",
+        "double o[RESULTS];",
         f"const double xs[] = {{{xs}}}, ms[] = {{{ms}}};",
-        f"double ds[] = {{{ds}}};",
-        "failures += settle(p, h, ms, xs, ds, o);",
+        f"const double ds[] = {{{ds}}};",
+        "cuts c;",
+        *(f"o[{k}] = {name(stages.fast['x'][k])};" for k in stages.velocities),
+        *(f"o[JUMP + {k}] = {name(node)};" for k, node in enumerate(stages.fast["jump"])),
+        f"const int ready = {as_number(stages.graph, stages.fast['doubt'][0], name)} == 0.0;",
+        "failures += located(p, h, ms, xs, ds, ready, o, &c);",
         "repeats += 1.0;",
     ]
     at = 0

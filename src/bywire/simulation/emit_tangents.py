@@ -7,19 +7,18 @@ from collections.abc import Sequence
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     PLAN,
-    exact_pass,
     indented,
     layout_of,
     leaf_count,
     leaf_namer,
     statements,
 )
-from bywire.simulation.exact_tangents import exact_tangents, settle_statements
+from bywire.simulation.emit_rare import rare_substep
+from bywire.simulation.exact_tangents import exact_tangents, located_statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.layout import Layout
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
-from bywire.simulation.turning_tangents import TURNS, declare_turns, mend_turns, watch_turns
 
 SIGNATURE = """void bw_run_tangents(const double *restrict p, double h, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, const int32_t *restrict selection,
@@ -89,14 +88,8 @@ class _Tangents:
         return needed(self.graph, roots, lambda n: self.level[n] < below)
 
 
-def emit_tangents(stages: Stages, lanes: int, velocities: Sequence[int] = ()) -> str:
-    """Return the C source of the kernel with ``lanes`` directions.
-
-    Parameters
-    ----------
-    velocities
-        Indices of the states that carry dry friction.
-    """
+def emit_tangents(stages: Stages, lanes: int) -> str:
+    """Return the C source of the kernel with ``lanes`` directions."""
     t = _Tangents(stages)
     layout = t.layout
     start, length = layout.start, layout.length
@@ -110,16 +103,14 @@ def emit_tangents(stages: Stages, lanes: int, velocities: Sequence[int] = ()) ->
         for k, (name, _) in enumerate(declared[:before])
     ]
     new_t = [f"T[{k} * L + l] {'+=' if k >= start['q'] else '='} t{k};" for k in range(before)]
-    return f"""{SCALAR}{exact_pass(stages)}
+    return f"""{SCALAR}{rare_substep(stages)}
 #define L {lanes}
 
-{TURNS}
 {exact_tangents(stages)}
 {SIGNATURE} {{
   {PLAN}
   double failures = state[{start["counters"]}], repeats = state[{start["counters"] + 1}];
   double *restrict T = tangents;
-  {declare_turns(velocities)}
   double C[{max(len(t.slot), 1)} * L] __attribute__((aligned(64)));
   {indented(loads, 2)}
   {indented(t.lines(t.once, False), 2)}
@@ -143,9 +134,8 @@ def emit_tangents(stages: Stages, lanes: int, velocities: Sequence[int] = ()) ->
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(t.lines(substep, False), 6)}
       {indented(t.results(t.value_roots, "s"), 6)}
-      {indented(watch_turns(velocities), 6)}
       if (__builtin_expect(s{len(t.value_roots) - 1} != 0.0, 0)) {{
-        {indented(settle_statements(layout, len(t.value_roots)), 8)}
+        {indented(located_statements(layout), 8)}
       }} else {{
         #pragma omp simd
         for (int l = 0; l < L; ++l) {{
@@ -155,7 +145,6 @@ def emit_tangents(stages: Stages, lanes: int, velocities: Sequence[int] = ()) ->
         }}
         {indented(commits, 8)}
       }}
-      {indented(mend_turns(velocities), 6)}
     }}
   }}
   {indented(stores, 2)}

@@ -5,6 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 CAP = 8  # passes through one substep before it is counted as unsettled
+JUMP, FLAG, DOUBT = 4, 5, 6  # places among the results of a pass, behind x, d, r, q
+# Where a substep is cut: how often the instant is tried, within which share of the substep's change
+# of velocity it counts as met, and the least share of a part that is cut off or left.
+ATTEMPTS, CLOSE, EDGE = 12, 1e-11, 1e-6
+
+
+def most_cuts(velocities: int) -> int:
+    """Return into how many parts a substep is cut before it is counted as unsettled.
+
+    Each velocity with dry friction may turn, and turn once more when others have.
+    """
+    return 2 * velocities + 2
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,8 @@ class Program:
     contact_jacobians
         ``(x, m, p)`` -> Jacobians of dx/dt, see ``stiff_contacts.contact_jacobians``.
     fast, exact
-        ``(x, d, m, p, h) -> (x, d, reaction, flow, flag)``, see ``scheme.Pass``.
+        ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``, see ``scheme.Pass``; the
+        flag is up where the pass is in doubt or a velocity turns round.
     ticks
         One ``(x, m, u, p) -> m`` per task.
     output
@@ -61,6 +62,12 @@ class Program:
     def parameter_names(self) -> tuple[str, ...]:
         """Names in the order of the parameter vector."""
         return tuple(self.parameter_ranges)
+
+    @property
+    def velocities(self) -> tuple[int, ...]:
+        """Indices of the states that carry dry friction."""
+        states = self.model.State._fields
+        return tuple(states.index(name) for name in self.model.frictions)
 
     @property
     def outputs(self) -> dict[str, Signal]:
@@ -142,7 +149,8 @@ def _ranges(par: ParameterSet, names: tuple[str, ...]) -> dict[str, tuple[float,
 
 
 def _pass_function(name: str, s: Symbols, result: Pass) -> Any:
-    results = [result.x, result.d, result.reaction, result.flow, result.flag]
+    flag = ca.fmax(result.doubt, result.turn)
+    results = (result.x, result.d, result.reaction, result.flow, result.jump, flag, result.doubt)
     return ca.Function(name, [s.x, s.d, s.m, s.p, s.h], [ca.densify(SX(r)) for r in results])
 
 

@@ -50,16 +50,22 @@ class Pass:
         Forces of the frictions, then of the limits.
     flow
         Rates of the integrals at the midpoint.
-    flag
+    doubt
         Positive where the pass must be repeated: a contact set changed, a limit was crossed, or the
         projection of the frictions failed.
+    jump
+        By how much each dry friction would change where its velocity changes sign, shape (m,).
+    turn
+        Positive where a velocity does, and its friction jumps: the substep must be cut.
     """
 
     x: Any
     d: Any
     reaction: Any
     flow: Any
-    flag: Any
+    doubt: Any
+    jump: Any
+    turn: Any
 
 
 @dataclass(frozen=True)
@@ -87,7 +93,8 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         Arguments of the pass.
     exact
         False: the pass of nearly every substep, which leaves one-sided limits alone and only
-        checks them. True: the repeated pass, with limits and every combination of signs.
+        checks them, and keeps at rest what rests. True: the repeated pass, with limits and every
+        combination of signs.
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
@@ -95,12 +102,14 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     at_y = K @ gaps(model, par, y, y)
     linear = _linearize(model, par, s, y, K)
     bounds = _bounds(model, par, s, y, at_y)
+    jump = column([high - low for low, high in bounds])
     mass = column(model.mass(symbol_tuple(model.State, y), par))
     A = ca.diag(2.0 / s.h * mass) - linear.J
     right = dict(enumerate(linear.rows))
     kept = _set_valued_states(model, exact)
     reduced = eliminate(A, right, kept, s.x, changing)
-    projection, reaction = _project(model, s, reduced, bounds, exact)
+    acting = [_acting(s.x[k], *pair) for k, pair in zip(kept, bounds, strict=False)]
+    projection, reaction = _project(model, s, reduced, acting, exact)
     d = _increments(s, reduced, projection)
     middle = s.x + d
     x = column(
@@ -122,10 +131,13 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     if not exact:
         doubts += [-x[model.State._fields.index(name)] for name in model.limits]
     # A maximum and no logical or: compilers do not vectorize selections between truth values.
-    flag = SX(0)
-    for doubt in doubts:
-        flag = ca.fmax(flag, doubt)
-    return Pass(x, d, reaction, column(flow), flag)
+    doubt = SX(0)
+    for one in doubts:
+        doubt = ca.fmax(doubt, one)
+    turn = SX(0)
+    for a in range(len(model.frictions)):
+        turn = ca.fmax(turn, -s.x[kept[a]] * x[kept[a]] * jump[a])
+    return Pass(x, d, reaction, column(flow), doubt, jump, turn)
 
 
 def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
@@ -161,10 +173,19 @@ def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _
 
 
 def _bounds(model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any) -> list[Any]:
+    """Return (low, high) of every friction."""
     state = symbol_tuple(model.State, y)
     memory = symbol_tuple(model.Memory, s.m)
     pairs = model.bounds(state, state, memory, par, scalars(contact))
     return [(ca.fmin(SX(low), 0), ca.fmax(SX(high), 0)) for low, high in pairs]
+
+
+def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
+    """Return the bounds of a friction at rest, where it moves twice the force that acts.
+
+    A velocity keeps the sign that it begins with; where it does not, the substep is cut.
+    """
+    return ca.if_else(v < 0, high, low), ca.if_else(v > 0, low, high)
 
 
 def _set_valued_states(model: Model, exact: bool) -> tuple[int, ...]:
@@ -182,8 +203,12 @@ def _project(
     # The unknowns are d = (w - x) / 2, so that S d = c + force is (S/2) w = c + (S/2) x + force.
     half = 0.5 * reduced.matrix
     c = column([reduced.start(row, half) for row in range(len(reduced.kept))])
-    projection = (project_exact if exact else project_fast)(half, c, low, high)
-    reaction = half @ projection.w - c
+    if exact:
+        projection = project_exact(half, c, low, high)
+    else:
+        resting = [s.x[k] == 0 for k in reduced.kept]
+        projection = project_fast(half, c, low, high, resting)
+    reaction = ca.SX(projection.force)
     first = len(model.frictions)
     for k in range(first, reaction.shape[0]):  # away from its limit a state feels nothing of it
         reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))

@@ -73,8 +73,7 @@ class TangentKernel:
         stages = build_stages(program, directions)
         self.layout: Layout = layout_of(stages)
         self.label = f"compiled C with tangents, {compiler.label}"
-        velocities = [program.model.State._fields.index(n) for n in program.model.frictions]
-        source = emit_tangents(stages, DIRECTIONS, velocities)
+        source = emit_tangents(stages, DIRECTIONS)
         entry = "bw_run_tangents"
         library, _ = load_library(source, vector_flags(compiler), compiler, entry)
         self._run = library[entry]
@@ -104,8 +103,7 @@ def simulate_with_sensitivities(
     exact derivatives of what is computed. Across stick-slip the instants of breakaway move with
     the parameters only as finely as sampled inputs change: there, let tasks and ideal sources
     tick as often as the step (the first slips of a ramp are then within 2 % at 20 us). Where a
-    body turns round without resting, the instant moves too (see ``turning_tangents``), within a
-    few per cent where the step resolves what acts on it.
+    body turns round or stops, the substep is cut there, and the instant moves with the parameters.
 
     Parameters
     ----------

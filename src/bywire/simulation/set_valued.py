@@ -12,16 +12,26 @@ from typing import Any
 
 import casadi as ca
 
-SWEEPS = 2
+NEVER = 1e30  # more than any misfit
+NOTHING = 1e-318  # makes exactly zero of a misfit below 1e-6
 RESIDUAL = 1e-9  # share of a row's own scale above which a projection counts as failed
 
 
 @dataclass(frozen=True)
 class Projection:
-    """End-of-step velocities, shape (m,), and whether they solve the problem (1.0 if not)."""
+    """End-of-step velocities and forces, shape (m,) each, and whether they solve the problem.
+
+    ``failed`` is 1.0 where they do not. Forces lie within their bounds to the last digit: what
+    rounding leaves of one must not turn a loss into a gain.
+    """
 
     w: Any
+    force: Any
     failed: Any
+
+
+def _within(force: Any, low: Any, high: Any) -> Any:
+    return ca.fmin(ca.fmax(force, low), high)
 
 
 def soft(z: Any, a: Any, b: Any) -> Any:
@@ -29,34 +39,41 @@ def soft(z: Any, a: Any, b: Any) -> Any:
     return ca.fmax(z + a, 0) + ca.fmin(z + b, 0)
 
 
-def project_fast(S: Any, c: Any, low: Any, high: Any) -> Projection:
-    """Solve by sweeps over the rows, then exactly for the signs that the sweeps found.
+def project_fast(S: Any, c: Any, low: Any, high: Any, resting: list[Any]) -> Projection:
+    """Solve with everything that rests still at rest, and check that its bounds can hold it.
 
-    One row is exact. Several take two Gauss-Seidel sweeps and a linear solve with the signs
-    kept; velocities must keep these signs and forces at rest their bounds, else ``failed``.
+    One row is exact. Several take one linear solve, whose matrix changes with what rests alone;
+    where a force at rest leaves its bounds, a body breaks away: ``failed``.
 
     Parameters
     ----------
     S, c
         Matrix and right-hand side, shapes (m, m) and (m,).
     low, high
-        Bounds, shape (m,).
+        Bounds, shape (m,); both are the force that acts where a row does not rest.
+    resting
+        Truth values, one per row.
     """
     m = c.shape[0]
     if m == 0:
-        return Projection(ca.SX(0, 1), ca.SX(0))
+        return Projection(ca.SX(0, 1), ca.SX(0, 1), ca.SX(0))
     if m == 1:
-        return Projection(soft(c, low, high) / S, ca.SX(0))
-    w = ca.SX.zeros(m)
-    for _ in range(SWEEPS):
-        w = _sweep(S, c, low, high, w)
-    signs, w = w, _polished(S, c, low, high, w)
+        force = _within(-c, low, high)
+        return Projection((c + force) / S, force, ca.SX(0))
+    M, b = ca.SX(S), ca.SX(c)
+    for k in range(m):
+        b[k] = ca.if_else(resting[k], 0, c[k] + low[k])
+        for j in range(m):
+            M[k, j] = ca.if_else(resting[k], 1.0 if j == k else 0.0, S[k, j])
+    w = solve_small(M, b)
     force = S @ w - c
     wrong = ca.SX(0)
     for k in range(m):
         beyond = ca.fmax(force[k] - high[k], low[k] - force[k])
-        wrong = ca.fmax(wrong, ca.if_else(signs[k] == 0, beyond, -signs[k] * w[k]))
-    return Projection(w, wrong > 0)
+        wrong = ca.fmax(wrong, ca.if_else(resting[k], beyond, 0))
+        # Else a row at rest would be zero but for rounding.
+        w[k] = ca.if_else(resting[k], 0, w[k])
+    return Projection(w, _within(force, low, high), wrong > 0)
 
 
 def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
@@ -66,43 +83,28 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
     """
     m = c.shape[0]
     if m == 0:
-        return Projection(ca.SX(0, 1), ca.SX(0))
-    best = ca.SX.zeros(m)
-    best_misfit = _misfit(S, c, low, high, best)
+        return Projection(ca.SX(0, 1), ca.SX(0, 1), ca.SX(0))
+    # Where both bounds are one force, that acts at zero, too: a velocity that happens to end there
+    # does not rest, and its derivatives are those of a moving one.
+    forced = [ca.if_else(low[k] < high[k], 0, 1) for k in range(m)]
+    best, best_misfit = ca.SX.zeros(m), ca.SX(NEVER)
     for signs in product((0, 1, -1), repeat=m):
-        if not any(signs):
-            continue
         w = _with_signs(S, c, low, high, signs)
         misfit = _misfit(S, c, low, high, w)
+        for k in range(m):
+            misfit = misfit + forced[k] if not signs[k] else misfit
         better = misfit < best_misfit
         best = ca.if_else(better, w, best)
-        best_misfit = ca.fmin(misfit, best_misfit)
-    return Projection(best, best_misfit > RESIDUAL)
+        best_misfit = ca.if_else(better, misfit, best_misfit)
+    # Forces that are no numbers must not pass for rest, and compilers need not compare them right:
+    # the misfit of what was chosen tells, of which nothing else is added.
+    best = best + _misfit(S, c, low, high, best) * NOTHING
+    return Projection(best, _within(S @ best - c, low, high), best_misfit > RESIDUAL)
 
 
 def _row(S: Any, c: Any, low: Any, high: Any, w: Any, k: int) -> Any:
     others = sum((S[k, j] * w[j] for j in range(c.shape[0]) if j != k), ca.SX(0))
     return soft(c[k] - others, low[k], high[k]) / S[k, k]
-
-
-def _sweep(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
-    w = ca.SX(w)
-    for k in range(c.shape[0]):
-        w[k] = _row(S, c, low, high, w, k)
-    return w
-
-
-def _polished(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
-    """Solve with the signs of w: zero rows stay zero, the others carry their sign's bound."""
-    m = c.shape[0]
-    M, b = ca.SX(S), ca.SX(c)
-    for k in range(m):
-        still = w[k] == 0
-        bound = ca.if_else(w[k] > 0, low[k], high[k])
-        b[k] = ca.if_else(still, 0, c[k] + bound)
-        for j in range(m):
-            M[k, j] = ca.if_else(still, 1.0 if j == k else 0.0, S[k, j])
-    return solve_small(M, b)
 
 
 def _with_signs(S: Any, c: Any, low: Any, high: Any, signs: tuple[int, ...]) -> Any:
@@ -118,14 +120,14 @@ def _with_signs(S: Any, c: Any, low: Any, high: Any, signs: tuple[int, ...]) -> 
 
 def _misfit(S: Any, c: Any, low: Any, high: Any, w: Any) -> Any:
     # A row is judged by the largest of what it adds up: where forces cancel (a body squeezed from
-    # both sides), what is left of them is rounding.
-    worst = ca.SX(0)
+    # both sides), what is left of them is rounding. A sum, for a maximum skips what is no number.
+    total = ca.SX(0)
     m = c.shape[0]
     for k in range(m):
         parts = sum((ca.fabs(S[k, j] * w[j]) for j in range(m) if j != k), ca.fabs(c[k]))
         scale = parts / S[k, k] + 1e-300
-        worst = ca.fmax(worst, ca.fabs(_row(S, c, low, high, w, k) - w[k]) / scale)
-    return worst
+        total = total + ca.fabs(_row(S, c, low, high, w, k) - w[k]) / scale
+    return total
 
 
 def solve_small(M: Any, b: Any) -> Any:

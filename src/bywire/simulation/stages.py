@@ -18,7 +18,7 @@ from bywire.simulation.signs import NOT_NEGATIVE, Interval
 
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
 LEVEL = {"p": 0, "h": 0, "sp": 0, "su": 0, "m": 1, "sm": 1}
-SEEDS = frozenset({"sp", "su", "sm", "sx", "sd", "sr", "sq"})
+SEEDS = frozenset({"sp", "su", "sm", "sx", "sd", "sr", "sq", "sh"})
 STATE = ("x", "d", "r", "q")  # what a substep renews, in the order of the state vector
 
 
@@ -29,15 +29,18 @@ class Stages:
     Parameters
     ----------
     fast, exact
-        Nodes per result of a pass: x, d, r (reactions), q (flows), flag.
+        Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see ``Program``.
     ticks
         Nodes of the memory after each task.
     output
         Nodes of the recorded signals.
+    velocities
+        Indices of the states that carry dry friction.
     quadrature
         How the integrals of the fast pass follow from running sums.
     fast_t, exact_t, ticks_t, output_t
-        Tangents of the same along one direction; empty lists without sensitivities.
+        Tangents of the same along one direction; empty lists without sensitivities. Those of the
+        exact pass also along the length of the step, at which a cut substep is cut.
     """
 
     graph: Graph
@@ -45,6 +48,7 @@ class Stages:
     exact: dict[str, list[Node]]
     ticks: list[list[Node]]
     output: list[Node]
+    velocities: tuple[int, ...]
     quadrature: Quadrature
     fast_t: dict[str, list[Node]]
     exact_t: dict[str, list[Node]]
@@ -96,19 +100,19 @@ def build_stages(
     def add(function: Any, kinds: str) -> list[list[Node]]:
         return graph.add_function(function, [leaves[k] for k in kinds])
 
-    def tangent(function: Any, kinds: str) -> list[list[Node]]:
+    def tangent(function: Any, kinds: str, fixed: str = "h") -> list[list[Node]]:
         if not directions:
             return [[] for _ in range(function.n_out())]
-        seeded = _with_tangents(function, kinds, directions)
+        seeded = _with_tangents(function, kinds, directions, fixed)
         inputs = [leaves[k] for k in kinds]
         for kind in kinds:
             if kind == "p":
                 inputs.append([graph.leaf("sp", k) for k in range(len(directions))])
-            elif kind != "h":
+            elif kind not in fixed:
                 inputs.append([graph.leaf(f"s{kind}", k) for k in range(lengths[kind])])
         return graph.add_function(seeded, inputs)
 
-    parts = ("x", "d", "r", "q", "flag")
+    parts = ("x", "d", "r", "q", "jump", "flag", "doubt")
     output = add(program.output, "xmprqh")[0]
     output = output if outputs is None else [output[k] for k in outputs]
     fast = dict(zip(parts, add(program.fast, "xdmph"), strict=True))
@@ -126,12 +130,13 @@ def build_stages(
     return Stages(
         graph=graph,
         fast=fast,
+        velocities=program.velocities,
         quadrature=quadrature,
         exact=dict(zip(parts, add(program.exact, "xdmph"), strict=True)),
         ticks=[add(tick, "xmup")[0] for tick in program.ticks],
         output=output,
         fast_t=dict(zip(parts, tangent(program.fast, "xdmph"), strict=True)),
-        exact_t=dict(zip(parts, tangent(program.exact, "xdmph"), strict=True)),
+        exact_t=dict(zip(parts, tangent(program.exact, "xdmph", fixed=""), strict=True)),
         ticks_t=[tangent(tick, "xmup")[0] for tick in program.ticks],
         output_t=tangent(program.output, "xmprqh")[0],
     )
@@ -152,12 +157,12 @@ def _balanced(
     return {**fast, **renewed}, Quadrature(list(new), quadrature.combinations)
 
 
-def _with_tangents(function: Any, kinds: str, directions: Sequence[int]) -> Any:
-    """Return the function of the tangents: the same arguments, then seeds of x, d, m, u, p, ..."""
+def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: str) -> Any:
+    """Return the function of the tangents: the same arguments, then seeds of all but the fixed."""
     arguments = function.sx_in()
     seeds, points, extra = [], [], []
     for kind, argument in zip(kinds, arguments, strict=True):
-        if kind == "h":
+        if kind in fixed:
             continue
         if kind == "p":
             chosen = ca.SX.sym("sp", len(directions))

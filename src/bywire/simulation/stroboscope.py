@@ -7,10 +7,9 @@ from one substep to the next: states, their last increments, and the memory of t
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,7 +22,6 @@ from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.native import plan_array
 from bywire.simulation.program import Program
 from bywire.simulation.repetition import window_schedule
-from bywire.simulation.reversals import reversals
 from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.sensitivity import DIRECTIONS, TangentKernel
@@ -94,9 +92,7 @@ class Stroboscope:
     def __init__(self, run: Run, inputs: Sequence[str], signals: Sequence[str]) -> None:
         compiler = find_compiler()
         if compiler is None:
-            raise CompilerError(
-                "derivatives need a C compiler: install the extra bywire[compiler]"
-            )
+            raise CompilerError("derivatives need a C compiler: install the extra bywire[compiler]")
         self._schedule = _by_substeps(window_schedule(run))
         self._open = replace(self._schedule, frames=self._schedule.frames + 1)
         program = prepare(run.model, run.par).program
@@ -112,8 +108,7 @@ class Stroboscope:
         self._layout = self._kernel.layout
         self._u = np.repeat(run.stimulus(np.zeros(1)), self._schedule.stimulus_rows, axis=0)
         first = self._layout.start["x"]
-        states = run.model.State._fields
-        self._frictions = np.array([first + states.index(v) for v in run.model.frictions], int)
+        self._frictions = np.array([first + k for k in program.velocities], int)
         start = initial_vector(self._layout, run.state, run.memory)
         self.start: Array = start[self._carried]
         self.names: tuple[str, ...] = (
@@ -142,31 +137,22 @@ class Stroboscope:
         return Period(vector[self._carried], values)
 
     def derivatives(self, start: Array) -> Derivatives:
-        """Return the derivatives of one period by start and inputs.
-
-        Through stick, slip and release they are those of what is computed; through a velocity
-        that reverses without resting, those of the motion in continuous time, see `reversals`.
-        """
+        """Return the derivatives of one period by start and inputs."""
         n, ticks = start.size, self.ticks
         count = n + ticks
         end = np.empty((n, count))
         rows = self._schedule.frames // self._schedule.record_frames
         shown = np.empty((rows, self._selection.size, count))
-        jumps = reversals(self.velocities(start))
         for first in range(0, count, DIRECTIONS):
             lanes = range(first, min(first + DIRECTIONS, count))
             vector, tangents = self._loaded(start)
             for lane, k in enumerate(lanes):
                 if k < n:
                     tangents[self._carried[k], lane] = 1.0
-            for begin, stop in pairwise(self._cuts(one.substep for one in jumps)):
-                moved = [lane for lane, k in enumerate(lanes) if k - n == self._tick(begin)]
-                before = tangents[self._frictions].copy()
+            for tick in range(ticks):
+                begin, stop = (k * self._schedule.stimulus_frames for k in (tick, tick + 1))
+                moved = [lane for lane, k in enumerate(lanes) if k - n == tick]
                 _, rec_t = self._segment(vector, tangents, self._seeds(moved), begin, stop)
-                for jump in jumps if stop == begin + 1 else ():
-                    if jump.substep == begin:
-                        own = self._frictions[jump.friction]
-                        tangents[own] = jump.factor * before[jump.friction]
                 at = -(-begin // self._schedule.record_frames)
                 shown[at : at + len(rec_t), :, first : lanes.stop] = rec_t[:, :, : len(lanes)]
             end[:, first : lanes.stop] = tangents[self._carried, : len(lanes)]
@@ -187,14 +173,6 @@ class Stroboscope:
             self._kernel.run(arrays, self._schedule.step)
             found[k] = vector[self._frictions]
         return found
-
-    def _tick(self, frame: int) -> int:
-        return frame // self._schedule.stimulus_frames
-
-    def _cuts(self, substeps: Iterable[int]) -> list[int]:
-        """Return the frames between which nothing needs to be done: ticks, and some substeps."""
-        cuts = set(range(0, self._schedule.frames + 1, self._schedule.stimulus_frames))
-        return sorted(cuts | {k + n for k in substeps for n in (0, 1)})
 
     def _seeds(self, lanes: Sequence[int]) -> Array:
         """Return seeds of the kernel's one parameter, which stays, and of all stimuli."""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.simulation.layout import CAP, Layout
+from bywire.simulation.cut_substep import CutSubstep
+from bywire.simulation.layout import CAP, DOUBT, FLAG, Layout
 from bywire.simulation.native import Request
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ class VirtualMachine:
         starts = np.concatenate(([0], np.cumsum(list(lengths.values()))))
         start = dict(zip([*lengths, "counters"], map(int, starts), strict=True))
         self.layout = Layout(start, lengths)
-        self._program = program
+        self._program, self._velocities = program, program.velocities
         self._fast = _Call(program.fast)
         self._exact = _Call(program.exact)
         self._ticks = [_Call(tick) for tick in program.ticks]
@@ -63,19 +64,27 @@ class VirtualMachine:
 
     def _substep(self, part: dict[str, Array], p: Array, h: Array) -> None:
         result = self._fast(part["x"], part["d"], part["m"], p, h)
-        if result[4][0] != 0.0:
-            guess = part["d"].copy()
-            for _ in range(CAP):
-                result = self._exact(part["x"], guess, part["m"], p, h)
-                if result[4][0] == 0.0:
-                    break
-                guess = result[1].copy()
-            else:
-                part["counters"][0] += 1.0
-            part["counters"][1] += 1.0
+        if result[FLAG][0] != 0.0:
+            cut = CutSubstep(self._settled, self._velocities, part["m"], p, float(h[0]))
+            result, failed = cut.results(part["x"].copy(), part["d"].copy())
+            part["counters"] += failed, 1.0
         for kind, value in zip(("x", "d", "r"), result, strict=False):
             part[kind][:] = value
         part["q"] += result[3]
+
+    def _settled(
+        self, x: Array, d: Array, m: Array, p: Array, h: float
+    ) -> tuple[list[Array], bool]:
+        """Return what a step of any length gives, and whether it did not settle."""
+        guess, step = d, np.array([h])
+        result = self._fast(x, guess, m, p, step)
+        if result[DOUBT][0] != 0.0:
+            for _ in range(CAP):
+                result = self._exact(x, guess, m, p, step)
+                if result[DOUBT][0] == 0.0:
+                    break
+                guess = result[1].copy()
+        return [part.copy() for part in result], bool(result[DOUBT][0] != 0.0)
 
 
 class _Call:

@@ -1,9 +1,10 @@
 /* The motorcycle brake and its ECU, written by hand for this one brake, its default choices
  * (peers/hand_c.py lists them) and one time-stepping scheme: the yardstick for bywire's kernels.
  *
- * Implicit midpoint with the midpoint predicted from the last increment, one dry friction
- * projected on the end-of-step speed, two end stops, and a chamber pressure that cannot fall
- * below zero. All rows but the shaft's are eliminated on paper, see struct Held.
+ * Implicit midpoint with the midpoint predicted from the last increment, one dry friction that
+ * holds a resting shaft or opposes a turning one, substeps cut where the speed passes zero, two end
+ * stops, and a chamber pressure that cannot fall below zero. All rows but the shaft's are
+ * eliminated on paper, see struct Held.
  *
  * The line below is replaced by enums P_, X_, M_, U_, E_ and O_ of parameters, state, memory,
  * stimulus, energies and outputs, generated from the model. */
@@ -16,6 +17,10 @@
 #define PI 3.14159265358979323846
 #define CAP 8            /* passes after which a substep whose contacts change is let go */
 #define FAR_DECAYED 40.0 /* exp(-40) is far below the last digit of 1 */
+#define TRIES 12         /* lengths tried to find where a speed passes zero */
+#define CLOSE 1e-11      /* share of a speed's change that counts as zero there */
+#define EDGE 1e-6        /* least share of a part that is cut off or left */
+#define CUTS 4           /* after which a substep is let go */
 #define BRINK 1e-9       /* share of the stroke at which a stop counts as near */
 /* gcc -O2 leaves the two large pieces of a substep out of line, and they take a third longer. */
 #define INLINE static inline __attribute__((always_inline))
@@ -71,32 +76,41 @@ INLINE double max2(double a, double b) { return a > b ? a : b; }
 INLINE double min2(double a, double b) { return a < b ? a : b; }
 INLINE double clip(double x, double low, double high) { return min2(max2(x, low), high); }
 
+/* The factors that depend on the step, for another one. */
+static Plant with_step(const Plant *any, double h)
+{
+    Plant k = *any;
+    const double *p = k.raw;
+    k.h = h, k.half = 0.5 * h, k.quarter = 0.25 * h;
+    k.a = k.half * k.k_g * k.A, k.aa = k.a * k.a, k.two_a = 2.0 * k.a;
+    const double G = k.half / k.K_lf, w_aa = 2.0 * PI * p[P_anti_alias_f_aa];
+    k.pd_gain = G / (k.pads + G), k.g = G * (1.0 - k.pd_gain), k.two_g = 2.0 * k.g;
+    k.V0 = k.A * p[P_master_cylinder_s_mc] / k.beta + k.g;
+    k.f_p = h * p[P_seal_f_cfr_p], k.f_n = h * p[P_seal_f_cfr_n];
+    k.T_pr = h * p[P_seal_T_pr], k.mu = h * p[P_seal_mu_T];
+    k.lag = h * w_aa / (1.0 + k.half * w_aa);
+    return k;
+}
+
 static Plant prepare(const double *p, double h)
 {
-    Plant k = {.raw = p, .h = h, .half = 0.5 * h, .quarter = 0.25 * h};
+    Plant k = {.raw = p};
     k.L = p[P_motor_L_m], k.R_m = p[P_motor_R_m], k.K_e = p[P_motor_K_e];
     k.V_bat = p[P_supply_V_bat], k.R_bat = p[P_supply_R_bat], k.beta = p[P_fluid_beta];
     k.k_g = p[P_gear_k_g], k.eta = p[P_gear_eta_g], k.J_mot = p[P_gear_J_mot];
     k.J = k.J_mot + k.k_g * k.k_g * p[P_gear_M_mc], k.M = k.J - (1.0 - k.eta) * k.J_mot;
     k.A = p[P_master_cylinder_A_mc], k.k_damp = p[P_master_cylinder_k_damp];
-    k.a = k.half * k.k_g * k.A, k.aa = k.a * k.a, k.two_a = 2.0 * k.a;
     const double A_pl = PI / 4.0 * p[P_pipeline_d_pl] * p[P_pipeline_d_pl];
     k.K_lf = p[P_pipeline_k_lf] * p[P_fluid_nu] * p[P_fluid_rho] * PI * p[P_pipeline_L_pl]
              / (A_pl * A_pl);
     k.pads = p[P_caliper_A_pd] * p[P_caliper_A_pd] / p[P_caliper_K_pd];
-    const double G = k.half / k.K_lf;
-    k.pd_gain = G / (k.pads + G), k.g = G * (1.0 - k.pd_gain), k.two_g = 2.0 * k.g;
-    k.V0 = k.A * p[P_master_cylinder_s_mc] / k.beta + k.g, k.V1 = k.A * k.k_g / k.beta;
+    k.V1 = k.A * k.k_g / k.beta;
     k.brk_p = p[P_seal_k_brk_p] - 1.0, k.brk_n = p[P_seal_k_brk_n] - 1.0;
-    k.f_p = h * p[P_seal_f_cfr_p], k.f_n = h * p[P_seal_f_cfr_n];
-    k.T_pr = h * p[P_seal_T_pr], k.mu = h * p[P_seal_mu_T];
     k.c = p[P_seal_c], k.still = FAR_DECAYED / k.c;
     k.k_stop = p[P_stop_k_stop], k.tau = p[P_stop_tau_stop];
     k.x_rest = p[P_master_cylinder_x_rest], k.x_end = p[P_master_cylinder_x_end];
     k.th_mid = 0.5 * (k.x_end + k.x_rest) / k.k_g;
     k.th_free = (0.5 - BRINK) * (k.x_end - k.x_rest) / k.k_g;
-    const double w_aa = 2.0 * PI * p[P_anti_alias_f_aa];
-    k.lag = h * w_aa / (1.0 + k.half * w_aa);
     k.p_gain = 1.0 / (p[P_pressure_sensor_p_high] - p[P_pressure_sensor_p_low]);
     k.p_zero = (p[P_fluid_p_atm] - p[P_pressure_sensor_p_low]) * k.p_gain;
     k.i_gain = 1.0 / (p[P_current_sensor_i_high] - p[P_current_sensor_i_low]);
@@ -104,7 +118,7 @@ static Plant prepare(const double *p, double h)
     k.lp_g = tan(PI * p[P_ecu_filter_f_c] * p[P_ecu_T_s]);
     k.lp_a = 1.0 / (1.0 + 2.0 * p[P_ecu_filter_zeta] * k.lp_g + k.lp_g * k.lp_g);
     k.c1 = 1.0 / (2.0 * k.beta), k.c2 = k.c1 / (3.0 * k.beta), k.c3 = k.c2 / (4.0 * k.beta);
-    return k;
+    return with_step(&k, h);
 }
 
 static Held hold(const Plant *k, double duty)
@@ -144,15 +158,15 @@ INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
         S += k->half * k->k_g * k->k_g * stiff * (k->half + k->tau);
         c -= k->half * k->k_g * (2.0 * force + k->k_g * stiff * (k->half - k->tau) * s->om);
     }
-    /* Friction opposes the speed that would come without it, and at most stops the shaft. */
-    const double load = max2(s->pm + s->dpm, 0.0);
-    const double coulomb = k->T_pr + (c > 0.0 ? k->f_p : k->f_n) * load;
-    const double peak = coulomb * (c > 0.0 ? k->brk_p : k->brk_n);
+    /* Friction opposes the speed that the shaft has, or holds it at rest as far as it can. */
+    const double way = s->om != 0.0 ? s->om : c, load = max2(s->pm + s->dpm, 0.0);
+    const double coulomb = k->T_pr + (way > 0.0 ? k->f_p : k->f_n) * load;
+    const double peak = coulomb * (way > 0.0 ? k->brk_p : k->brk_n);
     const double limit = (coulomb + k->mu * speed) + peak * decay;
 
     Pass q;
-    q.om = copysign(max2(fabs(c) - limit, 0.0), c) * (1.0 / S);
-    q.impulse = -copysign(min2(fabs(c), limit), c);
+    q.impulse = -copysign(s->om == 0.0 && fabs(c) < limit ? fabs(c) : limit, way);
+    q.om = (c + q.impulse) * (1.0 / S);
     const double both = s->om + q.om;
     q.i = u->alpha * s->i + u->drive - u->gamma * both;
     q.dpm = side.held ? -s->pm : r * (k->a * both - k->two_g * drop);
@@ -166,7 +180,8 @@ INLINE void predict(const Plant *k, Sim *s, Pass q)
     s->dom = 0.5 * (q.om - s->om), s->dpm = 0.5 * q.dpm;
 }
 
-INLINE void commit(const Plant *k, Sim *s, Pass q)
+/* Take over a part of a substep, as a share of it. */
+INLINE void commit(const Plant *k, Sim *s, Pass q, double share)
 {
     const double p_share = clip(k->p_gain * (s->pm + s->dpm) + k->p_zero, 0.0, 1.0);
     const double i_share = clip(k->i_gain * (s->i + s->di) + k->i_zero, 0.0, 1.0);
@@ -174,13 +189,14 @@ INLINE void commit(const Plant *k, Sim *s, Pass q)
     const double two_i = s->i + q.i, two_om = s->om + q.om;
     const double pm = s->pm + 0.5 * q.dpm, pd = s->pd + 0.5 * q.dpd;
 #ifndef WITHOUT_SUMS /* compiled out for who records no energy */
-    s->sum.i += two_i, s->sum.ii += two_i * two_i, s->sum.io += two_i * two_om;
-    s->sum.oo += two_om * two_om, s->sum.fo += q.impulse * two_om;
-    s->sum.pipe += (pm - pd) * (pm - pd) * pipe_loss(k, pm, pd);
-    s->sum.stuck += two_om == 0.0 ? 1.0 : 0.0;
+    s->sum.i += share * two_i, s->sum.ii += share * (two_i * two_i);
+    s->sum.io += share * (two_i * two_om), s->sum.oo += share * (two_om * two_om);
+    s->sum.fo += q.impulse * two_om;
+    s->sum.pipe += share * ((pm - pd) * (pm - pd) * pipe_loss(k, pm, pd));
+    s->sum.stuck += two_om == 0.0 ? share : 0.0;
 #endif
     predict(k, s, q);
-    s->impulse = q.impulse, s->i = q.i;
+    s->impulse = q.impulse / share, s->i = q.i;
     s->th += k->half * two_om;
     s->om = q.om, s->pm += q.dpm, s->pd += q.dpd;
 }
@@ -193,41 +209,118 @@ static Sides touching_sides(const Plant *k, double th, double om)
 }
 
 /* Book what only a substep at a stop or at the limit has: reactions and their energies. */
-static void book_sides(const Plant *k, Sim *s, Pass q, Sides side)
+static void book_sides(const Plant *k, Sim *s, Pass q, Sides side, double share)
 {
     const double both = s->om + q.om, v = k->k_g * 0.5 * both;
     const double x = k->k_g * (s->th + k->quarter * both);
     const double near = k->x_rest - x, far = x - k->x_end;
-    s->sum.stop += (side.k_far * (far + k->tau * v) - side.k_near * (near - k->tau * v)) * v;
+    const double force = side.k_far * (far + k->tau * v) - side.k_near * (near - k->tau * v);
+    s->sum.stop += share * (force * v);
     /* What the chamber's balance lacks, the reservoir adds. */
     const double P = k->V0 - k->V1 * (s->th + s->dth), pm = s->pm + 0.5 * q.dpm;
     const double lack = P * q.dpm - k->a * both + k->two_g * (s->pm - s->pd);
     s->makeup = side.held ? lack / k->h : 0.0;
-    s->sum.port -= s->makeup * pm * pipe_loss(k, pm, 0.0);
+    s->sum.port -= share * (s->makeup * pm * pipe_loss(k, pm, 0.0));
 }
 
-/* A substep near a stop or with the pressure about to fall below zero: pass after pass, each with
- * the contacts at the midpoint that the one before gave, until they stay the same. */
-static void careful(const Plant *k, const Held *u, Sim *s)
+/* A part of a substep, from s on: what its length gives. */
+typedef struct { Plant k; Sim s; Pass q; Sides side; bool settled; } Part;
+
+/* Pass after pass, each with the contacts at the midpoint that the one before gave, until they
+ * stay the same. */
+static void settle(Part *y, double duty)
 {
+    const Plant *k = &y->k;
+    const Held u = hold(k, duty);
+    Sim *s = &y->s;
     for (int pass = 1;; pass++) {
-        Sides side = touching_sides(k, s->th + s->dth, s->om + s->dom);
-        Pass q = solve(k, u, s, side);
-        if (s->pm + q.dpm < 0.0) {
-            side.held = true;
-            q = solve(k, u, s, side);
+        y->side = touching_sides(k, s->th + s->dth, s->om + s->dom);
+        y->q = solve(k, &u, s, y->side);
+        if (s->pm + y->q.dpm < 0.0) {
+            y->side.held = true;
+            y->q = solve(k, &u, s, y->side);
         }
-        const double both = s->om + q.om;
+        const double both = s->om + y->q.om;
         const Sides after = touching_sides(k, s->th + k->quarter * both, 0.5 * both);
-        const bool settled = side.k_near == after.k_near && side.k_far == after.k_far;
-        if (settled || pass == CAP) {
-            s->careful += 1.0, s->unsettled += !settled;
-            book_sides(k, s, q, side);
-            commit(k, s, q);
+        y->settled = y->side.k_near == after.k_near && y->side.k_far == after.k_far;
+        if (y->settled || pass == CAP)
             return;
-        }
-        predict(k, s, q);
+        predict(k, s, y->q);
     }
+}
+
+/* Scale the predicted half increments. */
+static void stretch(Sim *s, double by)
+{
+    s->di *= by, s->dth *= by, s->dom *= by, s->dpm *= by;
+}
+
+static void try_part(Part *y, const Plant *k, double duty, const Sim *s, double t)
+{
+    y->k = with_step(k, t), y->s = *s;
+    stretch(&y->s, t / k->h);
+    settle(y, duty);
+}
+
+/* Shorten a part of length t to where the speed is zero: by the parabola through three lengths,
+ * within what is known to lie before and behind. Return the length. */
+static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double t)
+{
+    const double first = EDGE * t, final = (1.0 - EDGE) * t;
+    double low = 0.0, high = t, P = 0.0, at_P = s->om, Q = t, at_Q = y->q.om;
+    const double close = CLOSE * fabs(at_P - at_Q);
+    double N = t * at_P / (at_P - at_Q);
+    for (int n = 0; n < TRIES; n++) {
+        N = clip(N, first, final);
+        try_part(y, k, duty, s, N);
+        const double at_N = y->q.om;
+        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q)
+            break;
+        if (at_N * s->om > 0.0)
+            low = N;
+        else
+            high = N;
+        const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
+                             - (at_Q - at_P) / (Q - P);
+        const double next = N - at_N / slope;
+        if (fabs(P - next) > fabs(Q - next))
+            P = N, at_P = at_N;
+        else
+            Q = N, at_Q = at_N;
+        N = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    return N;
+}
+
+/* A substep near a stop, with the pressure about to fall below zero, or in which the speed passes
+ * zero: there it is cut, for friction jumps, and the shaft rests or turns on as friction decides.
+ * Behind a cut the midpoint is predicted anew, from a first pass. */
+static void careful(const Plant *k, double duty, Sim *s)
+{
+    double left = k->h;
+    bool settled = true;
+    Part y;
+    for (int cuts = 0;; cuts++) {
+        try_part(&y, k, duty, s, left);
+        if (cuts) {
+            y.s = *s;
+            predict(&y.k, &y.s, y.q);
+            settle(&y, duty);
+        }
+        const bool turns = s->om * y.q.om < 0.0, cut = turns && cuts < CUTS;
+        if (turns && !cut)
+            y.q.om = 0.0;
+        const double t = cut ? shorten(&y, k, duty, s, left) : left, share = t / k->h;
+        settled &= y.settled && turns == cut;
+        book_sides(&y.k, &y.s, y.q, y.side, share);
+        commit(&y.k, &y.s, y.q, share);
+        *s = y.s;
+        stretch(s, 1.0 / share);
+        if (!cut)
+            break;
+        s->om = s->dom = 0.0, left -= t;
+    }
+    s->careful += 1.0, s->unsettled += !settled;
 }
 
 INLINE bool free_of_stops(const Plant *k, double th, double om)
@@ -244,9 +337,10 @@ static int64_t advance(const Plant *k, const Held *u, Sim *state, int64_t n)
     for (; done < n && free_of_stops(k, s.th + s.dth, s.om + s.dom); done++) {
         const Pass q = solve(k, u, &s, (Sides){.touching = false, .held = false});
         const double both = s.om + q.om;
-        if (s.pm + q.dpm < 0.0 || !free_of_stops(k, s.th + k->quarter * both, 0.5 * both))
+        if (s.om * q.om < 0.0 || s.pm + q.dpm < 0.0
+            || !free_of_stops(k, s.th + k->quarter * both, 0.5 * both))
             break;
-        commit(k, &s, q);
+        commit(k, &s, q, 1.0);
     }
     if (done)
         s.makeup = 0.0;
@@ -342,7 +436,7 @@ static void frame(const Plant *k, Saved *z, int64_t steps)
     for (int64_t n = 0; n < steps; n++) {
         n += advance(k, &u, &z->s, steps - n);
         if (n < steps)
-            careful(k, &u, &z->s);
+            careful(k, duty, &z->s);
     }
     const Sums sum = z->s.sum;
     const double kinetic = 0.5 * (z->s.om * z->s.om - om_start * om_start); /* sum of om d(om) */

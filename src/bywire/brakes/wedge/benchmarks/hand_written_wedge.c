@@ -2,8 +2,8 @@
  * scheme: the yardstick for bywire's kernels.
  *
  * Fully iterated implicit midpoint: contacts by an active set, bounds of the frictions, cogging and
- * saturations at the midpoint of the same substep, set-valued frictions projected on the
- * end-of-step velocity. Unknowns are the velocities of both shafts and of the wedge; currents and
+ * saturations at the midpoint of the same substep, frictions that oppose what moves and hold what
+ * rests as far as they can, substeps cut where a velocity passes zero. Unknowns are the velocities of both shafts and of the wedge; currents and
  * drives are eliminated on paper, see struct Winding, and the disc is so heavy that it follows.
  *
  * The lines below are replaced by enums P_, X_, M_, U_, E_ and O_ of parameters, state, memory,
@@ -14,6 +14,11 @@
 #define CAP 20     /* passes after which a substep that does not settle is let go */
 #define SIGN_CAP 8 /* changes of the signs of the frictions before all are tried */
 #define SPEEDS 3   /* shaft 1, shaft 2, wedge */
+#define TURNING 4  /* and the disc */
+#define CUTS 10    /* of a substep, after which it is let go */
+#define TRIES 12   /* lengths tried to find where a velocity passes zero */
+#define CLOSE 1e-9 /* share of a velocity's change that counts as zero there */
+#define EDGE 1e-6  /* least share of a part that is cut off or left */
 /* Change of the shafts' speeds from pass to pass, rad/s, at which a substep has settled. With 1e-12
  * the wedge's travel in Fig. 7 differs by 4e-15 m rms, and a run takes 2.7 passes and half as much
  * time again; the step's own error is 2e-10 m. */
@@ -193,10 +198,10 @@ INLINE double row(const double A[SPEEDS], const double *w)
     return A[0] * w[0] + A[1] * w[1] + A[2] * w[2];
 }
 
-/* Speeds and friction forces for given signs; return whether the signs come out as given, and
- * change them toward what came out. */
-INLINE bool slide(const Solver *z, const double *c, const double (*bound)[2], int *sign, double *w,
-                  double *force)
+/* Speeds and friction forces for given signs; return whether those of what rests come out as given,
+ * and change them toward what came out. */
+INLINE bool slide(const Solver *z, const double *start, const double *c, const double (*bound)[2],
+                  int *sign, double *w, double *force)
 {
     double b[SPEEDS];
     bool right = true;
@@ -207,7 +212,7 @@ INLINE bool slide(const Solver *z, const double *c, const double (*bound)[2], in
     for (int i = 0; i < SPEEDS; i++) {
         if (sign[i]) {
             force[i] = bound[i][sign[i] < 0];
-            if (w[i] * sign[i] <= 0.0)
+            if (start[i] == 0.0 && w[i] * sign[i] <= 0.0)
                 sign[i] = 0, right = false;
         } else {
             force[i] = row(z->S[i], w) - c[i];
@@ -218,18 +223,21 @@ INLINE bool slide(const Solver *z, const double *c, const double (*bound)[2], in
     return right;
 }
 
-/* Project the frictions: find the signs, beginning with those of the pass before. */
-static bool project(Solver *z, const double *c, const double (*bound)[2], int *sign, double *w,
-                    double *force)
+/* Project the frictions: what moves keeps its sign, that of what rests is found, beginning with the
+ * pass before. */
+static bool project(Solver *z, const double *start, const double *c, const double (*bound)[2],
+                    int *sign, double *w, double *force)
 {
     for (int n = 0; n < SIGN_CAP + 27; n++) {
         const int all = n - SIGN_CAP;
         if (all >= 0) /* they go in circles: try every combination */
             sign[0] = all % 3 - 1, sign[1] = all / 3 % 3 - 1, sign[2] = all / 9 - 1;
+        for (int i = 0; i < SPEEDS; i++)
+            sign[i] = start[i] > 0.0 ? 1 : start[i] < 0.0 ? -1 : sign[i];
         const int slipping = !!sign[0] | !!sign[1] << 1 | !!sign[2] << 2;
         if (z->slipping != slipping)
             invert(z, slipping);
-        if (slide(z, c, bound, sign, w, force))
+        if (slide(z, start, c, bound, sign, w, force))
             return true;
     }
     return false;
@@ -302,21 +310,24 @@ INLINE void right_side(const Scheme *s, const Sim *z, const Touch *t, const Give
         c[i] -= row(z->solver.S[i], w);
 }
 
+/* Add up the powers over a part, as a share of a substep. */
 INLINE void book(const Scheme *s, Sim *z, const Touch *t, const double *u, const Drive *q,
-                 const double *force, double climb)
+                 const double *force, double climb, double share)
 {
     const Plant *k = &s->k;
     Sums *a = &z->sum;
     const double r_1 = k->lead * u[0], r_2 = k->lead * u[1], push = t->F_N * u[2];
     for (int j = 0; j < 2; j++) {
-        a->vi += q[j].v * q[j].i, a->ii[j] += q[j].i * q[j].i, a->oo[j] += u[j] * u[j];
-        a->shaft -= force[j] * u[j];
+        a->vi += share * (q[j].v * q[j].i), a->ii[j] += share * (q[j].i * q[j].i);
+        a->oo[j] += share * (u[j] * u[j]), a->shaft -= share * (force[j] * u[j]);
     }
-    a->wedge -= force[2] * u[2], a->disc += t->turning * push, a->runout += t->F_N * climb;
-    a->caliper += t->way * push, a->stop += (t->far - t->near) * u[2];
-    a->heart += t->f.f_1 * (u[2] - r_1) + t->f.f_2 * (r_2 - u[2]) + t->f.f_12 * (r_1 - r_2);
-    a->brake -= force[3] * t->Om;
-    a->stuck += u[0] == 0.0 && u[1] == 0.0 && u[2] == 0.0 ? 1.0 : 0.0;
+    a->wedge -= share * (force[2] * u[2]), a->disc += share * (t->turning * push);
+    a->runout += share * (t->F_N * climb), a->caliper += share * (t->way * push);
+    a->stop += share * ((t->far - t->near) * u[2]), a->brake -= share * (force[3] * t->Om);
+    const double heart = t->f.f_1 * (u[2] - r_1) + t->f.f_2 * (r_2 - u[2])
+                         + t->f.f_12 * (r_1 - r_2);
+    a->heart += share * heart;
+    a->stuck += u[0] == 0.0 && u[1] == 0.0 && u[2] == 0.0 ? share : 0.0;
 }
 
 /* Take over the end of the substep: twice the midpoint less the start, speeds as they are. */
@@ -361,20 +372,40 @@ INLINE bool solve(const Scheme *s, Sim *z, const Touch *t, const Given *g, doubl
     if (z->solver.key != key)
         assemble(s, &z->solver, t, z->branch), z->solver.key = key;
     right_side(s, z, t, g, u, c);
-    const bool found = project(&z->solver, c, bound, z->sign, w, force);
+    const double start[SPEEDS] = {b->motor[0].om, b->motor[1].om, b->v};
+    const bool found = project(&z->solver, start, c, bound, z->sign, w, force);
     u[0] = 0.5 * (b->motor[0].om + w[0]), u[1] = 0.5 * (b->motor[1].om + w[1]);
     u[2] = 0.5 * (b->v + w[2]);
     return found;
 }
 
-/* Speed of the disc at the end: the pads' friction at most stops it. */
+/* Speed of the disc at the end: the pads' friction slows it down, and holds it at rest. */
 INLINE double slowed(const Scheme *s, double Om, double F_N)
 {
-    const double loss = s->per_J_F * s->k.per_F_N * F_N;
-    return copysign(max2(fabs(Om) - loss, 0.0), Om);
+    return Om == 0.0 ? 0.0 : Om - copysign(s->per_J_F * s->k.per_F_N * F_N, Om);
 }
 
-static void substep(const Scheme *s, Sim *z, const double *i_ref, bool on)
+INLINE double *speed_of(Sim *z, int n)
+{
+    return n < 2 ? &z->b.motor[n].om : n == 2 ? &z->b.v : &z->b.Om;
+}
+
+/* The first velocity that changes its sign between two states, -1 if none does, and when. */
+INLINE int first_turn(Sim *from, Sim *to, double *share)
+{
+    int first = -1;
+    *share = 1.0;
+    for (int n = 0; n < TURNING; n++) {
+        const double v = *speed_of(from, n), w = *speed_of(to, n);
+        if (v * w < 0.0 && v / (v - w) <= *share)
+            *share = v / (v - w), first = n;
+    }
+    return first;
+}
+
+/* A part of a substep, as a share of it; a whole one is not taken over where a velocity turns.
+ * Return whether it was. */
+static bool part(const Scheme *s, Sim *z, const double *i_ref, bool on, double share, bool whole)
 {
     const Plant *k = &s->k;
     Body *b = &z->b;
@@ -414,11 +445,97 @@ static void substep(const Scheme *s, Sim *z, const double *i_ref, bool on)
             break;
         }
     }
+    if (whole && (b->motor[0].om * w[0] < 0.0 || b->motor[1].om * w[1] < 0.0 || b->v * w[2] < 0.0
+                  || b->Om * Om_end < 0.0))
+        return false;
     force[SPEEDS] = (Om_end - b->Om) / s->per_J_F;
 #ifndef WITHOUT_SUMS /* compiled out for who records no energy */
-    book(s, z, &t, u, q, force, climb);
+    book(s, z, &t, u, q, force, climb, share);
 #endif
     commit(s, z, &t, w, u, g, q, force, Om_end);
+    return true;
+}
+
+static void stretch(Sim *z, double by)
+{
+    z->d[0] *= by, z->d[1] *= by, z->d[2] *= by, z->dOm *= by;
+}
+
+/* Where a part of length t leads to from z. */
+static Sim tried(const Scheme *s, const Sim *z, const double *i_ref, bool on, double t)
+{
+    const Scheme own = prepare(s->k.raw, t);
+    Sim y = *z;
+    y.solver.key = -1;
+    stretch(&y, t / s->k.h);
+    part(&own, &y, i_ref, on, t / s->k.h, false);
+    return y;
+}
+
+/* Shorten a part of length *t to the first instant at which a velocity is zero, by the parabola
+ * through three lengths, within what is known to lie before and behind. y is where *t leads to,
+ * before and behind. Return which velocity it is. */
+static int shorten(const Scheme *s, Sim *z, Sim *y, const double *i_ref, bool on, double *t)
+{
+    const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
+    double share, low = 0.0, high = *t, P = 0.0, Q = *t;
+    int turns = first_turn(z, y, &share);
+    double at_P = *speed_of(z, turns), at_Q = *speed_of(y, turns), N = *t * share;
+    double close = CLOSE * fabs(at_P - at_Q);
+    for (int n = 0; n < TRIES; n++) {
+        N = clip(N, first, final);
+        *y = tried(s, z, i_ref, on, N);
+        const int other = first_turn(z, y, &share);
+        if (other >= 0 && other != turns) { /* it is earlier */
+            turns = other, low = P = 0.0, high = Q = N, N *= share;
+            at_P = *speed_of(z, turns), at_Q = *speed_of(y, turns);
+            close = CLOSE * fabs(at_P - at_Q);
+            continue;
+        }
+        const double at_N = *speed_of(y, turns);
+        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q)
+            break;
+        if (at_N * *speed_of(z, turns) > 0.0)
+            low = N;
+        else
+            high = N;
+        const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
+                             - (at_Q - at_P) / (Q - P);
+        const double next = N - at_N / slope;
+        if (fabs(P - next) > fabs(Q - next))
+            P = N, at_P = at_N;
+        else
+            Q = N, at_Q = at_N;
+        N = next > low && next < high ? next : 0.5 * (low + high);
+    }
+    *t = N;
+    return turns;
+}
+
+static void substep(const Scheme *s, Sim *z, const double *i_ref, bool on)
+{
+    if (__builtin_expect(part(s, z, i_ref, on, 1.0, true), 1))
+        return;
+    double left = s->k.h, share;
+    Sim from = *z, y = tried(s, z, i_ref, on, left);
+    for (int cuts = 0;; cuts++) {
+        if (first_turn(&from, &y, &share) < 0)
+            break;
+        if (cuts == CUTS) {
+            y.unsettled += 1.0;
+            break;
+        }
+        double t = left;
+        const int turns = shorten(s, &from, &y, i_ref, on, &t);
+        stretch(&y, s->k.h / t);
+        *speed_of(&y, turns) = 0.0;
+        turns < SPEEDS ? (y.d[turns] = 0.0) : (y.dOm = 0.0);
+        from = y, left -= t;
+        y = tried(s, &from, i_ref, on, left);
+    }
+    *z = y;
+    stretch(z, s->k.h / left);
+    z->solver.key = -1;
 }
 
 /* The substeps of one tick, and the energies that they add up to. */

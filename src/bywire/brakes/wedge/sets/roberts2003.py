@@ -110,7 +110,7 @@ _STAND = {
     "flywheel.J_F": chosen(36.0, "a quarter of a passenger car at this radius"),
     "flywheel.Omega_0": chosen(60.0, "some 65 km/h"),
     "flywheel.K_drive": chosen(1e4, "keeps the speed within 0.2 % (law 'driven')"),
-    "flywheel.Omega_still": chosen(1e-3, "above what a substep changes, below what matters"),
+    "flywheel.Omega_still": chosen(1e-7, "none: a substep ends where the disc stops"),
     "flywheel.runout": chosen(4 * _MICRO, "what the floating caliper does not follow"),
     "moment_sensor.f_M": chosen(150.0, "stiff sensor with the caliper on it"),
     "encoder.law": chosen("quantized", "an incremental encoder counts"),
