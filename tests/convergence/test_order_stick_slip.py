@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from bywire.bench.experiment import as_run
 from bywire.simulation import engine, scheme
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.symbols import SX, scalars, symbol_tuple
+from bywire.simulation.symbols import SX
 from convergence.observed_order import assert_order
 from cross.motorcycle_reference import run_reference
 from systems import oscillator
@@ -86,14 +85,8 @@ def test_rubbing_oscillator(x_0: float) -> None:
 
 def test_friction_of_a_substep_s_end_is_of_first_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rule of old: nothing is cut, and the sign at the end of a substep holds for all of it."""
-
-    def of_the_end(model: Any, par: Any, s: Any, y: Any, contact: Any) -> Any:
-        state, memory = symbol_tuple(model.State, y), symbol_tuple(model.Memory, s.m)
-        pairs = model.bounds(state, state, memory, par, scalars(contact))
-        return [(SX(low), SX(high)) for low, high in pairs]
-
-    monkeypatch.setattr(scheme, "_bounds", of_the_end)
-    monkeypatch.setattr(scheme, "_turn", lambda model, start, end: SX(0))
+    monkeypatch.setattr(scheme, "_acting", lambda v, low, high: (low, high))
+    monkeypatch.setattr(scheme, "_turn", lambda start, end, jump: SX(0))
     monkeypatch.setattr(engine, "_PREPARED", {})
     errors = _errors(0.040)
     assert_order(STEPS, errors, 1.0, "release from 40 mm")

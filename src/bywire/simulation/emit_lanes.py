@@ -48,7 +48,8 @@ class _Lanes:
         }
         self.products = stages.quadrature.products
         self.flag = stages.fast["flag"][0]
-        self.pass_roots = [*self.results.values(), *self.products, self.flag]
+        self.doubts = [n for kind in ("jump", "doubt") for n in stages.fast[kind]]
+        self.pass_roots = [*self.results.values(), *self.products, self.flag, *self.doubts]
         self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
         self.name = leaf_namer(self.graph, self._leaf, lambda n: f"v{n}", "SET({})")
         self.mode = modes(self.graph, self.pass_roots, self.level)
@@ -213,8 +214,8 @@ def _settle_lanes(t: _Lanes, parameters: int) -> str:
                 lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
             at += 1
     velocities = [f"o[{k}] = n[{targets[f'x{k}']}][l];" for k in t.stages.velocities]
-    return f"""static RARE void settle_lanes(B flagged, const V *last, const M *P, double h, const V *m,
-    const V *old, V *n, V *q, V *counters) {{
+    return f"""static RARE void settle_lanes(B flagged, const V *doubts, const M *P, double h,
+    const V *m, const V *old, V *n, V *q, V *counters) {{
   double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
   for (int l = 0; l < W; ++l) {{
     if (!LANE(flagged, l)) continue;
@@ -223,7 +224,7 @@ def _settle_lanes(t: _Lanes, parameters: int) -> str:
     for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
     cuts c;
     {indented(velocities, 4)}
-    for (int k = JUMP; k < RESULTS; ++k) o[k] = last[k - JUMP][l];
+    for (int k = JUMP; k < RESULTS; ++k) o[k] = doubts[k - JUMP][l];
     counters[0][l] += located(ps, h, ms, xs, ds, o[DOUBT] == 0.0, o, &c);
     counters[1][l] += 1.0;
     for (int k = 0; k < {nz}; ++k) n[{len(targets)} + k][l] = 0.0;
@@ -240,8 +241,11 @@ def _repeat(t: _Lanes) -> list[str]:
     new = [*(f"{target}_" for target in t.results), *(f"z{k}" for k in range(len(t.products)))]
     flow = [f"q{k}" for k in range(length["q"])]
     memory = [f"m{k}" for k in range(length["m"])]
-    arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
-    arrays["doubts"] = [t.number(node) for kind in ("jump", "doubt") for node in t.stages.fast[kind]]
+    doubts = [t.number(node) for node in t.doubts]
+    arrays = {
+        "doubts": doubts, "old": old, "memory": memory or ["SET(0.0)"], "n": new,
+        "flow": flow or ["SET(0.0)"],
+    }  # fmt: skip
     return [
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
         "V count[] = {failures, repeats};",

@@ -16,8 +16,8 @@ from bywire.simulation.stages import STATE, Stages
 
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
 
-# A pass gives o: x, d, r, q, jump, doubt. Where the ordinary one is in doubt, the exact one is repeated
-# from its own increment until its contact sets reproduce.
+# A pass gives o: x, d, r, q, jump, doubt. Where the ordinary one is in doubt, the exact one is
+# repeated from its own increment until its contact sets reproduce.
 _SETTLE = """
 static APART int settle(const double *p, double h, const double *m, const double *x, double *d,
     double *o) {
@@ -152,8 +152,9 @@ def rare_substep(stages: Stages) -> str:
     return f"""
 #define RARE __attribute__((noinline, cold))
 #define APART {APART}
-enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, JUMP = FLOW + FLOWS,
-  VELOCITIES = {len(velocities)}, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, CAP = {CAP}, CUTS = {most}, ATTEMPTS = {ATTEMPTS} }};
+enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
+  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1,
+  CAP = {CAP}, CUTS = {most}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
 static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};

@@ -48,7 +48,8 @@ def emit_single(stages: Stages) -> str:
         if f"{kind}{k}" not in skipped
     }
     products = stages.quadrature.products
-    pass_roots = [*results.values(), *products, stages.fast["flag"][0]]
+    pass_roots = [*results.values(), *products]
+    pass_roots += [node for kind in ("flag", "jump", "doubt") for node in stages.fast[kind]]
     coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
     tick_roots = [node for task in stages.ticks for node in task]
     every_root = pass_roots + coefficients + tick_roots + stages.output

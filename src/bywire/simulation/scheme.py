@@ -129,15 +129,21 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     doubts = violations(model, par, overlap, contact, exact)
     doubts.append(ca.if_else(projection.failed, 1, 0))
     if not exact:
-        doubts += [-x[model.State._fields.index(name)] for name in model.limits]
+        doubts += [-x[_index(model, name)] for name in model.limits]
     # A maximum and no logical or: compilers do not vectorize selections between truth values.
     doubt = SX(0)
     for one in doubts:
         doubt = ca.fmax(doubt, one)
+    rubbing = [_index(model, name) for name in model.frictions]
+    return Pass(x, d, reaction, column(flow), doubt, jump, _turn(s.x[rubbing], x[rubbing], jump))
+
+
+def _turn(start: Any, end: Any, jump: Any) -> Any:
+    """Return what is positive where a velocity changes its sign and its friction jumps."""
     turn = SX(0)
-    for a in range(len(model.frictions)):
-        turn = ca.fmax(turn, -s.x[kept[a]] * x[kept[a]] * jump[a])
-    return Pass(x, d, reaction, column(flow), doubt, jump, turn)
+    for k in range(start.shape[0]):
+        turn = ca.fmax(turn, -start[k] * end[k] * jump[k])
+    return turn
 
 
 def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
@@ -190,7 +196,11 @@ def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
 
 def _set_valued_states(model: Model, exact: bool) -> tuple[int, ...]:
     names = model.frictions + (model.limits if exact else ())
-    return tuple(model.State._fields.index(name) for name in names)
+    return tuple(_index(model, name) for name in names)
+
+
+def _index(model: Model, name: str) -> int:
+    return model.State._fields.index(name)
 
 
 def _project(

@@ -29,7 +29,8 @@ class Stages:
     Parameters
     ----------
     fast, exact
-        Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see ``Program``.
+        Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
+        ``Program``.
     ticks
         Nodes of the memory after each task.
     output
