@@ -48,8 +48,7 @@ class _Lanes:
         }
         self.products = stages.quadrature.products
         self.flag = stages.fast["flag"][0]
-        self.doubts = [n for kind in ("jump", "doubt") for n in stages.fast[kind]]
-        self.pass_roots = [*self.results.values(), *self.products, self.flag, *self.doubts]
+        self.pass_roots = [*self.results.values(), *self.products, self.flag]
         self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
         self.name = leaf_namer(self.graph, self._leaf, lambda n: f"v{n}", "SET({})")
         self.mode = modes(self.graph, self.pass_roots, self.level)
@@ -129,13 +128,18 @@ def emit_lanes(stages: Stages) -> str:
     ]
     parameters, stimuli = leaf_count(stages, "p"), leaf_count(stages, "u")
     return f"""{LANES}{rare_substep(stages)}
-{_settle_lanes(t, parameters)}
+{_settle_lanes(t)}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
   const M *restrict P = (const M *)p;
   M *restrict vectors = (M *)state;
   const V h = SET(h_);
   V U[{max(stimuli, 1)}];
+  double ps[{max(parameters, 1)}], c[W * (CONSTANTS + 1)];
+  for (int l = 0; l < W; ++l) {{
+    for (int k = 0; k < {parameters}; ++k) ps[k] = P[k][l];
+    constants(ps, c + l * (CONSTANTS + 1));
+  }}
   {indented([f"V {name} = vectors[{k}];" for k, name in enumerate(names)], 2)}
   {indented(t.once(), 2)}
   {indented(t.mode_state(), 2)}
@@ -197,7 +201,7 @@ def _record(t: _Lanes) -> list[str]:
     ]
 
 
-def _settle_lanes(t: _Lanes, parameters: int) -> str:
+def _settle_lanes(t: _Lanes) -> str:
     """Return the C function that settles the flagged lanes one by one.
 
     It works on copies: a vector whose lanes are addressed would live in memory everywhere.
@@ -213,19 +217,15 @@ def _settle_lanes(t: _Lanes, parameters: int) -> str:
             elif f"{kind}{k}" in targets:
                 lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
             at += 1
-    velocities = [f"o[{k}] = n[{targets[f'x{k}']}][l];" for k in t.stages.velocities]
-    return f"""static RARE void settle_lanes(B flagged, const V *doubts, const M *P, double h,
-    const V *m, const V *old, V *n, V *q, V *counters) {{
-  double ps[{max(parameters, 1)}], ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
+    return f"""static RARE void settle_lanes(B flagged, const double *c, double h, const V *m,
+    const V *old, V *n, V *q, V *counters) {{
+  double ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
   for (int l = 0; l < W; ++l) {{
     if (!LANE(flagged, l)) continue;
-    for (int k = 0; k < {parameters}; ++k) ps[k] = P[k][l];
     for (int k = 0; k < {nm}; ++k) ms[k] = m[k][l];
     for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
-    cuts c;
-    {indented(velocities, 4)}
-    for (int k = JUMP; k < RESULTS; ++k) o[k] = doubts[k - JUMP][l];
-    counters[0][l] += located(ps, h, ms, xs, ds, o[DOUBT] == 0.0, o, &c);
+    cuts made;
+    counters[0][l] += located(c + l * (CONSTANTS + 1), h, ms, xs, ds, o, &made);
     counters[1][l] += 1.0;
     for (int k = 0; k < {nz}; ++k) n[{len(targets)} + k][l] = 0.0;
     {indented(lines, 4)}
@@ -241,15 +241,11 @@ def _repeat(t: _Lanes) -> list[str]:
     new = [*(f"{target}_" for target in t.results), *(f"z{k}" for k in range(len(t.products)))]
     flow = [f"q{k}" for k in range(length["q"])]
     memory = [f"m{k}" for k in range(length["m"])]
-    doubts = [t.number(node) for node in t.doubts]
-    arrays = {
-        "doubts": doubts, "old": old, "memory": memory or ["SET(0.0)"], "n": new,
-        "flow": flow or ["SET(0.0)"],
-    }  # fmt: skip
+    arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
     return [
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
         "V count[] = {failures, repeats};",
-        "settle_lanes(flagged, doubts, P, h_, memory, old, n, flow, count);",
+        "settle_lanes(flagged, c, h_, memory, old, n, flow, count);",
         *(f"{name} = n[{k}];" for k, name in enumerate(new)),
         *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
         "failures = count[0];",

@@ -1,17 +1,19 @@
 """C text of what is rare: a substep that one ordinary pass does not serve.
 
-Its functions stand alone and compute everything anew, for any length of a step. A substep in which
-a velocity with dry friction changes its sign is cut where it passes zero: friction jumps there, and
-with it the acceleration. Within each part every velocity keeps its sign; what has come to zero
-rests or moves on in the next part, as its bounds decide.
+Its functions stand alone and compute for any length of a step what does not follow from parameters
+alone. A substep in which a velocity with dry friction changes its sign is cut where it passes zero:
+friction jumps there, and with it the acceleration. Within each part every velocity keeps its sign;
+what has come to zero rests or moves on in the next part, as its bounds decide.
 """
 
 from __future__ import annotations
 
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
+from bywire.simulation.graph import Graph
 from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, most_cuts
 from bywire.simulation.operation import Node
+from bywire.simulation.quadrature import Levels
 from bywire.simulation.stages import STATE, Stages
 
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
@@ -19,12 +21,12 @@ APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be 
 # A pass gives o: x, d, r, q, jump, doubt. Where the ordinary one is in doubt, the exact one is
 # repeated from its own increment until its contact sets reproduce.
 _SETTLE = """
-static APART int settle(const double *p, double h, const double *m, const double *x, double *d,
+static APART int settle(const double *c, double h, const double *m, const double *x, double *d,
     double *o) {
-  fast_pass(p, h, m, x, d, o);
+  fast_pass(c, h, m, x, d, o);
   if (o[DOUBT] == 0.0) return 0;
   for (int pass = 0; pass < CAP; ++pass) {
-    exact_pass(p, h, m, x, d, o);
+    exact_pass(c, h, m, x, d, o);
     if (o[DOUBT] == 0.0) return 0;
     memcpy(d, o + NX, NX * sizeof(double));
   }
@@ -51,10 +53,10 @@ static inline int first_turn(const double *x, const double *o, double *share) {
 }
 
 // A part of length t; last: half increments of a whole substep h, from which it is predicted.
-static int part(const double *p, double h, double t, const double *m, const double *x,
+static int part(const double *c, double h, double t, const double *m, const double *x,
     const double *last, double *d, double *o) {
   for (int k = 0; k < NX; ++k) d[k] = last[k] * (t / h);
-  return settle(p, t, m, x, d, o);
+  return settle(c, t, m, x, d, o);
 }
 
 // Where a velocity that goes from v to w within a part of length t is zero, on the parabola that
@@ -70,7 +72,7 @@ static inline double zero_of(double v, double w, double t, double before, double
 // Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
 // through three lengths, within what is known to lie before and behind. Before, o is that of *t in
 // the velocities, behind in everything. Return which velocity it is.
-static APART int locate(const double *p, double h, double *t, const double *m, const double *x,
+static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
     const double *last, double *o) {
   double d[NX], share, low = 0.0, high = *t;
   const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
@@ -80,7 +82,7 @@ static APART int locate(const double *p, double h, double *t, const double *m, c
   double close = CLOSE * fabs(at_P - at_Q);
   for (int n = 0; n < ATTEMPTS; ++n) {
     N = fmin(fmax(N, first), final);
-    part(p, h, N, m, x, last, d, o);
+    part(c, h, N, m, x, last, d, o);
     const int other = first_turn(x, o, &share);
     if (other >= 0 && other != turns) { // another one is earlier
       turns = other;
@@ -102,40 +104,40 @@ static APART int locate(const double *p, double h, double *t, const double *m, c
   return turns;
 }
 
-// A substep, cut where velocities pass zero; ready: o is that of an ordinary pass over all of it in
-// velocities and jumps, and not in doubt. Behind a cut accelerations differ from those that the
-// midpoint was predicted from: the last part is computed twice.
-static APART int located(const double *p, double h, const double *m, const double *x,
-    const double *d, int ready, double *o, cuts *c) {
+// A substep, repeated until it settles, and cut where velocities pass zero. Behind a cut
+// accelerations differ from those that the midpoint was predicted from: the last part is computed
+// twice.
+static APART int located(const double *c, double h, const double *m, const double *x,
+    const double *d, double *o, cuts *made) {
   double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
   int failed = 0;
   memcpy(at, x, sizeof(at));
   memcpy(last, d, sizeof(last));
   memset(sum, 0, sizeof(sum));
-  for (c->count = 0;; ++c->count) {
-    if (c->count || !ready) failed = part(p, h, left, m, at, last, guess, o);
-    if (c->count) {
+  for (made->count = 0;; ++made->count) {
+    failed = part(c, h, left, m, at, last, guess, o);
+    if (made->count) {
       memcpy(guess, o + NX, sizeof(guess));
-      failed = settle(p, left, m, at, guess, o);
+      failed = settle(c, left, m, at, guess, o);
     }
     if (first_turn(at, o, &share) < 0) break;
-    if (c->count == CUTS) { // there is no end to it
+    if (made->count == CUTS) { // there is no end to it
       for (int k = 0; k < VELOCITIES; ++k)
         if (at[velocity[k]] * o[velocity[k]] * o[JUMP + k] < 0.0) o[velocity[k]] = 0.0;
       failed = 1;
       break;
     }
     double t = left;
-    const int turns = locate(p, h, &t, m, at, last, o);
+    const int turns = locate(c, h, &t, m, at, last, o);
     memcpy(at, o, sizeof(at));
     for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
     at[turns] = last[turns] = 0.0;
     for (int k = 0; k < FLOWS; ++k) sum[k] += o[FLOW + k] * (t / h);
-    c->state[c->count] = turns;
-    c->length[c->count] = t;
+    made->state[made->count] = turns;
+    made->length[made->count] = t;
     left -= t;
   }
-  if (c->count) {
+  if (made->count) {
     for (int k = 0; k < NX; ++k) o[NX + k] *= h / left;
     for (int k = 0; k < FLOWS; ++k) o[FLOW + k] = sum[k] + o[FLOW + k] * (left / h);
   }
@@ -145,37 +147,75 @@ static APART int located(const double *p, double h, const double *m, const doubl
 
 
 def rare_substep(stages: Stages) -> str:
-    """Return the C functions of a substep that is repeated or cut."""
+    """Return the C functions of a substep that is repeated or cut.
+
+    ``constants(p, c)`` fills c, shape (CONSTANTS,), with what they read of the parameters p.
+    """
     velocities = stages.velocities
     nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
-    most = most_cuts(len(velocities))
+    slots = _constants(stages)
     return f"""
 #define RARE __attribute__((noinline, cold))
 #define APART {APART}
 enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
-  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1,
-  CAP = {CAP}, CUTS = {most}, ATTEMPTS = {ATTEMPTS} }};
+  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, CONSTANTS = {len(slots)},
+  CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
 static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};
-{_pass_function(stages, stages.fast, "fast_pass", APART)}
-{_pass_function(stages, stages.exact, "exact_pass", "RARE")}
+{_constants_function(stages.graph, slots)}
+{_pass_function(stages, stages.fast, slots, "fast_pass", APART)}
+{_pass_function(stages, stages.exact, slots, "exact_pass", "RARE")}
 {_SETTLE}{_CUT}"""
 
 
+def _roots(results: dict[str, list[Node]]) -> list[Node]:
+    return [node for kind in (*STATE, "jump", "doubt") for node in results[kind]]
+
+
+def _constants(stages: Stages) -> dict[Node, int]:
+    """Return the places of what follows from parameters alone and is read beside other things."""
+    graph, level = stages.graph, Levels(stages.graph, {"p": 0})
+    roots = [*_roots(stages.fast), *_roots(stages.exact)]
+    order = needed(graph, roots, lambda _: False)
+    readers = [node for node in order if level[node] or graph.is_boolean(node)]
+    read = [*roots, *(a for node in readers for a in graph.arguments(node))]
+    chosen = [
+        node for node in dict.fromkeys(read)
+        if not level[node] and not graph.is_boolean(node) and graph.nodes[node].op != "const"
+    ]  # fmt: skip
+    return {node: k for k, node in enumerate(chosen)}
+
+
+def _leaf(kind: str, index: int) -> str:
+    return "h" if kind == "h" else f"{kind}[{index}]"
+
+
+def _constants_function(graph: Graph, slots: dict[Node, int]) -> str:
+    name = leaf_namer(graph, _leaf, lambda node: f"v{node}")
+    body = statements(graph, needed(graph, slots, lambda _: False), name, "const double ")
+    body += [f"c[{k}] = {name(node)};" for node, k in slots.items()]
+    return f"""static RARE void constants(const double *restrict p, double *restrict c) {{
+  {indented(body, 2)}
+}}"""
+
+
 def _pass_function(
-    stages: Stages, results: dict[str, list[Node]], title: str, attribute: str
+    stages: Stages,
+    results: dict[str, list[Node]],
+    slots: dict[Node, int],
+    title: str,
+    attribute: str,
 ) -> str:
-    graph = stages.graph
-    roots = [node for kind in (*STATE, "jump", "doubt") for node in results[kind]]
+    graph, roots = stages.graph, _roots(results)
+    other = leaf_namer(graph, _leaf, lambda node: f"v{node}")
 
-    def leaf(kind: str, index: int) -> str:
-        return "h" if kind == "h" else f"{kind}[{index}]"
+    def name(node: Node) -> str:
+        return f"c[{slots[node]}]" if node in slots else other(node)
 
-    name = leaf_namer(graph, leaf, lambda node: f"v{node}")
-    body = statements(graph, needed(graph, roots, lambda _: False), name, "const double ")
+    body = statements(graph, needed(graph, roots, slots.__contains__), name, "const double ")
     body += [f"o[{k}] = {as_number(graph, node, name)};" for k, node in enumerate(roots)]
-    return f"""static {attribute} void {title}(const double *restrict p, double h,
+    return f"""static {attribute} void {title}(const double *restrict c, double h,
     const double *restrict m, const double *restrict x, const double *restrict d,
     double *restrict o) {{
   {indented(body, 2)}

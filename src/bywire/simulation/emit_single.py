@@ -48,8 +48,7 @@ def emit_single(stages: Stages) -> str:
         if f"{kind}{k}" not in skipped
     }
     products = stages.quadrature.products
-    pass_roots = [*results.values(), *products]
-    pass_roots += [node for kind in ("flag", "jump", "doubt") for node in stages.fast[kind]]
+    pass_roots = [*results.values(), *products, stages.fast["flag"][0]]
     coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
     tick_roots = [node for task in stages.ticks for node in task]
     every_root = pass_roots + coefficients + tick_roots + stages.output
@@ -78,6 +77,8 @@ def emit_single(stages: Stages) -> str:
 {SIGNATURE} {{
   {PLAN}
   double failures = state[{counters}], repeats = state[{counters + 1}];
+  double c[CONSTANTS + 1];
+  constants(p, c);
   {indented(_loads(layout), 2)}
   {indented(block(hoisted), 2)}
   {indented(_mode_state(mode, name), 2)}
@@ -99,7 +100,7 @@ def emit_single(stages: Stages) -> str:
       {indented(_mode_change(mode, graph, name), 6)}
       {indented(block(mode.rest), 6)}
       if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
-        {indented(_repeat(stages, layout, name), 8)}
+        {indented(_repeat(layout), 8)}
       }} else {{
         {indented(_commit(results, products, name), 8)}
       }}
@@ -166,7 +167,7 @@ def _integrals(stages: Stages, name: Namer) -> list[str]:
     return lines
 
 
-def _repeat(stages: Stages, layout: Layout, name: Namer) -> list[str]:
+def _repeat(layout: Layout) -> list[str]:
     nx, nm = layout.length["x"], layout.length["m"]
     xs = ", ".join(f"x{k}" for k in range(nx))
     ds = ", ".join(f"d{k}" for k in range(nx))
@@ -175,11 +176,8 @@ def _repeat(stages: Stages, layout: Layout, name: Namer) -> list[str]:
         "double o[RESULTS];",
         f"const double xs[] = {{{xs}}}, ms[] = {{{ms}}};",
         f"const double ds[] = {{{ds}}};",
-        "cuts c;",
-        *(f"o[{k}] = {name(stages.fast['x'][k])};" for k in stages.velocities),
-        *(f"o[JUMP + {k}] = {name(node)};" for k, node in enumerate(stages.fast["jump"])),
-        f"const int ready = {as_number(stages.graph, stages.fast['doubt'][0], name)} == 0.0;",
-        "failures += located(p, h, ms, xs, ds, ready, o, &c);",
+        "cuts made;",
+        "failures += located(c, h, ms, xs, ds, o, &made);",
         "repeats += 1.0;",
     ]
     at = 0

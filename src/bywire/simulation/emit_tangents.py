@@ -112,6 +112,8 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
   double failures = state[{start["counters"]}], repeats = state[{start["counters"] + 1}];
   double *restrict T = tangents;
   double C[{max(len(t.slot), 1)} * L] __attribute__((aligned(64)));
+  double c[CONSTANTS + 1];
+  constants(p, c);
   {indented(loads, 2)}
   {indented(t.lines(t.once, False), 2)}
   #pragma omp simd

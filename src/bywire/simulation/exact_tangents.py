@@ -14,17 +14,17 @@ from bywire.simulation.stages import SEEDS, STATE, Stages
 
 _LOCATED = """
 // What a part of length t gives, and its tangents along parameters, start and length.
-static RARE void part_tangents(const double *p, double t, const double *m, const double *x,
-    const double *d, int twice, const double *sp, const double *sm, const double *sx,
-    const double *sd, const double *st, double *o, double *o_t) {
+static RARE void part_tangents(const double *p, const double *c, double t, const double *m,
+    const double *x, const double *d, int twice, const double *sp, const double *sm,
+    const double *sx, const double *sd, const double *st, double *o, double *o_t) {
   double guess[NX], moved[NX * L];
   memcpy(guess, d, sizeof(guess));
   memcpy(moved, sd, sizeof(moved));
   for (int times = 0; times <= twice; ++times) {
-    fast_pass(p, t, m, x, guess, o);
+    fast_pass(c, t, m, x, guess, o);
     if (o[DOUBT] == 0.0) exact_tangents(p, t, m, x, guess, sp, sm, sx, moved, st, o_t);
     for (int pass = 0; pass < CAP && o[DOUBT] != 0.0; ++pass) {
-      exact_pass(p, t, m, x, guess, o);
+      exact_pass(c, t, m, x, guess, o);
       exact_tangents(p, t, m, x, guess, sp, sm, sx, moved, st, o_t);
       if (o[DOUBT] == 0.0) break;
       memcpy(guess, o + NX, sizeof(guess));
@@ -36,30 +36,30 @@ static RARE void part_tangents(const double *p, double t, const double *m, const
 }
 
 // T: tangents of x, d, r, q, m before the substep.
-static RARE int located_tangents(const double *p, double h, const double *m, const double *x,
-    const double *d, double *o, const double *sp, const double *T, double *o_t) {
+static RARE int located_tangents(const double *p, const double *c, double h, const double *m,
+    const double *x, const double *d, double *o, const double *sp, const double *T, double *o_t) {
   static const double none[(NX + MEMORY + SEEDED) * L];
   double at[NX], last[NX], guess[NX], at_t[NX * L], last_t[NX * L], guess_t[NX * L], ones[L];
   double end[RESULTS], by[JUMP * L], sum[FLOWS * L + 1], gone[L] = {0.0}, left = h;
   const double *sm = T + JUMP * L;
-  cuts c;
-  const int failed = located(p, h, m, x, d, 0, o, &c);
+  cuts made;
+  const int failed = located(c, h, m, x, d, o, &made);
   memcpy(at, x, sizeof(at));
   memcpy(last, d, sizeof(last));
   memcpy(at_t, T, sizeof(at_t));
   memcpy(last_t, T + NX * L, sizeof(last_t));
   memset(sum, 0, sizeof(sum));
   for (int l = 0; l < L; ++l) ones[l] = 1.0;
-  for (int n = 0; n <= c.count; ++n) {
-    const int final = n == c.count, turns = final ? 0 : c.state[n];
-    const double t = final ? left : c.length[n];
+  for (int n = 0; n <= made.count; ++n) {
+    const int final = n == made.count, turns = final ? 0 : made.state[n];
+    const double t = final ? left : made.length[n];
     double moved[L];
     for (int k = 0; k < NX; ++k) guess[k] = last[k] * (t / h);
     for (int k = 0; k < NX * L; ++k) guess_t[k] = last_t[k] * (t / h);
-    part_tangents(p, t, m, at, guess, final && n, sp, sm, at_t, guess_t, none, end, o_t);
-    if (!c.count) break;
+    part_tangents(p, c, t, m, at, guess, final && n, sp, sm, at_t, guess_t, none, end, o_t);
+    if (!made.count) break;
     for (int k = 0; k < NX * L; ++k) guess_t[k] = last[k / L] / h;
-    part_tangents(p, t, m, at, guess, final && n, none, none, none, guess_t, ones, end, by);
+    part_tangents(p, c, t, m, at, guess, final && n, none, none, none, guess_t, ones, end, by);
     for (int l = 0; l < L; ++l)
       moved[l] = final ? -gone[l] : -o_t[turns * L + l] / by[turns * L + l];
     for (int k = 0; k < JUMP * L; ++k) o_t[k] += by[k] * moved[k % L];
@@ -124,7 +124,7 @@ def located_statements(layout: Layout) -> list[str]:
         f"const double xs[] = {{{', '.join(f'x{k}' for k in range(nx))}}};",
         f"const double ms[] = {{{', '.join(f'm{k}' for k in range(nm)) or '0.0'}}};",
         f"const double ds[] = {{{', '.join(f'd{k}' for k in range(nx))}}};",
-        "failures += located_tangents(p, h, ms, xs, ds, o, seeds, T, o_t);",
+        "failures += located_tangents(p, c, h, ms, xs, ds, o, seeds, T, o_t);",
         "repeats += 1.0;",
         *(f"{name} {'+=' if k >= q else '='} o[{k}];" for k, name in enumerate(names)),
         f"for (int k = 0; k < {q} * L; ++k) T[k] = o_t[k];",

@@ -17,7 +17,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.simulation.contact_set import gaps, stiffness, violations
 from bywire.simulation.elimination import Reduced, eliminate
 from bywire.simulation.linear_form import Form, forms
-from bywire.simulation.set_valued import Projection, project_exact, project_fast
+from bywire.simulation.set_valued import Projection, project_exact, project_fast, sliding
 from bywire.simulation.symbols import SX, column, nonlinear, scalars, symbol_tuple
 
 NEVER = 1e30  # bound of a one-sided limit's reaction
@@ -56,7 +56,7 @@ class Pass:
     jump
         By how much each dry friction would change where its velocity changes sign, shape (m,).
     turn
-        Positive where a velocity does, and its friction jumps: the substep must be cut.
+        Positive where a velocity with dry friction does: where that jumps, the substep is cut.
     """
 
     x: Any
@@ -108,8 +108,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     right = dict(enumerate(linear.rows))
     kept = _set_valued_states(model, exact)
     reduced = eliminate(A, right, kept, s.x, changing)
-    acting = [_acting(s.x[k], *pair) for k, pair in zip(kept, bounds, strict=False)]
-    projection, reaction = _project(model, s, reduced, acting, exact)
+    projection, reaction = _project(model, s, reduced, bounds, exact)
     d = _increments(s, reduced, projection)
     middle = s.x + d
     x = column(
@@ -135,14 +134,14 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     for one in doubts:
         doubt = ca.fmax(doubt, one)
     rubbing = [_index(model, name) for name in model.frictions]
-    return Pass(x, d, reaction, column(flow), doubt, jump, _turn(s.x[rubbing], x[rubbing], jump))
+    return Pass(x, d, reaction, column(flow), doubt, jump, _turn(s.x[rubbing], x[rubbing]))
 
 
-def _turn(start: Any, end: Any, jump: Any) -> Any:
-    """Return what is positive where a velocity changes its sign and its friction jumps."""
+def _turn(start: Any, end: Any) -> Any:
+    """Return what is positive where a velocity changes its sign."""
     turn = SX(0)
     for k in range(start.shape[0]):
-        turn = ca.fmax(turn, -start[k] * end[k] * jump[k])
+        turn = ca.fmax(turn, -start[k] * end[k])
     return turn
 
 
@@ -186,14 +185,6 @@ def _bounds(model: Model, par: ParameterSet, s: Symbols, y: Any, contact: Any) -
     return [(ca.fmin(SX(low), 0), ca.fmax(SX(high), 0)) for low, high in pairs]
 
 
-def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
-    """Return the bounds of a friction at rest, where it moves twice the force that acts.
-
-    A velocity keeps the sign that it begins with; where it does not, the substep is cut.
-    """
-    return ca.if_else(v < 0, high, low), ca.if_else(v > 0, low, high)
-
-
 def _set_valued_states(model: Model, exact: bool) -> tuple[int, ...]:
     names = model.frictions + (model.limits if exact else ())
     return tuple(_index(model, name) for name in names)
@@ -203,12 +194,20 @@ def _index(model: Model, name: str) -> int:
     return model.State._fields.index(name)
 
 
+def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
+    """Return the bounds of a friction at rest, where it moves twice the force that acts."""
+    moving = sliding(v, low, high)
+    return ca.if_else(v == 0, low, moving), ca.if_else(v == 0, high, moving)
+
+
 def _project(
     model: Model, s: Symbols, reduced: Reduced, bounds: list[Any], exact: bool
 ) -> tuple[Projection, Any]:
     """Return end-of-step values of the set-valued states, and all reactions."""
-    limits = [(SX(0), SX(NEVER)) for _ in model.limits]
-    pairs = bounds + (limits if exact else [])
+    pairs = bounds
+    if exact:
+        pairs = [_acting(s.x[k], *pair) for k, pair in zip(reduced.kept, bounds, strict=False)]
+        pairs += [(SX(0), SX(NEVER)) for _ in model.limits]
     low, high = column([p[0] for p in pairs]), column([p[1] for p in pairs])
     # The unknowns are d = (w - x) / 2, so that S d = c + force is (S/2) w = c + (S/2) x + force.
     half = 0.5 * reduced.matrix
@@ -216,8 +215,7 @@ def _project(
     if exact:
         projection = project_exact(half, c, low, high)
     else:
-        resting = [s.x[k] == 0 for k in reduced.kept]
-        projection = project_fast(half, c, low, high, resting)
+        projection = project_fast(half, c, low, high, [s.x[k] for k in reduced.kept])
     reaction = ca.SX(projection.force)
     first = len(model.frictions)
     for k in range(first, reaction.shape[0]):  # away from its limit a state feels nothing of it

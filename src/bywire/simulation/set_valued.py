@@ -39,7 +39,15 @@ def soft(z: Any, a: Any, b: Any) -> Any:
     return ca.fmax(z + a, 0) + ca.fmin(z + b, 0)
 
 
-def project_fast(S: Any, c: Any, low: Any, high: Any, resting: list[Any]) -> Projection:
+def sliding(v: Any, low: Any, high: Any) -> Any:
+    """Return the force on what moves: a velocity keeps the sign that it begins a substep with.
+
+    Where it does not, the substep is cut.
+    """
+    return ca.if_else(v > 0, low, high)
+
+
+def project_fast(S: Any, c: Any, low: Any, high: Any, v: list[Any]) -> Projection:
     """Solve with everything that rests still at rest, and check that its bounds can hold it.
 
     One row is exact. Several take one linear solve, whose matrix changes with what rests alone;
@@ -50,19 +58,22 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, resting: list[Any]) -> Pro
     S, c
         Matrix and right-hand side, shapes (m, m) and (m,).
     low, high
-        Bounds, shape (m,); both are the force that acts where a row does not rest.
-    resting
-        Truth values, one per row.
+        Bounds, shape (m,).
+    v
+        Velocities at the start of the substep, one per row: what is zero there rests.
     """
     m = c.shape[0]
     if m == 0:
         return Projection(ca.SX(0, 1), ca.SX(0, 1), ca.SX(0))
+    resting = [speed == 0 for speed in v]
+    slide = [sliding(v[k], low[k], high[k]) for k in range(m)]
     if m == 1:
-        force = _within(-c, low, high)
+        # Compilers make a branch of it, which moving bodies pass without what could hold them.
+        force = ca.if_else(resting[0], _within(-c, low, high), slide[0])
         return Projection((c + force) / S, force, ca.SX(0))
     M, b = ca.SX(S), ca.SX(c)
     for k in range(m):
-        b[k] = ca.if_else(resting[k], 0, c[k] + low[k])
+        b[k] = ca.if_else(resting[k], 0, c[k] + slide[k])
         for j in range(m):
             M[k, j] = ca.if_else(resting[k], 1.0 if j == k else 0.0, S[k, j])
     w = solve_small(M, b)
@@ -71,9 +82,10 @@ def project_fast(S: Any, c: Any, low: Any, high: Any, resting: list[Any]) -> Pro
     for k in range(m):
         beyond = ca.fmax(force[k] - high[k], low[k] - force[k])
         wrong = ca.fmax(wrong, ca.if_else(resting[k], beyond, 0))
+        force[k] = ca.if_else(resting[k], _within(force[k], low[k], high[k]), slide[k])
         # Else a row at rest would be zero but for rounding.
         w[k] = ca.if_else(resting[k], 0, w[k])
-    return Projection(w, _within(force, low, high), wrong > 0)
+    return Projection(w, force, wrong > 0)
 
 
 def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
