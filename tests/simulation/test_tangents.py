@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
@@ -15,6 +16,7 @@ from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
 from systems.three_contacts import heart
 from systems.thrown_body import FORCE, THROWN_AT, thrown
+from systems.towed_body import PULL, towed
 from systems.two_mass import rig
 
 Array = NDArray[np.float64]
@@ -131,12 +133,60 @@ def test_reversal_under_a_constant_force(step: float) -> None:
     there, back = (F + T) / m, (F - T) / m  # decelerations
     t_r = v_0 / there
     assert 0.0 < t_r < 0.9 * t
-    np.testing.assert_allclose(result.trajectory["v"][-1], -back * (t - t_r), rtol=1e-3)
+    np.testing.assert_allclose(result.trajectory["v"][-1], -back * (t - t_r), rtol=1e-9)
     # v = -(F - T) (t/m - v_0 / (F + T))
     by_m, by_T = back * t / m, (t / m - v_0 / (F + T)) - (F - T) * v_0 / (F + T) ** 2
     by_v = (F - T) / (F + T)
     found = [result.of("v", name)[-1] for name in result.parameters]
-    np.testing.assert_allclose(found, [by_m, by_T, by_v], rtol=2e-3)
+    np.testing.assert_allclose(found, [by_m, by_T, by_v], rtol=1e-8)
+
+
+def sampled_throw(m: float, T: float, g: float, v: float) -> tuple[float, float]:
+    """Return speed after 0.1 s and the first instant of standstill under F - g v, sampled."""
+    stops = 0.0
+    for tick in range(10):
+        force, left = FORCE - g * v, 1e-2
+        if v > 0.0:
+            t = min(v * m / (T - force), left)
+            v, left = v + (force - T) / m * t, left - t
+            v, stops = (0.0, tick * 1e-2 + t) if left else (v, stops)
+        if v <= 0.0:
+            assert abs(force) > T  # it never rests
+            v += (force + T) / m * left
+    return v, stops
+
+
+@pytest.mark.parametrize("early", [0.02, 0.5, 0.98])
+def test_reversal_in_the_last_substep_before_a_tick(early: float) -> None:
+    """The tick samples the speed behind it, and what it commands stays."""
+    run, g = thrown(20e-6), 4.0
+    m, T, at = run.par.m, run.par.T, 0.03 - early * run.step
+    v_0 = brentq(lambda v: sampled_throw(m, T, g, v)[1] - at, 0.15, 0.25, xtol=1e-16)
+    run = replace(run, par=run.par.replace({"g": g}), state=run.state._replace(v=v_0))
+    result = simulate_with_sensitivities(run, ["m", "T", "g", "initial.v"], ("v",))
+    point = np.array([m, T, g, v_0])
+    assert result.trajectory["v"][-1] == pytest.approx(sampled_throw(*point)[0], rel=1e-8)
+    for k, name in enumerate(result.parameters):
+        # Differences of the closed form, which is smooth while the order of events is the same.
+        d = np.eye(4)[k] * 1e-7 * early * (1.0 - early) * point
+        wanted = (sampled_throw(*(point + d))[0] - sampled_throw(*(point - d))[0]) / (2.0 * d[k])
+        assert result.of("v", name)[-1] == pytest.approx(wanted, rel=2e-5), name
+
+
+def test_breakaway_of_coupled_bodies_is_of_first_order_in_derivatives() -> None:
+    """Closed form: behind the breakaway x = V s - V/w sin(w s), which begins at s = t - T/(k V)."""
+    errors = []
+    for step in (20e-6, 10e-6, 5e-6):
+        run = towed(step)
+        result = simulate_with_sensitivities(run, ["T"], ("x",))
+        k, w = run.par.k, np.sqrt(run.par.k / run.par.m)
+        s = result.trajectory.time[1:] - run.par.T / (k * PULL)
+        moved = PULL * s - PULL / w * np.sin(w * s)
+        np.testing.assert_allclose(result.trajectory["x"][1:], moved, rtol=2e-3 * (step / 20e-6))
+        by_T = -(1.0 - np.cos(w * s)) / k
+        errors.append(np.abs(result.of("x", "T")[1:] - by_T).max() / np.abs(by_T).max())
+    assert errors[0] < 0.02
+    assert errors[2] < 0.6 * errors[0]
 
 
 def test_initial_state_that_depends_on_a_parameter() -> None:

@@ -16,10 +16,11 @@ FORCE, THROWN_AT = -2.0, 0.1037
 
 
 class Parameters(ParameterSet):
-    """Mass and dry friction."""
+    """Mass, dry friction, gain of a sampled brake."""
 
     m: Annotated[float, Unit("kg")]
     T: Annotated[float, Unit("N")]
+    g: Annotated[float, Unit("N*s/m")] = 0.0
 
 
 class State(NamedTuple):
@@ -42,14 +43,14 @@ class Work(NamedTuple):
 
 
 class ThrownBody(Model):
-    """m dv/dt = F - T sign(v)."""
+    """m dv/dt = F - g v_k - T sign(v), with the speed v_k at the last tick."""
 
     name = "thrown-body"
     State, Memory, Stimulus, Flow, Output = State, Force, Force, Work, State
     frictions = ("v",)
 
     def tasks(self, par: Parameters) -> tuple[Task, ...]:
-        return (Task("force", 1e-2, lambda x, m, u, par: Force(u.F)),)
+        return (Task("force", 1e-2, lambda x, m, u, par: Force(u.F - par.g * x.v)),)
 
     def mass(self, xe: State, par: Parameters) -> State:
         return State(1.0, par.m)

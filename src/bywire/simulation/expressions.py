@@ -85,7 +85,11 @@ VECTOR_C = Dialect(
 
 
 def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) -> list[Node]:
-    """Return the operations that the roots need, arguments first, down to nodes that stop."""
+    """Return the operations that the roots need, arguments first, down to nodes that stop.
+
+    Of a node's arguments that which takes most registers comes first, so that values wait as
+    little as they can (Sethi and Ullman, Journal of the ACM 17, 1970).
+    """
     order: list[Node] = []
     seen: set[Node] = set()
     stack = [(node, False) for node in reversed(list(roots))]
@@ -98,7 +102,8 @@ def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) ->
             continue
         seen.add(node)
         stack.append((node, True))
-        stack.extend((a, False) for a in reversed(graph.arguments(node)))
+        arguments = sorted(graph.arguments(node), key=graph.registers.__getitem__)
+        stack.extend((a, False) for a in arguments)
     return order
 
 

@@ -66,6 +66,7 @@ class Graph:
     nodes: list[Operation] = field(default_factory=list)
     intervals: list[Interval] = field(default_factory=list)
     fixed: list[bool] = field(default_factory=list)
+    registers: list[int] = field(default_factory=list)
     _known: dict[Operation, Node] = field(default_factory=dict)
 
     def leaf(self, kind: str, index: int) -> Node:
@@ -157,6 +158,9 @@ class Graph:
                 if operation.op == "leaf"
                 else all(self.fixed[a] for a in self.arguments(known))
             )
+            counts = sorted(self.registers[a] for a in self.arguments(known))
+            waiting = (count + k for k, count in enumerate(reversed(counts)))
+            self.registers.append(max(waiting, default=0) or int(operation.op not in ("leaf", "const")))
             self._known[operation] = known
         return known
 
