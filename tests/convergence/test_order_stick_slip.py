@@ -86,7 +86,7 @@ def test_rubbing_oscillator(x_0: float) -> None:
 def test_friction_of_a_substep_s_end_is_of_first_order(monkeypatch: pytest.MonkeyPatch) -> None:
     """The rule of old: nothing is cut, and the sign at the end of a substep holds for all of it."""
     monkeypatch.setattr(scheme, "_acting", lambda v, low, high: (low, high))
-    monkeypatch.setattr(scheme, "_turn", lambda start, end: SX(0))
+    monkeypatch.setattr(scheme, "_turn", lambda model, start, end: SX(0))
     monkeypatch.setattr(engine, "_PREPARED", {})
     errors = _errors(0.040)
     assert_order(STEPS, errors, 1.0, "release from 40 mm")

@@ -133,14 +133,14 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     doubt = SX(0)
     for one in doubts:
         doubt = ca.fmax(doubt, one)
-    rubbing = [_index(model, name) for name in model.frictions]
-    return Pass(x, d, reaction, column(flow), doubt, jump, _turn(s.x[rubbing], x[rubbing]))
+    return Pass(x, d, reaction, column(flow), doubt, jump, _turn(model, s.x, x))
 
 
-def _turn(start: Any, end: Any) -> Any:
-    """Return what is positive where a velocity changes its sign."""
+def _turn(model: Model, start: Any, end: Any) -> Any:
+    """Return what is positive where a velocity with dry friction changes its sign."""
     turn = SX(0)
-    for k in range(start.shape[0]):
+    for name in model.frictions:
+        k = _index(model, name)
         turn = ca.fmax(turn, -start[k] * end[k])
     return turn
 
