@@ -92,18 +92,19 @@ def needed(graph: Graph, roots: Iterable[Node], stop: Callable[[Node], bool]) ->
     """
     order: list[Node] = []
     seen: set[Node] = set()
-    stack = [(node, False) for node in reversed(list(roots))]
+    stack = list(roots)[::-1]
     while stack:
-        node, ready = stack.pop()
-        if ready:
-            order.append(node)
+        node = stack.pop()
+        if node < 0:  # everything that it needs is there
+            order.append(~node)
             continue
-        if node in seen or stop(node) or graph.nodes[node].op in ("leaf", "const"):
+        if node in seen:
             continue
         seen.add(node)
-        stack.append((node, True))
-        arguments = sorted(graph.arguments(node), key=graph.registers.__getitem__)
-        stack.extend((a, False) for a in arguments)
+        operands = graph.operands[node]
+        if operands and not stop(node):
+            stack.append(~node)
+            stack.extend(operands)
     return order
 
 

@@ -59,6 +59,9 @@ class Graph:
     fixed_leaves
         Kinds of leaves that change rarely: values of these alone are gathered, a + (b + x)
         becoming (a + b) + x, so that they are computed rarely too.
+    operands, registers
+        Of every node: its arguments, that which takes most registers last, and how many it takes
+        when these are computed first.
     """
 
     ranges: Mapping[tuple[str, int], Interval] = field(default_factory=dict)
@@ -66,6 +69,7 @@ class Graph:
     nodes: list[Operation] = field(default_factory=list)
     intervals: list[Interval] = field(default_factory=list)
     fixed: list[bool] = field(default_factory=list)
+    operands: list[tuple[Node, ...]] = field(default_factory=list)
     registers: list[int] = field(default_factory=list)
     _known: dict[Operation, Node] = field(default_factory=dict)
 
@@ -158,9 +162,10 @@ class Graph:
                 if operation.op == "leaf"
                 else all(self.fixed[a] for a in self.arguments(known))
             )
-            counts = sorted(self.registers[a] for a in self.arguments(known))
-            waiting = (count + k for k, count in enumerate(reversed(counts)))
-            self.registers.append(max(waiting, default=0) or int(operation.op not in ("leaf", "const")))
+            operands = sorted(self.arguments(known), key=self.registers.__getitem__)
+            waiting = (self.registers[a] + k for k, a in enumerate(reversed(operands)))
+            self.operands.append(tuple(operands))
+            self.registers.append(max(waiting, default=0) or int(bool(operands)))
             self._known[operation] = known
         return known
 
