@@ -20,8 +20,8 @@ def evaluate(project: object, S: Array, c: Array, low: Array, high: Array) -> tu
     """Return velocities, shape (count, m), and which of them are reported as failed."""
     count, m = c.shape
     args = [ca.SX.sym("S", m, m), *(ca.SX.sym(name, m) for name in ("c", "lo", "hi"))]
-    resting = [args[2][k] < args[3][k] for k in range(m)]
-    more = [resting] if project is project_fast else []
+    speeds = [ca.if_else(args[2][k] < args[3][k], 0, 1) for k in range(m)]
+    more = [speeds] if project is project_fast else []
     result = project(*args, *more)  # type: ignore[operator]
     one = ca.Function("one", args, [result.w, result.failed])
     values = [ca.DM(np.hstack(list(S))), *(ca.DM(v.T) for v in (c, low, high))]

@@ -12,6 +12,7 @@ import signal
 import sys
 import traceback
 import warnings
+from collections import namedtuple
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
@@ -40,9 +41,9 @@ def main() -> None:
         except KeyboardInterrupt:  # while the last words were said
             message("interrupted")
             status = INTERRUPTED
-    # In text that is executed, as where a data class is made, CPython notes a KeyboardInterrupt as
-    # unhandled, and ends ``python -m`` by the signal whatever becomes of it: more text resets it.
-    exec("")
+    # In text that is executed, as where a named tuple is made, CPython notes a KeyboardInterrupt as
+    # unhandled, and ends ``python -m`` by the signal whatever becomes of it: another resets it.
+    namedtuple("Reset", ())
     raise SystemExit(status)
 
 

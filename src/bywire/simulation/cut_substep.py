@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.simulation.layout import ATTEMPTS, CLOSE, EDGE, JUMP, most_cuts
+from bywire.simulation.layout import ATTEMPTS, CLOSE, EDGE, JUMP, STILL, most_cuts
 
 Settle = Callable[[Array, Array, Array, Array, float], tuple[list[Array], bool]]
 
@@ -52,8 +52,10 @@ class CutSubstep:
                 failed = True
                 break
             o, t, turns = self._locate(x, d, o, left)
-            x, d = o[0], o[1] * (h / t)
-            x[turns] = d[turns] = 0.0
+            before, x, d = x, o[0], o[1] * (h / t)
+            # Bodies that are alike stop at once.
+            still = [k for k in self._velocities if abs(x[k]) < STILL * abs(before[k])]
+            x[[turns, *still]] = d[[turns, *still]] = 0.0
             flow = flow + o[3] * (t / h)
             left -= t
         if left < h:

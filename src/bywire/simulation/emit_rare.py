@@ -11,7 +11,7 @@ from __future__ import annotations
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph
-from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, most_cuts
+from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, STILL, most_cuts
 from bywire.simulation.operation import Node
 from bywire.simulation.quadrature import Levels
 from bywire.simulation.stages import STATE, Stages
@@ -104,6 +104,15 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   return turns;
 }
 
+// At the end of a part that was cut, from speeds x: what is zero there, with its increment.
+static inline void rest(const double *x, int turns, double *at, double *last) {
+  at[turns] = last[turns] = 0.0;
+  for (int k = 0; k < VELOCITIES; ++k) {
+    const int v = velocity[k]; // bodies that are alike stop at once
+    if (fabs(at[v]) < STILL * fabs(x[v])) at[v] = last[v] = 0.0;
+  }
+}
+
 // A substep, repeated until it settles, and cut where velocities pass zero. Behind a cut
 // accelerations differ from those that the midpoint was predicted from: the last part is computed
 // twice.
@@ -129,9 +138,9 @@ static APART int located(const double *c, double h, const double *m, const doubl
     }
     double t = left;
     const int turns = locate(c, h, &t, m, at, last, o);
-    memcpy(at, o, sizeof(at));
     for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
-    at[turns] = last[turns] = 0.0;
+    rest(at, turns, o, last);
+    memcpy(at, o, sizeof(at));
     for (int k = 0; k < FLOWS; ++k) sum[k] += o[FLOW + k] * (t / h);
     made->state[made->count] = turns;
     made->length[made->count] = t;
@@ -162,6 +171,7 @@ enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocit
   CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
+#define STILL {STILL}
 static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};
 {_constants_function(stages.graph, slots)}
 {_pass_function(stages, stages.fast, slots, "fast_pass", APART)}

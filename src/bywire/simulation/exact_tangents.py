@@ -71,11 +71,11 @@ static RARE int located_tangents(const double *p, const double *c, double h, con
       memcpy(o_t + FLOW * L, sum, FLOWS * L * sizeof(double));
       break;
     }
-    memcpy(at, end, sizeof(at));
     memcpy(at_t, o_t, sizeof(at_t));
     memcpy(last_t, o_t + NX * L, sizeof(last_t));
     for (int k = 0; k < NX; ++k) last[k] = end[NX + k] * (h / t);
-    at[turns] = last[turns] = 0.0;
+    rest(at, turns, end, last);
+    memcpy(at, end, sizeof(at));
     for (int l = 0; l < L; ++l) {
       at_t[turns * L + l] = last_t[turns * L + l] = 0.0;
       gone[l] += moved[l];
