@@ -17,8 +17,9 @@
 #define TURNING 4  /* and the disc */
 #define CUTS 10    /* of a substep, after which it is let go */
 #define TRIES 12   /* lengths tried to find where a velocity passes zero */
-#define CLOSE 1e-9 /* share of a velocity's change that counts as zero there */
-#define EDGE 1e-6  /* least share of a part that is cut off or left */
+#define CLOSE 1e-12 /* share of a velocity's change that counts as zero there */
+#define EDGE 1e-9  /* least share of a part that is cut off or left */
+#define STILL 1e-9 /* share of its speed below which another velocity stops at the same instant */
 /* Change of the shafts' speeds from pass to pass, rad/s, at which a substep has settled. With 1e-12
  * the wedge's travel in Fig. 7 differs by 4e-15 m rms, and a run takes 2.7 passes and half as much
  * time again; the step's own error is 2e-10 m. */
@@ -528,8 +529,11 @@ static void substep(const Scheme *s, Sim *z, const double *i_ref, bool on)
         double t = left;
         const int turns = shorten(s, &from, &y, i_ref, on, &t);
         stretch(&y, s->k.h / t);
-        *speed_of(&y, turns) = 0.0;
-        turns < SPEEDS ? (y.d[turns] = 0.0) : (y.dOm = 0.0);
+        for (int k = 0; k <= SPEEDS; k++)
+            if (k == turns || fabs(*speed_of(&y, k)) < STILL * fabs(*speed_of(&from, k))) {
+                *speed_of(&y, k) = 0.0;
+                k < SPEEDS ? (y.d[k] = 0.0) : (y.dOm = 0.0);
+            }
         from = y, left -= t;
         y = tried(s, &from, i_ref, on, left);
     }
