@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
@@ -15,7 +16,7 @@ from bywire.simulation.emission import (
 )
 from bywire.simulation.emit_rare import rare_substep
 from bywire.simulation.exact_tangents import exact_tangents, located_statements
-from bywire.simulation.expressions import as_number, needed
+from bywire.simulation.expressions import PLAIN_C, Dialect, as_number, needed
 from bywire.simulation.layout import Layout
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import SEEDS, STATE, Stages
@@ -44,6 +45,12 @@ class _Tangents:
         self.framed = [n for n in framed if self.level[n] == 1]
         hoisted = [n for n in (*self.once, *self.framed) if self.lane[n]]
         self.slot = {node: k for k, node in enumerate(hoisted)}
+        # Compilers do not vectorize what nested selections by truth values of all lanes become:
+        # in the substep each lane has its own, as a number.
+        operations = (self.graph.nodes[n] for n in self.block(self.pass_roots, 2) if self.lane[n])
+        truths = [o.args[0] for o in operations if o.op in ("select", "if_else_zero")]
+        self.truths = [n for n in dict.fromkeys(truths) if not self.lane[n]]
+        self.kept = replace(PLAIN_C, kept=self._kept)
 
     def name(self, node: Node) -> str:
         """Return the text of a value or a tangent."""
@@ -51,6 +58,9 @@ class _Tangents:
 
     def _operation(self, node: Node) -> str:
         return f"C[{self.slot[node]} * L + l]" if node in self.slot else f"v{node}"
+
+    def _kept(self, node: Node) -> str:
+        return f"K[{self.truths.index(node)} * L + l] != 0.0" if node in self.truths else ""
 
     def leaf(self, kind: str, index: int) -> str:
         """Return the text of an input."""
@@ -63,13 +73,25 @@ class _Tangents:
             return "h"
         return {"p": f"p[{index}]", "u": f"uk[{index}]"}.get(kind, f"{kind}{index}")
 
-    def lines(self, order: Sequence[Node], lane: bool) -> list[str]:
+    def truth_lines(self) -> list[str]:
+        """Return the statements that keep the truth values of a substep for every lane."""
+        if not self.truths:
+            return []
+        values = [as_number(self.graph, n, self.name) for n in self.truths]
+        return [
+            f"double K[{len(values)} * L] __attribute__((aligned(64)));",
+            *(f"for (int l = 0; l < L; ++l) K[{k} * L + l] = {v};" for k, v in enumerate(values)),
+        ]
+
+    def lines(
+        self, order: Sequence[Node], lane: bool, dialect: Dialect = PLAIN_C
+    ) -> list[str]:
         """Return the statements of the nodes that differ between lanes, or of those that do not."""
         chosen = [n for n in order if self.lane[n] == lane]
         stored = [n for n in chosen if n in self.slot]
         local = [n for n in chosen if n not in self.slot]
         if not stored:
-            return statements(self.graph, local, self.name, "const double ")
+            return statements(self.graph, local, self.name, "const double ", dialect)
         lines = []
         for node in chosen:
             declare = "" if node in self.slot else "const double "
@@ -139,9 +161,10 @@ def emit_tangents(stages: Stages, lanes: int) -> str:
       if (__builtin_expect(s{len(t.value_roots) - 1} != 0.0, 0)) {{
         {indented(located_statements(layout), 8)}
       }} else {{
+        {indented(t.truth_lines(), 8)}
         #pragma omp simd
         for (int l = 0; l < L; ++l) {{
-          {indented(t.lines(substep, True), 10)}
+          {indented(t.lines(substep, True, t.kept), 10)}
           {indented(t.results(t.tangent_roots, "t"), 10)}
           {indented(new_t, 10)}
         }}

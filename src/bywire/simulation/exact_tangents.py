@@ -13,19 +13,20 @@ from bywire.simulation.layout import Layout
 from bywire.simulation.stages import SEEDS, STATE, Stages
 
 _LOCATED = """
-// What a part of length t gives, and its tangents along parameters, start and length.
-static RARE void part_tangents(const double *p, const double *c, double t, const double *m,
-    const double *x, const double *d, int twice, const double *sp, const double *sm,
-    const double *sx, const double *sd, const double *st, double *o, double *o_t) {
+// What a part of length t gives, and its tangents along parameters, start and length, in lanes.
+static APART void part_tangents(int lanes, const double *p, const double *c, double t,
+    const double *m, const double *x, const double *d, int twice, const double *sp,
+    const double *sm, const double *sx, const double *sd, const double *st, double *o,
+    double *o_t) {
   double guess[NX], moved[NX * L];
   memcpy(guess, d, sizeof(guess));
   memcpy(moved, sd, sizeof(moved));
   for (int times = 0; times <= twice; ++times) {
     fast_pass(c, t, m, x, guess, o);
-    if (o[DOUBT] == 0.0) exact_tangents(p, t, m, x, guess, sp, sm, sx, moved, st, o_t);
+    if (o[DOUBT] == 0.0) exact_tangents(lanes, p, t, m, x, guess, sp, sm, sx, moved, st, o_t);
     for (int pass = 0; pass < CAP && o[DOUBT] != 0.0; ++pass) {
       exact_pass(c, t, m, x, guess, o);
-      exact_tangents(p, t, m, x, guess, sp, sm, sx, moved, st, o_t);
+      exact_tangents(lanes, p, t, m, x, guess, sp, sm, sx, moved, st, o_t);
       if (o[DOUBT] == 0.0) break;
       memcpy(guess, o + NX, sizeof(guess));
       memcpy(moved, o_t + NX * L, sizeof(moved));
@@ -35,13 +36,24 @@ static RARE void part_tangents(const double *p, const double *c, double t, const
   }
 }
 
+// At the end of a part of length t: its flows join the sum of the substep h, its increments become
+// those of the whole.
+static inline void part_ends(double t, double h, const double *moved, const double *end,
+    double *o_t, double *sum) {
+  for (int k = 0; k < FLOWS * L; ++k)
+    sum[k] += (o_t[FLOW * L + k] * t + end[FLOW + k / L] * moved[k % L]) / h;
+  for (int k = NX * L; k < 2 * NX * L; ++k)
+    o_t[k] = (o_t[k] - end[k / L] * moved[k % L] / t) * (h / t);
+}
+
 // T: tangents of x, d, r, q, m before the substep.
-static RARE int located_tangents(const double *p, const double *c, double h, const double *m,
+static APART int located_tangents(const double *p, const double *c, double h, const double *m,
     const double *x, const double *d, double *o, const double *sp, const double *T, double *o_t) {
   static const double none[(NX + MEMORY + SEEDED) * L];
-  double at[NX], last[NX], guess[NX], at_t[NX * L], last_t[NX * L], guess_t[NX * L], ones[L];
-  double end[RESULTS], by[JUMP * L], sum[FLOWS * L + 1], gone[L] = {0.0}, left = h;
-  const double *sm = T + JUMP * L;
+  double at[NX], last[NX], guess[NX], at_t[NX * L], last_t[NX * L], guess_t[NX * L];
+  double end[RESULTS], by[JUMP * L], sum[FLOWS * L + 1], moved[L] = {0.0}, gone[L] = {0.0};
+  double left = h;
+  const double *sm = T + JUMP * L, one[L] = {1.0};
   cuts made;
   const int failed = located(c, h, m, x, d, o, &made);
   memcpy(at, x, sizeof(at));
@@ -49,38 +61,38 @@ static RARE int located_tangents(const double *p, const double *c, double h, con
   memcpy(at_t, T, sizeof(at_t));
   memcpy(last_t, T + NX * L, sizeof(last_t));
   memset(sum, 0, sizeof(sum));
-  for (int l = 0; l < L; ++l) ones[l] = 1.0;
-  for (int n = 0; n <= made.count; ++n) {
-    const int final = n == made.count, turns = final ? 0 : made.state[n];
-    const double t = final ? left : made.length[n];
-    double moved[L];
+  for (int n = 0; n < made.count; ++n) {
+    const int turns = made.state[n];
+    const double t = made.length[n];
     for (int k = 0; k < NX; ++k) guess[k] = last[k] * (t / h);
     for (int k = 0; k < NX * L; ++k) guess_t[k] = last_t[k] * (t / h);
-    part_tangents(p, c, t, m, at, guess, final && n, sp, sm, at_t, guess_t, none, end, o_t);
-    if (!made.count) break;
-    for (int k = 0; k < NX * L; ++k) guess_t[k] = last[k / L] / h;
-    part_tangents(p, c, t, m, at, guess, final && n, none, none, none, guess_t, ones, end, by);
-    for (int l = 0; l < L; ++l)
-      moved[l] = final ? -gone[l] : -o_t[turns * L + l] / by[turns * L + l];
-    for (int k = 0; k < JUMP * L; ++k) o_t[k] += by[k] * moved[k % L];
-    for (int k = 0; k < FLOWS * L; ++k)
-      sum[k] += (o_t[FLOW * L + k] * t + end[FLOW + k / L] * moved[k % L]) / h;
-    for (int k = 0; k < NX * L; ++k)
-      o_t[NX * L + k] = (o_t[NX * L + k] - end[NX + k / L] * moved[k % L] / t) * (h / t);
-    if (final) {
-      memcpy(o_t + FLOW * L, sum, FLOWS * L * sizeof(double));
-      break;
-    }
-    memcpy(at_t, o_t, sizeof(at_t));
-    memcpy(last_t, o_t + NX * L, sizeof(last_t));
+    part_tangents(L, p, c, t, m, at, guess, 0, sp, sm, at_t, guess_t, none, end, o_t);
+    // Along the length in a lane of its own, which says how far it moves in every other.
+    for (int k = 0; k < NX; ++k) guess_t[k * L] = last[k] / h;
+    part_tangents(1, p, c, t, m, at, guess, 0, none, none, none, guess_t, one, end, by);
+    for (int l = 0; l < L; ++l) moved[l] = -o_t[turns * L + l] / by[turns * L];
+    for (int k = 0; k < JUMP; ++k)
+      for (int l = 0; l < L; ++l) o_t[k * L + l] += by[k * L] * moved[l];
+    part_ends(t, h, moved, end, o_t, sum);
     for (int k = 0; k < NX; ++k) last[k] = end[NX + k] * (h / t);
     rest(at, turns, end, last);
     memcpy(at, end, sizeof(at));
+    memcpy(at_t, o_t, sizeof(at_t));
+    memcpy(last_t, o_t + NX * L, sizeof(last_t));
     for (int l = 0; l < L; ++l) {
       at_t[turns * L + l] = last_t[turns * L + l] = 0.0;
-      gone[l] += moved[l];
+      gone[l] -= moved[l];
     }
     left -= t;
+  }
+  // The last part is what is left, and with it its tangents.
+  for (int k = 0; k < NX; ++k) guess[k] = last[k] * (left / h);
+  for (int k = 0; k < NX * L; ++k)
+    guess_t[k] = last_t[k] * (left / h) + last[k / L] / h * gone[k % L];
+  part_tangents(L, p, c, left, m, at, guess, made.count > 0, sp, sm, at_t, guess_t, gone, end, o_t);
+  if (made.count) {
+    part_ends(left, h, gone, end, o_t, sum);
+    memcpy(o_t + FLOW * L, sum, FLOWS * L * sizeof(double));
   }
   return failed;
 }
@@ -104,11 +116,13 @@ def exact_tangents(stages: Stages) -> str:
     inner = statements(graph, [n for n in order if lane[n]], name, "const double ")
     inner += [f"o[{k} * L + l] = {as_number(graph, n, name)};" for k, n in enumerate(roots)]
     return f"""enum {{ MEMORY = {len(stages.ticks[0])}, SEEDED = {leaf_count(stages, "sp")} }};
-static RARE void exact_tangents(const double *p, double h, const double *m, const double *x,
-    const double *d, const double *sp, const double *sm, const double *sx, const double *sd,
-    const double *sh, double *o) {{
+static APART void exact_tangents(int lanes, const double *restrict p, double h,
+    const double *restrict m, const double *restrict x, const double *restrict d,
+    const double *restrict sp, const double *restrict sm, const double *restrict sx,
+    const double *restrict sd, const double *restrict sh, double *restrict o) {{
   {indented(values, 2)}
-  for (int l = 0; l < L; ++l) {{
+  #pragma omp simd
+  for (int l = 0; l < lanes; ++l) {{
     {indented(inner, 4)}
   }}
 }}

@@ -28,6 +28,8 @@ class Dialect:
         Format strings of selections, comparisons, truth values, maxima and reciprocals.
     exp_where
         Format string of "c ? exp(a) : 0" where that is one operation.
+    kept
+        Condition of a truth value that is kept as a number, empty where it is not.
     """
 
     calls: dict[str, str]
@@ -41,6 +43,7 @@ class Dialect:
     zero: str
     one: str
     exp_where: str = ""
+    kept: Callable[[Node], str] = lambda _: ""
 
 
 PLAIN_C = Dialect(
@@ -156,6 +159,8 @@ def condition(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C)
     """Return the C condition of a node, true where it is not zero."""
     operation = graph.nodes[node]
     op = operation.op
+    if kept := dialect.kept(node):
+        return kept
     if op in dialect.compare:
         a, b = (as_number(graph, x, name, dialect) for x in operation.args)
         return dialect.compare[op].format(a=a, b=b)
