@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from bywire.simulation import ensemble
 from bywire.simulation.c_runtime import LANES
-from bywire.simulation.compiler import Compiler, compile_library, find_compiler, vector_flags
+from bywire.simulation.compiler import VECTOR, compile_library, find_compiler
 from bywire.simulation.native import pointer
 from bywire.simulation.run import simulate
 from systems.three_contacts import heart
@@ -46,7 +46,7 @@ def source() -> str:
 def library(request: pytest.FixtureRequest) -> ctypes.CDLL:
     compiler = find_compiler()
     assert compiler is not None
-    flags = (*vector_flags(compiler), *WIDTHS[request.param])
+    flags = (*VECTOR, *WIDTHS[request.param])
     loaded = ctypes.CDLL(str(compile_library(source(), flags, compiler)))
     assert loaded.width() <= {"native": 8, "at most 4": 4, "2": 2}[request.param]
     return loaded
@@ -112,11 +112,7 @@ def test_arithmetic(library: ctypes.CDLL) -> None:
 @pytest.mark.parametrize("width", WIDTHS)
 def test_kernels_of_every_width(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The heart of a wedge brake in lanes: the same run, whatever the processor offers."""
-
-    def narrowed(compiler: Compiler) -> tuple[str, ...]:
-        return (*vector_flags(compiler), *WIDTHS[width])
-
-    monkeypatch.setattr(ensemble, "vector_flags", narrowed)
+    monkeypatch.setattr(ensemble, "VECTOR", (*VECTOR, *WIDTHS[width]))
     monkeypatch.setattr(ensemble, "lane_kernel", ensemble.LaneKernel)  # built anew
     run, names = heart(0.02), ["X_1", "x", "f_1"]
     result = ensemble.simulate_ensemble(run, {"F_S0": [250.0, 260.0, 270.0]}, names)

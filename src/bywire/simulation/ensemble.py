@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.compiler import Compiler, find_compiler, load_library, vector_flags
+from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_lanes import emit_lanes
 from bywire.simulation.engine import built_once, prepare
@@ -73,7 +73,7 @@ class LaneKernel:
         self._signals = len(selection)
         self.layout: Layout = layout_of(stages)
         source = emit_lanes(stages)
-        library, _ = load_library(source, vector_flags(compiler), compiler, "bw_run_lanes")
+        library, _ = load_library(source, VECTOR, compiler, "bw_run_lanes")
         self.lanes = int(library.bw_lanes())
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
         self._run = library.bw_run_lanes

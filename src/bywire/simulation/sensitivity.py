@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.compiler import Compiler, find_compiler, load_library, vector_flags
+from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
 from bywire.simulation.engine import built_once, prepare
@@ -75,7 +75,7 @@ class TangentKernel:
         self.label = f"compiled C with tangents, {compiler.label}"
         source = emit_tangents(stages, DIRECTIONS)
         entry = "bw_run_tangents"
-        library, _ = load_library(source, vector_flags(compiler), compiler, entry)
+        library, _ = load_library(source, VECTOR, compiler, entry)
         self._run = library[entry]
         self._run.restype = None
         self.rounds = rounds(stages)
