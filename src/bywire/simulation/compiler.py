@@ -23,8 +23,8 @@ from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, u
 _MATH = ("-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only")
 _STRICT = ("-Werror=implicit-function-declaration",)
 _COMMON = ("-shared", "-fPIC", "-std=c11", *_MATH, *_STRICT)
-# Packing a few scalars costs more than it saves, and so does waiting for both sides of a choice that
-# goes the same way for thousands of substeps: branches are a seventh quicker.
+# Packing a few scalars costs more than it saves. So does computing both sides of a choice that goes
+# the same way for thousands of substeps: with branches a run is a seventh quicker.
 _BRANCHES = ("-fno-if-conversion", "-fno-if-conversion2", "-mtune=native")
 PLAIN = ("-O2", "-fno-tree-vectorize", *_BRANCHES)
 _X86 = platform.machine().lower() in ("x86_64", "amd64")
