@@ -26,12 +26,15 @@ _COMMON = ("-shared", "-fPIC", "-std=c11", *_MATH, *_STRICT)
 # Packing a few scalars costs more than it saves. So does computing both sides of a choice that goes
 # the same way for thousands of substeps: with branches a run is a seventh quicker.
 _BRANCHES = ("-fno-if-conversion", "-fno-if-conversion2", "-mtune=native")
-PLAIN = ("-O2", "-fno-tree-vectorize", *_BRANCHES)
+# Values that are shared across a kernel's branches are shared already: looking for more takes an
+# eighth of the compiler's time, and registers.
+_SHARED = ("-fno-tree-pre", "-fno-gcse")
+PLAIN = ("-O2", "-fno-tree-vectorize", *_BRANCHES, *_SHARED)
 _X86 = platform.machine().lower() in ("x86_64", "amd64")
 _WIDE = ("-march=native", "-ffp-contract=fast", *(("-mprefer-vector-width=512",) if _X86 else ()))
 _SCHEDULED = ("-fschedule-insns", "-fsched-pressure")  # a tenth quicker
 VECTOR = ("-O2", "-fopenmp-simd", *_WIDE, *_SCHEDULED)
-_GCC_ONLY = frozenset({*_BRANCHES, *_SCHEDULED})
+_GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED})
 TIMEOUT = 300.0
 _OTHERWISE = (
     "set BYWIRE_CC to another C compiler, or to none, with which runs are about 200 times slower"
