@@ -20,7 +20,7 @@ from systems import oscillator
 STEPS = (50e-6, 40e-6, 25e-6, 20e-6, 12.5e-6, 10e-6, 8e-6, 5e-6)
 
 
-@pytest.mark.parametrize("law", ["paper", "directional"])
+@pytest.mark.parametrize("law", [pytest.param("paper", marks=pytest.mark.trust), "directional"])
 def test_first_jumps_of_the_ramp(law: str) -> None:
     """Five jumps without dither: the mean error in time, and the angle at which each jump ends.
 

@@ -67,9 +67,13 @@ def short() -> Short:
 
 
 laws = pytest.mark.parametrize("law", ["paper", "directional"])
+# Seconds each: the other law is a trust run.
+long_laws = pytest.mark.parametrize(
+    "law", [pytest.param("paper", marks=pytest.mark.trust), "directional"]
+)
 
 
-@laws
+@long_laws
 def test_hard_braking_with_dither(law: str) -> None:
     run = braking(law, "sine")
     reference = run_reference(run, REFERENCE_STEP)
@@ -83,7 +87,7 @@ def test_hard_braking_without_dither(law: str) -> None:
     compare(run, run_reference(run, REFERENCE_STEP), 0.001)
 
 
-@laws
+@long_laws
 def test_ramp(law: str) -> None:
     """The staircase of jumps up and down again."""
     run = ramp(law)

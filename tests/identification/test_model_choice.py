@@ -32,7 +32,12 @@ def options_for(law: str) -> Options:
     return SHORT.replace({f"truth.{name}": v for name, v in MADE[law].items()})
 
 
-@pytest.mark.parametrize("law", MADE)
+QUICK = ("asymmetric", "pressure", "stribeck")
+
+
+@pytest.mark.parametrize(
+    "law", [pytest.param(x, marks=() if x in QUICK else pytest.mark.trust) for x in MADE]
+)
 def test_the_law_that_made_the_record_is_chosen(law: str) -> None:
     """Never a simpler one; now and then the noise makes a richer one look better."""
     options, names = options_for(law), [one.name for one in LAWS]

@@ -46,6 +46,10 @@ BRAKE = Plant(
 BLOCK = replace(BRAKE, beta=1e-6, k_damp=0.0, f_cfr_p=0.0, f_cfr_n=0.0, k_brk_p=1.0, k_brk_n=1.0)
 gears = pytest.mark.parametrize("gear", ["paper", "directional"])
 Gear = Literal["paper", "directional"]
+# Seconds each: the other law is a trust run.
+long_gears = pytest.mark.parametrize(
+    "gear", [pytest.param("paper", marks=pytest.mark.trust), "directional"]
+)
 
 
 def balanced(plant: Plant, p: float, omega: float = 0.0, x: float = 7e-3) -> dict[str, float]:
@@ -139,7 +143,7 @@ def test_oscillator_with_coulomb_friction() -> None:
     assert out["mode_changes"] == 8  # breakaway, three reversals of two changes each, stick
 
 
-@gears
+@long_gears
 def test_halving_the_step_changes_nothing(gear: Gear) -> None:
     """The solution in braking with dither is converged far below 1e-4 bar."""
     plant = replace(BRAKE, gear=gear)
@@ -153,7 +157,7 @@ def test_halving_the_step_changes_nothing(gear: Gear) -> None:
     assert np.abs(fine["p_mc"] - coarse["p_mc"]).max() < 1e-5 * BAR
 
 
-@gears
+@long_gears
 @pytest.mark.parametrize("sigma", [1, -1])
 def test_sticks_below_breakaway_and_slips_above(gear: Gear, sigma: int) -> None:
     """At 0.9 of breakaway nothing ever moves; just above, it does, eqs. (18), (19)."""

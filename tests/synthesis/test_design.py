@@ -143,6 +143,7 @@ def test_models_of_the_pressure_loop_are_its_responses() -> None:
     np.testing.assert_allclose(closed.response(f)[:, 0, 0], loop.closed(f), rtol=1e-6)
 
 
+@pytest.mark.trust
 def test_a_pi_on_the_identified_model_reaches_23_degrees_at_10_hz() -> None:
     found = design(
         PI, read(["crossover >= 10 Hz", "phase margin >= 60 deg"]), [identified()],
