@@ -274,16 +274,24 @@ def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path) -> None:
     assert len(search(problem, starts, store=store).solutions) == 4
 
 
-def test_starts_that_cannot_be_computed_are_counted() -> None:
-    def evaluate(values: Array) -> tuple[Array, Array]:
-        if values[0] > 1.0:
-            raise SolverError("left the numbers")
-        return values - 0.5 * np.ones(1), np.ones((1, 1))
+@pytest.mark.parametrize("error", [SolverError, ParameterError])
+def test_trials_that_are_refused_do_not_end_a_search(error: type[Exception]) -> None:
+    """By the model, or by its parameters' own rules; starts that are refused are counted."""
 
-    problem = Problem((Unknown("x", 0.8),), evaluate)
-    found = search(problem, [np.array([0.8]), np.array([2.0])])
+    refused = []
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
+        if x[0] > 1.5:
+            refused.append(x[0])
+            raise error("refused")
+        return np.arctan(x - 1.4), np.array([1.0 / (1.0 + (x - 1.4) ** 2)])
+
+    problem = Problem((Unknown("x", 1.0),), evaluate)
+    found = search(problem, [np.array([-2.0]), np.array([2.0])])
     assert found.failed == 1
-    with pytest.raises(SolverError, match="no start could be computed"):
+    assert len(refused) > 1  # of the way from the other start, too
+    assert found.best.values[0] == pytest.approx(1.4, abs=1e-3)
+    with pytest.raises(error, match="no start could" if error is SolverError else "refused"):
         search(problem, [np.array([2.0])])
 
 

@@ -28,6 +28,8 @@ from bywire.identification.step_share import with_step_share
 __all__ = ["Loss", "Problem", "Solution", "estimate", "solve", "with_priors"]
 
 
+NO_TRIAL = (SolverError, ParameterError)
+"""what a trial ends with whose values the model, or its parameters' own rules, do not take"""
 _NEWTON = 8  # steps from the least sum to where instruments see no residual
 _WORSE = 0.02  # of the least sum of squares: more is another place
 _NEAR = 1e-2  # of the scale: how far from a bound a search with bounds may stop short of it
@@ -89,7 +91,7 @@ def solve(
     def residuals(z: Array) -> Array:
         try:
             return both(z)[0]
-        except SolverError:  # a trial step left the numbers: refused, a shorter one follows
+        except NO_TRIAL:  # a step left the numbers, or what the model takes: a shorter one follows
             return np.full(cache_size[0], 1e6)
 
     def jacobian(z: Array) -> Array:

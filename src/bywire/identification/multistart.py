@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from bywire.core.errors import SolverError
+from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array, Progress
 from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import Loss, Problem, Solution, estimate, solve
+from bywire.identification.least_squares import NO_TRIAL, Loss, Problem, Solution, estimate, solve
 from bywire.identification.unknown import moved, scattered
 from bywire.simulation.job_store import JobStore
 
@@ -135,6 +135,8 @@ def search(
     ------
     SolverError
         When no start led anywhere.
+    ParameterError
+        Likewise, where the parameters' own rules refuse a start.
     KeyboardInterrupt
         When interrupted; finished starts are in the store.
     """
@@ -154,7 +156,7 @@ def search(
     def solved(start: Array) -> Solution:
         return solve(guarded, start if before is None else before(start), loss, share=_ENDED)
 
-    failed = 0
+    failed, refused = 0, None  # type: int, ParameterError | None
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         jobs = {
             pool.submit(solved, start): k for k, start in enumerate(starts) if k not in solutions
@@ -166,14 +168,17 @@ def search(
                     solutions[k] = job.result()
                     kept.append({"key": keys[k], "values": solutions[k].values.tolist(),
                                  "cost": solutions[k].cost})  # fmt: skip
-                except SolverError:
+                except NO_TRIAL as error:
                     failed += 1
+                    refused = error if isinstance(error, ParameterError) else refused
                 if progress is not None:
                     progress("starts", (len(solutions) + failed) / len(starts))
         except KeyboardInterrupt:
             stop.set()
             pool.shutdown(cancel_futures=True)
             raise
+    if not solutions and refused is not None:
+        raise refused
     if not solutions:
         raise SolverError(
             "no start could be computed: begin nearer to the truth, or measure at other points"
