@@ -284,10 +284,10 @@ def test_trials_that_are_refused_do_not_end_a_search(error: type[Exception]) -> 
         if x[0] > 1.5:
             refused.append(x[0])
             raise error("refused")
-        return np.arctan(x - 1.4), np.array([1.0 / (1.0 + (x - 1.4) ** 2)])
+        return np.arctan(3.0 * (x - 1.4)), np.array([3.0 / (1.0 + 9.0 * (x - 1.4) ** 2)])
 
     problem = Problem((Unknown("x", 1.0),), evaluate)
-    found = search(problem, [np.array([-2.0]), np.array([2.0])])
+    found = search(problem, [np.array([1.0]), np.array([2.0])])
     assert found.failed == 1
     assert len(refused) > 1  # of the way from the other start, too
     assert found.best.values[0] == pytest.approx(1.4, abs=1e-3)
