@@ -135,6 +135,15 @@ def test_folder_results_and_benches_give_the_same(results, folders):
     assert from_folder["kpis"] == in_memory["kpis"] == run_now["kpis"]
 
 
+def test_what_a_run_warned_of_is_said_of_its_folder_too(folders, tmp_path):
+    with pytest.warns(UserWarning, match="energy balance is open"):
+        coarse = bywire.run("hard-braking", {**QUICK, "pipeline.k_lf": "1e-15"})
+    coarse.write(tmp_path / "coarse")
+    with pytest.warns(UserWarning, match="coarse: the energy balance is open"):
+        found = bywire.compare(folders[0], tmp_path / "coarse")
+    assert found.warnings == [f"coarse: {text}" for text in coarse.warnings]
+
+
 def test_curves_lie_in_the_brakes_panels_with_what_differs_in_the_legend(folders):
     comparison = bywire.compare(*folders)
     (block,) = [b for b in comparison.document().flat() if getattr(b, "name", "") == "overlay"]

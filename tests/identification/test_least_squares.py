@@ -277,7 +277,6 @@ def test_an_interrupted_search_goes_on_where_it_was(tmp_path: Path) -> None:
 @pytest.mark.parametrize("error", [SolverError, ParameterError])
 def test_trials_that_are_refused_do_not_end_a_search(error: type[Exception]) -> None:
     """By the model, or by its parameters' own rules; starts that are refused are counted."""
-
     refused = []
 
     def evaluate(x: Array) -> tuple[Array, Array]:

@@ -154,7 +154,8 @@ def kept(folder: Path) -> ComparedRun:
     """
     result = read_result(folder)
     name = folder.resolve().name
-    return ComparedRun(name, str(folder), result.recordings, result.kpis, result.verdicts)
+    recordings, figures, verdicts = result.recordings, result.kpis, result.verdicts
+    return ComparedRun(name, str(folder), recordings, figures, verdicts, result.warnings)
 
 
 def _settings(

@@ -36,6 +36,8 @@ class FolderResult:
         Key figures, and the requirements beside them.
     status
         ``passed`` or ``failed``.
+    warnings
+        What its run warned of.
     """
 
     name: str
@@ -43,6 +45,7 @@ class FolderResult:
     kpis: tuple[Kpi, ...]
     verdicts: tuple[Verdict, ...]
     status: str
+    warnings: tuple[str, ...] = ()
 
 
 def is_result_folder(path: Path) -> bool:
@@ -68,6 +71,7 @@ def read_result(folder: Path) -> FolderResult:
         # Names alone, within the folder: it may have moved since.
         files = [folder / Path(str(text)).name for text in record["files"]]
         name = str(record["bench"])
+        warned = tuple(map(str, record.get("warnings", ())))
     except (AttributeError, KeyError, TypeError, ValueError) as error:
         raise FileError(
             f"{folder / RECORD} is damaged ({type(error).__name__}: {error}); {_AGAIN}"
@@ -75,7 +79,7 @@ def read_result(folder: Path) -> FolderResult:
     recordings = {path.stem: _recording(path) for path in files if path.suffix == ".nc"}
     if not recordings:
         raise FileError(f"{folder / RECORD} names no recording; {_AGAIN}")
-    return FolderResult(name, recordings, kpis, verdicts, status)
+    return FolderResult(name, recordings, kpis, verdicts, status, warned)
 
 
 def kpi_record(kpi: Kpi) -> dict[str, Any]:
