@@ -14,7 +14,9 @@ from bywire.contracts import stepping
 from bywire.contracts.evidence import Evidence, examine
 from bywire.contracts.model_contracts import OF_A_MODEL
 from bywire.contracts.subjects import demands_on
+from bywire.simulation import engine, scheme
 from bywire.simulation.compiler import find_compiler
+from bywire.simulation.symbols import SX
 from systems.loading import loaded
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
@@ -110,6 +112,18 @@ def test_every_gate_lets_the_right_brake_pass(tmp_path: Path) -> None:
     with seeded(tmp_path, "seeded-none") as subject:
         found = {name: examine(contract, subject) for name, contract in OF_A_MODEL.items()}
     assert {name: each.text for name, each in found.items() if not each.holds} == {}
+
+
+def test_reversals_that_are_not_located_are_refused(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The rule of old: nothing is cut, and the sign at the end of a substep holds for all of it."""
+    monkeypatch.setattr(scheme, "_acting", lambda v, low, high: (low, high))
+    monkeypatch.setattr(scheme, "_turn", lambda model, start, end: SX(0))
+    monkeypatch.setattr(engine, "_PREPARED", {})
+    with seeded(tmp_path, "seeded-reversal") as subject:
+        found = examine(OF_A_MODEL["order of the step"], subject)
+    assert not found.holds, found.text
 
 
 @pytest.mark.parametrize("contract", ["engines", "lanes"])

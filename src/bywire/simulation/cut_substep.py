@@ -40,6 +40,7 @@ class CutSubstep:
         """Return x, d, r, q at the end of the substep, and whether it did not settle."""
         h, left, most = self._h, self._h, most_cuts(len(self._velocities))
         flow: Array | float = 0.0
+        unsettled = False
         for count in range(most + 1):
             o, failed = self._part(x, d, left)
             if count:  # accelerations differ from those that the midpoint was predicted from
@@ -51,7 +52,8 @@ class CutSubstep:
                 o[0][[k for k, jump in self._jumps(o) if x[k] * o[0][k] * jump < 0.0]] = 0.0
                 failed = True
                 break
-            o, t, turns = self._locate(x, d, o, left)
+            o, t, turns, failed = self._locate(x, d, o, left)
+            unsettled |= failed
             before, x, d = x, o[0], o[1] * (h / t)
             # Bodies that are alike stop at once.
             still = [k for k in self._velocities if abs(x[k]) < STILL * abs(before[k])]
@@ -60,7 +62,7 @@ class CutSubstep:
             left -= t
         if left < h:
             o[1], o[3] = o[1] * (h / left), flow + o[3] * (left / h)
-        return o, failed
+        return o, failed or unsettled
 
     def _part(self, x: Array, d: Array, t: float) -> tuple[list[Array], bool]:
         return self._settle(x, d * (t / self._h), self._m, self._p, t)
@@ -80,8 +82,11 @@ class CutSubstep:
 
     def _locate(
         self, x: Array, d: Array, o: list[Array], length: float
-    ) -> tuple[list[Array], float, int]:
-        """Return a part that ends where the first velocity is zero, its length, and which it is."""
+    ) -> tuple[list[Array], float, int, bool]:
+        """Return a part that ends where the first velocity is zero.
+
+        Its length, which velocity it is, and whether it did not settle.
+        """
         first, final = EDGE * length, (1.0 - EDGE) * length
         turns, _ = self._first_turn(x, o)
         low, high = 0.0, length
@@ -90,7 +95,7 @@ class CutSubstep:
         t = _zero_of(*points[0][1:], *points[1], 2.0 * float(d[turns]) / self._h, self._h)
         for _ in range(ATTEMPTS):
             t = float(np.clip(t, first, final))
-            o, _ = self._part(x, d, t)
+            o, failed = self._part(x, d, t)
             other, share = self._first_turn(x, o)
             if other >= 0 and other != turns:
                 turns, low, high = other, 0.0, t
@@ -107,7 +112,7 @@ class CutSubstep:
             following = t - w / slope
             points[0 if abs(P - following) > abs(Q - following) else 1] = (t, w)
             t = following if low < following < high else 0.5 * (low + high)
-        return o, t, turns
+        return o, t, turns, failed
 
 
 def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:

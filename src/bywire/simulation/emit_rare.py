@@ -71,9 +71,10 @@ static inline double zero_of(double v, double w, double t, double before, double
 
 // Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
 // through three lengths, within what is known to lie before and behind. Before, o is that of *t in
-// the velocities, behind in everything. Return which velocity it is.
+// the velocities, behind in everything. Return which velocity it is; failed: that part did not
+// settle.
 static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
-    const double *last, double *o) {
+    const double *last, double *o, int *failed) {
   double d[NX], share, low = 0.0, high = *t;
   const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
   int turns = first_turn(x, o, &share);
@@ -82,7 +83,7 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   double close = CLOSE * fabs(at_P - at_Q);
   for (int n = 0; n < ATTEMPTS; ++n) {
     N = fmin(fmax(N, first), final);
-    part(c, h, N, m, x, last, d, o);
+    *failed = part(c, h, N, m, x, last, d, o);
     const int other = first_turn(x, o, &share);
     if (other >= 0 && other != turns) { // another one is earlier
       turns = other;
@@ -119,7 +120,7 @@ static inline void rest(const double *x, int turns, double *at, double *last) {
 static APART int located(const double *c, double h, const double *m, const double *x,
     const double *d, double *o, cuts *made) {
   double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
-  int failed = 0;
+  int failed = 0, before = 0;
   memcpy(at, x, sizeof(at));
   memcpy(last, d, sizeof(last));
   memset(sum, 0, sizeof(sum));
@@ -137,7 +138,8 @@ static APART int located(const double *c, double h, const double *m, const doubl
       break;
     }
     double t = left;
-    const int turns = locate(c, h, &t, m, at, last, o);
+    const int turns = locate(c, h, &t, m, at, last, o, &failed);
+    before |= failed;
     for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
     rest(at, turns, o, last);
     memcpy(at, o, sizeof(at));
@@ -150,7 +152,7 @@ static APART int located(const double *c, double h, const double *m, const doubl
     for (int k = 0; k < NX; ++k) o[NX + k] *= h / left;
     for (int k = 0; k < FLOWS; ++k) o[FLOW + k] = sum[k] + o[FLOW + k] * (left / h);
   }
-  return failed;
+  return failed | before;
 }
 """
 
