@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,8 +16,12 @@ from scipy.optimize import brentq
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.core.errors import UnknownNameError
+from bywire.simulation import compiler
+from bywire.simulation.emit_tangents import emit_tangents
+from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
+from bywire.simulation.stages import build_stages
 from systems.three_contacts import heart
 from systems.thrown_body import FORCE, THROWN_AT, thrown
 from systems.towed_body import PULL, towed
@@ -245,3 +253,21 @@ def test_initial_states_and_offsets_of_the_stimulus_are_directions_too() -> None
         assert (error / np.abs(wanted).max(axis=0)).max() < 1e-5, name
     with pytest.raises(UnknownNameError, match=r"initial\.omega"):
         simulate_with_sensitivities(run, ["initial.omgea"], signals)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="asks gcc what it did")
+def test_the_lanes_of_a_substep_are_vectorized(tmp_path: Path) -> None:
+    """Friction chooses by truth values that all lanes share, which compilers stumble over."""
+    run = thrown(20e-6)
+    program = prepare(run.model, run.par).program
+    source = tmp_path / "kernel.c"
+    source.write_text(emit_tangents(build_stages(program, (0, 1)), 8), encoding="utf-8")
+    flags = (*compiler._COMMON, *compiler.VECTOR, "-fopt-info-vec-optimized")
+    done = subprocess.run(
+        ["gcc", *flags, str(source), "-o", str(tmp_path / "kernel.so")],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    lines = source.read_text(encoding="utf-8").splitlines()
+    substep = max(k for k, line in enumerate(lines, 1) if "#pragma omp simd" in line)
+    told = re.findall(r"kernel\.c:(\d+):\d+: optimized: loop vectorized", done.stderr)
+    assert any(int(line) > substep for line in told), done.stderr
