@@ -21,15 +21,55 @@ def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return new(NAME, tmp_path_factory.mktemp("new")).folder
 
 
-def command(project: Path, *arguments: str, status: int = 0) -> str:
-    """Return what a command prints for the new brake."""
-    system = ["--system", str(project / "src" / "front_caliper")]
+OWN_TESTS = """
+import json, sys
+from pathlib import Path
+import bywire, pytest
+check = bywire.check
+def kept(*arguments):
+    found = check(*arguments)
+    Path(sys.argv[1]).write_text(json.dumps(found.as_object()))
+    return found
+bywire.check = kept
+sys.exit(pytest.main(["-q", "-p", "no:cacheprovider", "tests"]))
+"""
+
+
+@pytest.fixture(scope="module")
+def own_tests(project: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[str, Path]:
+    """Return what the new brake's own tests say, and the file of the check that they make."""
+    checked = tmp_path_factory.mktemp("checked") / "check.json"
     done = subprocess.run(
-        [sys.executable, "-m", "bywire.cli", *arguments, *system],
+        [sys.executable, "-c", OWN_TESTS, str(checked)],
         capture_output=True, text=True, check=False, cwd=project,
     )  # fmt: skip
-    assert done.returncode == status, done.stderr
-    return done.stdout
+    assert done.returncode == 0, done.stdout
+    return done.stdout, checked
+
+
+COMMANDS = """
+import json, sys
+from bywire.cli.main import main
+for words in json.load(sys.stdin):
+    sys.argv = ["bywire", *words]
+    try:
+        main()
+    except SystemExit as ended:
+        if ended.code:
+            raise
+    print("end of a command", flush=True)
+"""
+
+
+def said(project: Path, *commands: tuple[str, ...]) -> list[str]:
+    """Return what commands print for the new brake, in one process."""
+    system = ("--system", str(project / "src" / "front_caliper"))
+    done = subprocess.run(
+        [sys.executable, "-c", COMMANDS], input=json.dumps([words + system for words in commands]),
+        capture_output=True, text=True, check=False, cwd=project,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split("end of a command\n")
 
 
 def test_everything_is_named_after_it(project: Path) -> None:
@@ -42,8 +82,8 @@ def test_everything_is_named_after_it(project: Path) -> None:
         assert "starter" not in path.read_text(encoding="utf-8").lower()
 
 
-def test_it_passes_the_check(project: Path) -> None:
-    found = json.loads(command(project, "check", "--json"))
+def test_it_passes_the_check(own_tests: tuple[str, Path]) -> None:
+    found = json.loads(own_tests[1].read_text())
     assert found["holds"]
     assert found["subject"] == NAME
     assert found["not_checked"] == 0
@@ -54,21 +94,20 @@ def test_it_passes_the_check(project: Path) -> None:
 
 
 def test_commands_work_with_it(project: Path, tmp_path: Path) -> None:
-    assert "front-caliper-clamp" in command(project, "list", "experiments")
-    assert "clamp force" in command(project, "list", "front-caliper-actuator")
-    command(project, "run", "front-caliper-clamp", "--out", str(tmp_path / "out"))
-    assert (tmp_path / "out" / "report.html").is_file()
-    assert "phase" in command(project, "margins", "front-caliper-force")
-    assert command(project, "linearize", "front-caliper-force")
-
-
-def test_its_own_tests_pass(project: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "tests"],
-        capture_output=True, text=True, check=False, cwd=project,
+    experiments, actuator, _, margins, linear, _ = said(
+        project, ("list", "experiments"), ("list", "front-caliper-actuator"),
+        ("run", "front-caliper-clamp", "--out", str(tmp_path / "out")),
+        ("margins", "front-caliper-force"), ("linearize", "front-caliper-force"),
     )  # fmt: skip
-    assert done.returncode == 0, done.stdout
-    assert "4 passed" in done.stdout
+    assert "front-caliper-clamp" in experiments
+    assert "clamp force" in actuator
+    assert (tmp_path / "out" / "report.html").is_file()
+    assert "phase" in margins
+    assert linear
+
+
+def test_its_own_tests_pass(own_tests: tuple[str, Path]) -> None:
+    assert "4 passed" in own_tests[0]
 
 
 @pytest.mark.parametrize(
