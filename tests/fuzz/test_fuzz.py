@@ -14,6 +14,8 @@ from fuzz.__main__ import KINDS, tried
 from fuzz.judge import judged
 
 SEED = 20261122
+KILLED = 1467
+"""seed of a case in which a braking is to replace a characteristic and is killed after 2 s"""
 SECONDS = 2.0
 """of a processor, for each kind"""
 
@@ -54,7 +56,7 @@ def test_what_went_wrong_once(case: str) -> None:
 
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Path) -> None:
-    assert kills.case(Random(SEED), tmp_path) == ""
+    assert kills.case(Random(KILLED), tmp_path) == ""
 
 
 def test_a_case_comes_again() -> None:
