@@ -6,20 +6,23 @@ import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import bywire
+from bywire.cli.main import main
 from bywire.core.errors import FileError
 from bywire.data import limited_source
 from bywire.data.measurement import read_measurement
 from bywire.data.trace import read_trace, trace_names
 
-SECONDS = 1.0
+SECONDS = 0.5
 PEDAL = """
 experiment = "pedal-tracking"
 parameters = "dardanelli2010"
@@ -61,7 +64,8 @@ def test_every_reader_ends(
 ) -> None:
     monkeypatch.setattr(limited_source, "SECONDS", SECONDS)
     started = time.monotonic()
-    with pytest.raises(FileError, match=r"longer than 1 s without getting further: it is damaged"):
+    said = r"longer than 0\.5 s without getting further: it is damaged"
+    with pytest.raises(FileError, match=said):
         read(endless)
     assert time.monotonic() - started < 10.0
 
@@ -74,15 +78,48 @@ COMMANDS = {
 }
 
 
-@pytest.mark.skipif(os.name != "posix", reason="signals")
-@pytest.mark.parametrize("command", COMMANDS)
-def test_ctrl_c_ends_every_command_at_once(endless: Path, tmp_path: Path, command: str) -> None:
+@pytest.fixture
+def words(endless: Path, tmp_path: Path) -> Callable[[str], list[str]]:
+    """Return a function that gives what a command is asked with the file."""
     bench = tmp_path / "bench.toml"
     bench.write_text(PEDAL.format(path=endless))
     names = {"path": endless, "folder": tmp_path, "bench": bench}
-    words = [word.format(**names) for word in COMMANDS[command]]
+    return lambda command: [word.format(**names) for word in COMMANDS[command]]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+@pytest.mark.parametrize("command", COMMANDS)
+def test_ctrl_c_ends_every_command_at_once(
+    words: Callable[[str], list[str]], tmp_path: Path, command: str,
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+) -> None:  # fmt: skip
+    children, within = [], limited_source.Child.within
+
+    def interrupted(child: limited_source.Child, seconds: float) -> AbstractContextManager[None]:
+        main_thread = threading.main_thread().ident
+        assert main_thread is not None
+        if not children:
+            threading.Timer(0.3, signal.pthread_kill, (main_thread, signal.SIGINT)).start()
+        children.append(child)
+        return within(child, seconds)
+
+    monkeypatch.setattr(limited_source.Child, "within", interrupted)
+    monkeypatch.setattr(sys, "argv", ["bywire", *words(command)])
+    started = time.monotonic()
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert (ended.value.code, capsys.readouterr().err) == (130, "bywire: interrupted\n")
+    assert time.monotonic() - started < 3.0
+    assert not (tmp_path / "b.csv").exists()
+    assert all(child._process.poll() is not None for child in children)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_ctrl_c_ends_a_process_and_those_that_it_started(
+    words: Callable[[str], list[str]], tmp_path: Path
+) -> None:
     with subprocess.Popen(
-        [sys.executable, "-m", "bywire.cli", *words], stdout=subprocess.PIPE,
+        [sys.executable, "-m", "bywire.cli", *words("convert")], stdout=subprocess.PIPE,
         stderr=subprocess.PIPE, text=True,
     ) as process:  # fmt: skip
         wait_for_reader(process)
