@@ -14,8 +14,8 @@ from fuzz.__main__ import KINDS, tried
 from fuzz.judge import judged
 
 SEED = 20261122
-KILLED = 1467
-"""seed of a case in which a braking is to replace a characteristic and is killed after 2 s"""
+KILLED = 1261
+"""seed of a case in which a braking that replaces a characteristic is interrupted after 1.3 s"""
 SECONDS = 2.0
 """of a processor, for each kind"""
 
