@@ -16,6 +16,7 @@ from bywire.core.errors import FileError, ParameterError
 from bywire.core.scratch import UNFINISHED
 from bywire.report.answer import AnswerWarning
 from bywire.report.style import SEQUENCE
+from undrawn import undrawn
 
 QUICK = {"options.duration": "40 ms", "options.settle": "10 ms"}
 
@@ -36,8 +37,9 @@ def results():
 def folders(results, tmp_path_factory):
     """Return their result folders."""
     top = tmp_path_factory.mktemp("results")
-    for result, name in zip(results, ("base", "warm"), strict=True):
-        result.write(top / name)
+    with undrawn():
+        for result, name in zip(results, ("base", "warm"), strict=True):
+            result.write(top / name)
     return top / "base", top / "warm"
 
 
@@ -76,7 +78,8 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
     """By what is in memory, and by what a folder says; without an estimate nothing is claimed."""
     changed = {**QUICK, "requirements.overshoot": "<= 15 %", "motor.R_m": "0.3500002 ohm"}
     near = bywire.run("hard-braking", changed)
-    near.write(tmp_path / "near")
+    with undrawn():
+        near.write(tmp_path / "near")
     energies = [each.kpi("energy") for each in (results[0], near)]
     assert 0.0 < abs(energies[1].value - energies[0].value) < sum(e.error for e in energies)
     pairs = (results[0], near), (folders[0], tmp_path / "near")
@@ -97,7 +100,8 @@ def test_a_change_smaller_than_the_steps_error_is_not_distinct(results, folders,
 def test_an_error_that_no_step_shows_is_kept_in_a_folder(results, tmp_path):
     """An infinite error is null in JSON, as one that was not estimated: the record tells which."""
     unknown = replace(results[0], kpis=tuple(replace(k, error=math.inf) for k in results[0].kpis))
-    unknown.write(tmp_path / "unknown")
+    with undrawn():
+        unknown.write(tmp_path / "unknown")
     read = read_result(tmp_path / "unknown")
     assert all(math.isinf(each.error) for each in read.kpis)
     comparison = bywire.compare(tmp_path / "unknown", results[1])

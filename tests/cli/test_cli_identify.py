@@ -14,6 +14,7 @@ from bywire.core.catalog import parameters
 from bywire.core.scratch import UNFINISHED
 from bywire.identification.method import METHODS
 from bywire.identification.parameter_file import parameter_file
+from undrawn import undrawn
 
 Bywire = Callable[..., Outcome]
 
@@ -45,15 +46,17 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
     bywire: Bywire, tmp_path: Path
 ) -> None:
     arguments = ("identify", "motor-winding", "--synthetic", "1", "--option", "duration=0.2 s")
-    good = bywire(*arguments, "--out", tmp_path / "good")
+    with undrawn():
+        good = bywire(*arguments, "--out", tmp_path / "good")
     assert good.status == 0
     assert "does not replay it" in good.err
     said = (tmp_path / "good" / "parameters.toml").read_text()
     assert "CHECK FAILED" not in said
     assert "does not replay it" in said
     data = tmp_path / "good" / "measurement.nc"
-    wrong = bywire("identify", "motor-winding", data, "--set", "anti_alias.f_aa=120 Hz", "--out",
-                   tmp_path / "wrong", "--json")  # fmt: skip
+    other = ("--set", "anti_alias.f_aa=120 Hz", "--out", tmp_path / "wrong")
+    with undrawn():
+        wrong = bywire("identify", "motor-winding", data, *other, "--json")
     assert wrong.status == 1
     first = (tmp_path / "wrong" / "parameters.toml").read_text().splitlines()[0]
     assert first.startswith("# CHECK FAILED, do not use it as it is: residual_over_noise = ")
@@ -70,7 +73,8 @@ def test_options_that_only_simulate_are_options() -> None:
 
 def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path: Path) -> None:
     seal = ("identify", "seal-friction")
-    assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
+    with undrawn():
+        assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
     data, other = tmp_path / "measurement.nc", tmp_path / "notes.txt"
     other.write_text("the user's own")
     refused(bywire("identify", "friction-model", "--synthetic", "1", "--out", tmp_path),
@@ -80,8 +84,9 @@ def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path
     bad.write_text("t [s],F [N],x [m],p [Pa]\n" + "".join(f"{k},1,0,2\n" for k in range(50)))
     refused(bywire(*seal, bad, "--out", tmp_path))
     assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", "still.csv"}
-    assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
-    again = bywire(*seal, data, "--out", tmp_path)
+    with undrawn():
+        assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
+        again = bywire(*seal, data, "--out", tmp_path)
     assert again.status == 0
     assert data.exists()
     assert "no parameters.toml is written" in again.err

@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 from command_line import refused
 
+from undrawn import undrawn
+
 
 def test_linearize_prints_the_model_as_json(bywire):
     found = bywire("linearize", "moment", "--json").object
@@ -46,10 +48,9 @@ def test_margins_leave_figures_and_a_report(bywire, tmp_path):
 
 
 def test_a_locus_names_the_border(bywire, tmp_path):
-    outcome = bywire(
-        "linearize", "moment", "--locus", "control.moment.f_c=50 Hz:90 Hz:5", "--out", tmp_path,
-        "--json",
-    )  # fmt: skip
+    asked = ("linearize", "moment", "--locus", "control.moment.f_c=50 Hz:90 Hz:5", "--json")
+    with undrawn():
+        outcome = bywire(*asked, "--out", tmp_path)
     assert outcome.status == 0
     (border,) = outcome.object["locus"]["borders"]
     assert 50.0 < border["value"] < 90.0
@@ -82,7 +83,8 @@ def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
     assert found["largest"] == ["bearing friction"]
     assert "agree" in (tmp_path / "report.html").read_text(encoding="utf-8")
     monkeypatch.setattr("bywire.analysis.agreement.GAIN", -1.0)
-    assert bywire(*asked).status == 1
+    with undrawn():
+        assert bywire(*asked).status == 1
     assert "DO NOT agree" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 

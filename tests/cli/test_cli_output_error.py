@@ -12,6 +12,7 @@ from command_line import Outcome, no_half_files, refused
 
 import bywire
 from bywire.bench.bench_file import load
+from undrawn import undrawn
 
 Bywire = Callable[..., Outcome]
 
@@ -103,7 +104,9 @@ def test_a_closed_loop_simulated_and_fed_back(bywire: Bywire, tmp_path: Path) ->
         "--unknown", "motor.K_e", "--starts", "2",
     )  # fmt: skip
     out = tmp_path / "out"
-    first = bywire("identify", "output-error", "--synthetic", "1", *common, "--out", out, "--json")
+    given = ("identify", "output-error", "--synthetic", "1", *common)
+    with undrawn():
+        first = bywire(*given, "--out", out, "--json")
     assert first.status == 0, first.err
     estimate = first.object["estimates"]["output error"]
     for name, value in (("motor.R_m", 0.35), ("motor.K_e", 0.0304)):

@@ -1,0 +1,28 @@
+"""For tests that look at files but not at figures: drawing takes most of a command's time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import cache
+
+import pytest
+from matplotlib.figure import Figure
+
+from bywire.report import files, inline_figure
+
+_drawn = files.figure_bytes
+
+
+@contextmanager
+def undrawn() -> Iterator[None]:
+    """Have figures made, and an empty one in their files."""
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (files, inline_figure):
+            patch.setattr(module, "figure_bytes", lambda figure, kind="png": _empty(kind))
+        yield
+
+
+@cache
+def _empty(kind: str) -> bytes:
+    return _drawn(Figure((1.0, 1.0)), kind)
