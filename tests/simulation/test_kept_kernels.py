@@ -19,6 +19,7 @@ from bywire.core import sources
 from bywire.core.errors import ModelError
 from bywire.simulation import engine, kept_kernel, program
 from bywire.simulation.compiler import Compiler, find_compiler
+from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate
 from systems.nonlinear_drive import PARAMETERS, Memory, NonlinearDrive, State
 from systems.two_mass import rig
@@ -96,6 +97,30 @@ def test_what_else_is_asked_of_it_is_built_then(kept: Kept) -> None:
     require_equal(machine, simulate(CONTACT, engine="virtual-machine"))
     assert len(engine.prepare(CONTACT.model, CONTACT.par).program.ticks) == 1
     assert kept.builds == 2
+
+
+def test_kernels_in_lanes_are_kept_by_what_they_record(
+    kept: Kept, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    masses = {"m_1": [1.0, 1.1, 1.2]}
+    plain = simulate_ensemble(CONTACT, masses, ("x_1", "v_1"))
+
+    def again(*signals: str) -> Ensemble:
+        monkeypatch.setattr(engine, "_PREPARED", {})
+        return simulate_ensemble(CONTACT, masses, signals)
+
+    for _ in range(2):
+        np.testing.assert_array_equal(again("x_1", "v_1").values, plain.values)
+        assert kept.builds == 1
+    np.testing.assert_array_equal(again("v_1").values, plain.values[:, :, 1:])
+    assert kept.builds == 2
+    monkeypatch.setattr(kept_kernel, "processor", lambda: "another one")
+    again("v_1")
+    assert kept.builds == 3
+    # A single run needs a kernel of its own; what was kept of the model says nothing wrong.
+    for _ in range(2):
+        require_equal(kept.run(CONTACT), simulate(CONTACT))
+        assert kept.builds == 4
 
 
 def halved(path: Path) -> None:

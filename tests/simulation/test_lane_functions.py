@@ -113,7 +113,10 @@ def test_arithmetic(library: ctypes.CDLL) -> None:
 def test_kernels_of_every_width(width: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """The heart of a wedge brake in lanes: the same run, whatever the processor offers."""
     monkeypatch.setattr(ensemble, "VECTOR", (*VECTOR, *WIDTHS[width]))
-    monkeypatch.setattr(ensemble, "lane_kernel", ensemble.LaneKernel)  # built anew
+    monkeypatch.setattr(
+        ensemble, "lane_kernel",
+        lambda prepared, *rest: ensemble.LaneKernel.of(prepared.program, *rest),
+    )  # fmt: skip
     run, names = heart(0.02), ["X_1", "x", "f_1"]
     result = ensemble.simulate_ensemble(run, {"F_S0": [250.0, 260.0, 270.0]}, names)
     single = simulate(run, names)

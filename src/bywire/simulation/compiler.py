@@ -146,7 +146,7 @@ def compile_library(
     """
     if "clang" in compiler.label:
         flags = tuple(flag for flag in flags if flag not in _GCC_ONLY)
-    built_for = _processor() if "-march=native" in flags else platform.machine()
+    built_for = processor() if "-march=native" in flags else platform.machine()
     parts = "\0".join((source, *_COMMON, *flags, compiler.label, built_for))
     key = hashlib.sha256(parts.encode()).hexdigest()[:32]
     folder = usable_folder()
@@ -170,7 +170,7 @@ def compile_library(
 
 
 @cache
-def _processor() -> str:
+def processor() -> str:
     """Return what tells processors of different abilities apart that share a cache folder."""
     try:
         lines = Path("/proc/cpuinfo").read_text().splitlines()

@@ -66,6 +66,8 @@ class Prepared:
 
     The program is built at once, so that a model that fails a check fails here, unless an earlier
     command did so and kept the kernel; else when it is asked for.
+
+    ``place`` is where kernels of this structure are kept; None where they must not be.
     """
 
     def __init__(self, model: Model, par: ParameterSet) -> None:
@@ -73,8 +75,8 @@ class Prepared:
         self._par = par
         self._program: Program | None = None
         self._engines: dict[str, Engine] = {}
-        self._place = place_of(model, structure_of(model, par))
-        self._kept = None if self._place is None else self._place.kept()
+        self.place = place_of(model, structure_of(model, par))
+        self._kept = None if self.place is None else self.place.kept()
         if self._kept is None:
             self._program = self._built()
 
@@ -102,6 +104,11 @@ class Prepared:
         """As in ``Program``."""
         kept = self._kept
         return self.program.contact_jacobians if kept is None else kept.contact_jacobians
+
+    def keep_model(self) -> None:
+        """Keep that the model is sound, unless that is kept, or will be with a kernel."""
+        if self.place is not None and self._kept is None and not self._engines:
+            self.place.keep_model(self.program.contact_jacobians)
 
     def engine(self, kind: str = "auto") -> Engine:
         """Return the engine for single runs.
@@ -141,11 +148,11 @@ class Prepared:
 
     def _kernel(self, compiler: Compiler) -> SingleKernel:
         kept = self._kept
-        if kept is not None and kept.compiler == compiler.label:
+        if kept is not None and kept.library is not None and kept.compiler == compiler.label:
             return SingleKernel(kept.layout, kept.library, compiler)
         kernel = SingleKernel.of(self.program, compiler)
-        if self._place is not None:
-            self._place.keep(kernel, self.program.contact_jacobians)
+        if self.place is not None:
+            self.place.keep(kernel, self.program.contact_jacobians)
         return kernel
 
 

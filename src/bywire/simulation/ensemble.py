@@ -7,6 +7,8 @@ import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,12 +17,10 @@ from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
-from bywire.simulation.emission import layout_of
-from bywire.simulation.emit_lanes import emit_lanes
-from bywire.simulation.engine import built_once, prepare
+from bywire.simulation.engine import Prepared, built_once, prepare
+from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import plan_array, pointer
-from bywire.simulation.program import Program
 from bywire.simulation.run import (
     Run,
     initial_vector,
@@ -29,8 +29,10 @@ from bywire.simulation.run import (
     simulate,
 )
 from bywire.simulation.schedule import Schedule
-from bywire.simulation.stages import build_stages
 from bywire.simulation.variations import Variations, case_matrix
+
+if TYPE_CHECKING:
+    from bywire.simulation.program import Program
 
 
 @dataclass(frozen=True)
@@ -62,22 +64,31 @@ class Ensemble:
 class LaneKernel:
     """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
 
-    Parameters
-    ----------
-    selection
-        Indices of the outputs to record.
+    ``signals``: how many outputs it records.
     """
 
-    def __init__(self, program: Program, compiler: Compiler, selection: tuple[int, ...]) -> None:
-        stages = build_stages(program, outputs=selection)
-        self._signals = len(selection)
-        self.layout: Layout = layout_of(stages)
-        source = emit_lanes(stages)
-        library, _ = load_library(source, VECTOR, compiler, "bw_run_lanes")
-        self.lanes = int(library.bw_lanes())
+    ENTRY = "bw_run_lanes"
+    """its function in the library"""
+
+    def __init__(self, layout: Layout, library: Path, compiler: Compiler, signals: int) -> None:
+        self.layout, self.library, self.compiler = layout, library, compiler
+        self._signals = signals
+        loaded = load(library, self.ENTRY)
+        self.lanes = int(loaded.bw_lanes())
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
-        self._run = library.bw_run_lanes
+        self._run = loaded[self.ENTRY]
         self._run.restype = None
+
+    @classmethod
+    def of(cls, program: Program, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
+        """Emit the kernel of a program, and compile it unless the cache has it."""
+        from bywire.simulation.emission import layout_of
+        from bywire.simulation.emit_lanes import emit_lanes
+        from bywire.simulation.stages import build_stages
+
+        stages = build_stages(program, outputs=selection)
+        _, library = load_library(emit_lanes(stages), VECTOR, compiler, cls.ENTRY)
+        return cls(layout_of(stages), library, compiler, len(selection))
 
     def advance(
         self,
@@ -154,15 +165,15 @@ def simulate_ensemble(
     ParameterError
         When a value is out of range, lengths differ, or a sample time varies.
     """
-    program = prepare(run.model, run.par).program
+    prepared = prepare(run.model, run.par)
     if threads is not None and threads < 1:
         raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
     matrix = case_matrix(run, variations)
     compiler = find_compiler()
     if compiler is None:
         return _one_by_one(run, variations, tuple(signals))
-    selection = selected(tuple(program.outputs), signals)
-    kernel = lane_kernel(program, compiler, tuple(selection.tolist()))
+    selection = selected(tuple(prepared.outputs), signals)
+    kernel = lane_kernel(prepared, compiler, tuple(selection.tolist()))
     schedule = run.schedule()
     stimulus = sampled_stimulus(run, schedule)
     count = matrix.shape[1]
@@ -195,9 +206,20 @@ def simulate_ensemble(
 
 
 @built_once
-def lane_kernel(program: Program, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
-    """Return the kernel that records some outputs; built once."""
-    return LaneKernel(program, compiler, selection)
+def lane_kernel(prepared: Prepared, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
+    """Return the kernel that records some outputs, by index; built once.
+
+    What an earlier command kept is taken as it is.
+    """
+    place = None if prepared.place is None else prepared.place.in_lanes(selection)
+    kept = None if place is None else place.kept()
+    if kept is not None and kept.library is not None and kept.compiler == compiler.label:
+        return LaneKernel(kept.layout, kept.library, compiler, len(selection))
+    kernel = LaneKernel.of(prepared.program, compiler, selection)
+    if place is not None:
+        place.keep(kernel)
+        prepared.keep_model()
+    return kernel
 
 
 def _one_by_one(run: Run, variations: Variations, signals: tuple[str, ...]) -> Ensemble:

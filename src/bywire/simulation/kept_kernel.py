@@ -1,8 +1,9 @@
 """What a command keeps of a prepared model, so that the next one need not evaluate it on symbols.
 
 To know which compiled kernel is a model's, its whole graph had to be built, simplified and emitted
-again. Kept is what a single run needs beside the library: its name and digest, the layout of the
-state vector, and the Jacobians that judge the contacts. All else is built when it is asked for.
+again. Kept is what runs need beside the library: its name and digest, the layout of the state
+vector, and the Jacobians that judge the contacts; of kernels in lanes one for every choice of
+outputs. All else is built when it is asked for.
 
 A stale entry would be a wrong number in silence. So kept are only our own models, whose files are
 all in `source_state`: what another's model is made of, tables read from elsewhere for instance,
@@ -18,7 +19,7 @@ import sys
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import casadi as ca
 import numpy as np
@@ -26,11 +27,18 @@ import numpy as np
 from bywire.core.errors import CompilerError
 from bywire.core.model import Model
 from bywire.core.sources import source_state
+from bywire.simulation.compiler import Compiler, processor
 from bywire.simulation.kernel_cache import is_intact, keep_text, load, sha256, usable_folder
 from bywire.simulation.layout import Layout
 
-if TYPE_CHECKING:
-    from bywire.simulation.native import SingleKernel
+
+class Keepable(Protocol):
+    """A kernel, as far as it can be kept."""
+
+    ENTRY: str
+    layout: Layout
+    library: Path
+    compiler: Compiler
 
 
 class Identity(int):
@@ -43,14 +51,16 @@ class KeptKernel:
 
     Parameters
     ----------
+    library
+        None where that command needed no kernel for single runs: the model is sound all the same.
     compiler
         Label of the compiler that made it.
     jacobians
-        ``Program.contact_jacobians``, as CasADi writes a function down.
+        ``Program.contact_jacobians``, as CasADi writes a function down; empty in lanes.
     """
 
     layout: Layout
-    library: Path
+    library: Path | None
     compiler: str
     jacobians: str
 
@@ -75,6 +85,11 @@ class Place:
     file: Path
     state: str
 
+    def in_lanes(self, selection: tuple[int, ...]) -> Place:
+        """Return where the kernel in lanes is kept that records some outputs, by index."""
+        name = _digest(repr((self.file.name, selection, processor())))[:32]
+        return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
+
     def kept(self) -> KeptKernel | None:
         """Return what is kept there; None where there is nothing, or it is stale or damaged."""
         try:
@@ -82,10 +97,13 @@ class Place:
             if digest != _digest(text):
                 return None
             entry = json.loads(text)
+            if entry["state"] != self.state:
+                return None
+            if not entry["library"]:
+                return KeptKernel(Layout({}, {}), None, "", entry["jacobians"])
             library = self.file.with_name(entry["library"])
             entry_point = entry["entry"]
-            is_same = entry["state"] == self.state and sha256(library) == entry["digest"]
-            if not (is_same and is_intact(library, entry_point)):
+            if not (sha256(library) == entry["digest"] and is_intact(library, entry_point)):
                 return None
             load(library, entry_point)
             layout = Layout(entry["start"], entry["length"])
@@ -93,21 +111,26 @@ class Place:
         except (OSError, ValueError, KeyError, TypeError, CompilerError):
             return None
 
-    def keep(self, kernel: SingleKernel, contact_jacobians: Any) -> None:
+    def keep(self, kernel: Keepable, contact_jacobians: Any = None) -> None:
         """Keep a kernel, unless a file has changed since its model was loaded."""
-        if _running_state() != self.state:
-            return
-        entry = {
-            "state": self.state,
+        self._keep(contact_jacobians, {
             "start": kernel.layout.start,
             "length": kernel.layout.length,
             "library": kernel.library.name,
             "entry": kernel.ENTRY,
             "digest": sha256(kernel.library),
             "compiler": kernel.compiler.label,
-            "jacobians": contact_jacobians.serialize(),
-        }
-        text = json.dumps(entry)
+        })  # fmt: skip
+
+    def keep_model(self, contact_jacobians: Any) -> None:
+        """Keep that a model is sound, and what judges its contacts, without a kernel."""
+        self._keep(contact_jacobians, {"library": ""})
+
+    def _keep(self, contact_jacobians: Any, kernel: dict[str, Any]) -> None:
+        if _running_state() != self.state:
+            return
+        said = "" if contact_jacobians is None else contact_jacobians.serialize()
+        text = json.dumps({"state": self.state, "jacobians": said, **kernel})
         keep_text(self.file, f"{_digest(text)}\n{text}")
 
 

@@ -115,14 +115,14 @@ def repeat(
     count = matrix.shape[1]
     given = given_rows(stimuli, count, schedule)
     prepared = prepare(run.model, run.par)
-    selection = selected(tuple(prepared.program.outputs), signals)
+    selection = selected(tuple(prepared.outputs), signals)
     compiler = find_compiler()
     # One frame too many: the end of a window is the beginning of the next, and ticks only there.
     open_end = replace(schedule, frames=schedule.frames + 1)
     if compiler is None or not lanes:
         advance, width = one_by_one(run, open_end, selection), 1
     else:
-        kernel = lane_kernel(prepared.program, compiler, tuple(selection.tolist()))
+        kernel = lane_kernel(prepared, compiler, tuple(selection.tolist()))
         width = kernel.lanes
 
         def advance(p: Array, u: Array, vector: Array, values: Array, frames: int) -> None:

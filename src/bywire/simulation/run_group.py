@@ -82,10 +82,10 @@ def simulate_group(
         )
     compiler = find_compiler()
     assert compiler is not None
-    program = prepare(runs[0].model, runs[0].par).program
-    names = tuple(program.outputs)
+    prepared = prepare(runs[0].model, runs[0].par)
+    names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    kernel = lane_kernel(program, compiler, tuple(selected(names, wanted).tolist()))
+    kernel = lane_kernel(prepared, compiler, tuple(selected(names, wanted).tolist()))
     schedule = runs[0].schedule()
     shape = (kernel.lanes, schedule.rows, len(wanted))
     groups = [runs[k : k + kernel.lanes] for k in range(0, len(runs), kernel.lanes)]
