@@ -157,7 +157,7 @@ def test_native_code_is_kept_apart_per_processor(
     """A cache folder shared between machines must not hand out instructions that one lacks."""
     compiler, native = system_compiler(), (*PLAIN, "-march=native")
     plain, here = (compile_library(SOURCE, flags, compiler) for flags in (PLAIN, native))
-    monkeypatch.setattr(compiler_module, "_processor", lambda: "flags: another one")
+    monkeypatch.setattr(compiler_module, "processor", lambda: "flags: another one")
     assert compile_library(SOURCE, native, compiler) != here
     assert compile_library(SOURCE, PLAIN, compiler) == plain
 
