@@ -29,8 +29,8 @@ def kpi(value: float, error: float = math.nan) -> Kpi:
     return Kpi("energy", value, "J", "Of this test.", error=error)
 
 
-def test_second_order_error_is_exact():
-    """Of q + c h^2 the error is c h^2; of q + c h it is 1.5 times the estimate."""
+def test_errors_of_second_and_of_first_order_are_exact():
+    """Of q + c h^2 the error is c h^2, from either other step; of q + c h it takes both."""
     h, c = 20e-6, 3e7
     for factor in OTHER_STEPS:
         other = {factor: [kpi(2.0 + c * (factor * h) ** 2)]}
@@ -38,7 +38,7 @@ def test_second_order_error_is_exact():
         assert second.error == pytest.approx(c * h**2, rel=1e-6)
     others = {factor: [kpi(2.0 + c * factor * h)] for factor in OTHER_STEPS}
     (first,) = with_step_errors([kpi(2.0 + c * h)], others, {})
-    assert first.error == pytest.approx(c * h / 1.5)
+    assert first.error == pytest.approx(c * h)
 
 
 def test_small_difference_by_chance_is_seen_by_the_other_step():
@@ -141,6 +141,19 @@ def test_a_time_read_at_a_row_is_no_sharper_than_the_rows():
     assert error(0.0) == 0.0
     power = Kpi("power", 0.057, "W", "Of this test.")
     assert with_step_errors([power], {0.5: [power]}, rows)[0].error == 0.0
+
+
+@pytest.mark.parametrize(
+    ("half", "double", "error"),
+    [(0.75, 3.0, 1.0), (0.5, 1.0, 1.0), (0.5, 0.1, 1.0), (0.0, 0.6, 0.2)],
+    ids=["second order", "first order", "no order", "nothing in half steps"],
+)
+def test_differences_that_do_not_grow_as_squares_count_as_of_first_order(half, double, error):
+    def figure(value: float) -> Kpi:
+        return Kpi("force", value, "N", "Of this test.")
+
+    others = {0.5: [figure(7.0 - half)], 2.0: [figure(7.0 + double)]}
+    assert with_step_errors([figure(7.0)], others, {})[0].error == pytest.approx(error)
 
 
 def test_standing_wedge_brake_says_how_far_rows_leave_its_times_open():

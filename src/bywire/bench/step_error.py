@@ -3,7 +3,8 @@
 The scheme is of second order: a figure of steps h is off by c h^2, and differs from that of steps
 f h by c h^2 |1 - f^2|. Half the step tells c, and so does twice the step where that divides the
 sample times. Where friction and contacts make c depend on where in a step things happen, one of
-both differences may be small by chance: the larger estimate counts.
+both differences may be small by chance: the larger estimate counts. And where the two do not grow
+as squares do, a figure is taken to be off by c h.
 """
 
 from __future__ import annotations
@@ -25,18 +26,19 @@ NO_ESTIMATE = (StepError, RunError)
 """what runs in other steps may end with: no divisor of a sample time, or too coarse"""
 ROUNDING = 1e-11
 """rounding of many steps, over the largest value of a signal"""
+_REGULAR = 2.0**1.5  # least ratio of the differences to double and half steps at second order
 _SAME = 1e-10  # s, between a time and that of the row where it was read
 
 
-def of_difference(factor: float) -> float:
-    """Return the error of steps h over the difference to steps ``factor`` h, at second order.
+def of_difference(factor: float, order: int = 2) -> float:
+    """Return the error of steps h over the difference to steps ``factor`` h.
 
     Examples
     --------
     >>> round(of_difference(0.5), 4), round(of_difference(2.0), 4)
     (1.3333, 0.3333)
     """
-    return 1.0 / abs(1.0 - factor**2)
+    return 1.0 / abs(1.0 - factor**order)
 
 
 def unestimated(failures: Mapping[float, Exception]) -> str:
@@ -93,9 +95,9 @@ def with_step_errors(
     by_name = {factor: {each.name: each.value for each in made} for factor, made in others.items()}
 
     def estimated(kpi: Kpi) -> Kpi:
-        errors = [
-            _error(kpi.value, values[kpi.name], factor) for factor, values in by_name.items()
-        ]
+        apart = {f: _apart(kpi.value, values[kpi.name]) for f, values in by_name.items()}
+        order = 2 if apart.get(2.0, math.inf) >= _REGULAR * apart.get(0.5, 0.0) else 1
+        errors = [of_difference(factor, order) * each for factor, each in apart.items()]
         reading = _reading(kpi.value, intervals) if kpi.unit == "s" else 0.0
         return replace(kpi, error=max(errors) + rounding.get(kpi.unit, 0.0) + reading)
 
@@ -160,7 +162,7 @@ def _reading(time: float, intervals: Iterable[float]) -> float:
     return max(at_rows, default=0.0)
 
 
-def _error(value: float, other: float, factor: float) -> float:
+def _apart(value: float, other: float) -> float:
     if math.isnan(value) or math.isnan(other):
         return math.nan if math.isnan(value) and math.isnan(other) else math.inf
-    return of_difference(factor) * abs(value - other)
+    return abs(value - other)
