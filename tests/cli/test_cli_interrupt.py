@@ -230,6 +230,32 @@ def test_interrupt_after_all_is_said_changes_nothing():
     assert done.stdout.strip()
 
 
+_LATE = (
+    "import atexit, os, sys\n"
+    "class Late:\n"
+    "    def __del__(self, abort=os.abort): abort()\n"
+    "late = Late()\n"
+    "from bywire.cli import main as room\n"
+    "main, sys.argv = room.main, ['bywire', '--version']\n"
+    "room.main = lambda: (atexit.register(print, 'tidy'), main())\n"
+    "room."
+)
+
+
+@posix
+@pytest.mark.parametrize(("entry", "status"), [("process", 0), ("main", -signal.SIGABRT)])
+def test_nothing_of_a_library_runs_when_all_is_said_and_tidied_up(entry, status):
+    """CPython aborts where a thread or an object of a library calls it while it takes itself down.
+
+    What was registered to be done at exit is done.
+    """
+    code = f"{_LATE}{entry}()"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert done.returncode == status
+    if status == 0:
+        assert done.stdout.splitlines()[-1] == "tidy"
+
+
 def test_interrupt_while_graphs_are_built_is_not_lost(
     bywire, bench, tmp_path, machine, monkeypatch
 ):

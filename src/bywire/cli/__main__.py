@@ -1,5 +1,5 @@
 """``python -m bywire.cli``: the same as the command ``bywire``."""
 
-from bywire.cli.main import main
+from bywire.cli.main import process
 
-main()
+process()
