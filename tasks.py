@@ -122,7 +122,8 @@ def lock() -> int:
     install("test")
     common = ["uv", "pip", "compile", "pyproject.toml", "--universal", "--python-version", "3.11",
               "--generate-hashes", "--no-header", "--quiet", "--no-emit-index-url",
-              "--no-annotate", "--extra", "compiler", "--extra", "build"]  # fmt: skip
+              "--no-annotate", "--extra", "compiler", "--extra", "build",
+              "--extra", "studies"]  # fmt: skip
     return run(*common, "-o", "requirements.lock") or run(
         *common, "--extra", "dev", "-o", "requirements-dev.lock"
     )

@@ -33,7 +33,9 @@ if TYPE_CHECKING:
     from bywire.api.reproduce import reproduce
     from bywire.api.run import BenchResult, run
     from bywire.api.run_over import BenchRange
+    from bywire.api.run_study import resume_study, run_study, study_report
     from bywire.api.study import study
+    from bywire.api.study_run import StudyRun
     from bywire.api.trust import TrustStudy, trust
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
@@ -70,6 +72,10 @@ _HOMES = {
     "Run": "simulation.run",
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
+    "StudyRun": "api.study_run",
+    "run_study": "api.run_study",
+    "resume_study": "api.run_study",
+    "study_report": "api.run_study",
     "TrustStudy": "api.trust",
     "convert": "api.convert",
     "identify": "api.identify",
@@ -118,6 +124,7 @@ __all__ = [
     "Replay",
     "Run",
     "Sensitivity",
+    "StudyRun",
     "Trajectory",
     "TrustStudy",
     "agreement",
@@ -140,11 +147,14 @@ __all__ = [
     "replay",
     "reproduce",
     "resample",
+    "resume_study",
     "run",
+    "run_study",
     "simulate",
     "simulate_ensemble",
     "simulate_with_sensitivities",
     "study",
+    "study_report",
     "trust",
     "write_measurement",
     "write_recording",

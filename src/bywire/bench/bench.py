@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -103,6 +103,10 @@ class Bench:
         self._check_names()
         check(self.requirements, chosen.kpis_with(self.chosen_options))
         self._made(chosen.preview or chosen.cases)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy is made of: not what follows from it."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     def _check_stimulus(self, chosen: Experiment) -> None:
         """Refuse a stimulus that the experiment does not take."""

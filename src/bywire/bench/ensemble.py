@@ -19,7 +19,7 @@ from bywire.bench.running import Progress, judged, recording_of, run_of, static_
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
+from bywire.core.parameters import choice_fields, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.ensemble import Ensemble
@@ -152,16 +152,18 @@ def varied_leaf(bench: Bench, name: str) -> Leaf:
     return known[name]
 
 
-def changed(bench: Bench, values: Mapping[str, float]) -> Bench:
-    """Return a bench with other parameters and options [SI].
+def changed(bench: Bench, values: Mapping[str, float | str]) -> Bench:
+    """Return a bench with other parameters, choices and options [SI].
 
     Raises
     ------
     InputError
         When one is unknown or out of range, or contradicts another; the values are named.
     """
+    choices = choice_fields(type(bench.par))
     for name in values:
-        varied_leaf(bench, name)
+        if name not in choices:
+            varied_leaf(bench, name)
     options = {n.removeprefix(_OPTION): v for n, v in values.items() if n.startswith(_OPTION)}
     overrides = {n: v for n, v in values.items() if not n.startswith(_OPTION)}
     try:
@@ -171,7 +173,10 @@ def changed(bench: Bench, values: Mapping[str, float]) -> Bench:
             options={**bench.options, **options},
         )
     except InputError as error:
-        said = ", ".join(f"{name} = {value:g}" for name, value in values.items())
+        said = ", ".join(
+            f"{name} = {value}" if isinstance(value, str) else f"{name} = {value:g}"
+            for name, value in values.items()
+        )
         raise type(error)(f"{said} (in SI): {error}") from None
 
 

@@ -48,7 +48,7 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
         if not names:
             groups = {f"{name.rpartition('.')[0]}.*" for name in values if "." in name}
             raise unknown_name("parameter (none is matched)", pattern, {*values, *groups})
-        share = _share(changes[pattern])
+        share = share_of(changes[pattern])
         if share is not None:
             names = [name for name in names if name in leaves and any(_nodes(values[name]))]
             if not names:
@@ -59,14 +59,20 @@ def settled(base: ParameterSet, changes: Mapping[str, Any]) -> dict[str, Any]:
         spread |= dict.fromkeys(names, changes[pattern])
     spread |= {name: value for name, value in changes.items() if not _PATTERN.search(name)}
     return {
-        name: value if (share := _share(value)) is None or name not in values
+        name: value if (share := share_of(value)) is None or name not in values
         else _scaled(name, value, share, values[name], name in leaves)
         for name, value in spread.items()
     }  # fmt: skip
 
 
-def _share(value: object) -> float | None:
-    """Return the share that a text asks for; None where it is a value."""
+def share_of(value: object) -> float | None:
+    """Return the share that a text asks for; None where it is a value.
+
+    Examples
+    --------
+    >>> share_of("+50%"), share_of("50 %")
+    (0.5, None)
+    """
     match = _SHARE.fullmatch(value) if isinstance(value, str) else None
     return None if match is None else float(match[1].replace(" ", "")) / 100.0
 

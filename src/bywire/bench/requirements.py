@@ -8,13 +8,17 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.values import number
 from bywire.core import units
 from bywire.core.errors import ParameterError, UnitError, quoted, unknown_name
+from bywire.core.typing import Array
 
 # Longer signs first, as "<=" begins with "<".
-_COMPARE: dict[str, Callable[[float, float], bool]] = {
+_COMPARE: dict[str, Callable[[Any, float], Any]] = {
     "<=": operator.le,
     ">=": operator.ge,
     "<": operator.lt,
@@ -91,11 +95,16 @@ def judge(requirements: Mapping[str, str], kpis: Sequence[Kpi]) -> tuple[Verdict
         kpi = by_name[name]
         compare, bound = limit_of(name, text, kpi.unit)
         is_decided = not (abs(kpi.value - bound) <= kpi.error or math.isinf(kpi.error))
-        met = is_decided and not math.isnan(kpi.value) and _COMPARE[compare](kpi.value, bound)
+        met = is_decided and not math.isnan(kpi.value) and bool(_COMPARE[compare](kpi.value, bound))
         verdicts.append(
             Verdict(name, text, kpi.value, kpi.unit, met, kpi.note, kpi.error, is_decided)
         )
     return tuple(verdicts)
+
+
+def is_met(values: Array, compare: str, bound: float) -> NDArray[np.bool_]:
+    """Return whether each value meets a limit of `limit_of`; what is not defined does not."""
+    return np.asarray(_COMPARE[compare](values, bound))
 
 
 def status_of(verdicts: Sequence[Verdict]) -> str:

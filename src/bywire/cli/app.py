@@ -26,6 +26,7 @@ from bywire.cli.loop_commands import (
 )
 from bywire.cli.output import result
 from bywire.cli.sizing_commands import design_command, study_command
+from bywire.cli.study_commands import study_app
 
 app = typer.Typer(
     name="bywire",
@@ -44,7 +45,8 @@ app.command("linearize")(linearize_command)
 app.command("frequency-response")(frequency_response_command)
 app.command("agreement")(agreement_command)
 app.command("margins")(margins_command)
-app.command("study")(study_command)
+study_app.command("size")(study_command)
+app.add_typer(study_app, name="study")
 app.command("design")(design_command)
 app.command("convert")(convert)
 app.command("identify")(identify)

@@ -145,7 +145,7 @@ class FileFormat:
     counts: tuple[str, int] = ("row", 0)
 
 
-def library(name: str, what: str) -> ModuleType:
+def library(name: str, what: str, extra: str = "measurements") -> ModuleType:
     """Return an optional library.
 
     Raises
@@ -158,7 +158,7 @@ def library(name: str, what: str) -> ModuleType:
     except ImportError:
         raise FileError(
             f"{what} need the library {name.partition('.')[0]}, which is not installed: "
-            f"{how_to_install('measurements')}"
+            f"{how_to_install(extra)}"
         ) from None
 
 

@@ -1,0 +1,193 @@
+"""Many runs of a bench: probabilities of its requirements, and what drives its key figures."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from bywire.api.study_run import StudyRun
+from bywire.bench import running
+from bywire.bench.result import Result
+from bywire.bench.running import Progress
+from bywire.core.errors import FileError, ParameterError
+from bywire.core.typing import silent
+from bywire.report.answer import use_case
+from bywire.studies.findings import Findings
+from bywire.studies.plan import StudyPlan
+from bywire.studies.points import Spanned
+from bywire.studies.running import complete
+from bywire.studies.store import StudyStore
+from bywire.studies.study_file import read_study
+
+
+@use_case
+def run_study(
+    study: str | Path,
+    out: str | Path | None = None,
+    *,
+    cases: int | None = None,
+    workers: int | None = None,
+    cluster: str = "",
+    progress: Progress | None = None,
+) -> StudyRun:
+    """Run a study: a bench for many values of what varies.
+
+    What its folder holds is not computed again, so that the same call goes on with a study that
+    was interrupted or killed.
+
+    Parameters
+    ----------
+    study
+        Study file; see ``docs/studies.md``.
+    out
+        Its folder; by default the name of the file, without its ending, in the current folder.
+    cases
+        Cases in place of the file's; more of them extend what is there.
+    workers
+        Processes; by default one a core where the work is worth their start.
+    cluster
+        Address of a Dask scheduler that computes instead.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    StudyRun
+        Probabilities of the requirements with intervals, the spread of key figures in SI units,
+        what drives them, the worst cases.
+
+    Raises
+    ------
+    InputError
+        For a study file that does not fit, and a folder that holds another study.
+    RunError
+        When the bench itself fails, or workers are lost. A case that fails is a case without a
+        result.
+    KeyboardInterrupt
+        When interrupted; finished chunks stay.
+    """
+    source = Path(study)
+    folder = Path(out) if out is not None else Path(source.stem)
+    return _completed(source, StudyStore(folder), cases, workers, cluster, progress)
+
+
+def _completed(
+    source: Path, store: StudyStore, cases: int | None, workers: int | None, cluster: str,
+    progress: Progress | None,
+) -> StudyRun:  # fmt: skip
+    """Return a study with all of its cases, those that were missing computed."""
+    plan = _with_cases(read_study(source), cases)
+    nominal = running.run(plan.bench, estimate_error=True)
+    try:
+        complete(
+            plan, store, source, workers=workers, cluster=cluster, progress=progress or silent
+        )
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(
+            f"{len(store.finished())} of {plan.chunks} chunks are kept: bywire study resume "
+            f"{store.folder}"
+        ) from None
+    return _run_of(plan, store, nominal)
+
+
+@use_case
+def resume_study(
+    folder: str | Path,
+    *,
+    cases: int | None = None,
+    workers: int | None = None,
+    cluster: str = "",
+    progress: Progress | None = None,
+) -> StudyRun:
+    """Go on with the study of a folder, where it was interrupted or with more cases.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+    cases
+        Cases in place of those that were asked for so far; more of them extend the study by points
+        of the same sequence.
+    workers, cluster, progress
+        See `run_study`.
+
+    Returns
+    -------
+    StudyRun
+        See `run_study`; values in SI units.
+
+    Raises
+    ------
+    InputError
+        When the folder holds no study, its file is gone, or says something else by now.
+    RunError
+        When workers are lost.
+    KeyboardInterrupt
+        When interrupted; finished chunks stay.
+    """
+    store = StudyStore(Path(folder))
+    source, known = _kept(store)
+    return _completed(source, store, cases or known, workers, cluster, progress)
+
+
+@use_case
+def study_report(folder: str | Path) -> StudyRun:
+    """Return what the study of a folder shows so far; nothing is computed but the bench itself.
+
+    Requirements are those that its file says now.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+
+    Returns
+    -------
+    StudyRun
+        See `run_study`; values in SI units.
+
+    Raises
+    ------
+    InputError
+        When the folder holds no study, its file is gone, or says something else by now.
+    """
+    store = StudyStore(Path(folder))
+    source, known = _kept(store)
+    plan = _with_cases(read_study(source), known)
+    store.require(plan)
+    return _run_of(plan, store, running.run(plan.bench, estimate_error=True))
+
+
+def _kept(store: StudyStore) -> tuple[Path, int]:
+    """Return the file of a folder's study, and how many cases were asked for."""
+    said = store.record()
+    source = Path(said["source"])
+    if not source.is_file():
+        raise FileError(
+            f"the study file {source} of {store.folder} is gone: run it from where it is now, "
+            f"bywire study run FILE --out {store.folder}"
+        )
+    return source, int(said["cases"])
+
+
+def _with_cases(plan: StudyPlan, cases: int | None) -> StudyPlan:
+    if cases is None:
+        return plan
+    if cases < 1:
+        raise ParameterError(f"cases = {cases} is not admissible: it must be >= 1")
+    if isinstance(plan.points, Spanned):
+        return plan  # it has those that it lists
+    return replace(plan, cases=cases)
+
+
+def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
+    findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
+    status = "unfinished"
+    if len(findings.cases) == plan.total:
+        outcomes = {each.outcome for each in findings.judgments}
+        status = (
+            "failed" if "missed" in outcomes
+            else "undecided" if "undecided" in outcomes
+            else "passed" if outcomes else "done"
+        )  # fmt: skip
+    return StudyRun(plan, store.folder, findings, nominal, status)

@@ -1,0 +1,108 @@
+"""The tables of a study: requirements, key figures, what varies, and what drives them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bywire.report.document import TableBlock
+from bywire.report.tables import Cell, Column, Table, Verdict, text_table, value_text
+from bywire.report.wording import amount, clean
+from bywire.studies.findings import Findings
+from bywire.studies.plan import StudyPlan
+from bywire.studies.statistics import Influence, Outcome, Share
+
+_SHOWN = 5  # quantities that drive a key figure
+_OUTCOMES: dict[Outcome, tuple[str, Verdict]] = {
+    "met": ("ok", "good"),
+    "missed": ("failed", "bad"),
+    "undecided": ("undecided", "bad"),
+}
+
+
+def demand_table(findings: Findings) -> Table:
+    """Return the requirements: how often they are met, how probable that is, and the verdict."""
+    confidence = f"{100.0 * findings.plan.confidence:g} %"
+    is_sampled = findings.plan.is_sampled
+    columns = [Column("requirement"), Column("cases that meet it", numeric=True)]
+    columns += [Column("probability", numeric=True), Column(f"{confidence} interval")] * is_sampled
+    rows = []
+    for each in findings.judgments:
+        count = f"{each.share.count} of {each.share.cases}"
+        count += f" ({each.undecided} too close)" if each.undecided else ""
+        cells = [Cell(clean(each.demand.text)), Cell(count, value=each.share.count)]
+        if is_sampled:
+            cells += [
+                Cell(percent(each.share.value, each.share), value=each.share.value),
+                Cell(f"{percent(each.share.low, each.share)} to "
+                     f"{percent(each.share.high, each.share)}"),
+            ]  # fmt: skip
+        rows.append((*cells, Cell(*_OUTCOMES[each.outcome])))
+    return Table((*columns, Column("result")), tuple(rows))
+
+
+def percent(value: float, of: Share) -> str:
+    """Return a probability in the digits that its interval leaves.
+
+    Examples
+    --------
+    >>> percent(0.98765, Share(98765, 100000, 0.98694, 0.98833))
+    '98.77 %'
+    >>> percent(1.0, Share(1000, 1000, 0.9963, 1.0)), percent(0.5, Share(5, 10, 0.19, 0.81))
+    ('100.00 %', '50 %')
+    """
+    width = 100.0 * (of.high - of.low)
+    digits = 0 if width >= 10 else 1 if width >= 1 else 2 if width >= 0.1 else 3
+    return f"{100.0 * value:.{digits}f} %"
+
+
+def spread_table(findings: Findings) -> Table:
+    """Return the key figures: the bench itself, percentiles and ends of the cases."""
+    heads = ["the bench itself", "5 %", "median", "95 %", "least", "largest"]
+    rows = []
+    for each in findings.spreads:
+        values = [each.nominal, *(q.value for q in each.quantiles), each.least, each.largest]
+        name = clean(each.name)
+        name += f" (not defined in {each.undefined})" if each.undefined else ""
+        rows.append((Cell(name), *(Cell(amount(v, each.unit), value=v) for v in values)))
+    return Table((Column("name"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
+
+
+def varied_table(plan: StudyPlan) -> Table:
+    """Return what varies, and how."""
+    return text_table(
+        ["quantity", "in the bench", "distribution", "together with it"],
+        [
+            (v.name, value_text(v.nominal, v.unit or "1"), v.distribution.text,
+             ", ".join(v.together) or "-")
+            for v in plan.varied
+        ],
+    )  # fmt: skip
+
+
+def influence_tables(findings: Findings) -> list[TableBlock]:
+    """Return what drives each key figure of a requirement; of all where nothing is required."""
+    if not findings.plan.is_sampled:
+        return []
+    each = {name: findings.influences(name) for name in shown_figures(findings)}
+    return [
+        TableBlock(_influence_table(found), f"What drives {name}.", title=f"what drives {name}")
+        for name, found in each.items() if found
+    ]  # fmt: skip
+
+
+def shown_figures(findings: Findings) -> list[str]:
+    """Return the key figures that matter: those that something is required of, or all."""
+    required = [demand.kpi for demand in findings.plan.demands]
+    known = [each.name for each in findings.spreads]
+    return [name for name in required if name in known] or known
+
+
+def _influence_table(influences: Sequence[Influence]) -> Table:
+    rows = [
+        (
+            i.quantity, f"{i.correlation:+.2f}", f"{i.low:+.2f} to {i.high:+.2f}",
+            "yes" if i.is_distinct else "not distinct from none",
+        )
+        for i in influences[:_SHOWN]
+    ]  # fmt: skip
+    return text_table(["quantity", "rank correlation", "interval", "drives it"], rows)

@@ -1,0 +1,122 @@
+"""Options of the commands that run studies of many cases; sizing studies go by their names."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from bywire.cli.options import JsonFlag
+from bywire.cli.output_folder import folder
+from bywire.cli.show import show
+
+_SIZE = "size"
+
+
+class _StudyGroup(TyperGroup):
+    """Commands of studies; the name of a sizing study stands for ``size NAME``."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # types of typer's own click
+        """Return the command of the first word; see click."""
+        if args and not args[0].startswith("-") and args[0] not in self.commands:
+            args = [_SIZE, *args]
+        return super().resolve_command(ctx, args)
+
+
+study_app = typer.Typer(
+    cls=_StudyGroup,
+    no_args_is_help=True,
+    help="Run a study of many cases (run FILE), or compare designs of a brake (NAME).",
+)
+
+StudyFolder = Annotated[
+    Path, typer.Argument(help="Folder of the study.", metavar="FOLDER", show_default=False)
+]
+Cases = Annotated[
+    int | None, typer.Option(help="Cases in place of the file's; more extend the study.", min=1)
+]
+Workers = Annotated[
+    int | None, typer.Option(help="Processes; one a core by default, where it is worth it.", min=1)
+]
+ClusterAddress = Annotated[
+    str, typer.Option("--cluster", metavar="ADDRESS", help="Dask scheduler that computes instead.")
+]
+
+
+@study_app.command("run")
+def study_run_command(
+    study: Annotated[
+        Path, typer.Argument(help="Study file (TOML).", metavar="FILE", show_default=False)
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option("--out", help="Folder of the study; by default named as the file.",
+                     parser=folder, metavar="PATH"),
+    ] = None,
+    cases: Cases = None,
+    workers: Workers = None,
+    cluster: ClusterAddress = "",
+    json: JsonFlag = False,
+) -> None:
+    """Run a bench for many values of what varies: probabilities, spread, what drives them."""
+    from bywire.api.run_study import run_study
+
+    place = out if out is not None else Path(study.stem)
+    show(
+        lambda progress: run_study(
+            study, place, cases=cases, workers=workers, cluster=cluster, progress=progress
+        ),
+        place, json,
+    )  # fmt: skip
+
+
+@study_app.command("resume")
+def resume_command(
+    place: StudyFolder, workers: Workers = None, cluster: ClusterAddress = "",
+    json: JsonFlag = False,
+) -> None:  # fmt: skip
+    """Go on with a study that was interrupted or killed."""
+    _resumed(place, None, workers, cluster, json)
+
+
+@study_app.command("extend")
+def extend_command(
+    place: StudyFolder,
+    cases: Annotated[int, typer.Option(help="Cases altogether.", min=1, show_default=False)],
+    workers: Workers = None,
+    cluster: ClusterAddress = "",
+    json: JsonFlag = False,
+) -> None:
+    """Add cases to a study, by points of the same sequence."""
+    _resumed(place, cases, workers, cluster, json)
+
+
+@study_app.command("report")
+def report_command(place: StudyFolder, json: JsonFlag = False) -> None:
+    """Judge what a study has so far, by the requirements of its file, and write its report."""
+    from bywire.api.run_study import study_report
+
+    show(lambda _: study_report(place), place, json)
+
+
+@study_app.command("status")
+def status_command(place: StudyFolder, json: JsonFlag = False) -> None:
+    """Say how far a study is, and what it shows so far; nothing is written."""
+    from bywire.api.run_study import study_report
+
+    show(lambda _: study_report(place), None, json)
+
+
+def _resumed(
+    place: Path, cases: int | None, workers: int | None, cluster: str, as_json: bool
+) -> None:
+    from bywire.api.run_study import resume_study
+
+    show(
+        lambda progress: resume_study(
+            place, cases=cases, workers=workers, cluster=cluster, progress=progress
+        ),
+        place, as_json,
+    )  # fmt: skip

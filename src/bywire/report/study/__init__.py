@@ -1,0 +1,1 @@
+"""Figures of studies: how figures are spread, what drives them, how sure an estimate is."""

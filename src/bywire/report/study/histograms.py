@@ -1,0 +1,96 @@
+"""Figure: how key figures are spread over the cases of a study, with limits and percentiles."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+from bywire.core.typing import Array
+from bywire.report import style
+from bywire.report.line_role import Role
+from bywire.report.wording import amount, in_display_unit
+
+_COLUMNS = 2
+_HEIGHT = 1.5  # of a panel [inch]
+_BINS = 60  # at most
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A key figure over the cases.
+
+    Parameters
+    ----------
+    values
+        In ``unit``, shape (cases,); NaN where it is not defined.
+    unit
+        SI unit, or ``"%"``.
+    nominal
+        What the bench itself gives; NaN where it is not defined.
+    limit
+        Limit that is required; None where there is none.
+    """
+
+    values: Array
+    unit: str
+    nominal: float
+    limit: float | None = None
+
+
+def histograms(spreads: Mapping[str, Spread]) -> Figure:
+    """Draw a histogram of every key figure, by name, each in a panel of its own.
+
+    Dashed the bench itself, dotted the limit; the shaded band holds 90 % of the cases.
+    """
+    rows = -(-len(spreads) // _COLUMNS)
+    figure = Figure(
+        figsize=(style.WIDTH, 0.5 + _HEIGHT * rows), layout="constrained", facecolor="white"
+    )
+    grid = figure.subplots(rows, _COLUMNS, squeeze=False)
+    bound, own = style.STROKES[Role.LIMIT], style.STROKES[Role.SET_POINT]
+    for axes, (name, spread) in zip(grid.flat, spreads.items(), strict=False):
+        style.dress(axes)
+        factor = in_display_unit(1.0, spread.unit)[0]
+        values = factor * spread.values[np.isfinite(spread.values)]
+        axes.hist(values, bins=_bins(values), color=style.BLUE, alpha=0.75)
+        axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
+        for at, look in ((spread.nominal, own), (spread.limit, bound)):
+            if at is None or not np.isfinite(at):
+                continue
+            if look is bound and (far := _beyond(factor * at, values)):
+                text = f"limit {amount(at, spread.unit)}"
+                axes.text(
+                    0.99 if far > 0 else 0.01, 0.9, f"{text} →" if far > 0 else f"← {text}",
+                    transform=axes.transAxes, ha="right" if far > 0 else "left",
+                    color=look.color, fontsize=style.TEXT_SIZE,
+                )  # fmt: skip
+                continue
+            axes.axvline(factor * at, color=look.color, linestyle=look.linestyle,
+                         linewidth=look.linewidth)  # fmt: skip
+        style.few_ticks(axes, 3)
+        axes.set_xlabel(style.axis_label(name.replace("_", " "), spread.unit))
+        axes.set_ylabel("cases")
+    for spare in list(grid.flat)[len(spreads) :]:
+        spare.set_visible(False)
+    lines = [Line2D([], [], color=own.color, linestyle="--", label="the bench itself"),
+             Line2D([], [], color=bound.color, linestyle=":", label="limit")]  # fmt: skip
+    figure.legend(handles=lines, loc="outside upper left", ncols=2, frameon=False,
+                  fontsize=style.TEXT_SIZE)  # fmt: skip
+    return figure
+
+
+def _beyond(limit: float, values: Array) -> int:
+    """Return on which side a limit lies so far off that it would squeeze the histogram; 0: none."""
+    low, high = float(values.min()), float(values.max())
+    reach = max(high - low, 1e-12)
+    return int(limit > high + reach) - int(limit < low - reach)
+
+
+def _bins(values: Array) -> int:
+    """Return how many bins show the shape of values and not their scatter."""
+    edges = np.histogram_bin_edges(values, bins="auto") if np.ptp(values) > 0 else values[:2]
+    return int(np.clip(edges.size - 1, 1, _BINS))

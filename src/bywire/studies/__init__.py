@@ -1,0 +1,1 @@
+"""Studies: one bench for many values of what varies, and what its key figures make of that."""

@@ -1,0 +1,115 @@
+"""A chunk of a study's cases, computed: what varied and what it gave, a column each.
+
+It depends on the plan and its number alone, wherever and in whatever order it is computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.bench import Bench
+from bywire.bench.ensemble import changed, run_benches
+from bywire.bench.result import Result
+from bywire.core.errors import BywireError
+from bywire.studies.plan import CHUNK, StudyPlan
+
+CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
+"""columns beside values and key figures: number, why there is no result, what the run warns of"""
+
+Columns = dict[str, NDArray[Any]]
+
+
+def computed_chunk(plan: StudyPlan, chunk: int, threads: int | None = None) -> Columns:
+    """Return the cases of a chunk.
+
+    Parameters
+    ----------
+    plan
+        The study.
+    chunk
+        Number of the chunk, >= 0.
+    threads
+        Threads to use; all cores by default.
+
+    Returns
+    -------
+    dict
+        Columns of equal length: the case's number, the values that varied by name [SI], every key
+        figure by name in its unit (NaN where it is not defined), and as texts why a case has no
+        result and what it warns of, empty where there is nothing.
+
+    Raises
+    ------
+    KeyboardInterrupt
+        When interrupted.
+    """
+    values = plan.values(chunk)
+    count = len(next(iter(values.values())))
+    numbers = chunk * CHUNK + np.arange(count)
+    benches: dict[int, Bench] = {}
+    failures = [""] * count
+    for k in range(count):
+        given = {name: column[k].item() for name, column in values.items()}
+        try:
+            benches[k] = case_bench(plan, int(numbers[k]), given)
+        except BywireError as error:
+            failures[k] = str(error)
+    results: dict[int, Result] = {}
+    for group in _alike(benches):
+        results |= _results({k: benches[k] for k in group}, failures, threads)
+    units = plan.bench.definition.kpis_with(plan.bench.chosen_options)
+    columns: Columns = {CASE: numbers, **values}
+    for name in units:
+        column = np.full(count, math.nan)
+        for k, result in results.items():
+            column[k] = next((kpi.value for kpi in result.kpis if kpi.name == name), math.nan)
+        columns[name] = column
+    columns[FAILURE] = np.array(failures, dtype=object)
+    said = ["; ".join(results[k].warnings) if k in results else "" for k in range(count)]
+    columns[WARNINGS] = np.array(said, dtype=object)
+    return columns
+
+
+def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench:
+    """Return the bench of a case: its values, and of drawn ones noise of its own.
+
+    Raises
+    ------
+    InputError
+        When the values contradict each other, or the experiment does not run with them.
+    """
+    bench = plan.bench
+    if plan.is_sampled:
+        bench = replace(bench, seed=bench.seed + number)
+    return changed(bench, values)
+
+
+def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
+    """Return cases in groups that differ in numbers alone, so that they run side by side."""
+    groups: dict[tuple[Any, ...], list[int]] = {}
+    for k, bench in benches.items():
+        chosen = {**bench.par.choices(), **bench.chosen_options.choices()}
+        groups.setdefault(tuple(chosen.items()), []).append(k)
+    return list(groups.values())
+
+
+def _results(
+    benches: Mapping[int, Bench], failures: list[str], threads: int | None
+) -> dict[int, Result]:
+    """Return the results of cases; where they fail together, each for itself says why."""
+    cases: Sequence[int] = list(benches)
+    try:
+        return dict(zip(cases, run_benches(list(benches.values()), threads=threads), strict=True))
+    except BywireError as error:
+        if len(cases) == 1:
+            failures[cases[0]] = str(error)
+            return {}
+    middle = len(cases) // 2
+    halves = ({k: benches[k] for k in part} for part in (cases[:middle], cases[middle:]))
+    return {k: result for half in halves for k, result in _results(half, failures, threads).items()}

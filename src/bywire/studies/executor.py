@@ -1,0 +1,191 @@
+"""Who computes the chunks of a study: this process, a pool of processes, or a Dask cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from functools import partial
+from multiprocessing import get_context
+from typing import Any, Protocol
+
+from bywire.core.brake import load_system, loaded_files
+from bywire.core.errors import ParameterError, RunError
+from bywire.data.file_format import library
+from bywire.studies.chunk import Columns, computed_chunk
+from bywire.studies.plan import StudyPlan
+
+_AHEAD = 2  # chunks in flight for each worker, so that none waits for us
+_SECONDS = 10.0  # to reach a cluster
+_WORTH = 8  # chunks from which on processes are worth their start
+_WHAT = ("studies on a cluster", "cluster")
+
+
+class Executor(Protocol):
+    """Computes chunks, in any order."""
+
+    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+        """Yield the number and the columns of each chunk as soon as it is there.
+
+        Raises
+        ------
+        RunError
+            When workers are lost and none is left.
+        """
+        ...
+
+
+class InProcess:
+    """The process itself, with lanes on all cores."""
+
+    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+        """Yield each chunk; see `Executor`."""
+        for chunk in chunks:
+            yield chunk, computed_chunk(plan, chunk)
+
+
+class Pool:
+    """Processes of this machine, a core each.
+
+    Parameters
+    ----------
+    workers
+        How many, >= 1.
+    """
+
+    def __init__(self, workers: int) -> None:
+        self.workers = workers
+
+    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+        """Yield each chunk; see `Executor`."""
+        pool = ProcessPoolExecutor(
+            self.workers, get_context("spawn"), initializer=_begin, initargs=(loaded_files(),)
+        )
+        try:
+            yield from _as_completed(pool, plan, chunks, _AHEAD * self.workers)
+        except BrokenProcessPool:
+            raise RunError(
+                "a process of the study was killed, most likely for want of memory: resume it, "
+                "with fewer --workers"
+            ) from None
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in list((pool._processes or {}).values()):
+                process.terminate()
+
+
+class Cluster:
+    """A cluster of dask.distributed.
+
+    Parameters
+    ----------
+    address
+        Of its scheduler, for instance ``tcp://host:8786``.
+    """
+
+    def __init__(self, address: str) -> None:
+        self.address = address
+
+    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+        """Yield each chunk; see `Executor`."""
+        with _client(self.address) as client:
+            workers = len(client.scheduler_info()["workers"])
+            if not workers:
+                raise RunError(f"the cluster at {self.address} has no workers: start some first")
+            yield from _of_cluster(client, plan, chunks)
+
+
+def executor_of(workers: int | None, cluster: str, chunks: int) -> Executor:
+    """Return who computes: a cluster if one is named, else so many processes.
+
+    Parameters
+    ----------
+    workers
+        Processes; None for one a core where the work is worth their start.
+    cluster
+        Address of a Dask scheduler; empty for this machine.
+    chunks
+        How many chunks are left.
+
+    Raises
+    ------
+    ParameterError
+        For no workers, and for both at once.
+    """
+    if workers is not None and workers < 1:
+        raise ParameterError(f"workers = {workers} is not admissible: it must be >= 1")
+    if cluster:
+        if workers is not None:
+            raise ParameterError("workers of a cluster are the cluster's own: leave one out")
+        return Cluster(cluster)
+    count = min(workers or os.cpu_count() or 1, chunks)
+    is_worth = workers is not None or chunks >= _WORTH
+    return Pool(count) if count > 1 and is_worth else InProcess()
+
+
+def _begin(files: tuple[str, ...]) -> None:
+    """Prepare a process of a pool: Ctrl-C is for the one that asked."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    _load(files)
+
+
+def _load(files: tuple[str, ...]) -> None:
+    """Load the brakes that were loaded by path."""
+    for file in files:
+        load_system(file)
+
+
+def _single(plan: StudyPlan, chunk: int) -> tuple[int, Columns]:
+    return chunk, computed_chunk(plan, chunk, threads=1)
+
+
+def _as_completed(
+    pool: ProcessPoolExecutor, plan: StudyPlan, chunks: Iterable[int], ahead: int
+) -> Iterator[tuple[int, Columns]]:
+    """Yield what a pool has finished, with few jobs in flight."""
+    left = iter(chunks)
+    running: set[Future[Any]] = set()
+    while True:
+        for chunk in left:
+            running.add(pool.submit(_single, plan, chunk))
+            if len(running) >= ahead:
+                break
+        if not running:
+            return
+        done, running = wait(running, return_when=FIRST_COMPLETED)
+        for each in done:
+            yield each.result()
+
+
+@contextmanager
+def _client(address: str) -> Iterator[Any]:
+    distributed = library("distributed", *_WHAT)
+    try:
+        client = distributed.Client(address, timeout=_SECONDS, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise RunError(
+            f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
+            "'dask worker', and give the address that the scheduler says"
+        ) from None
+    try:
+        yield client
+    finally:
+        client.close()
+
+
+def _of_cluster(
+    client: Any, plan: StudyPlan, chunks: Iterable[int]
+) -> Iterator[tuple[int, Columns]]:
+    distributed = library("distributed", *_WHAT)
+    client.run(_load, loaded_files())
+    futures = client.map(partial(_single, plan), list(chunks), pure=False)
+    try:
+        with client.as_current():
+            completed = distributed.as_completed(futures)
+        for future in completed:
+            yield future.result()
+    except distributed.KilledWorker as error:
+        raise RunError(f"the cluster lost its workers ({error}): resume the study") from None

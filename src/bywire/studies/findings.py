@@ -1,0 +1,201 @@
+"""What a study found: its requirements judged, its key figures' spread, and what drives them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.requirements import is_met, limit_of
+from bywire.core.typing import Array
+from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.plan import Demand, StudyPlan
+from bywire.studies.statistics import (
+    Influence,
+    Outcome,
+    Quantile,
+    Share,
+    influences,
+    judged,
+    quantile,
+    share,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+QUANTILES = (0.05, 0.5, 0.95)
+"""shares of the cases below the quantiles that are shown"""
+
+
+@dataclass(frozen=True)
+class Judgment:
+    """A requirement over all cases.
+
+    Parameters
+    ----------
+    demand
+        The requirement.
+    met
+        Whether each case meets it, shape (cases,); a case without a result does not.
+    share
+        How often, and the interval of the probability.
+    undecided
+        Cases no further from the limit than their figure may be off by the step.
+    outcome
+        Whether it is met with the probability that is wanted; of one that every case has to meet,
+        whether all do.
+    worst
+        Row of the case that is worst of all; None where no case has the figure.
+    """
+
+    demand: Demand
+    met: NDArray[np.bool_]
+    share: Share
+    undecided: int
+    outcome: Outcome
+    worst: int | None
+
+
+@dataclass(frozen=True)
+class Spread:
+    """A key figure over all cases; values in ``unit``, NaN where no case has it.
+
+    Parameters
+    ----------
+    name, unit
+        The figure.
+    nominal
+        What the bench itself gives.
+    undefined
+        Cases in which it is not defined, or without a result.
+    mean, sd
+        Mean and standard deviation.
+    quantiles
+        Those of `QUANTILES`, with intervals.
+    least, largest
+        Ends.
+    """
+
+    name: str
+    unit: str
+    nominal: float
+    undefined: int
+    mean: float
+    sd: float
+    quantiles: tuple[Quantile, ...]
+    least: float
+    largest: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """The cases of a study, and what they say.
+
+    Parameters
+    ----------
+    plan
+        The study.
+    cases
+        A row for each case that was computed; see `bywire.studies.chunk.computed_chunk`.
+    nominal
+        Key figures of the bench itself, with their error from the step.
+    """
+
+    plan: StudyPlan
+    cases: pd.DataFrame
+    nominal: tuple[Kpi, ...]
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """Unit of every key figure by name."""
+        bench = self.plan.bench
+        return bench.definition.kpis_with(bench.chosen_options)
+
+    def figure(self, name: str) -> Array:
+        """Return a key figure of every case, shape (cases,)."""
+        return np.asarray(self.cases[name], dtype=float)
+
+    @cached_property
+    def judgments(self) -> tuple[Judgment, ...]:
+        """Every requirement, in the order of the file."""
+        return tuple(map(self._judgment, self.plan.demands))
+
+    @cached_property
+    def spreads(self) -> tuple[Spread, ...]:
+        """Every key figure that any case has."""
+        nominal = {kpi.name: kpi.value for kpi in self.nominal}
+        return tuple(
+            self._spread(name, unit, nominal.get(name, math.nan))
+            for name, unit in self.units.items() if np.isfinite(self.figure(name)).any()
+        )  # fmt: skip
+
+    def influences(self, name: str) -> Sequence[Influence]:
+        """Return how a key figure goes with what varies, the strongest first; choices apart."""
+        varied = [v.name for v in self.plan.varied if v.unit]
+        columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
+        return influences(varied, columns, self.figure(name), self.plan.confidence)
+
+    @property
+    def failures(self) -> Mapping[int, str]:
+        """Row -> why the case has no result."""
+        texts = self.cases[FAILURE]
+        return {k: str(text) for k, text in enumerate(texts) if text}
+
+    @property
+    def warnings(self) -> Mapping[str, int]:
+        """What runs warned of -> in how many cases, without their numbers."""
+        said: dict[str, int] = {}
+        for text in self.cases[WARNINGS]:
+            for each in filter(None, str(text).split("; ")):
+                said[each] = said.get(each, 0) + 1
+        return said
+
+    def number(self, row: int) -> int:
+        """Return the number of a case by its row."""
+        return int(self.cases[CASE].iloc[row])
+
+    def values(self, row: int) -> dict[str, float | str]:
+        """Return what varied in a case [SI]."""
+        names = [name for v in self.plan.varied for name in (v.name, *v.together)]
+        return {name: self.cases[name].iloc[row] for name in names}
+
+    def _judgment(self, demand: Demand) -> Judgment:
+        values = self.figure(demand.kpi)
+        errors = {kpi.name: kpi.error for kpi in self.nominal}
+        error = errors.get(demand.kpi, math.nan)
+        compare, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
+        met = is_met(values, compare, bound)
+        near = np.abs(values - bound) <= (error if math.isfinite(error) else 0.0)
+        count, confidence = values.size, self.plan.confidence
+        may, surely = (
+            share(int(each.sum()), count, confidence) for each in (met | near, met & ~near)
+        )
+        if demand.probability is not None:
+            outcome = judged(may, surely, demand.probability)
+        elif may.count < count:
+            outcome = "missed"
+        else:
+            outcome = "met" if surely.count == count else "undecided"
+        sign = -1.0 if compare.startswith("<") else 1.0
+        known = np.isfinite(values)
+        worst = int(np.argmin(np.where(known, sign * values, np.inf))) if known.any() else None
+        return Judgment(
+            demand, met, share(int(met.sum()), count, confidence), int(near.sum()), outcome, worst
+        )
+
+    def _spread(self, name: str, unit: str, nominal: float) -> Spread:
+        values = self.figure(name)
+        known = values[np.isfinite(values)]
+        return Spread(
+            name, unit, nominal, values.size - known.size, float(known.mean()),
+            float(known.std(ddof=1)) if known.size > 1 else math.nan,
+            tuple(quantile(known, p, self.plan.confidence) for p in QUANTILES),
+            float(known.min()), float(known.max()),
+        )  # fmt: skip

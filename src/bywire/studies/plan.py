@@ -1,0 +1,224 @@
+"""The plan of a study: which bench, what varies and how, where it is computed, what is asked."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.bench.bench import Bench
+from bywire.core.brake import brakes, is_package
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import ParameterError
+from bywire.core.typing import Array
+from bywire.core.version import __version__
+from bywire.studies.distribution import Distribution
+from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
+
+CHUNK = 64
+"""cases of a chunk, the piece of work that is computed, kept and counted as a whole"""
+
+
+@dataclass(frozen=True)
+class Varied:
+    """A quantity that varies.
+
+    Parameters
+    ----------
+    name
+        Dotted name of a parameter or choice, or ``options.NAME``.
+    unit
+        SI unit; empty of a choice.
+    nominal
+        What the bench has.
+    distribution
+        How it varies.
+    together
+        Further parameters that vary with it, by the same ratio to what the bench has.
+    """
+
+    name: str
+    unit: str
+    nominal: Any
+    distribution: Distribution
+    together: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Demand:
+    """A requirement with the probability with which it has to be met.
+
+    Parameters
+    ----------
+    kpi, limit
+        Key figure, and its limit as text.
+    probability
+        Least probability that it is met; None where every case has to meet it.
+    """
+
+    kpi: str
+    limit: str
+    probability: float | None = None
+
+    @property
+    def text(self) -> str:
+        """The requirement as a study file says it."""
+        with_ = "" if self.probability is None else f" with {100.0 * self.probability:.10g} %"
+        return f"{self.kpi} {self.limit}{with_}"
+
+
+@dataclass(frozen=True)
+class StudyPlan:
+    """What a study file says.
+
+    Parameters
+    ----------
+    name
+        What reports call it.
+    bench
+        What is tested; its requirements are those of the study.
+    varied
+        What varies.
+    design
+        One of `points.SAMPLED` or `points.SPANNED`.
+    cases
+        Cases asked for; of listed points, all there are.
+    seed
+        Of the points.
+    demands
+        What is required.
+    confidence
+        Of all intervals, between 0 and 1.
+    levels
+        Values of each quantity of a grid, or of one at a time.
+    correlations
+        Pairs of names -> correlation of their normal scores.
+    """
+
+    name: str
+    bench: Bench
+    varied: tuple[Varied, ...]
+    design: str = "monte-carlo"
+    cases: int = 1024
+    seed: int = 1
+    demands: tuple[Demand, ...] = ()
+    confidence: float = 0.95
+    levels: int = 5
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
+
+    @property
+    def is_sampled(self) -> bool:
+        """Whether shares of its cases are probabilities."""
+        return self.design in SAMPLED
+
+    @cached_property
+    def points(self) -> Sampled | Spanned:
+        """Where it is computed."""
+        each = [v.distribution for v in self.varied]
+        if self.is_sampled:
+            return Sampled(self.design, self.seed, each, self._factor)
+        return spanned(self.design, each, [v.nominal for v in self.varied], self.levels)
+
+    @property
+    def chunks(self) -> int:
+        """How many chunks it has; those of drawn points are whole."""
+        points = self.points
+        cases = points.cases if isinstance(points, Spanned) else self.cases
+        return -(-cases // CHUNK)
+
+    @property
+    def total(self) -> int:
+        """How many cases are computed."""
+        points = self.points
+        return points.cases if isinstance(points, Spanned) else self.chunks * CHUNK
+
+    def values(self, chunk: int) -> dict[str, NDArray[Any]]:
+        """Return the values of what varies, by name, in each case of a chunk [SI].
+
+        Parameters that vary together with another follow it.
+        """
+        columns: dict[str, NDArray[Any]] = {}
+        flat = self.bench.par.flat()
+        for each, column in zip(self.varied, self.points.values(chunk, CHUNK), strict=True):
+            columns[each.name] = column
+            columns |= {
+                follower: flat[follower] * (column.astype(float) / each.nominal)
+                for follower in each.together
+            }
+        return columns
+
+    @cached_property
+    def _factor(self) -> Array | None:
+        return correlation_factor([v.name for v in self.varied], self.correlations)
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells a study from another: all that its cases' figures depend on."""
+        bench = self.bench
+        said = {
+            "version": __version__,
+            "brake": _source_digest(PARAMETER_SETS.owner(bench.parameters)),
+            "experiment": bench.experiment,
+            "system": bench.system,
+            "parameters": bench.par.flat(),
+            "options": bench.chosen_options.flat(),
+            "stimuli": {
+                name: [each.kind, each.parameters.model_dump(mode="json")]
+                for name, each in bench.chosen_stimuli.items()
+            },
+            "step": bench.step, "record": bench.record, "noise": bench.seed,
+            "varied": [
+                [v.name, v.distribution.kind, v.together,
+                 v.distribution.quantile(np.linspace(0.01, 0.99, 9)).tolist()]
+                for v in self.varied
+            ],
+            "correlations": sorted([*names, value] for names, value in self.correlations.items()),
+            "design": self.design, "seed": self.seed, "chunk": CHUNK,
+            "levels": 0 if self.is_sampled else self.levels,
+        }  # fmt: skip
+        text = json.dumps(said, sort_keys=True, default=str)
+        return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _source_digest(module: str) -> str:
+    """Return what tells the code of a brake, by its module, from another's."""
+    brake = next(each for each in brakes().values() if each.module == module)
+    file = Path(brake.file)
+    digest = hashlib.sha256()
+    for path in sorted(file.parent.rglob("*.py")) if is_package(brake) else [file]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def correlation_factor(
+    names: Sequence[str], correlations: Mapping[tuple[str, str], float]
+) -> Array | None:
+    """Return the Cholesky factor of a correlation matrix; None where nothing is correlated.
+
+    Raises
+    ------
+    ParameterError
+        When no such quantities can exist: the matrix is not positive definite.
+    """
+    if not correlations:
+        return None
+    matrix = np.eye(len(names))
+    for (first, second), value in correlations.items():
+        i, k = names.index(first), names.index(second)
+        matrix[i, k] = matrix[k, i] = value
+    try:
+        return np.asarray(np.linalg.cholesky(matrix))
+    except np.linalg.LinAlgError:
+        least = float(np.linalg.eigvalsh(matrix)[0])
+        told = "; ".join(f"{a}, {b}: {value:g}" for (a, b), value in correlations.items())
+        raise ParameterError(
+            f"[[correlation]] {told}: no quantities can be correlated so, for the matrix is not "
+            f"positive definite (least eigenvalue {least:.2g}): take values closer to zero"
+        ) from None

@@ -1,0 +1,185 @@
+"""What the cases of a study say: probabilities and quantiles with intervals, and what drives them.
+
+Intervals are those of independent cases. Latin hypercubes and scrambled sequences scatter less, of
+averages at least: their intervals are on the safe side as a rule (A. B. Owen, Monte Carlo variance
+of scrambled net quadrature, SIAM J. Numer. Anal. 34, 1997).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+
+from bywire.core.typing import Array
+
+Outcome = Literal["met", "missed", "undecided"]
+
+
+@dataclass(frozen=True)
+class Share:
+    """How often something was so, and what that says of how probable it is.
+
+    Parameters
+    ----------
+    count, cases
+        How often, of how many.
+    low, high
+        Interval of the probability.
+    """
+
+    count: int
+    cases: int
+    low: float
+    high: float
+
+    @property
+    def value(self) -> float:
+        """The estimate; NaN without cases."""
+        return self.count / self.cases if self.cases else math.nan
+
+
+def share(count: int, cases: int, confidence: float) -> Share:
+    """Return a probability with its exact two-sided interval.
+
+    C. J. Clopper and E. S. Pearson, The use of confidence or fiducial limits, Biometrika 26, 1934:
+    it holds the probability at least as often as it claims.
+
+    Parameters
+    ----------
+    count, cases
+        How often it was so, of how many independent cases.
+    confidence
+        Of the interval.
+
+    Examples
+    --------
+    >>> round(share(0, 100, 0.95).high, 4)  # nothing seen in a hundred is no proof
+    0.0362
+    """
+    if not cases:
+        return Share(0, 0, 0.0, 1.0)
+    low, high = stats.binomtest(count, cases).proportion_ci(confidence, method="exact")
+    return Share(count, cases, float(low), float(high))
+
+
+def judged(met: Share, surely: Share, wanted: float) -> Outcome:
+    """Return whether a requirement is met with a probability.
+
+    Parameters
+    ----------
+    met
+        Cases that meet it, or may do so within the error of their figures.
+    surely
+        Cases that meet it for certain.
+    wanted
+        Least probability.
+    """
+    if surely.low >= wanted:
+        return "met"
+    return "missed" if met.high < wanted else "undecided"
+
+
+@dataclass(frozen=True)
+class Quantile:
+    """A quantile with its interval.
+
+    Parameters
+    ----------
+    probability
+        Share of the cases below it.
+    value, low, high
+        Estimate and interval; NaN where the cases are too few for one.
+    """
+
+    probability: float
+    value: float
+    low: float
+    high: float
+
+
+def quantile(values: Array, probability: float, confidence: float) -> Quantile:
+    """Return a quantile of independent values with an interval that needs no distribution.
+
+    W. J. Conover, Practical Nonparametric Statistics (1999), section 3.2: order statistics whose
+    ranks the binomial distribution gives.
+    """
+    if not values.size:
+        return Quantile(probability, math.nan, math.nan, math.nan)
+    test = stats.quantile_test(values, p=probability)
+    interval: Any = test.confidence_interval(confidence)  # its stub says float
+    return Quantile(
+        probability, float(np.quantile(values, probability)), float(interval.low),
+        float(interval.high),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Influence:
+    """How a key figure goes with a quantity that varies.
+
+    Parameters
+    ----------
+    quantity
+        Its name.
+    correlation
+        Rank correlation (Spearman), -1 to 1.
+    low, high
+        Its interval.
+    """
+
+    quantity: str
+    correlation: float
+    low: float
+    high: float
+
+    @property
+    def is_distinct(self) -> bool:
+        """Whether it differs from none."""
+        return self.low > 0.0 or self.high < 0.0
+
+
+def influences(
+    names: Sequence[str], columns: Sequence[Array], figure: Array, confidence: float
+) -> list[Influence]:
+    """Return how a key figure goes with each quantity, the strongest first.
+
+    A rank correlation sees what rises or falls throughout; a quantity whose effect has an optimum
+    within its range it may miss. The interval is Fisher's with the variance of Bonett and Wright,
+    Psychometrika 65, 2000.
+
+    Parameters
+    ----------
+    names, columns
+        Quantities, and their values in each case, shape (cases,) each.
+    figure
+        The key figure in each case, shape (cases,); cases without one are left out.
+    confidence
+        Of the intervals.
+    """
+    known = np.isfinite(figure)
+    count = int(known.sum())
+    if count < 8 or np.ptp(figure[known]) == 0.0:
+        return []
+    reach = float(stats.norm.ppf(0.5 + 0.5 * confidence))
+    found = []
+    for name, column in zip(names, columns, strict=True):
+        x = column[known]
+        if np.ptp(x) == 0.0:
+            continue
+        r = float(stats.spearmanr(x, figure[known]).statistic)
+        z = math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12))
+        width = reach * math.sqrt((1.0 + 0.5 * r * r) / (count - 3))
+        found.append(Influence(name, r, math.tanh(z - width), math.tanh(z + width)))
+    return sorted(found, key=lambda each: -abs(each.correlation))
+
+
+def running_share(met: NDArray[np.bool_], confidence: float, count: int = 60) -> list[Share]:
+    """Return how an estimate came about: the share of the first cases, of ever more of them."""
+    sizes = np.unique(np.geomspace(1, max(met.size, 1), count).astype(int))
+    return [share(int(met[:n].sum()), int(n), confidence) for n in sizes if met.size]

@@ -1,0 +1,175 @@
+"""The folder of a study: one Parquet file a chunk, and what tells whose they are.
+
+The files are the truth: a chunk that is there is never computed again. Each appears whole or not at
+all, so that whatever is killed loses the chunks that it was at.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bywire.core.errors import FileError
+from bywire.core.scratch import replacing, sweep
+from bywire.data.file_format import library
+from bywire.studies.chunk import Columns
+from bywire.studies.plan import CHUNK, StudyPlan
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RECORD = "study.json"
+"""file that says which study a folder holds"""
+CHUNKS = "chunks"
+"""folder of the chunks"""
+_SAID = {"digest": str, "source": str, "cases": int}
+_WHAT = ("the files of a study", "studies")
+
+
+@dataclass(frozen=True)
+class StudyStore:
+    """Where the chunks of a study lie.
+
+    Parameters
+    ----------
+    folder
+        The study's folder.
+    """
+
+    folder: Path
+
+    def open(self, plan: StudyPlan, source: Path) -> None:
+        """Make the folder one of a study, or refuse that of another.
+
+        Raises
+        ------
+        FileError
+            When it holds another study, or cannot be written.
+        """
+        library("pyarrow", *_WHAT)
+        known = self.require(plan) if (self.folder / RECORD).exists() else {}
+        try:
+            (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
+            sweep(self.folder / CHUNKS)
+            said = {
+                "digest": plan.digest, "source": str(source.resolve()), "name": plan.name,
+                "cases": max(plan.total, known.get("cases", 0)), "chunk": CHUNK,
+            }  # fmt: skip
+            with replacing(self.folder / RECORD) as fresh:
+                fresh.write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
+        except OSError as error:
+            raise _unwritable(self.folder, error) from None
+
+    def require(self, plan: StudyPlan) -> dict[str, Any]:
+        """Return what the folder says, or refuse it where it holds another study.
+
+        Raises
+        ------
+        FileError
+            When it does, or holds none.
+        """
+        known = self.record()
+        if known["digest"] != plan.digest:
+            raise FileError(
+                f"{self.folder} holds another study, or one of another version of bywire or of its "
+                "bench: what is computed there does not belong to this one; name another folder "
+                "with --out, or remove it"
+            )
+        return known
+
+    def record(self) -> dict[str, Any]:
+        """Return what the folder says of its study.
+
+        Raises
+        ------
+        FileError
+            When it holds none.
+        """
+        path = self.folder / RECORD
+        try:
+            said = json.loads(path.read_bytes())
+            if all(isinstance(said[key], kind) for key, kind in _SAID.items()):
+                return dict(said)
+        except OSError as error:
+            raise FileError(
+                f"{self.folder} holds no study ({path.name}: {error.strerror}): name the folder "
+                "that 'bywire study run' has written"
+            ) from None
+        except (ValueError, KeyError, TypeError):
+            pass
+        raise FileError(f"{path} is damaged: run the study into another folder")
+
+    def path(self, chunk: int) -> Path:
+        """Return the file of a chunk."""
+        return self.folder / CHUNKS / f"{chunk:06d}.parquet"
+
+    def finished(self) -> set[int]:
+        """Return the numbers of the chunks that are there."""
+        return {
+            int(path.stem) for path in (self.folder / CHUNKS).glob("*.parquet")
+            if path.stem.isdecimal()
+        }  # fmt: skip
+
+    def write(self, chunk: int, columns: Columns, units: Mapping[str, str]) -> None:
+        """Keep a chunk, whole or not at all.
+
+        Raises
+        ------
+        FileError
+            When it cannot be written.
+        """
+        pa, parquet = library("pyarrow", *_WHAT), library("pyarrow.parquet", *_WHAT)
+        arrays = {name: pa.array(column.tolist() if column.dtype.kind in "OU" else column)
+                  for name, column in columns.items()}  # fmt: skip
+        fields = [
+            pa.field(name, array.type, metadata={b"unit": units.get(name, "1").encode()})
+            for name, array in arrays.items()
+        ]
+        table = pa.table(list(arrays.values()), schema=pa.schema(fields))
+        try:
+            with replacing(self.path(chunk)) as fresh:
+                parquet.write_table(table, fresh, write_page_checksum=True)
+        except OSError as error:
+            raise _unwritable(self.path(chunk), error) from None
+
+    def read(self, chunks: int) -> pd.DataFrame:
+        """Return all cases of the first chunks that are there, in their order.
+
+        Raises
+        ------
+        FileError
+            When a file is damaged.
+        """
+        import pandas as pd
+
+        parquet = library("pyarrow.parquet", *_WHAT)
+        frames = []
+        for chunk in sorted(self.finished()):
+            if chunk >= chunks:
+                continue
+            try:
+                table = parquet.read_table(
+                    self.path(chunk), page_checksum_verification=True, use_threads=False
+                )
+                frames.append(pd.DataFrame({
+                    name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
+                    for name in table.column_names
+                }))  # fmt: skip
+            except Exception as error:  # the library raises what it likes of damaged files
+                raise FileError(
+                    f"{self.path(chunk)} is damaged ({type(error).__name__}): remove it, and "
+                    "'bywire study resume' computes it again"
+                ) from None
+        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+
+def _unwritable(path: Path, error: OSError) -> FileError:
+    return FileError(
+        f"cannot write {path}: {error.strerror or error}: make room there and resume the study; "
+        "what is finished stays"
+    )

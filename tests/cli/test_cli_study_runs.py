@@ -1,0 +1,68 @@
+"""The commands of studies of many cases."""
+
+from __future__ import annotations
+
+import pytest
+from command_line import BRAKING, QUICK, no_half_files, refused
+
+from undrawn import undrawn
+
+STUDY = 'bench = "bench.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n'
+
+
+@pytest.fixture
+def study(bench, tmp_path):
+    bench(BRAKING + QUICK + '[requirements]\npeak_current = "<= 18.57 A"\n')
+    path = tmp_path / "tolerances.toml"
+    path.write_text(STUDY + '[requirements]\npeak_current = "<= 25 A with 90 %"\n')
+    return path
+
+
+def test_from_the_file_to_the_report_and_on(bywire, study, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with undrawn():
+        outcome = bywire("study", "run", study)
+        assert outcome.status == 0
+        assert "64 of 64" in outcome.out
+        out = tmp_path / "tolerances"
+        names = {path.name for path in out.iterdir()}
+        assert {"report.html", "report.json", "study.json", "histograms.png", "convergence.png",
+                "worst-peak_current.toml", "worst-peak_current.nc"} <= names  # fmt: skip
+        extended = bywire("study", "extend", out, "--cases", "128", "--json").object
+        assert (extended["cases"], extended["status"]) == (128, "passed")
+        assert bywire("study", "resume", out).status == 0
+    status = bywire("study", "status", out, "--json").object
+    assert status["kpis"]["peak_current"] == extended["kpis"]["peak_current"]
+    assert bywire("run", out / "worst-peak_current.toml").status == 0
+    no_half_files(out)
+
+
+def test_what_every_case_has_to_meet_and_one_does_not(bywire, study, tmp_path):
+    study.write_text(STUDY)  # the bench's own requirement
+    with undrawn():
+        outcome = bywire("study", "run", study, "--out", tmp_path / "out")
+    assert outcome.status == 1
+    assert "bywire: requirement missed: peak_current <= 18.57 A" in outcome.lines
+
+
+def test_an_unfinished_study_says_so(bywire, study, tmp_path):
+    out = tmp_path / "out"
+    with undrawn():
+        bywire("study", "run", study, "--out", out, "--cases", "128")
+    (out / "chunks" / "000001.parquet").unlink()
+    outcome = bywire("study", "status", out)
+    assert outcome.status == 1
+    assert "64 of 128 cases are not computed yet" in outcome.err
+
+
+def test_bad_input_is_one_error(bywire, study, tmp_path):
+    study.write_text(STUDY.replace("motor.R_m", "motor.R_x"))
+    refused(bywire("study", "run", study), "motor.R_m", str(study))
+    refused(bywire("study", "status", tmp_path), "holds no study")
+    refused(bywire("study", "tolerances.toml"), "unknown study")
+
+
+def test_help_names_both_kinds_of_studies(bywire):
+    outcome = bywire("study", "--help")
+    assert outcome.status == 0
+    assert all(word in outcome.out for word in ("run", "resume", "extend", "report", "size"))

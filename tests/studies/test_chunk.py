@@ -1,0 +1,70 @@
+"""Chunks: the figures of cases are those of single runs, and a case that fails fails alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bywire.bench import running
+from bywire.core.errors import RunError
+from bywire.studies import chunk as chunks
+from bywire.studies.chunk import case_bench, computed_chunk
+from bywire.studies.study_file import read_study
+
+
+@pytest.fixture
+def plan(study, monkeypatch):
+    monkeypatch.setattr("bywire.studies.chunk.CHUNK", 8)
+    monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
+    return read_study(study())
+
+
+def test_key_figures_are_those_of_single_runs(plan):
+    columns = computed_chunk(plan, 2)
+    assert columns["case"].tolist() == list(range(16, 24))
+    assert not any(columns["failure"])
+    for k in (0, 5):
+        values = {name: column[k] for name, column in plan.values(2).items()}
+        alone = running.run(case_bench(plan, 16 + k, values))
+        for kpi in alone.kpis:
+            assert columns[kpi.name][k] == pytest.approx(kpi.value, rel=1e-9, nan_ok=True)
+
+
+def test_cases_of_several_structures_run_in_groups(study, monkeypatch):
+    monkeypatch.setattr("bywire.studies.plan.CHUNK", 8)
+    plan = read_study(study('[vary]\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+                            '"motor.R_m" = "+-5 %"\n'))  # fmt: skip
+    columns = computed_chunk(plan, 0)
+    assert {*columns["adc.law"]} == {"ideal", "quantized"}
+    assert np.isfinite(columns["peak_current"]).all()
+
+
+def test_a_case_that_fails_fails_alone(plan, monkeypatch):
+    worst = float(np.sort(plan.values(0)["motor.R_m"])[-1])
+    run_benches = chunks.run_benches
+
+    def failing(benches, **options):
+        if any(bench.par.motor.R_m == worst for bench in benches):
+            raise RunError("it left the numbers")
+        return run_benches(benches, **options)
+
+    monkeypatch.setattr(chunks, "run_benches", failing)
+    columns = computed_chunk(plan, 0)
+    failed = columns["motor.R_m"] == worst
+    assert [text == "it left the numbers" for text in columns["failure"]] == failed.tolist()
+    assert (np.isnan(columns["peak_current"]) == failed).all()
+
+
+def test_values_that_contradict_each_other_are_a_failure(study):
+    plan = read_study(study('[vary]\n"master_cylinder.s_mc" = { kind = "discrete", '
+                            'values = ["0.0001 mm", "10 mm"] }\n'))  # fmt: skip
+    columns = computed_chunk(plan, 0)
+    failed = np.array([bool(text) for text in columns["failure"]])
+    assert (failed == (columns["master_cylinder.s_mc"] < 1e-6)).all()
+    assert failed.any()
+    assert not failed.all()
+
+
+def test_drawn_cases_have_noise_of_their_own(plan):
+    values = {name: column[0] for name, column in plan.values(0).items()}
+    assert case_bench(plan, 5, values).seed == plan.bench.seed + 5

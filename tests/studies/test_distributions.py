@@ -1,0 +1,95 @@
+"""Distributions: closed forms of their moments, and one clear error for each that is wrong."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from bywire.core.errors import InputError
+from bywire.core.leaf import Leaf
+from bywire.core.quantities import Unit
+from bywire.studies.distribution import read_choice, read_distribution
+
+LEAF = Leaf("motor.R_m", Unit("ohm"), 0.0, 10.0, True, False)
+MIDDLES = (np.arange(200_000) + 0.5) / 200_000
+
+
+def read(entry, nominal=0.4, leaf=LEAF):
+    return read_distribution("motor.R_m", entry, leaf, nominal)
+
+
+@pytest.mark.parametrize(
+    ("entry", "mean", "sd"),
+    [
+        ("+-10 %", 0.4, 0.04 / math.sqrt(3)),
+        ("± 0.04 ohm", 0.4, 0.04 / math.sqrt(3)),
+        ({"kind": "uniform", "low": "0.2 ohm", "high": "+50 %"}, 0.4, 0.4 / math.sqrt(12)),
+        ({"kind": "normal", "sd": "5 %"}, 0.4, 0.02),
+        ({"kind": "normal", "mean": "500 mohm", "sd": "20 mohm"}, 0.5, 0.02),
+        ({"kind": "normal", "sd": "0.1 ohm", "low": "0.4 ohm"}, 0.4 + 0.1 * math.sqrt(2 / math.pi),
+         0.1 * math.sqrt(1 - 2 / math.pi)),
+        ({"kind": "triangular", "low": "0.1 ohm", "high": "0.7 ohm"}, 0.4, 0.3 / math.sqrt(6)),
+        ({"kind": "discrete", "values": ["0.3 ohm", "0.5 ohm"], "weights": [1, 3]}, 0.45,
+         0.2 * math.sqrt(0.25 * 0.75)),
+    ],
+)  # fmt: skip
+def test_moments_are_those_of_the_closed_form(entry, mean, sd):
+    values = read(entry).quantile(MIDDLES)
+    assert values.mean() == pytest.approx(mean, rel=1e-4)
+    assert values.std() == pytest.approx(sd, rel=1e-3)
+
+
+def test_log_normal_has_its_median_and_coefficient():
+    wide = Leaf("x", Unit("ohm"), 0.0, math.inf, True, False)
+    values = read({"kind": "log-normal", "sd": "30 %"}, leaf=wide).quantile(MIDDLES)
+    assert np.median(values) == pytest.approx(0.4, rel=1e-4)
+    assert np.log(values).std() == pytest.approx(math.sqrt(math.log(1.09)), rel=1e-3)
+
+
+def test_a_normal_tolerance_ends_where_it_says():
+    made = read({"kind": "tolerance", "tolerance": "10 %", "shape": "normal"})
+    assert (made.low, made.high) == pytest.approx((0.36, 0.44))
+    assert made.quantile(MIDDLES).std() == pytest.approx(0.04 / 3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("entry", "texts"),
+    [
+        ({"kind": "normal", "sd": "50 %"}, ["> 0 ohm", "probability of 0.023", "'low'"]),
+        ({"kind": "uniform", "low": "-1 ohm", "high": "1 ohm"}, ["leaves what is admissible"]),
+        ({"kind": "discrete", "values": ["0 ohm", "1 ohm"]}, ["leaves what is admissible"]),
+        ({"kind": "uniform", "low": "0.5 ohm", "high": "0.4 ohm"}, ["must be below"]),
+        ({"kind": "uniform", "low": "0.5 ohm"}, ["needs 'high'"]),
+        ({"kind": "uniform", "low": 0.3, "high": "0.4 ohm"}, ["low = '0.3'", "ohm"]),
+        ({"kind": "normal", "sd": "5 V"}, ["wrong unit"]),
+        ({"kind": "normal", "sd": "0 %"}, ["width > 0"]),
+        ({"kind": "normal", "sigma": "5 %"}, ["'sigma'", "sd"]),
+        ({"kind": "norml", "sd": "5 %"}, ["'norml'", "'normal'"]),
+        ({"kind": "triangular", "low": "0.5 ohm", "high": "0.7 ohm"}, ["must rise"]),
+        ({"kind": "discrete", "values": ["0.3 ohm"], "weights": [1, 2]}, ["1 numbers > 0"]),
+        ({"kind": "discrete", "values": []}, ["values = [...]"]),
+        ({"kind": "tolerance", "tolerance": "5 %", "shape": "cauchy"}, ["'cauchy'", "normal"]),
+        ("5 %", ["write a tolerance"]),
+        (0.4, ["write a tolerance"]),
+    ],
+)
+def test_what_is_wrong_is_said(entry, texts):
+    with pytest.raises(InputError) as refused:
+        read(entry)
+    for text in ("[vary] motor.R_m", *texts):
+        assert text in str(refused.value)
+
+
+def test_a_share_of_zero_needs_an_amount():
+    with pytest.raises(InputError, match="give an amount"):
+        read("+-5 %", nominal=0.0)
+
+
+def test_choices_are_drawn_by_their_weights():
+    made = read_choice("law", {"values": ["a", "b"], "weights": [3, 1]}, ("a", "b", "c"))
+    values = made.quantile(MIDDLES)
+    assert np.mean(values == "a") == pytest.approx(0.75)
+    with pytest.raises(InputError, match="'d'"):
+        read_choice("law", {"values": ["d"]}, ("a", "b", "c"))

@@ -1,0 +1,199 @@
+"""Studies run: closed forms come back, kills lose nothing, and who computes changes no bit."""
+
+from __future__ import annotations
+
+import math
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+import bywire
+from bywire.core.errors import FileError, ParameterError, RunError
+from bywire.studies import store as stores
+from bywire.studies.executor import Cluster, InProcess, Pool, executor_of
+from bywire.studies.store import StudyStore
+from bywire.studies.study_file import read_study
+
+DAMPED = """
+bench = "bench.toml"
+[vary]
+d = { kind = "normal", sd = "15 %" }
+[design]
+kind = "KIND"
+cases = 512
+[requirements]
+overshoot = "<= 60 % with 98 %"
+"""
+AXIS = """
+experiment = "step"
+parameters = "spring-axis-one"
+[options]
+input = "F_set"
+output = "x"
+end = "100 N"
+duration = "2 s"
+record = "0.1 ms"
+[simulation]
+step = "0.1 ms"
+[set]
+F_c = "0 N"
+k_c = "1 nN/m"
+T_s = "0.1 ms"
+"""
+
+
+def overshoot(d):
+    """Of a mass on a spring without dry friction [%]; it falls with the damping."""
+    zeta = d / (2.0 * math.sqrt(1e4 * 2.0))
+    return 100.0 * np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta**2))
+
+
+@pytest.mark.parametrize("kind", ["monte-carlo", "latin-hypercube", "sobol"])
+def test_a_linear_axis_has_the_quantiles_of_its_closed_form(tmp_path, spring_axis, kind):
+    (tmp_path / "bench.toml").write_text(AXIS)
+    (tmp_path / "study.toml").write_text(DAMPED.replace("KIND", kind))
+    study = bywire.run_study(tmp_path / "study.toml", tmp_path / "out", workers=1)
+    law = stats.norm(60.0, 9.0)
+    np.testing.assert_allclose(study.cases["overshoot"], overshoot(study.cases["d"]), rtol=2e-3)
+    (spread,) = (s for s in study.findings.spreads if s.name == "overshoot")
+    for each in spread.quantiles:
+        true = overshoot(law.ppf(1.0 - each.probability))
+        assert each.low - 0.05 <= true <= each.high + 0.05
+        if kind != "monte-carlo":  # even points: far closer than the interval says
+            assert abs(each.value - true) < 0.2 * (each.high - each.low)
+    (judgment,) = study.findings.judgments
+    edge = 2.0 * math.sqrt(2e4) * abs(math.log(0.6)) / math.hypot(math.pi, math.log(0.6))
+    assert judgment.share.low <= law.sf(edge) <= judgment.share.high
+    assert (judgment.outcome, study.status) == ("missed", "failed")
+    (influence,) = study.findings.influences("overshoot")
+    assert influence.correlation == pytest.approx(-1.0)
+    assert study.worst("overshoot").par.d == study.cases["d"].min()
+
+
+def test_who_computes_changes_no_bit(study, tmp_path, monkeypatch):
+    plan = read_study(study())
+    frames = []
+    for name, executor in (("own", InProcess()), ("pool", Pool(2))):
+        store = StudyStore(tmp_path / name)
+        store.open(plan, tmp_path / "study.toml")
+        chunks = [2, 0, 1] if name == "own" else [0, 1, 2]  # in whatever order
+        for chunk, columns in executor.computed(plan, chunks):
+            store.write(chunk, columns, {})
+        frames.append(store.read(3))
+    pd.testing.assert_frame_equal(*frames, check_exact=True)
+
+
+def test_a_cluster_computes_the_same(study, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    plan = read_study(study())
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
+    ) as cluster:
+        ((_, theirs),) = Cluster(cluster.scheduler_address).computed(plan, [1])
+    ((_, ours),) = InProcess().computed(plan, [1])
+    for name, column in ours.items():
+        np.testing.assert_array_equal(column, theirs[name])
+
+
+def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("bywire.studies.executor._SECONDS", 0.5)
+    with pytest.raises(RunError, match="no cluster answers at 'tcp://localhost:9'"):
+        next(iter(Cluster("tcp://localhost:9").computed(read_study(study()), [0])))
+
+
+def test_who_computes_is_chosen_by_the_work():
+    assert isinstance(executor_of(None, "", 2), InProcess)
+    assert isinstance(executor_of(1, "", 100), InProcess)
+    assert isinstance(executor_of(3, "", 100), Pool)
+    with pytest.raises(ParameterError, match="workers = 0"):
+        executor_of(0, "", 1)
+    with pytest.raises(ParameterError, match="the cluster's own"):
+        executor_of(2, "tcp://host:8786", 1)
+
+
+KILLS = 3
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals")
+def test_a_killed_study_goes_on_and_ends_as_one_that_was_not(study, tmp_path):
+    path = study()
+    line = [sys.executable, "-m", "bywire", "study", "run", str(path), "--cases", "256",
+            "--workers", "1", "--out"]  # fmt: skip
+    rng, killed = random.Random(4), tmp_path / "killed"
+    for _ in range(KILLS):
+        with subprocess.Popen([*line, str(killed)], stdout=subprocess.DEVNULL,
+                              stderr=subprocess.DEVNULL) as process:  # fmt: skip
+            _wait_for(killed / stores.RECORD, process)
+            time.sleep(rng.uniform(0.0, 0.6))
+            process.send_signal(signal.SIGKILL)
+    before = {p: p.stat().st_mtime_ns for p in (killed / stores.CHUNKS).glob("*.parquet")}
+    resumed = bywire.resume_study(killed)
+    whole = bywire.run_study(path, tmp_path / "whole", cases=256)
+    pd.testing.assert_frame_equal(resumed.cases, whole.cases, check_exact=True)
+    assert all(p.stat().st_mtime_ns == at for p, at in before.items())  # nothing is done twice
+    assert not list((killed / stores.CHUNKS).glob(".*"))
+
+
+def _wait_for(path: Path, process: subprocess.Popen[bytes]) -> None:
+    give_up = time.monotonic() + 30.0
+    while not path.exists() and process.poll() is None and time.monotonic() < give_up:
+        time.sleep(0.02)
+
+
+def test_more_cases_extend_a_study_and_requirements_may_change(study, tmp_path):
+    path, out = study(), tmp_path / "out"
+    first = bywire.run_study(path, out, cases=64)
+    more = bywire.resume_study(out, cases=128)
+    pd.testing.assert_frame_equal(more.cases[:64], first.cases, check_exact=True)
+    assert len(bywire.study_report(out).cases) == 128
+    path.write_text(path.read_text() + '[requirements]\npeak_current = "<= 1 A"\n')
+    assert bywire.study_report(out).status == "failed"
+
+
+def test_a_folder_of_another_study_is_refused(study, tmp_path):
+    path, out = study(), tmp_path / "out"
+    bywire.run_study(path, out, cases=64)
+    path.write_text(path.read_text().replace("4 %", "5 %"))
+    for call in (lambda: bywire.run_study(path, out), lambda: bywire.resume_study(out),
+                 lambda: bywire.study_report(out)):  # fmt: skip
+        with pytest.raises(FileError, match="holds another study"):
+            call()
+    path.unlink()
+    with pytest.raises(FileError, match="is gone"):
+        bywire.resume_study(out)
+    with pytest.raises(FileError, match="holds no study"):
+        bywire.study_report(tmp_path)
+
+
+def test_a_damaged_chunk_is_named(study, tmp_path):
+    path, out = study(), tmp_path / "out"
+    bywire.run_study(path, out, cases=64)
+    file = StudyStore(out).path(0)
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    file.write_bytes(bytes(data))
+    with pytest.raises(FileError, match=r"000000\.parquet is damaged"):
+        bywire.study_report(out)
+    file.unlink()
+    assert len(bywire.resume_study(out).cases) == 64
+
+
+def test_results_in_python(study, tmp_path):
+    result = bywire.run_study(study(), tmp_path / "out", cases=64)
+    assert result.status == "passed"
+    assert result.data["motor.R_m"].attrs["units"] == "ohm"
+    assert result.data["peak_current"].dims == ("case",)
+    assert "peak_current" in str(result)
+    assert "probability" in result._repr_html_()
+    with pytest.raises(ParameterError, match="no worst case"):
+        result.worst("overshoot")

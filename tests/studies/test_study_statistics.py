@@ -1,0 +1,66 @@
+"""Intervals cover as they claim, and verdicts say no more than the cases do."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from bywire.studies.statistics import influences, judged, quantile, running_share, share
+
+REPEATS = 400
+
+
+def test_shares_cover_at_least_as_often_as_they_claim():
+    counts = np.random.default_rng(1).binomial(200, 0.93, REPEATS)
+    held = [(s := share(int(n), 200, 0.9)).low <= 0.93 <= s.high for n in counts]
+    assert np.mean(held) >= 0.9
+
+
+@pytest.mark.parametrize("probability", [0.05, 0.5, 0.95])
+def test_intervals_of_quantiles_cover(probability):
+    rng = np.random.default_rng(2)
+    true = -np.log1p(-probability)
+    made = [quantile(rng.exponential(size=300), probability, 0.9) for _ in range(REPEATS)]
+    assert np.mean([q.low <= true <= q.high for q in made]) >= 0.87
+    few = quantile(rng.exponential(size=10), 0.95, 0.9)
+    assert np.isnan(few.high)  # ten cases bound no such quantile from above
+
+
+def test_intervals_of_rank_correlations_cover():
+    rng, true = np.random.default_rng(3), 6.0 / np.pi * np.arcsin(0.25)  # of normal ones with 0.5
+    held = []
+    for _ in range(REPEATS):
+        x = rng.standard_normal(200)
+        y = 0.5 * x + np.sqrt(0.75) * rng.standard_normal(200)
+        ((found,),) = (influences(["x"], [x], y, 0.95),)
+        held.append(found.low <= true <= found.high)
+    assert 0.92 <= np.mean(held) <= 0.985
+
+
+def test_the_strongest_comes_first_and_what_does_nothing_is_not_distinct():
+    rng = np.random.default_rng(4)
+    a, b, c = rng.standard_normal((3, 500))
+    first, second, third = influences(["a", "b", "c"], [a, b, c], -3.0 * a + b, 0.999)
+    assert [first.quantity, second.quantity, third.quantity] == ["a", "b", "c"]
+    assert first.correlation < 0.0
+    assert (first.is_distinct, second.is_distinct, third.is_distinct) == (True, True, False)
+
+
+@pytest.mark.parametrize(
+    ("met", "wanted", "outcome"),
+    [(1000, 0.99, "met"), (1000, 0.999, "undecided"), (980, 0.999, "missed"),
+     (990, 0.99, "undecided")],
+)  # fmt: skip
+def test_a_verdict_needs_the_whole_interval(met, wanted, outcome):
+    found = share(met, 1000, 0.95)
+    assert judged(found, found, wanted) == outcome
+
+
+def test_cases_too_close_to_their_limit_decide_nothing():
+    assert judged(share(1000, 1000, 0.95), share(900, 1000, 0.95), 0.95) == "undecided"
+
+
+def test_the_running_estimate_ends_with_all_cases():
+    met = np.arange(300) % 10 > 0
+    last = running_share(met, 0.95)[-1]
+    assert (last.count, last.cases) == (270, 300)
