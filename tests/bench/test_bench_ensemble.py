@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -95,3 +96,27 @@ def test_what_is_refused(bench):
         bywire.simulate_ensemble(single, {"motor.R_m": [0.3]})
     raw = bywire.simulate_ensemble(single, {"motor.R_m": [0.3]}, ["p_mc"])
     assert raw["p_mc"].shape[0] == 1
+
+
+def test_key_figures_and_warnings_without_recordings_are_the_same():
+    """The piston of a release rests on its stop, which the run warns of."""
+    bench = bywire.Bench("release", "dardanelli2010")
+    benches = [bench.varied({"motor.R_m": value}, {}) for value in (0.3, 0.4)]
+    figures = ensemble.key_figures_of(benches)
+    for ours, result in zip(figures, ensemble.run_benches(benches), strict=True):
+        assert ours.kpis == result.kpis
+        assert list(ours.warnings) == result.warnings
+        assert any("retracted stop" in text for text in ours.warnings)
+
+
+def test_a_varied_bench_is_the_one_that_is_made_anew(bench):
+    changes = {"motor.R_m": 0.5, "adc.law": "ideal"}
+    varied = bench.varied(changes, {"p_to": 20e5}, seed=7)
+    anew = replace(bench, overrides=changes, options={**OPTIONS, "p_to": 20e5}, seed=7)
+    assert (varied.par, varied.chosen_options, varied.system) == (
+        anew.par, anew.chosen_options, anew.system
+    )
+    assert varied == replace(varied)  # every check again
+    assert run(varied).kpis == run(anew).kpis
+    with pytest.raises(ParameterError, match=r"motor\.R_m"):
+        bench.varied({"motor.R_m": -1.0}, {})

@@ -10,6 +10,7 @@ import pytest
 
 import bywire
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.rows import Rows
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
@@ -83,6 +84,23 @@ def test_every_signal_has_unit_and_name(results, name):
         for variable in recording.variables.values():
             assert variable.attrs["units"]
             assert variable.attrs["long_name"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_plain_rows_give_the_same_figures(results, name):
+    result = results[name]
+    rows = {label: _rows(recording) for label, recording in result.recordings.items()}
+    kpis = EXPERIMENTS.all()[name].judge(rows, result.bench.chosen_options)
+    exact = {kpi.name: kpi.value for kpi in result.kpis}
+    assert {kpi.name: kpi.value for kpi in kpis} == pytest.approx(exact, rel=0, abs=0, nan_ok=True)
+
+
+def _rows(recording):
+    if set(recording.dims) != {"time"}:
+        return recording  # a static characteristic
+    signals = {str(n): v.values for n, v in recording.items()}
+    attributes = {n: recording[n].attrs for n in signals}
+    return Rows(recording["time"].values, signals, attributes, lambda: recording.attrs)
 
 
 @pytest.mark.parametrize(("name", "parameters"), PAIRS)

@@ -41,14 +41,14 @@ def test_cases_of_several_structures_run_in_groups(study, monkeypatch):
 
 def test_a_case_that_fails_fails_alone(plan, monkeypatch):
     worst = float(np.sort(plan.values(0)["motor.R_m"])[-1])
-    run_benches = chunks.run_benches
+    key_figures_of = chunks.key_figures_of
 
-    def failing(benches, **options):
+    def failing(benches, threads):
         if any(bench.par.motor.R_m == worst for bench in benches):
             raise RunError("it left the numbers")
-        return run_benches(benches, **options)
+        return key_figures_of(benches, threads)
 
-    monkeypatch.setattr(chunks, "run_benches", failing)
+    monkeypatch.setattr(chunks, "key_figures_of", failing)
     columns = computed_chunk(plan, 0)
     failed = columns["motor.R_m"] == worst
     assert [text == "it left the numbers" for text in columns["failure"]] == failed.tolist()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
@@ -102,7 +103,10 @@ class Bench:
         self._check_stimulus(chosen)
         self._check_names()
         check(self.requirements, chosen.kpis_with(self.chosen_options))
-        self._made(chosen.preview or chosen.cases)
+        if chosen.preview is None:
+            self.cases()
+        else:
+            self._made(chosen.preview)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of: not what follows from it."""
@@ -129,7 +133,7 @@ class Bench:
             if name in options and name not in parameters:
                 raise unknown_name("parameter", name, [f"options.{name}"])
 
-    @property
+    @cached_property
     def system(self) -> str:
         """Name of the assembly that is tested."""
         return self.assembly or PARAMETER_SETS.find(self.parameters).assembly
@@ -169,6 +173,10 @@ class Bench:
 
     def cases(self) -> tuple[Case, ...]:
         """Return the runs that the experiment consists of, with settling times as they are run."""
+        return self._cases
+
+    @cached_property
+    def _cases(self) -> tuple[Case, ...]:
         return self._made(self.definition.cases)
 
     def cases_with(self, par: Any, options: Any, make: Cases | None = None) -> tuple[Case, ...]:
@@ -200,6 +208,35 @@ class Bench:
             case.label: as_run(case, self.step, seed=(self.seed, number))
             for number, case in enumerate(self.cases())
         }
+
+    def varied(
+        self, overrides: Mapping[str, Any], options: Mapping[str, Any], seed: int | None = None
+    ) -> Bench:
+        """Return this bench with other numbers and choices, quicker than a new one is made.
+
+        What its names and files are is known to fit; the values are checked as ever.
+
+        Parameters
+        ----------
+        overrides, options
+            Parameters, choices and numbers of the options by dotted name [SI].
+        seed
+            Seed of the sensors' noise; as it is by default.
+
+        Raises
+        ------
+        InputError
+            For values out of range, or with which the experiment cannot be set up.
+        """
+        made = copy(self)
+        known = made.__dict__
+        known |= {name: getattr(self, name) for name in ("definition", "system", "chosen_stimuli")}
+        known["overrides"] = {**self.overrides, **overrides}
+        known["options"] = {**self.options, **options}
+        known["seed"] = self.seed if seed is None else seed
+        known["par"] = self.par.replace(overrides)
+        made.cases()
+        return made
 
     def with_overrides(self, overrides: Mapping[str, Any]) -> Bench:
         """Return this bench with further parameters changed; shares are of what it has."""

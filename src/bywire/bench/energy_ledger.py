@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
+from functools import cache
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -16,6 +18,7 @@ import xarray as xr
 from bywire.core.signals import Role
 
 _PREFIX = "energy_"
+_ROLE = tuple(each.name for each in fields(Role))
 
 
 @dataclass(frozen=True)
@@ -143,11 +146,14 @@ def _roles(recording: xr.Dataset, changes: Mapping[str, float]) -> dict[str, Rol
 
 
 def _role_of(variable: xr.Variable) -> Role | None:
-    said = {
-        each.name: variable.attrs[_PREFIX + each.name]
-        for each in fields(Role)
-        if _PREFIX + each.name in variable.attrs
-    }
+    said = variable.attrs
+    named = (name for name in _ROLE if _PREFIX + name in said)
+    return _role(tuple((name, str(said[_PREFIX + name])) for name in named))
+
+
+@cache
+def _role(attributes: tuple[tuple[str, str], ...]) -> Role | None:
+    said: dict[str, Any] = dict(attributes)
     return Role(**{**said, "split": bool(said.get("split"))}) if "side" in said else None
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -13,9 +13,18 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
+from bywire.bench.experiment import Case
 from bywire.bench.extent import check_memory
+from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.result import Result
-from bywire.bench.running import Progress, judged, recording_of, run_of, static_recordings
+from bywire.bench.running import (
+    Progress,
+    judged,
+    recording_of,
+    rows_recorded,
+    run_of,
+    static_recordings,
+)
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
@@ -152,8 +161,10 @@ def varied_leaf(bench: Bench, name: str) -> Leaf:
     return known[name]
 
 
-def changed(bench: Bench, values: Mapping[str, float | str]) -> Bench:
-    """Return a bench with other parameters, choices and options [SI].
+def changed(
+    bench: Bench, values: Mapping[str, float | str], seed: int | None = None
+) -> Bench:
+    """Return a bench with other parameters, choices and options [SI], and noise of another seed.
 
     Raises
     ------
@@ -167,11 +178,7 @@ def changed(bench: Bench, values: Mapping[str, float | str]) -> Bench:
     options = {n.removeprefix(_OPTION): v for n, v in values.items() if n.startswith(_OPTION)}
     overrides = {n: v for n, v in values.items() if not n.startswith(_OPTION)}
     try:
-        return replace(
-            bench,
-            overrides={**bench.overrides, **overrides},
-            options={**bench.options, **options},
-        )
+        return bench.varied(overrides, options, seed)
     except InputError as error:
         said = ", ".join(
             f"{name} = {value}" if isinstance(value, str) else f"{name} = {value:g}"
@@ -237,24 +244,66 @@ def run_benches(
     )
 
 
+@dataclass(frozen=True)
+class KeyFigures:
+    """What a bench gave, without recordings: its key figures, and what its runs warned of."""
+
+    kpis: tuple[Kpi, ...]
+    warnings: tuple[str, ...]
+
+
+def key_figures_of(
+    benches: Sequence[Bench], threads: int | None = None
+) -> tuple[KeyFigures, ...]:
+    """Return the key figures of several benches of one experiment, as `run_benches` gives them.
+
+    Nothing is recorded for anybody to look at, which takes most of the time of short runs.
+
+    Raises
+    ------
+    StepError
+        When the runs do not fit into this machine together.
+    RunError
+        When a run fails.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    recordings: list[dict[str, Any]] = [static_recordings(bench) for bench in benches]
+    warnings: list[list[str]] = [[] for _ in benches]
+    for k, case, run, trajectory in _runs(benches, None, "auto", threads):
+        recordings[k][case.label], said = rows_recorded(benches[k], case, run, trajectory)
+        has_several = len(benches[k].cases()) > 1
+        warnings[k] += [f"{case.label}: {text}" if has_several else text for text in said]
+    return tuple(
+        KeyFigures(bench.definition.judge(made, bench.chosen_options), tuple(said))
+        for bench, made, said in zip(benches, recordings, warnings, strict=True)
+    )
+
+
 def _recordings(
     benches: Sequence[Bench], progress: Progress | None, engine: str, threads: int | None
 ) -> list[dict[str, xr.Dataset]]:
     """Return the recordings of each bench by label."""
-    cases = [bench.cases() for bench in benches]
     recordings = [static_recordings(bench) for bench in benches]
+    for k, case, run, trajectory in _runs(benches, progress, engine, threads):
+        recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
+    return recordings
+
+
+def _runs(
+    benches: Sequence[Bench], progress: Progress | None, engine: str, threads: int | None
+) -> Iterator[tuple[int, Case, Run, Trajectory]]:
+    """Yield every run of every bench, by the bench's place, with its case and what it gave."""
+    cases = [bench.cases() for bench in benches]
     for number in range(max(len(each) for each in cases)):
         present = [k for k, each in enumerate(cases) if number < len(each)]
         runs = [run_of(benches[k], cases[k][number], number) for k in present]
         check_memory(runs[0], len(runs) * len(runs[0].model.Output._fields))
         label = cases[present[0]][number].label
         report = None if progress is None else partial(progress, label)
-        for k, run, trajectory in zip(
-            present, runs, _trajectories(runs, report, engine, threads), strict=True
-        ):
-            case = cases[k][number]
-            recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
-    return recordings
+        trajectories = _trajectories(runs, report, engine, threads)
+        for k, run, trajectory in zip(present, runs, trajectories, strict=True):
+            yield k, cases[k][number], run, trajectory
 
 
 def _trajectories(

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ import pandas as pd
 import xarray as xr
 
 from bywire.bench.energy_ledger import actuator_ledger, role_attributes
+from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
@@ -40,20 +42,23 @@ def record(
     xarray.Dataset
         Dimension ``time`` [s]; variables with ``units`` and ``long_name``.
     """
-    time = trajectory.time - settle
-    kept = time >= -keep - 1e-9
-    signals = signals_of(run.model.Output)
-    variables = {
-        name: ("time", trajectory[name][kept], _attributes(s))
-        for name, s in signals.items()
-        if name in trajectory.names
-    }
+    rows = rows_of(run, trajectory, settle, keep)
+    variables = {n: ("time", row.values, dict(row.attrs)) for n, row in rows.data_vars.items()}
     # As an index of pandas: from an array, xarray would load pint to see what it is.
-    axis = pd.Index(np.round(time[kept], 12), name="time")
+    axis = pd.Index(rows["time"].values, name="time")
     recording = xr.Dataset(variables, coords={"time": ("time", axis, {"units": "s"})})
     recording["time"].attrs["long_name"] = "time"
-    warnings = watch(recording, run, trajectory)
     recording.attrs = {
+        **_notes(run, trajectory),
+        "warnings": "; ".join(watch(recording, run, trajectory)),
+        **notes,
+    }
+    return recording
+
+
+def _notes(run: Run, trajectory: Trajectory) -> dict[str, Any]:
+    """Return what a recording says of its run, but for the warnings."""
+    return {
         "bywire_version": __version__,
         "model": run.model.name,
         "parameter_hash": parameter_hash(run.par),
@@ -63,10 +68,32 @@ def record(
         "status": trajectory.status,
         "unsettled_substeps": trajectory.unsettled,
         "repeated_substeps": trajectory.repeated,
-        "warnings": "; ".join(warnings),
-        **notes,
     }
-    return recording
+
+
+def rows_of(
+    run: Run,
+    trajectory: Trajectory,
+    settle: float,
+    keep: float,
+    notes: Callable[[], Mapping[str, Any]] = dict,
+) -> Rows:
+    """Return what a recording of a run holds, as plain arrays, without warnings; see `record`."""
+    time = trajectory.time - settle
+    begin = int(np.searchsorted(time, -keep - 1e-9))
+    attributes = _attributes_of(run.model.Output)
+    # A copy: each signal in one piece, and the settling not kept in memory.
+    kept = dict(zip(trajectory.names, trajectory.values[begin:].T.copy(), strict=True))
+    signals = {name: kept[name] for name in attributes if name in kept}
+    return Rows(
+        np.round(time[begin:], 12), signals, attributes,
+        lambda: {**_notes(run, trajectory), **notes()},
+    )  # fmt: skip
+
+
+@cache
+def _attributes_of(output: type) -> Mapping[str, Mapping[str, str]]:
+    return {name: _attributes(signal) for name, signal in signals_of(output).items()}
 
 
 def _attributes(signal: Signal) -> dict[str, str]:

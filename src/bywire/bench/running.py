@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -16,7 +16,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.extent import check_extent
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.recording import record
+from bywire.bench.recording import record, rows_of, watch
 from bywire.bench.requirements import judge, status_of
 from bywire.bench.result import Result
 from bywire.bench.step_error import (
@@ -136,13 +136,32 @@ def run_of(bench: Bench, case: Case, number: int) -> Run:
 
 def recording_of(bench: Bench, case: Case, computed: Run, trajectory: Trajectory) -> xr.Dataset:
     """Return the recording of one of a bench's cases, with what its experiment adds."""
-    notes = {**_bench_notes(bench), "case": case.label, "seed": bench.seed}
+    notes = _case_notes(bench, case)
     recording = record(computed, trajectory, case.settle, case.keep, notes)
+    return _finished(bench, case, recording)
+
+
+def _finished(bench: Bench, case: Case, recording: xr.Dataset) -> xr.Dataset:
+    """Return a recording with what its experiment adds."""
     definition = bench.definition
     if definition.beside is not None:
         recording = _with_inputs(recording, case)
     finish = definition.finish
     return recording if finish is None else finish(recording, bench.chosen_options)
+
+
+def _case_notes(bench: Bench, case: Case) -> dict[str, Any]:
+    return {**_bench_notes(bench), "case": case.label, "seed": bench.seed}
+
+
+def rows_recorded(
+    bench: Bench, case: Case, computed: Run, trajectory: Trajectory
+) -> tuple[xr.Dataset, list[str]]:
+    """Return what `recording_of` would hold, as plain arrays, and what the run warns of."""
+    rows = rows_of(computed, trajectory, case.settle, case.keep, partial(_case_notes, bench, case))
+    recording = cast(xr.Dataset, rows)  # it answers as one
+    warnings = watch(recording, computed, trajectory)
+    return _finished(bench, case, recording), warnings
 
 
 def judged(

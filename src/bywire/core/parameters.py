@@ -56,7 +56,7 @@ class ParameterSet(BaseModel):
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
-        return dict(_walk(self, ""))
+        return dict(self._values)
 
     def leaves(self) -> dict[str, float]:
         """Return the numbers by dotted name, tables spread as ``name.0``, ``name.1``, ..."""
@@ -67,11 +67,16 @@ class ParameterSet(BaseModel):
         return dict(self.numbers_and_choices[1])
 
     @cached_property
+    def _values(self) -> dict[str, Any]:
+        """Leaves and choices by dotted name, looked up once: a set never changes."""
+        return dict(_walk(self, ""))
+
+    @cached_property
     def numbers_and_choices(self) -> tuple[dict[str, float], dict[str, Any]]:
-        """Leaves and choices, looked up once: a set never changes."""
+        """Leaves and choices, tables spread."""
         numbers: dict[str, float] = {}
         choices: dict[str, Any] = {}
-        for name, value in _walk(self, ""):
+        for name, value in self._values.items():
             if isinstance(value, tuple):
                 numbers |= {f"{name}.{k}": float(v) for k, v in enumerate(value)}
                 choices[name] = len(value)

@@ -81,13 +81,8 @@ class Kind(Generic[T]):
         UnknownNameError
             With the nearest known names.
         """
-        guess = self.guess(name)
-        if guess is not None:
-            return guess
-        known = self.all()
-        if name not in known:
-            raise self.unknown(name)
-        return known[name]
+        thing: T = _found(self, name, tuple(brakes().values()))
+        return thing
 
     def unknown(self, name: str, *others: Kind[Any]) -> UnknownNameError:
         """Return the error of a name that nothing of this kind, nor of the others, answers to.
@@ -182,6 +177,24 @@ def _all(kind: Kind[Any]) -> tuple[tuple[Any, str], ...]:
         When two things of different places have one name.
     """
     return _gathered(kind, tuple(brakes().values()))
+
+
+@cache
+def _found(kind: Kind[Any], name: str, known: tuple[Brake, ...]) -> Any:
+    """Return the thing of a name among some brakes; studies ask for the same ones ten times a case.
+
+    Raises
+    ------
+    UnknownNameError
+        With the nearest known names.
+    """
+    guess = kind.guess(name)
+    if guess is not None:
+        return guess
+    every = kind.all()
+    if name not in every:
+        raise kind.unknown(name)
+    return every[name]
 
 
 @cache

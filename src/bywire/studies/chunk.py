@@ -7,15 +7,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import changed, run_benches
-from bywire.bench.result import Result
+from bywire.bench.ensemble import KeyFigures, changed, key_figures_of
 from bywire.core.errors import BywireError
 from bywire.studies.plan import CHUNK, StudyPlan
 
@@ -60,16 +58,15 @@ def computed_chunk(plan: StudyPlan, chunk: int, threads: int | None = None) -> C
             benches[k] = case_bench(plan, int(numbers[k]), given)
         except BywireError as error:
             failures[k] = str(error)
-    results: dict[int, Result] = {}
+    results: dict[int, KeyFigures] = {}
     for group in _alike(benches):
         results |= _results({k: benches[k] for k in group}, failures, threads)
-    units = plan.bench.definition.kpis_with(plan.bench.chosen_options)
+    names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
     columns: Columns = {CASE: numbers, **values}
-    for name in units:
-        column = np.full(count, math.nan)
-        for k, result in results.items():
-            column[k] = next((kpi.value for kpi in result.kpis if kpi.name == name), math.nan)
-        columns[name] = column
+    columns |= {name: np.full(count, math.nan) for name in names}
+    for k, result in results.items():
+        for kpi in result.kpis:
+            columns[kpi.name][k] = kpi.value
     columns[FAILURE] = np.array(failures, dtype=object)
     said = ["; ".join(results[k].warnings) if k in results else "" for k in range(count)]
     columns[WARNINGS] = np.array(said, dtype=object)
@@ -84,10 +81,8 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
     InputError
         When the values contradict each other, or the experiment does not run with them.
     """
-    bench = plan.bench
-    if plan.is_sampled:
-        bench = replace(bench, seed=bench.seed + number)
-    return changed(bench, values)
+    seed = plan.bench.seed + number if plan.is_sampled else None
+    return changed(plan.bench, values, seed)
 
 
 def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
@@ -101,11 +96,11 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
 
 def _results(
     benches: Mapping[int, Bench], failures: list[str], threads: int | None
-) -> dict[int, Result]:
+) -> dict[int, KeyFigures]:
     """Return the results of cases; where they fail together, each for itself says why."""
     cases: Sequence[int] = list(benches)
     try:
-        return dict(zip(cases, run_benches(list(benches.values()), threads=threads), strict=True))
+        return dict(zip(cases, key_figures_of(list(benches.values()), threads), strict=True))
     except BywireError as error:
         if len(cases) == 1:
             failures[cases[0]] = str(error)
