@@ -102,7 +102,9 @@ class StudyStore:
             ) from None
         except (ValueError, KeyError, TypeError):
             pass
-        raise FileError(f"{path} is damaged: run the study into another folder")
+        raise FileError(
+            f"{path} is damaged, or not of a study of many cases: run the study into another folder"
+        )
 
     def path(self, chunk: int) -> Path:
         """Return the file of a chunk."""

@@ -17,10 +17,11 @@ from bywire.core.parameters import choice_fields, choices_of, leaf_fields
 from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
 from bywire.studies.distribution import read_choice, read_distribution
+from bywire.studies.measured import varied_as_measured
 from bywire.studies.plan import Demand, StudyPlan, Varied, correlation_factor
 from bywire.studies.points import MOST, SAMPLED, SPANNED
 
-_KEYS = ("name", "bench", "vary", "correlation", "design", "set", "requirements")
+_KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
 _DESIGN = ("kind", "cases", "seed", "levels", "confidence")
 _WITH = re.compile(r"(.*\S)\s+with\s+(\S.*%)\s*", re.DOTALL)
 _OPTION = "options."
@@ -54,7 +55,7 @@ def _plan(content: Mapping[str, Any], file: Path) -> StudyPlan:
     for key in content:
         if key not in _KEYS:
             raise unknown_name("key of a study file", key, _KEYS)
-    for key in ("vary", "design", "set", "requirements"):
+    for key in ("vary", "measured", "design", "set", "requirements"):
         if not isinstance(content.get(key, {}), Mapping):
             raise ParameterError(f"[{key}] must be a section with key = value lines")
     name = content.get("name", file.stem)
@@ -64,8 +65,8 @@ def _plan(content: Mapping[str, Any], file: Path) -> StudyPlan:
     demands = tuple(_demands(bench, content.get("requirements", {})))
     limits = {demand.kpi: demand.limit for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or name)
-    varied = tuple(_varied(bench, content.get("vary", {})))
-    correlations = _correlations(content.get("correlation", []), varied)
+    varied, measured = _all_varied(bench, content, file.parent)
+    correlations = {**measured, **_correlations(content.get("correlation", []), varied, measured)}
     plan = StudyPlan(
         name, bench, varied, demands=demands, correlations=correlations,
         **_design(content.get("design", {})),
@@ -112,22 +113,33 @@ def _probability(kpi: str, text: str) -> float:
     return share
 
 
+def _all_varied(
+    bench: Bench, content: Mapping[str, Any], folder: Path
+) -> tuple[tuple[Varied, ...], Mapping[tuple[str, str], float]]:
+    """Return what varies, as the file says or as it was measured, and what goes together so."""
+    measured: tuple[Varied, ...] = ()
+    correlations: Mapping[tuple[str, str], float] = {}
+    if "measured" in content:
+        measured, correlations = varied_as_measured(bench, content["measured"], folder)
+    varied = (*measured, *_varied(bench, content.get("vary", {})))
+    if not varied:
+        raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
+    names = [name for each in varied for name in (each.name, *each.together)]
+    for name in names:
+        if names.count(name) > 1:
+            raise ParameterError(f"[vary] {name} varies twice: leave one of both out")
+    return varied, correlations
+
+
 def _varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
     entries = dict(_entries(section))
-    if not entries:
-        raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
     values = {
         **bench.par.flat(),
         **{f"{_OPTION}{k}": v for k, v in bench.chosen_options.flat().items()},
     }
     choices = choice_fields(type(bench.par))
-    taken: set[str] = set()
     for name, entry in entries.items():
         together = _together(name, entry, bench, values)
-        for each in (name, *together):
-            if each in taken:
-                raise ParameterError(f"[vary] {each} varies twice: leave one of both out")
-            taken.add(each)
         if name in choices:
             if together:
                 raise ParameterError(f"[vary] {name} is a choice: nothing varies by its ratio")
@@ -169,7 +181,7 @@ def _together(
 
 
 def _correlations(
-    entries: Any, varied: Sequence[Varied]
+    entries: Any, varied: Sequence[Varied], known: Mapping[tuple[str, str], float]
 ) -> dict[tuple[str, str], float]:
     if not isinstance(entries, list) or not all(isinstance(each, Mapping) for each in entries):
         raise ParameterError("write [[correlation]] with two brackets, once for each pair")
@@ -192,10 +204,10 @@ def _correlations(
                 "number between -1 and 1"
             )
         first, second = sorted(pair)
-        if (first, second) in pairs:
+        if (first, second) in {**known, **pairs}:
             raise ParameterError(f"[[correlation]] of {first} and {second} stands there twice")
         pairs[first, second] = float(value)
-    correlation_factor(list(names), pairs)
+    correlation_factor(list(names), {**known, **pairs})
     return pairs
 
 
