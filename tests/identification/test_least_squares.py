@@ -231,6 +231,26 @@ def test_too_few_measurements_are_refused() -> None:
         estimate(problem)
 
 
+@pytest.mark.parametrize("undefined", ["residual", "slope"])
+def test_trials_where_something_is_not_defined_do_not_end_a_search(undefined: str) -> None:
+    """As a key figure that a trial's run does not have, or one of the runs beside it."""
+    refused = []
+
+    def evaluate(x: Array) -> tuple[Array, Array]:
+        r = np.arctan(3.0 * (x - 1.4))
+        J = np.array([3.0 / (1.0 + 9.0 * (x - 1.4) ** 2)])
+        if x[0] > 1.5:
+            refused.append(x[0])
+            (r if undefined == "residual" else J)[...] = np.nan
+        return r, J
+
+    problem = Problem((Unknown("x", 1.0),), evaluate)
+    found = search(problem, [np.array([1.0]), np.array([2.0])])
+    assert found.failed == 1
+    assert len(refused) > 1
+    assert found.best.values[0] == pytest.approx(1.4, abs=1e-3)
+
+
 def test_several_starts_find_the_lower_of_two_minima() -> None:
     def evaluate(values: Array) -> tuple[Array, Array]:
         x = values[0]

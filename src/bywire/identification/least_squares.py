@@ -85,6 +85,8 @@ def solve(
         if key not in cache:
             cache.clear()
             r, J = with_priors(problem, z * scale)
+            if not (np.isfinite(r).all() and np.isfinite(J).all()):
+                raise SolverError("a residual, or how it changes, is not defined at these values")
             cache[key] = (r, J * scale)
         return cache[key]
 
