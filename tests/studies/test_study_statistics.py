@@ -46,6 +46,14 @@ def test_the_strongest_comes_first_and_what_does_nothing_is_not_distinct():
     assert (first.is_distinct, second.is_distinct, third.is_distinct) == (True, True, False)
 
 
+def test_what_follows_exactly_lies_within_its_interval():
+    x = np.arange(50.0)
+    for sign in (1.0, -1.0):
+        (found,) = influences(["x"], [x], sign * x**3, 0.95)
+        assert found.correlation == pytest.approx(sign)
+        assert found.low <= found.correlation <= found.high
+
+
 @pytest.mark.parametrize(
     ("met", "wanted", "outcome"),
     [(1000, 0.99, "met"), (1000, 0.999, "undecided"), (980, 0.999, "missed"),

@@ -56,11 +56,13 @@ def percent(value: float, of: Share) -> str:
 
 
 def spread_table(findings: Findings) -> Table:
-    """Return the key figures: the bench itself, percentiles and ends of the cases."""
-    heads = ["the bench itself", "5 %", "median", "95 %", "least", "largest"]
+    """Return the key figures: the bench itself, percentiles of drawn cases, and ends."""
+    is_sampled = findings.plan.is_sampled
+    heads = ["the bench itself", *["5 %", "median", "95 %"] * is_sampled, "least", "largest"]
     rows = []
     for each in findings.spreads:
-        values = [each.nominal, *(q.value for q in each.quantiles), each.least, each.largest]
+        middle = [q.value for q in each.quantiles] if is_sampled else []
+        values = [each.nominal, *middle, each.least, each.largest]
         name = clean(each.name)
         name += f" (not defined in {each.undefined})" if each.undefined else ""
         rows.append((Cell(name), *(Cell(amount(v, each.unit), value=v) for v in values)))

@@ -175,7 +175,8 @@ def influences(
         r = float(stats.spearmanr(x, figure[known]).statistic)
         z = math.atanh(min(max(r, -1.0 + 1e-12), 1.0 - 1e-12))
         width = reach * math.sqrt((1.0 + 0.5 * r * r) / (count - 3))
-        found.append(Influence(name, r, math.tanh(z - width), math.tanh(z + width)))
+        low, high = math.tanh(z - width), math.tanh(z + width)
+        found.append(Influence(name, r, min(low, r), max(high, r)))  # one of 1 lies at its end
     return sorted(found, key=lambda each: -abs(each.correlation))
 
 
