@@ -4,7 +4,8 @@ Of each kind as many cases, or those of ``--kind``, all in one process; ``--firs
 repeats one. Benches and commands are admissible but for a quarter, which has a defect; how many of
 the others gave a result is said. What is wrong is listed with kind and number, and the status is 1.
 Seconds each take commands that are killed or interrupted (``--kills 30 --interrupts 30``), and
-those that are compared with the same in a process of its own (``--alone 30``).
+those that are compared with the same in a process of its own (``--alone 30``), and studies whose
+processes are killed up to four times each (``--studies 10``).
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from fuzz import inputs, kills, sound
+from fuzz import inputs, kills, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
 
 
@@ -126,6 +127,7 @@ ONE_BY_ONE: dict[str, Callable[[Random, Path], str]] = {
     "kills": partial(kills.case, sign=signal.SIGKILL),
     "interrupts": partial(kills.case, sign=signal.SIGINT),
     "alone": alone,
+    "studies": study_kills.case,
 }
 
 
