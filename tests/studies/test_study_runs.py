@@ -107,7 +107,7 @@ def test_a_cluster_computes_the_same(study, tmp_path):
 def test_a_cluster_that_is_not_there_is_named(study, monkeypatch):
     pytest.importorskip("distributed")
     monkeypatch.setattr("bywire.studies.executor._SECONDS", 0.5)
-    with pytest.raises(RunError, match="no cluster answers at 'tcp://192.0.2.1:9'"):
+    with pytest.raises(RunError, match=r"no cluster answers at 'tcp://192\.0\.2\.1:9'"):
         next(iter(Cluster("tcp://192.0.2.1:9").computed(read_study(study()), [0])))
 
 
