@@ -155,6 +155,7 @@ class StudyRun(Answer):
         spreads = TableBlock(spread_table(findings), width=140)
         is_indexed = plan.sensitivity is not None
         drivers = sensitivity_tables(findings) if is_indexed else influence_tables(findings)
+        unindexed = [Listing(texts)] if (texts := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
         missing = self._failures()
         return Document(
@@ -163,7 +164,8 @@ class StudyRun(Answer):
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
                 Section("Key figures", [spreads]),
-                *([Section("What drives them", list(drivers))] if drivers else []),
+                *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
+                  else []),
                 Section("Figures", study_figures(findings, self._recordings)),
                 *([Section("Worst cases", [Listing(self._worst_texts())])] if judged else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),

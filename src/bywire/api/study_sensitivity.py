@@ -56,12 +56,19 @@ def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
         }
     if name not in shown_figures(findings):
         return {}
-    drivers = [asdict(each) for each in findings.sensitivity(name).drivers]
-    return {"sensitivity": {each.pop("quantity"): each for each in drivers}}
+    found = findings.sensitivity(name)
+    drivers = [asdict(each) for each in found.drivers]
+    data: dict[str, Any] = {"sensitivity": {each.pop("quantity"): each for each in drivers}}
+    return data | ({"sensitivity_missing": found.missing} if found.missing else {})
 
 
 def missing_indices(findings: Findings) -> list[str]:
-    """Return in a sentence which key figures have no indices, and why; nothing where all have."""
+    """Return in a sentence which key figures have no indices, and why; nothing where all have.
+
+    Nothing, too, of designs that are not made for indices.
+    """
+    if findings.plan.sensitivity is None:
+        return []
     reasons: dict[str, list[str]] = {}
     for name in shown_figures(findings):
         if reason := findings.sensitivity(name).missing:
