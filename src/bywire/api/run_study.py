@@ -14,7 +14,7 @@ from bywire.core.typing import silent
 from bywire.report.answer import use_case
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
-from bywire.studies.points import Spanned
+from bywire.studies.points import SPANNED
 from bywire.studies.running import complete
 from bywire.studies.store import StudyStore
 from bywire.studies.study_file import read_study
@@ -175,9 +175,11 @@ def _with_cases(plan: StudyPlan, cases: int | None) -> StudyPlan:
         return plan
     if cases < 1:
         raise ParameterError(f"cases = {cases} is not admissible: it must be >= 1")
-    if isinstance(plan.points, Spanned):
+    if plan.design in SPANNED:
         return plan  # it has those that it lists
-    return replace(plan, cases=cases)
+    asked = replace(plan, cases=cases)
+    asked.points  # noqa: B018 - refuses too few before anything runs
+    return asked
 
 
 def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:

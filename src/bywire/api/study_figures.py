@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bywire.api.study_sensitivity import sensitivity_figures
 from bywire.api.study_tables import shown_figures
 from bywire.bench.requirements import limit_of
 from bywire.report.document import Block, FigureBlock
@@ -49,9 +50,12 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             "What drives the key figures: rank correlations with their intervals. Pale: not "
             "distinct from none.", "influences",
         ))  # fmt: skip
+    if findings.plan.sensitivity is not None:
+        blocks += sensitivity_figures(findings)
     for judgment in findings.judgments:
         name = judgment.demand.kpi
-        if findings.influences(name):
+        # Trajectories stand on a few levels: their points would be stripes.
+        if findings.plan.design != "morris" and findings.drivers(name):
             blocks.append(FigureBlock(
                 partial(_scatter, findings, name),
                 f"{name.replace('_', ' ')} over what drives it most; crosses miss the limit.",
@@ -104,8 +108,8 @@ def _scatter(findings: Findings, name: str) -> Figure:
     units = {v.name: v.unit for v in findings.plan.varied}
     judgment = next(j for j in findings.judgments if j.demand.kpi == name)
     drivers = [
-        Axis(i.quantity, units[i.quantity], np.asarray(findings.cases[i.quantity], dtype=float))
-        for i in findings.influences(name)[:_DRIVERS]
+        Axis(each, units[each], np.asarray(findings.cases[each], dtype=float))
+        for each in findings.drivers(name)[:_DRIVERS]
     ]
     own = Axis(name, findings.units[name], findings.figure(name))
     limit = _limit(findings, name)
@@ -128,7 +132,7 @@ def _parallel(findings: Findings) -> Figure:
 
     units = {v.name: v.unit for v in findings.plan.varied if v.unit}
     figures = [each.demand.kpi for each in findings.judgments]
-    ranked = [i.quantity for name in figures for i in findings.influences(name)[:_DRIVERS]]
+    ranked = [each for name in figures for each in findings.drivers(name)[:_DRIVERS]]
     names = list(dict.fromkeys([*ranked, *units]))[: max(_AXES - len(figures), 2)]
     axes = [Axis(n, units[n], np.asarray(findings.cases[n], dtype=float)) for n in names]
     axes += [Axis(n, findings.units[n], findings.figure(n)) for n in figures]

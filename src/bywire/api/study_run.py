@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.api.study_figures import study_figures
+from bywire.api.study_sensitivity import drivers_data, missing_indices, sensitivity_tables
 from bywire.api.study_tables import (
     demand_table,
     influence_tables,
@@ -114,7 +115,13 @@ class StudyRun(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What the intervals stand for."""
+        """What the intervals stand for, and which key figures have no indices."""
+        if self.plan.sensitivity is not None:
+            return [
+                f"{self.plan.design}: cases share values, so that shares of them are no "
+                "probabilities",
+                *(missing_indices(self.findings) if len(self.cases) else []),
+            ]
         if not self.plan.is_sampled:
             return [f"{self.plan.design}: what may happen, and not how often"]
         if self.plan.design == "monte-carlo":
@@ -146,7 +153,9 @@ class StudyRun(Answer):
                           plan.bench.par)  # fmt: skip
         demands = TableBlock(demand_table(findings), width=120)
         spreads = TableBlock(spread_table(findings), width=140)
-        drivers = influence_tables(findings)
+        is_indexed = plan.sensitivity is not None
+        drivers = sensitivity_tables(findings) if is_indexed else influence_tables(findings)
+        unindexed = [Listing(texts)] if (texts := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
         missing = self._failures()
         return Document(
@@ -155,7 +164,8 @@ class StudyRun(Answer):
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
                 Section("Key figures", [spreads]),
-                *([Section("What drives them", list(drivers))] if drivers else []),
+                *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
+                  else []),
                 Section("Figures", study_figures(findings, self._recordings)),
                 *([Section("Worst cases", [Listing(self._worst_texts())])] if judged else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
@@ -293,10 +303,7 @@ class StudyRun(Answer):
                         {"probability": q.probability, "value": q.value, "low": q.low,
                          "high": q.high} for q in each.quantiles
                     ],
-                    "influences": {
-                        i.quantity: {"correlation": i.correlation, "low": i.low, "high": i.high}
-                        for i in findings.influences(each.name)
-                    },
+                    **drivers_data(findings, each.name),
                 }
                 for each in (findings.spreads if len(self.cases) else ())
             },

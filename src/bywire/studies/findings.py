@@ -16,6 +16,7 @@ from bywire.bench.requirements import is_met, limit_of
 from bywire.core.typing import Array
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
 from bywire.studies.plan import Demand, StudyPlan
+from bywire.studies.sensitivity import Sensitivity, sensitivity
 from bywire.studies.statistics import (
     Influence,
     Outcome,
@@ -142,6 +143,23 @@ class Findings:
         columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
         return influences(varied, columns, self.figure(name), self.plan.confidence)
 
+    def sensitivity(self, name: str) -> Sensitivity:
+        """Return the indices of a key figure, in a study whose design is made for them."""
+        known, design = self._sensitivities, self.plan.sensitivity
+        if name not in known:
+            assert design is not None
+            names = [v.name for v in self.plan.varied]
+            known[name] = sensitivity(design, names, self.figure(name), self.plan.confidence)
+        return known[name]
+
+    def drivers(self, name: str) -> Sequence[str]:
+        """Return the quantities that a key figure goes with, the strongest first; choices apart."""
+        if self.plan.sensitivity is None:
+            return [each.quantity for each in self.influences(name)]
+        numbers = {v.name for v in self.plan.varied if v.unit}
+        ranked = [each.quantity for each in self.sensitivity(name).drivers]
+        return [each for each in ranked if each in numbers]
+
     @property
     def failures(self) -> Mapping[int, str]:
         """Row -> why the case has no result."""
@@ -165,6 +183,11 @@ class Findings:
         """Return what varied in a case [SI]."""
         names = [name for v in self.plan.varied for name in (v.name, *v.together)]
         return {name: self.cases[name].iloc[row] for name in names}
+
+    @cached_property
+    def _sensitivities(self) -> dict[str, Sensitivity]:
+        """Indices by key figure, as they were asked for: those of many cases take a second."""
+        return {}
 
     def _judgment(self, demand: Demand) -> Judgment:
         values = self.figure(demand.kpi)

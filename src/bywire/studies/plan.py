@@ -21,6 +21,7 @@ from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.studies.distribution import Distribution
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
+from bywire.studies.sensitivity_design import SENSITIVITY, SensitivityDesign
 
 CHUNK = 64
 """cases of a chunk, the piece of work that is computed, kept and counted as a whole"""
@@ -87,9 +88,9 @@ class StudyPlan:
     varied
         What varies.
     design
-        One of `points.SAMPLED` or `points.SPANNED`.
+        One of `points.SAMPLED`, `points.SPANNED` or `sensitivity_design.SENSITIVITY`.
     cases
-        Cases asked for; of listed points, all there are.
+        Cases asked for; of indices, at most so many; of other listed points, all there are.
     seed
         Of the points.
     demands
@@ -119,9 +120,18 @@ class StudyPlan:
         return self.design in SAMPLED
 
     @cached_property
+    def sensitivity(self) -> SensitivityDesign | None:
+        """The design of its indices of sensitivity; None of a study without them."""
+        if self.design not in SENSITIVITY:
+            return None
+        return SensitivityDesign(self.design, len(self.varied), self.cases, self.seed)
+
+    @cached_property
     def points(self) -> Sampled | Spanned:
         """Where it is computed."""
         each = [v.distribution for v in self.varied]
+        if self.sensitivity is not None:
+            return Spanned(self.sensitivity.columns(each))
         if self.is_sampled:
             return Sampled(self.design, self.seed, each, self._factor)
         return spanned(self.design, each, [v.nominal for v in self.varied], self.levels)
@@ -183,6 +193,11 @@ class StudyPlan:
             "design": self.design, "seed": self.seed, "chunk": CHUNK,
             "levels": 0 if self.is_sampled else self.levels,
         }  # fmt: skip
+        if self.sensitivity is not None:
+            # Indices are of all groups together. The points themselves, for a library draws them.
+            said["groups"] = self.sensitivity.base
+            points = self.sensitivity.probabilities.tobytes()
+            said["points"] = hashlib.sha256(points).hexdigest()
         text = json.dumps(said, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 

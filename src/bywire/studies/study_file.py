@@ -16,13 +16,16 @@ from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import choice_fields, choices_of, leaf_fields
 from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
+from bywire.studies.design_rules import require_agreement
 from bywire.studies.distribution import read_choice, read_distribution
 from bywire.studies.measured import varied_as_measured
 from bywire.studies.plan import Demand, StudyPlan, Varied, correlation_factor
 from bywire.studies.points import MOST, SAMPLED, SPANNED
+from bywire.studies.sensitivity_design import LEVELS, SENSITIVITY
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
 _DESIGN = ("kind", "cases", "seed", "levels", "confidence")
+_KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY)
 _WITH = re.compile(r"(.*\S)\s+with\s+(\S.*%)\s*", re.DOTALL)
 _OPTION = "options."
 
@@ -71,7 +74,7 @@ def _plan(content: Mapping[str, Any], file: Path) -> StudyPlan:
         name, bench, varied, demands=demands, correlations=correlations,
         **_design(content.get("design", {})),
     )  # fmt: skip
-    _require_agreement(plan)
+    require_agreement(plan)
     return plan
 
 
@@ -217,9 +220,15 @@ def _design(section: Mapping[str, Any]) -> dict[str, Any]:
             raise unknown_name("key of [design]", key, _DESIGN)
     design: dict[str, Any] = {}
     if "kind" in section:
-        if section["kind"] not in (*SAMPLED, *SPANNED):
-            raise unknown_name("[design] kind", str(section["kind"]), (*SAMPLED, *SPANNED))
+        if section["kind"] not in _KINDS:
+            raise unknown_name("[design] kind", str(section["kind"]), _KINDS)
         design["design"] = section["kind"]
+        if "levels" in section and section["kind"] in SENSITIVITY:
+            raise ParameterError(
+                f"[design] levels: {section['kind']!r} has none to choose"
+                + (f", it steps on {LEVELS}" if section["kind"] == "morris" else "")
+                + ": leave them out"
+            )
     for key, low, high in (("cases", 1, MOST), ("seed", 0, 2**63 - 1), ("levels", 2, 1000)):
         if key in section:
             design[key] = _whole(key, section[key], low, high)
@@ -240,22 +249,3 @@ def _whole(key: str, value: Any, low: int, high: int) -> int:
             f"[design] {key} = {quoted(value)}: a whole number from {low} to {high} is wanted"
         )
     return value
-
-
-def _require_agreement(plan: StudyPlan) -> None:
-    """Refuse probabilities and correlations of designs that draw nothing."""
-    if plan.is_sampled:
-        return
-    if plan.correlations:
-        raise ParameterError(
-            f"[[correlation]]: {plan.design!r} goes to the ends of each quantity for itself: leave "
-            f"it out, or take {', '.join(map(repr, SAMPLED))}"
-        )
-    for demand in plan.demands:
-        if demand.probability is not None:
-            raise ParameterError(
-                f"requirement {demand.text!r}: {plan.design!r} draws nothing, so that its cases "
-                f"have no probability: take {', '.join(map(repr, SAMPLED))}, or leave 'with ...' "
-                "out: every case then has to meet the limit"
-            )
-    plan.points  # noqa: B018 - refuses what is too large

@@ -1,0 +1,109 @@
+"""What drives the key figures of a study by indices: tables, figure, JSON, and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from bywire.api.study_tables import shown_figures
+from bywire.report.document import FigureBlock, TableBlock
+from bywire.report.tables import Cell, Column, Table
+from bywire.report.wording import amount, clean
+from bywire.studies.findings import Findings
+from bywire.studies.sensitivity import ElementaryEffects, Estimate, VarianceShares
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_CAPTIONS = {
+    "sobol-indices": "Shares of the variance of each key figure that a quantity makes, alone and "
+    "with all others, with their intervals. Pale: not distinct from none.",
+    "morris": "Mean size (with its interval) and standard deviation of the elementary effects of "
+    "each quantity. Pale: not distinct from none.",
+}
+
+
+def sensitivity_tables(findings: Findings) -> list[TableBlock]:
+    """Return the indices of each key figure of a requirement; of all where nothing is required."""
+    return [
+        TableBlock(_table(found, findings.units[name]), f"What drives {name}.",
+                   title=f"what drives {name}")
+        for name in shown_figures(findings) if (found := findings.sensitivity(name).drivers)
+    ]  # fmt: skip
+
+
+def sensitivity_figures(findings: Findings) -> list[FigureBlock]:
+    """Return the figure of all indices; none where there are none."""
+    if not any(findings.sensitivity(name).drivers for name in shown_figures(findings)):
+        return []
+    caption = _CAPTIONS[findings.plan.design]
+    return [FigureBlock(partial(_bars, findings), caption, "sensitivity")]
+
+
+def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
+    """Return what drives a key figure for JSON: rank correlations, or indices of those shown.
+
+    Effects are in the unit of the figure.
+    """
+    if findings.plan.sensitivity is None:
+        return {
+            "influences": {
+                i.quantity: {"correlation": i.correlation, "low": i.low, "high": i.high}
+                for i in findings.influences(name)
+            }
+        }
+    if name not in shown_figures(findings):
+        return {}
+    found = findings.sensitivity(name)
+    drivers = [asdict(each) for each in found.drivers]
+    data: dict[str, Any] = {"sensitivity": {each.pop("quantity"): each for each in drivers}}
+    return data | ({"sensitivity_missing": found.missing} if found.missing else {})
+
+
+def missing_indices(findings: Findings) -> list[str]:
+    """Return in a sentence which key figures have no indices, and why; nothing where all have.
+
+    Nothing, too, of designs that are not made for indices.
+    """
+    if findings.plan.sensitivity is None:
+        return []
+    reasons: dict[str, list[str]] = {}
+    for name in shown_figures(findings):
+        if reason := findings.sensitivity(name).missing:
+            reasons.setdefault(reason, []).append(name)
+    said = [f"of {', '.join(names)}: {reason}" for reason, names in reasons.items()]
+    return [f"no indices {'; '.join(said)}"] if said else []
+
+
+def _table(
+    drivers: Sequence[VarianceShares] | Sequence[ElementaryEffects], unit: str
+) -> Table:
+    columns, rows = [Column("quantity")], []
+    for each in drivers:
+        if isinstance(each, VarianceShares):
+            heads = ["first order", "interval", "total", "interval"]
+            cells = [*_cells(each.first), *_cells(each.total)]
+        else:
+            heads = ["mu*", "interval", "sigma"]
+            cells = [*_cells(each.mu_star, unit), Cell(amount(each.sigma, unit, 3))]
+        rows.append((Cell(clean(each.quantity)), *cells))
+    columns += [Column(head, numeric=head != "interval") for head in heads]
+    return Table(tuple(columns), tuple(rows))
+
+
+def _cells(of: Estimate, unit: str = "") -> list[Cell]:
+    """Return estimate and interval: of shares where there is no unit."""
+    value, low, high = (
+        amount(each, unit, 3) if unit else f"{round(each, 2) + 0.0:.2f}"  # no -0.00
+        for each in (of.value, of.low, of.high)
+    )
+    return [Cell(value, value=of.value), Cell(f"{low} to {high}")]
+
+
+def _bars(findings: Findings) -> Figure:
+    from bywire.report.study.sensitivity_bars import sensitivity_bars
+
+    each = {name: findings.sensitivity(name).drivers for name in shown_figures(findings)}
+    return sensitivity_bars({n: found for n, found in each.items() if found}, findings.units)

@@ -1,0 +1,41 @@
+"""What the design of a study admits: probabilities, correlations, and how many cases."""
+
+from __future__ import annotations
+
+from bywire.core.errors import ParameterError
+from bywire.studies.plan import StudyPlan
+from bywire.studies.points import SAMPLED
+from bywire.studies.sensitivity_design import SENSITIVITY
+
+_DEPENDENT = "has cases that share values and are not independent"
+
+
+def require_agreement(plan: StudyPlan) -> None:
+    """Refuse probabilities and correlations of designs without independent cases.
+
+    Raises
+    ------
+    ParameterError
+        For these, and for a number of cases that the design does not admit.
+    """
+    if plan.is_sampled:
+        return
+    is_indexed = plan.design in SENSITIVITY
+    others = ", ".join(map(repr, SAMPLED))
+    if plan.correlations:
+        why = (
+            "exchanges each quantity for itself, so that none may depend on another" if is_indexed
+            else "goes to the ends of each quantity for itself"
+        )  # fmt: skip
+        raise ParameterError(
+            f"[[correlation]]: {plan.design!r} {why}: leave it out, or take {others}"
+        )
+    for demand in plan.demands:
+        if demand.probability is not None:
+            why = _DEPENDENT if plan.design == "sobol-indices" else "draws nothing"
+            raise ParameterError(
+                f"requirement {demand.text!r}: {plan.design!r} {why}, so that its cases "
+                f"have no probability: take {others}, or leave 'with ...' out: every case then has "
+                "to meet the limit"
+            )
+    plan.points  # noqa: B018 - refuses what is too large, or too small for indices
