@@ -68,7 +68,7 @@ def _killed(rng: Random, path: Path, out: Path, workers: str) -> str:
             _, said = process.communicate(timeout=_LONGEST)
         except subprocess.TimeoutExpired:
             process.kill()
-            return "it does not end after a worker was killed"
+            return "its processes do not end after one was killed"
     give_up = time.monotonic() + _LONGEST
     while any(Path(f"/proc/{each}").exists() for each in below):
         if time.monotonic() > give_up:
@@ -80,11 +80,13 @@ def _killed(rng: Random, path: Path, out: Path, workers: str) -> str:
 
 
 def _children(pid: int) -> list[int]:
-    """Return the processes that a process has started (Linux)."""
+    """Return the workers that a process has started (Linux)."""
     try:
-        return [int(x) for x in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
+        below = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        lines = {int(x): Path(f"/proc/{x}/cmdline").read_bytes() for x in below}
     except OSError:  # it has ended
         return []
+    return [each for each, line in lines.items() if b"resource_tracker" not in line]
 
 
 @cache

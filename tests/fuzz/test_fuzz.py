@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import os
+import sys
+from itertools import islice
 from pathlib import Path
 from random import Random
 
 import pytest
 
 from bywire.data import limited_source
-from fuzz import inputs, kills
+from fuzz import inputs, kills, study_kills
 from fuzz.__main__ import KINDS, tried
 from fuzz.judge import judged
 
@@ -57,6 +59,13 @@ def test_what_went_wrong_once(case: str) -> None:
 @pytest.mark.skipif(os.name != "posix", reason="signals")
 def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Path) -> None:
     assert kills.case(Random(KILLED), tmp_path) == ""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="signals, and the list of a process's children")
+def test_a_study_whose_client_is_killed_leaves_no_worker_and_goes_on(tmp_path: Path) -> None:
+    """Its workers would wait for jobs forever."""
+    _, rng = next(islice(inputs.numbered(3, "studies"), 1, 2))
+    assert study_kills.case(rng, tmp_path) == ""
 
 
 def test_a_case_comes_again() -> None:

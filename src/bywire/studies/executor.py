@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import os
 import signal
+import threading
 from collections.abc import Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from typing import Any, Protocol
 
 from bywire.core.brake import load_system, loaded_files
@@ -62,10 +63,10 @@ class Pool:
     def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
         """Yield each chunk; see `Executor`."""
         pool = ProcessPoolExecutor(
-            self.workers, get_context("spawn"), initializer=_begin, initargs=(loaded_files(),)
+            self.workers, get_context("spawn"), initializer=_begin, initargs=(loaded_files(), plan)
         )
         try:
-            yield from _as_completed(pool, plan, chunks, _AHEAD * self.workers)
+            yield from _as_completed(pool, chunks, _AHEAD * self.workers)
         except BrokenProcessPool:
             raise RunError(
                 "a process of the study was killed, most likely for want of memory: resume it, "
@@ -126,10 +127,28 @@ def executor_of(workers: int | None, cluster: str, chunks: int) -> Executor:
     return Pool(count) if count > 1 and is_worth else InProcess()
 
 
-def _begin(files: tuple[str, ...]) -> None:
-    """Prepare a process of a pool: Ctrl-C is for the one that asked."""
+# What a process of a pool computes: given once, and not with every job.
+_given: list[StudyPlan] = []
+
+
+def _begin(files: tuple[str, ...], plan: StudyPlan) -> None:
+    """Prepare a process of a pool: Ctrl-C is for the one that asked, with which it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     _load(files)
+    _given[:] = [plan]
+
+
+def _end_with_parent() -> None:
+    """End this process when the one that asked is killed: a pool's would wait for jobs forever."""
+    parent = parent_process()
+    if parent is not None:
+        parent.join()
+        os._exit(1)
+
+
+def _computed(chunk: int) -> tuple[int, Columns]:
+    return _single(_given[0], chunk)
 
 
 def _load(files: tuple[str, ...]) -> None:
@@ -143,14 +162,14 @@ def _single(plan: StudyPlan, chunk: int) -> tuple[int, Columns]:
 
 
 def _as_completed(
-    pool: ProcessPoolExecutor, plan: StudyPlan, chunks: Iterable[int], ahead: int
+    pool: ProcessPoolExecutor, chunks: Iterable[int], ahead: int
 ) -> Iterator[tuple[int, Columns]]:
     """Yield what a pool has finished, with few jobs in flight."""
     left = iter(chunks)
     running: set[Future[Any]] = set()
     while True:
         for chunk in left:
-            running.add(pool.submit(_single, plan, chunk))
+            running.add(pool.submit(_computed, chunk))
             if len(running) >= ahead:
                 break
         if not running:
