@@ -35,11 +35,11 @@ _MOST = 4  # kills of a case
 _LONGEST = 120.0  # s that a command may take to end
 
 
-def case(rng: Random, folder: Path) -> str:
+def case(rng: Random, folder: Path, kills: int = 0) -> str:
     """Kill a study again and again, finish it, and say what is wrong with what it gave."""
     path, out = folder / "study.toml", folder / "out"
     path.write_text(_STUDY, encoding="utf-8")
-    for _ in range(rng.randint(1, _MOST)):
+    for _ in range(kills or rng.randint(1, _MOST)):
         workers = rng.choice(("1", "2"))
         wrong = _killed(rng, path, out, workers)
         if wrong:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from itertools import islice
 from pathlib import Path
 from random import Random
 
@@ -18,6 +17,8 @@ from fuzz.judge import judged
 SEED = 20261122
 KILLED = 1261
 """seed of a case in which a braking that replaces a characteristic is interrupted after 1.3 s"""
+KILLED_STUDY = 38
+"""seed of a case in which the client of two workers is killed after 3 s"""
 SECONDS = 2.0
 """of a processor, for each kind"""
 
@@ -64,8 +65,7 @@ def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Pa
 @pytest.mark.skipif(sys.platform != "linux", reason="signals, and the list of a process's children")
 def test_a_study_whose_client_is_killed_leaves_no_worker_and_goes_on(tmp_path: Path) -> None:
     """Its workers would wait for jobs forever."""
-    _, rng = next(islice(inputs.numbered(3, "studies"), 1, 2))
-    assert study_kills.case(rng, tmp_path) == ""
+    assert study_kills.case(Random(KILLED_STUDY), tmp_path, kills=1) == ""
 
 
 def test_a_case_comes_again() -> None:
