@@ -1,0 +1,103 @@
+"""Studies of many cases: what a million hard brakings take, and how much of it is simulation."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+from bywire.bench.ensemble import changed
+from bywire.bench.running import run_of
+from bywire.benchmark.commands import environment
+from bywire.benchmark.result import Result, at_most
+from bywire.benchmark.suite import Part
+from bywire.simulation.run_group import simulate_group
+from bywire.studies.chunk import computed_chunk
+from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.study_file import read_study
+
+_STUDY = """
+bench = "hard-braking"
+[vary]
+"motor.R_m" = "+-5 %"
+"motor.K_e" = "+-5 %"
+"seal.T_pr" = { kind = "log-normal", sd = "20 %" }
+[requirements]
+overshoot = "<= 15 % with 90 %"
+"""
+_CHUNKS = 4
+_ROUNDS = 3
+_CASES = 1024  # of the study whose memory is measured
+# The kernel's own mark of this program, its workers apart.
+_MEMORY = """
+import sys
+from bywire.cli.main import main
+try:
+    main()
+except SystemExit:
+    pass
+with open("/proc/self/status") as status:
+    print(next(line.split()[1] for line in status if line.startswith("VmHWM")), file=sys.stderr)
+"""
+
+
+def studies() -> list[Result]:
+    """Measure the cases of a study on one core, and the memory of its command."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "study.toml"
+        path.write_text(_STUDY, encoding="utf-8")
+        plan = read_study(path)
+        computed_chunk(plan, 0, threads=1)  # the kernel is built
+        whole = min(_seconds(plan) for _ in range(_ROUNDS)) / (_CHUNKS * CHUNK)
+        simulated = min(_simulated(plan) for _ in range(_ROUNDS)) / CHUNK
+        cores = os.cpu_count() or 1
+        results = [
+            at_most(
+                "study.million_seconds", 1e6 * whole / cores, 600.0, "s",
+                f"a million stops with all key figures on {cores} cores, {1e3 * whole:.3g} ms of a "
+                f"core each, measured over {_CHUNKS * CHUNK}",
+            ),
+            at_most(
+                "study.kpi_share", whole / simulated - 1.0, 0.05, "1",
+                "what set-up, key figures and warnings take beside the simulation",
+            ),
+        ]  # fmt: skip
+        if Path("/proc/self/status").exists():
+            results.append(_memory(path, Path(folder) / "out"))
+    return results
+
+
+def _seconds(plan: StudyPlan) -> float:
+    begin = time.process_time()
+    for chunk in range(_CHUNKS):
+        computed_chunk(plan, chunk, threads=1)
+    return time.process_time() - begin
+
+
+def _simulated(plan: StudyPlan) -> float:
+    """Return what the runs of a chunk take, set up beforehand and looked at by nobody."""
+    values = plan.values(0)
+    runs = []
+    for k in range(CHUNK):
+        bench = changed(plan.bench, {name: column[k].item() for name, column in values.items()})
+        runs.append(run_of(bench, bench.cases()[0], 0))
+    begin = time.process_time()
+    simulate_group(runs, ("p_mc",), threads=1)
+    return time.process_time() - begin
+
+
+def _memory(study: Path, out: Path) -> Result:
+    line = [sys.executable, "-c", _MEMORY, "study", "run", str(study), "--out", str(out),
+            "--cases", str(_CASES), "--workers", "1", "--json"]  # fmt: skip
+    done = subprocess.run(
+        line, env=environment(), stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True,
+        check=True,
+    )  # fmt: skip
+    peak = float(done.stderr.split()[-1]) * 1024.0 / 1e6
+    return at_most("study.memory", peak, 500.0, "MB", f"peak of a study of {_CASES} cases")
+
+
+PART = Part("studies", studies)
