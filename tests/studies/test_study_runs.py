@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import math
+import signal
+import sys
+from multiprocessing import active_children
 
 import numpy as np
 import pandas as pd
@@ -82,6 +85,19 @@ def test_who_computes_changes_no_bit(study, tmp_path, monkeypatch):
             store.write(chunk, columns, {})
         frames.append(store.read(3))
     pd.testing.assert_frame_equal(*frames, check_exact=True)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
+def test_workers_end_at_once_when_nobody_asks_any_more(study):
+    """As after Ctrl-C: what they are at may take long."""
+    computing = Pool(2).computed(read_study(study()), range(100))
+    next(computing)
+    workers = active_children()
+    assert workers
+    computing.close()
+    for each in workers:
+        each.join(10.0)
+    assert {each.exitcode for each in workers} == {-signal.SIGTERM}
 
 
 def test_a_cluster_computes_the_same(study, tmp_path):

@@ -10,7 +10,7 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from functools import partial
-from multiprocessing import get_context, parent_process
+from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Protocol
 
 from bywire.core.brake import load_system, loaded_files
@@ -62,6 +62,7 @@ class Pool:
 
     def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
         """Yield each chunk; see `Executor`."""
+        others = active_children()
         pool = ProcessPoolExecutor(
             self.workers, get_context("spawn"), initializer=_begin, initargs=(loaded_files(), plan)
         )
@@ -72,10 +73,10 @@ class Pool:
                 "a process of the study was killed, most likely for want of memory: resume it, "
                 "with fewer --workers"
             ) from None
-        finally:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for process in list((pool._processes or {}).values()):
+        finally:  # at once, also after Ctrl-C: nobody waits for what they are at
+            for process in set(active_children()).difference(others):
                 process.terminate()
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
 class Cluster:
