@@ -14,7 +14,7 @@ from bywire.brakes.motorcycle.paper.dardanelli2010_measured import (
     _best,
     reproduce,
 )
-from bywire.brakes.motorcycle.paper.measured.estimation import LOSS, estimated, problem
+from bywire.brakes.motorcycle.paper.measured.estimation import LOSS, _slopes, estimated, problem
 from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, allowances
 from bywire.brakes.motorcycle.paper.measured.unknowns import FREE, HELD, TIED, brake, prior
 from bywire.brakes.motorcycle.paper.runs import parameters
@@ -141,6 +141,22 @@ def test_a_trial_step_to_no_brake_is_one_that_cannot_be_computed():
     soft = [1e5 if u.name == "caliper.K_pd" else u.start for u in misfit.unknowns]
     with pytest.raises(SolverError, match="stiffer pads"):
         misfit.evaluate(np.array(soft))
+
+
+def test_a_side_that_lacks_a_figure_leaves_its_slope_to_the_other():
+    """Of 3 x + y a side is missing, then both."""
+    x, ends = np.array([1.0, 2.0]), (np.array([0.9, 1.8]), np.array([1.1, 2.2]))
+
+    def residual(values):
+        return np.array([3.0 * values[0] + values[1], values[0] - values[1]])
+
+    lower = np.array([residual([0.9, 2.0]), residual([1.0, 1.8])])
+    upper = np.array([residual([1.1, 2.0]), residual([1.0, 2.2])])
+    lower[0, 0] = upper[1, 0] = np.nan
+    slopes = _slopes(x, residual(x), lower, upper, ends)
+    assert slopes == pytest.approx(np.array([[3.0, 1.0], [1.0, -1.0]]))
+    upper[0, 0] = np.nan
+    assert np.isnan(_slopes(x, residual(x), lower, upper, ends)[0, 0])
 
 
 @pytest.mark.trust

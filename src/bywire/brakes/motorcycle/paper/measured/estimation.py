@@ -83,19 +83,37 @@ def problem(free: tuple[Unknown, ...] | None = None, step: float = _STEP) -> Pro
 
     def fresh(values: Array) -> tuple[Array, Array]:
         try:
-            r, lower, upper, width = _around(free, values, step)
+            r, lower, upper, ends = _around(free, values, step)
         except ParameterError as error:  # a trial step too far: a shorter one follows
             raise SolverError(str(error)) from error
-        return r, np.asarray(((upper - lower) / width[:, None]).T)
+        return r, _slopes(values, r, lower, upper, ends)
 
     parts = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
     return Problem(free, evaluate, parts=parts, resolved=_RESOLVED)
 
 
+def _slopes(
+    values: Array, r: Array, lower: Array, upper: Array, ends: tuple[Array, Array]
+) -> Array:
+    """Return how residuals change, shape (statements, unknowns): by both sides.
+
+    Where one side does not have what a statement is of, such as a loop of a piston that sticks, the
+    other side tells alone.
+    """
+    sides = []
+    for side, end in zip((lower, upper), ends, strict=True):
+        known = np.isfinite(side)
+        at = np.where(known, end[:, None], values[:, None])
+        sides.append((np.where(known, side, r), at))
+    (below, low), (above, high) = sides
+    with np.errstate(invalid="ignore"):  # where no side does: it is not defined
+        return np.asarray(((above - below) / (high - low)).T)
+
+
 def _around(
     free: Sequence[Unknown], values: Array, step: float
-) -> tuple[Array, Array, Array, Array]:
-    """Return the residuals, those below and above in each unknown, and how far these are apart."""
+) -> tuple[Array, Array, Array, tuple[Array, Array]]:
+    """Return the residuals, those below and above in each unknown, and its values there."""
     size = step * np.array([u.scale for u in free])
     low, high = (np.array([getattr(u, end) for u in free]) for end in ("low", "high"))
     ends = np.maximum(values - size, low), np.minimum(values + size, high)
@@ -104,7 +122,7 @@ def _around(
         rows += list(np.where(np.eye(values.size, dtype=bool), end, values))
     r = residuals([brake(_named(free, row)) for row in rows])
     lower, upper = r[1 : 1 + values.size], r[1 + values.size :]
-    return r[0], lower, upper, ends[1] - ends[0]
+    return r[0], lower, upper, ends
 
 
 def _named(free: Sequence[Unknown], values: Array) -> Mapping[str, float]:
@@ -123,8 +141,8 @@ def appraised(par: Par) -> Appraisal:
     """
     values = np.array([par.leaves()[u.name] for u in unknowns()])
     free = moved(_sized(values), values)
-    r, lower, upper, width = _around(free, values, _STEP)
-    J = np.asarray(((upper - lower) / width[:, None]).T)
+    r, lower, upper, ends = _around(free, values, _STEP)
+    J = _slopes(values, r, lower, upper, ends)
     parts = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
     best = estimate(Problem(free, lambda _: (r, J), parts=parts), LOSS, values, search=False)
     told = [[u.name for u in free].index(name) for name in best.names]
@@ -170,7 +188,7 @@ class Appraisal:
         At a minimum there is none but the roughness that stick and slip leave.
         """
         misfits = [_misfit(r) for side in self.beside for r in side]
-        return 1.0 - min(misfits) / self.misfit
+        return 1.0 - float(np.nanmin(misfits)) / self.misfit
 
     def tellers(self, name: str, most: int = 3) -> tuple[str, ...]:
         """Return the statements that move a parameter most when they move by their tolerance.
