@@ -285,14 +285,7 @@ class StudyRun(Answer):
             "confidence": self.plan.confidence,
             "failed": len(findings.failures),
             "requirements": [
-                {
-                    "kpi": each.demand.kpi, "limit": each.demand.limit,
-                    "wanted": each.demand.probability, "outcome": each.outcome,
-                    "met": each.share.count, "probability": each.share.value,
-                    "low": each.share.low, "high": each.share.high,
-                    "undecided_cases": each.undecided,
-                    "worst_case": None if each.worst is None else findings.number(each.worst),
-                }
+                self._judgment_data(each)
                 for each in (findings.judgments if len(self.cases) else ())
             ],
             "kpis": {
@@ -308,4 +301,18 @@ class StudyRun(Answer):
                 for each in (findings.spreads if len(self.cases) else ())
             },
             "warnings": self.warnings,
+        }  # fmt: skip
+
+    def _judgment_data(self, judgment: Judgment) -> dict[str, Any]:
+        """Return a requirement for JSON; of cases that were not drawn, without a probability."""
+        demand, share = judgment.demand, judgment.share
+        probability = {"probability": share.value, "low": share.low, "high": share.high}
+        return {
+            "kpi": demand.kpi, "limit": demand.limit, "wanted": demand.probability,
+            "outcome": judgment.outcome, "met": share.count,
+            **(probability if self.plan.is_sampled else {}),
+            "undecided_cases": judgment.undecided,
+            "worst_case": (
+                None if judgment.worst is None else self.findings.number(judgment.worst)
+            ),
         }  # fmt: skip

@@ -195,7 +195,7 @@ class Findings:
         error = errors.get(demand.kpi, math.nan)
         compare, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
         met = is_met(values, compare, bound)
-        near = np.abs(values - bound) <= (error if math.isfinite(error) else 0.0)
+        near = np.abs(values - bound) <= (0.0 if math.isnan(error) else error)
         count, confidence = values.size, self.plan.confidence
         may, surely = (
             share(int(each.sum()), count, confidence) for each in (met | near, met & ~near)

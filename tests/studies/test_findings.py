@@ -1,0 +1,68 @@
+"""Cases are judged: what is too close to its limit decides nothing, what has no result misses."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bywire.bench.kpis.kpi import Kpi
+from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.findings import Findings
+from bywire.studies.study_file import read_study
+
+
+@pytest.fixture
+def found(study):
+    def make(peaks, error=math.nan, limit="<= 20 A with 90 %"):
+        lines = '[vary]\n"motor.R_m" = "+-5 %"\n[requirements]\n'
+        plan = read_study(study(f'{lines}peak_current = "{limit}"\n'))
+        peaks = np.array(peaks, dtype=float)
+        names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
+        columns = {name: np.full(peaks.size, math.nan) for name in names}
+        columns |= {CASE: np.arange(peaks.size), "motor.R_m": np.linspace(0.3, 0.4, peaks.size),
+                    "peak_current": peaks}  # fmt: skip
+        columns[FAILURE] = np.where(np.isnan(peaks), "it left the numbers", "")
+        columns[WARNINGS] = np.full(peaks.size, "far out; hot", dtype=object)
+        kpi = Kpi("peak_current", float(peaks[0]), "A", "Largest current.", error=error)
+        return Findings(plan, pd.DataFrame(columns), (kpi,))
+
+    return make
+
+
+@pytest.mark.parametrize(
+    ("error", "outcome", "undecided"),
+    [(math.nan, "met", 0), (0.5, "met", 0), (2.0, "undecided", 200), (math.inf, "undecided", 200)],
+)
+def test_cases_closer_to_the_limit_than_their_error_decide_nothing(
+    found, error, outcome, undecided
+):
+    (judgment,) = found([19.0] * 200, error).judgments
+    assert (judgment.outcome, judgment.undecided) == (outcome, undecided)
+
+
+def test_a_case_without_a_result_misses_and_the_worst_is_named(found):
+    findings = found([19.0, math.nan, 21.0, 19.5])
+    (judgment,) = findings.judgments
+    assert judgment.met.tolist() == [True, False, False, True]
+    assert (judgment.share.count, judgment.worst) == (2, 2)
+    assert findings.failures == {1: "it left the numbers"}
+    assert findings.warnings == {"far out": 4, "hot": 4}
+    assert [s.undefined for s in findings.spreads] == [1]
+    assert findings.values(2) == {"motor.R_m": pytest.approx(0.3 + 0.2 / 3)}
+
+
+@pytest.mark.parametrize(
+    ("peaks", "error", "outcome"),
+    [([19.0] * 5, 0.1, "met"), ([19.0, 21.0], 0.1, "missed"), ([19.0, 19.95], 0.1, "undecided"),
+     ([19.0, math.nan], 0.1, "missed")],
+)  # fmt: skip
+def test_without_a_probability_every_case_has_to_meet_it(found, peaks, error, outcome):
+    (judgment,) = found(peaks, error, "<= 20 A").judgments
+    assert judgment.outcome == outcome
+
+
+def test_the_worst_of_a_lower_limit_is_the_smallest(found):
+    assert found([19.0, 25.0, 18.0], limit=">= 20 A").judgments[0].worst == 2
