@@ -25,7 +25,8 @@ def found(study):
         columns |= {CASE: np.arange(peaks.size), "motor.R_m": np.linspace(0.3, 0.4, peaks.size),
                     "peak_current": peaks}  # fmt: skip
         columns[FAILURE] = np.where(np.isnan(peaks), "it left the numbers", "")
-        columns[WARNINGS] = np.full(peaks.size, "far out; hot", dtype=object)
+        said = [f"far out; hot: {20 + k} degC" for k in range(peaks.size)]
+        columns[WARNINGS] = np.array(said, dtype=object)
         kpi = Kpi("peak_current", float(peaks[0]), "A", "Largest current.", error=error)
         return Findings(plan, pd.DataFrame(columns), (kpi,))
 
@@ -49,7 +50,7 @@ def test_a_case_without_a_result_misses_and_the_worst_is_named(found):
     assert judgment.met.tolist() == [True, False, False, True]
     assert (judgment.share.count, judgment.worst) == (2, 2)
     assert findings.failures == {1: "it left the numbers"}
-    assert findings.warnings == {"far out": 4, "hot": 4}
+    assert findings.warnings == {"far out": 4, "hot: 20 degC, and so on": 4}
     assert [s.undefined for s in findings.spreads] == [1]
     assert findings.values(2) == {"motor.R_m": pytest.approx(0.3 + 0.2 / 3)}
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.core.errors import FileError, ParameterError
+from bywire.core.errors import ParameterError
 from bywire.studies.findings import Findings
 from undrawn import undrawn
 
@@ -81,8 +81,10 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
         assert holds(indices[name].first, first)
         assert indices[name].first.value == pytest.approx(first, abs=0.05)
         assert holds(indices[name].total, first)  # next to nothing together
-    assert study.notes == ["sobol-indices: cases share values, so that shares of them are no "
-                           "probabilities"]  # fmt: skip
+    assert study.notes == [
+        "256 cases in place of 300: they come in whole groups",
+        "sobol-indices: cases share values, so that shares of them are no probabilities",
+    ]
     assert "what drives overshoot" in str(study)
     with undrawn():
         study.write(out)
@@ -95,10 +97,10 @@ def test_a_simulated_study_has_the_shares_of_its_closed_form(axis):
     assert bywire.resume_study(out).findings.sensitivity("overshoot").drivers == list(
         indices.values()
     )
-    with pytest.raises(FileError, match="holds another study"):
+    with pytest.raises(ParameterError, match="groups belong together"):
         bywire.resume_study(out, cases=512)
     with pytest.raises(ParameterError, match="at least 256"):
-        bywire.resume_study(out, cases=255)
+        bywire.run_study(out.with_name("sobol-indices.toml"), out, cases=255)
 
 
 def test_a_simulated_study_has_the_effects_of_its_closed_form(axis):

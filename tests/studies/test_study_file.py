@@ -70,6 +70,8 @@ def test_an_experiment_needs_no_bench_file(tmp_path):
         ('[vary]\n"motor.R_m" = "+-5 %"\n"motor.K_e" = "+-5 %"\n[[correlation]]\n'
          'of = ["motor.R_m", "motor.K_e"]\nvalue = 1.0', ["between -1 and 1"]),
         ('[vary]\n"motor.R_m" = "+-5 %"\n[set]\n"motor.K_e" = 0.3', ["write the value as a text"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nlevels = 3', ["levels", "'monte-carlo'"]),
+        ('[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "grid"\ncases = 9', ["'grid' lists"]),
         ('[vary]\n"friction.law" = { values = ["dry"] }', ["friction.law"]),
     ],
 )  # fmt: skip

@@ -137,8 +137,26 @@ def test_more_cases_extend_a_study_and_requirements_may_change(study, tmp_path):
     assert StudyStore(out).path(0).stat().st_mtime_ns == written  # nothing is computed twice
     pd.testing.assert_frame_equal(more.cases[:64], first.cases, check_exact=True)
     assert len(bywire.study_report(out).cases) == 128
+    assert len(bywire.run_study(path, out, cases=128).cases) == 128
+    with pytest.raises(ParameterError, match="has 128 already"):
+        bywire.resume_study(out, cases=64)
     path.write_text(path.read_text() + '[requirements]\npeak_current = "<= 1 A"\n')
     assert bywire.study_report(out).status == "failed"
+
+
+@pytest.mark.parametrize(
+    ("design", "why"),
+    [('kind = "corners"', "lists them"), ('kind = "morris"\ncases = 64', "groups belong together")],
+)
+def test_a_design_that_has_its_own_cases_takes_no_more(study, tmp_path, design, why):
+    path, out = study(f'[vary]\n"motor.R_m" = "+-5 %"\n[design]\n{design}\n'), tmp_path / "out"
+    result = bywire.run_study(path, out)
+    with pytest.raises(ParameterError, match=why):
+        bywire.resume_study(out, cases=256)
+    again = bywire.study_report(out)
+    assert len(again.cases) == len(result.cases) == result.plan.total
+    figures = again.as_object()["kpis"]["peak_current"]
+    assert not {"mean", "quantiles", "influences"} & set(figures)
 
 
 def test_a_folder_of_another_study_is_refused(study, tmp_path):
@@ -170,8 +188,15 @@ def test_a_damaged_chunk_is_named(study, tmp_path):
 
 
 def test_results_in_python(study, tmp_path):
-    result = bywire.run_study(study(), tmp_path / "out", cases=64)
+    text = (
+        '[vary]\n"motor.R_m" = "+-4 %"\n"adc.law" = { values = ["ideal", "quantized"] }\n'
+        '"motor.K_e" = { kind = "normal", sd = "2 %", together = ["ecu.est_par.K_e"] }\n'
+    )
+    result = bywire.run_study(study(text), tmp_path / "out", cases=50)
     assert result.status == "passed"
+    assert result.data["ecu.est_par.K_e"].attrs["units"] == "N*m/A"
+    assert any("64 cases in place of 50" in note for note in result.notes)
+    assert any("adc.law: a choice" in note for note in result.notes)
     assert result.data["motor.R_m"].attrs["units"] == "ohm"
     assert result.data["peak_current"].dims == ("case",)
     assert "peak_current" in str(result)

@@ -42,7 +42,8 @@ def run_study(
     out
         Its folder; by default the name of the file, without its ending, in the current folder.
     cases
-        Cases in place of the file's; more of them extend what is there.
+        Cases in place of the file's; more of them extend what is there. Where the folder has more
+        than the file asks for, all are judged.
     workers
         Processes; by default one a core where the work is worth their start.
     cluster
@@ -68,15 +69,16 @@ def run_study(
     """
     source = Path(study)
     folder = Path(out) if out is not None else Path(source.stem)
-    return _completed(source, StudyStore(folder), cases, workers, cluster, progress)
+    store = StudyStore(folder)
+    plan = _with_cases(read_study(source), store, cases)
+    return _completed(plan, store, source, workers, cluster, progress)
 
 
 def _completed(
-    source: Path, store: StudyStore, cases: int | None, workers: int | None, cluster: str,
+    plan: StudyPlan, store: StudyStore, source: Path, workers: int | None, cluster: str,
     progress: Progress | None,
 ) -> StudyRun:  # fmt: skip
     """Return a study with all of its cases, those that were missing computed."""
-    plan = _with_cases(read_study(source), cases)
     nominal = running.run(plan.bench, estimate_error=True)
     try:
         complete(
@@ -126,8 +128,11 @@ def resume_study(
         When interrupted; finished chunks stay.
     """
     store = StudyStore(Path(folder))
-    source, known = _kept(store)
-    return _completed(source, store, cases or known, workers, cluster, progress)
+    plan, source = _kept(store)
+    if cases is not None:
+        _refuse_cases(plan, cases)
+        plan = _with_cases(plan, store, cases)
+    return _completed(plan, store, source, workers, cluster, progress)
 
 
 @use_case
@@ -152,14 +157,13 @@ def study_report(folder: str | Path) -> StudyRun:
         When the folder holds no study, its file is gone, or says something else by now.
     """
     store = StudyStore(Path(folder))
-    source, known = _kept(store)
-    plan = _with_cases(read_study(source), known)
+    plan, _ = _kept(store)
     store.require(plan)
     return _run_of(plan, store, running.run(plan.bench, estimate_error=True))
 
 
-def _kept(store: StudyStore) -> tuple[Path, int]:
-    """Return the file of a folder's study, and how many cases were asked for."""
+def _kept(store: StudyStore) -> tuple[StudyPlan, Path]:
+    """Return the study of a folder, with as many cases as were asked for, and its file."""
     said = store.record()
     source = Path(said["source"])
     if not source.is_file():
@@ -167,19 +171,50 @@ def _kept(store: StudyStore) -> tuple[Path, int]:
             f"the study file {source} of {store.folder} is gone: run it from where it is now, "
             f"bywire study run FILE --out {store.folder}"
         )
-    return source, int(said["cases"])
+    plan = read_study(source)
+    is_listed = plan.design in SPANNED
+    return (plan if is_listed else replace(plan, cases=int(said["cases"]))), source
 
 
-def _with_cases(plan: StudyPlan, cases: int | None) -> StudyPlan:
-    if cases is None:
-        return plan
-    if cases < 1:
+def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:
+    """Return the plan with so many cases, and with all that its folder has.
+
+    Raises
+    ------
+    ParameterError
+        For fewer than there are, too few, and where the design says how many there are.
+    """
+    if cases is not None and cases < 1:
         raise ParameterError(f"cases = {cases} is not admissible: it must be >= 1")
     if plan.design in SPANNED:
-        return plan  # it has those that it lists
-    asked = replace(plan, cases=cases)
+        if cases is not None:
+            _refuse_cases(plan, cases)
+        return plan
+    if plan.is_sampled:
+        known = store.cases_of(plan)
+        if cases is not None and cases < known:
+            raise ParameterError(
+                f"cases = {cases}: {store.folder} has {known} already, and none are taken off: "
+                "name more of them, or another folder"
+            )
+        return replace(plan, cases=max(cases or plan.cases, known))
+    asked = plan if cases is None else replace(plan, cases=cases)
     asked.points  # noqa: B018 - refuses too few before anything runs
     return asked
+
+
+def _refuse_cases(plan: StudyPlan, cases: int) -> None:
+    """Refuse to add cases to a design that has its own."""
+    if plan.is_sampled:
+        return
+    why = (
+        "it lists them by quantities and levels" if plan.design in SPANNED
+        else "its groups belong together"
+    )  # fmt: skip
+    raise ParameterError(
+        f"cases = {cases}: none are added to a study of {plan.design!r}, for {why}: change the "
+        "study file, and run it into another folder"
+    )
 
 
 def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:

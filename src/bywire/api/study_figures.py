@@ -36,11 +36,12 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     recordings
         Returns the recordings of the bench itself and of worst cases, by run and by what they are.
     """
+    band = "; the shaded band holds 90 % of them" if findings.plan.is_sampled else ""
     blocks: list[Block] = [
         FigureBlock(
             partial(_histograms, findings),
-            "Spread of the key figures over the cases; the shaded band holds 90 % of them. Dashed, "
-            "the bench itself; dotted, the limit.", "histograms",
+            f"Spread of the key figures over the cases{band}. Dashed, the bench itself; dotted, "
+            "the limit.", "histograms",
         )
     ]  # fmt: skip
     figures = shown_figures(findings)
@@ -92,7 +93,7 @@ def _histograms(findings: Findings) -> Figure:
     } or {
         each.name: Spread(findings.figure(each.name), each.unit, each.nominal)
         for each in findings.spreads[:1]
-    })  # fmt: skip
+    }, has_band=findings.plan.is_sampled)  # fmt: skip
 
 
 def _influences(findings: Findings) -> Figure:

@@ -12,6 +12,7 @@ import numpy as np
 from bywire.api.study_figures import study_figures
 from bywire.api.study_sensitivity import drivers_data, missing_indices, sensitivity_tables
 from bywire.api.study_tables import (
+    correlated,
     demand_table,
     influence_tables,
     spread_table,
@@ -37,8 +38,8 @@ from bywire.report.document import (
 from bywire.report.subject import Subject
 from bywire.report.wording import amount
 from bywire.studies.chunk import case_bench
-from bywire.studies.findings import Findings, Judgment
-from bywire.studies.plan import StudyPlan
+from bywire.studies.findings import Findings, Judgment, Spread
+from bywire.studies.plan import CHUNK, StudyPlan
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -82,7 +83,7 @@ class StudyRun(Answer):
         """The cases with their units, dimension ``case``."""
         import xarray as xr
 
-        units = {v.name: v.unit for v in self.plan.varied if v.unit} | dict(self.findings.units)
+        units = {**self.plan.units, **self.findings.units}
         columns = {
             name: ("case", np.asarray(self.cases[name]), {"units": units[name]} if name in units
                    else {})
@@ -115,7 +116,26 @@ class StudyRun(Answer):
 
     @property
     def notes(self) -> list[str]:
-        """What the intervals stand for, and which key figures have no indices."""
+        """What was rounded, what the intervals stand for, and what nothing is said of."""
+        return [*self._rounding(), *self._on_intervals(), *self._on_choices()]
+
+    def _rounding(self) -> list[str]:
+        plan = self.plan
+        if plan.total == plan.cases or not (plan.is_sampled or plan.sensitivity is not None):
+            return []
+        what = "whole groups" if plan.sensitivity is not None else f"whole chunks of {CHUNK}"
+        return [f"{plan.total} cases in place of {plan.cases}: they come in {what}"]
+
+    def _on_choices(self) -> list[str]:
+        choices = [v.name for v in self.plan.varied if not v.unit]
+        if not choices or not self.plan.is_sampled:
+            return []
+        return [
+            f"{', '.join(choices)}: a choice has no rank correlation; 'sobol-indices' tells what "
+            "it does"
+        ]
+
+    def _on_intervals(self) -> list[str]:
         if self.plan.sensitivity is not None:
             return [
                 f"{self.plan.design}: cases share values, so that shares of them are no "
@@ -169,7 +189,7 @@ class StudyRun(Answer):
                 Section("Figures", study_figures(findings, self._recordings)),
                 *([Section("Worst cases", [Listing(self._worst_texts())])] if judged else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
-                Section("What varies", [TableBlock(varied_table(plan))]),
+                Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
                 subject.provenance(f"Chunks of the study: {self.folder}."),
             ],
             brief=spaced([
@@ -199,7 +219,9 @@ class StudyRun(Answer):
         text = f"{outcomes.count('met')} of {len(outcomes)} requirements met"
         if open_ := outcomes.count("undecided"):
             text += f", {open_} undecided"
-        return Banner(text, "good" if self.holds else "bad")
+        if self.holds:
+            return Banner(text, "good")
+        return Banner(text, "bad" if "missed" in outcomes else "none")
 
     def _failures(self) -> list[str]:
         """Return the first cases without a result, with their values."""
@@ -209,9 +231,9 @@ class StudyRun(Answer):
         return texts + ([f"and {rest} more"] if rest else [])
 
     def _named(self, row: int) -> str:
-        units = {v.name: v.unit for v in self.plan.varied}
+        units = self.plan.units
         values = ", ".join(
-            f"{name} = {value if isinstance(value, str) else amount(value, units.get(name) or '1')}"
+            f"{name} = {value if isinstance(value, str) else amount(value, units[name])}"
             for name, value in self.findings.values(row).items()
         )
         return f"{self.findings.number(row)} ({values})"
@@ -290,17 +312,15 @@ class StudyRun(Answer):
             ],
             "kpis": {
                 each.name: {
-                    "unit": each.unit, "nominal": each.nominal, "mean": each.mean, "sd": each.sd,
-                    "least": each.least, "largest": each.largest, "undefined": each.undefined,
-                    "quantiles": [
-                        {"probability": q.probability, "value": q.value, "low": q.low,
-                         "high": q.high} for q in each.quantiles
-                    ],
+                    "unit": each.unit, "nominal": each.nominal, "least": each.least,
+                    "largest": each.largest, "undefined": each.undefined,
+                    **(_spread_data(each) if self.plan.is_sampled else {}),
                     **drivers_data(findings, each.name),
                 }
                 for each in (findings.spreads if len(self.cases) else ())
             },
             "warnings": self.warnings,
+            "notes": self.notes,
         }  # fmt: skip
 
     def _judgment_data(self, judgment: Judgment) -> dict[str, Any]:
@@ -316,3 +336,14 @@ class StudyRun(Answer):
                 None if judgment.worst is None else self.findings.number(judgment.worst)
             ),
         }  # fmt: skip
+
+
+def _spread_data(spread: Spread) -> dict[str, Any]:
+    """Return mean and quantiles of drawn cases for JSON."""
+    return {
+        "mean": spread.mean, "sd": spread.sd,
+        "quantiles": [
+            {"probability": q.probability, "value": q.value, "low": q.low, "high": q.high}
+            for q in spread.quantiles
+        ],
+    }  # fmt: skip

@@ -47,6 +47,8 @@ def drivers_data(findings: Findings, name: str) -> dict[str, Any]:
 
     Effects are in the unit of the figure.
     """
+    if findings.plan.sensitivity is None and not findings.plan.is_sampled:
+        return {}
     if findings.plan.sensitivity is None:
         return {
             "influences": {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from bywire.report.document import TableBlock
+from bywire.report.document import Listing, TableBlock
 from bywire.report.tables import Cell, Column, Table, Verdict, text_table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.findings import Findings
@@ -36,7 +36,10 @@ def demand_table(findings: Findings) -> Table:
                 Cell(f"{percent(each.share.low, each.share)} to "
                      f"{percent(each.share.high, each.share)}"),
             ]  # fmt: skip
-        rows.append((*cells, Cell(*_OUTCOMES[each.outcome])))
+        text, verdict = _OUTCOMES[each.outcome]
+        if each.outcome == "met" and each.demand.probability is None:
+            text = "ok in all"
+        rows.append((*cells, Cell(text, verdict)))
     return Table((*columns, Column("result")), tuple(rows))
 
 
@@ -79,6 +82,15 @@ def varied_table(plan: StudyPlan) -> Table:
             for v in plan.varied
         ],
     )  # fmt: skip
+
+
+def correlated(plan: StudyPlan) -> list[Listing]:
+    """Return which quantities go together, where any do."""
+    texts = [
+        f"{first} and {second}: correlation {value:.3g} of their normal scores"
+        for (first, second), value in plan.correlations.items()
+    ]
+    return [Listing(texts)] if texts else []
 
 
 def influence_tables(findings: Findings) -> list[TableBlock]:

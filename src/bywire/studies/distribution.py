@@ -264,8 +264,10 @@ def _discrete(entry: _Entry) -> Distribution:
 
 def _among(values: list[Any], weights: Array, text: str) -> Distribution:
     each, edges = np.array(values), np.cumsum(weights)[:-1]
+    alike = np.allclose(weights, weights[0])
+    shares = "" if alike else f", with {', '.join(f'{100.0 * w:.3g} %' for w in weights)}"
     return Distribution(
-        "discrete", f"one of {text}", partial(_picked, each, edges), is_discrete=True
+        "discrete", f"one of {text}{shares}", partial(_picked, each, edges), is_discrete=True
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -31,6 +32,7 @@ from bywire.studies.statistics import (
 if TYPE_CHECKING:
     import pandas as pd
 
+_NUMBER = re.compile(r"[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?")
 QUANTILES = (0.05, 0.5, 0.95)
 """shares of the cases below the quantiles that are shown"""
 
@@ -168,12 +170,15 @@ class Findings:
 
     @property
     def warnings(self) -> Mapping[str, int]:
-        """What runs warned of -> in how many cases, without their numbers."""
-        said: dict[str, int] = {}
+        """What runs warned of -> in how many cases; what differs in its numbers alone, once."""
+        said: dict[str, list[str]] = {}
         for text in self.cases[WARNINGS]:
             for each in filter(None, str(text).split("; ")):
-                said[each] = said.get(each, 0) + 1
-        return said
+                said.setdefault(_NUMBER.sub("#", each), []).append(each)
+        return {
+            each[0] if len({*each}) == 1 else f"{each[0]}, and so on": len(each)
+            for each in said.values()
+        }
 
     def number(self, row: int) -> int:
         """Return the number of a case by its row."""

@@ -17,6 +17,7 @@ from bywire.bench.bench import Bench
 from bywire.core.brake import brakes, is_package
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import ParameterError
+from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.studies.distribution import Distribution
@@ -148,6 +149,13 @@ class StudyPlan:
         """How many cases are computed."""
         points = self.points
         return points.cases if isinstance(points, Spanned) else self.chunks * CHUNK
+
+    @cached_property
+    def units(self) -> Mapping[str, str]:
+        """SI unit of every number that varies, those that follow another among them, by name."""
+        leaves = leaf_fields(type(self.bench.par))
+        units = {v.name: v.unit for v in self.varied if v.unit}
+        return units | {name: leaves[name].unit.symbol for v in self.varied for name in v.together}
 
     def values(self, chunk: int) -> dict[str, NDArray[Any]]:
         """Return the values of what varies, by name, in each case of a chunk [SI].

@@ -43,8 +43,7 @@ def complete(
     missing = sorted(set(range(plan.chunks)) - store.finished())
     if not missing:
         return
-    units = {v.name: v.unit or "1" for v in plan.varied}
-    units |= plan.bench.definition.kpis_with(plan.bench.chosen_options)
+    units = {**plan.units, **plan.bench.definition.kpis_with(plan.bench.chosen_options)}
     done = plan.chunks - len(missing)
     label = f"{plan.total} cases"
     progress(label, done / plan.chunks)

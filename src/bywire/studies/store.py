@@ -65,6 +65,13 @@ class StudyStore:
         except OSError as error:
             raise _unwritable(self.folder, error) from None
 
+    def cases_of(self, plan: StudyPlan) -> int:
+        """Return for how many cases the folder was asked, if it holds this study; else zero."""
+        if not (self.folder / RECORD).exists():
+            return 0
+        known = self.record()
+        return int(known["cases"]) if known["digest"] == plan.digest else 0
+
     def require(self, plan: StudyPlan) -> dict[str, Any]:
         """Return what the folder says, or refuse it where it holds another study.
 

@@ -27,6 +27,7 @@ _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "r
 _DESIGN = ("kind", "cases", "seed", "levels", "confidence")
 _KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY)
 _WITH = re.compile(r"(.*\S)\s+with\s+(\S.*%)\s*", re.DOTALL)
+_WITH_LEVELS = ("grid", "one-at-a-time")
 _OPTION = "options."
 
 
@@ -223,12 +224,7 @@ def _design(section: Mapping[str, Any]) -> dict[str, Any]:
         if section["kind"] not in _KINDS:
             raise unknown_name("[design] kind", str(section["kind"]), _KINDS)
         design["design"] = section["kind"]
-        if "levels" in section and section["kind"] in SENSITIVITY:
-            raise ParameterError(
-                f"[design] levels: {section['kind']!r} has none to choose"
-                + (f", it steps on {LEVELS}" if section["kind"] == "morris" else "")
-                + ": leave them out"
-            )
+    _require_of_use(design.get("design", StudyPlan.design), section)
     for key, low, high in (("cases", 1, MOST), ("seed", 0, 2**63 - 1), ("levels", 2, 1000)):
         if key in section:
             design[key] = _whole(key, section[key], low, high)
@@ -241,6 +237,20 @@ def _design(section: Mapping[str, Any]) -> dict[str, Any]:
             )
         design["confidence"] = share
     return design
+
+
+def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
+    """Refuse what a design has no use for."""
+    if "levels" in section and kind not in _WITH_LEVELS:
+        raise ParameterError(
+            f"[design] levels: {kind!r} has none to choose"
+            + (f", it steps on {LEVELS}" if kind == "morris" else "")
+            + ": leave them out"
+        )
+    if "cases" in section and kind in SPANNED:
+        raise ParameterError(
+            f"[design] cases: {kind!r} lists its cases by quantities and levels: leave them out"
+        )
 
 
 def _whole(key: str, value: Any, low: int, high: int) -> int:

@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
 from bywire.report import style
@@ -41,10 +43,17 @@ class Spread:
     limit: float | None = None
 
 
-def histograms(spreads: Mapping[str, Spread]) -> Figure:
+def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     """Draw a histogram of every key figure, by name, each in a panel of its own.
 
-    Dashed the bench itself, dotted the limit; the shaded band holds 90 % of the cases.
+    Dashed the bench itself, dotted the limit.
+
+    Parameters
+    ----------
+    spreads
+        By name.
+    has_band
+        Whether a shaded band holds 90 % of the cases: of those that were drawn.
     """
     rows = -(-len(spreads) // _COLUMNS)
     figure = Figure(
@@ -57,7 +66,8 @@ def histograms(spreads: Mapping[str, Spread]) -> Figure:
         factor = in_display_unit(1.0, spread.unit)[0]
         values = factor * spread.values[np.isfinite(spread.values)]
         axes.hist(values, bins=_bins(values), color=style.BLUE, alpha=0.75)
-        axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
+        if has_band:
+            axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
         for at, look in ((spread.nominal, own), (spread.limit, bound)):
             if at is None or not np.isfinite(at):
                 continue
@@ -76,9 +86,14 @@ def histograms(spreads: Mapping[str, Spread]) -> Figure:
         axes.set_ylabel("cases")
     for spare in list(grid.flat)[len(spreads) :]:
         spare.set_visible(False)
-    lines = [Line2D([], [], color=own.color, linestyle="--", label="the bench itself"),
-             Line2D([], [], color=bound.color, linestyle=":", label="limit")]  # fmt: skip
-    figure.legend(handles=lines, loc="outside upper left", ncols=2, frameon=False,
+    lines: list[Artist] = [
+        Line2D([], [], color=own.color, linestyle="--", label="the bench itself")
+    ]
+    if any(spread.limit is not None for spread in spreads.values()):
+        lines.append(Line2D([], [], color=bound.color, linestyle=":", label="limit"))
+    if has_band:
+        lines.append(Patch(color=style.SHADE, label="90 % of the cases"))
+    figure.legend(handles=lines, loc="outside upper left", ncols=3, frameon=False,
                   fontsize=style.TEXT_SIZE)  # fmt: skip
     return figure
 
