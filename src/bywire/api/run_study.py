@@ -7,6 +7,7 @@ from pathlib import Path
 
 from bywire.api.study_run import StudyRun
 from bywire.bench import running
+from bywire.bench.requirements import status_of
 from bywire.bench.result import Result
 from bywire.bench.running import Progress
 from bywire.core.errors import FileError, ParameterError
@@ -219,12 +220,6 @@ def _refuse_cases(plan: StudyPlan, cases: int) -> None:
 
 def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
     findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
-    status = "unfinished"
-    if len(findings.cases) == plan.total:
-        outcomes = {each.outcome for each in findings.judgments}
-        status = (
-            "failed" if "missed" in outcomes
-            else "undecided" if "undecided" in outcomes
-            else "passed" if outcomes else "done"
-        )  # fmt: skip
+    is_whole = len(findings.cases) == plan.total
+    status = status_of(findings.judgments) if is_whole else "unfinished"
     return StudyRun(plan, store.folder, findings, nominal, status)

@@ -6,7 +6,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -107,7 +107,16 @@ def is_met(values: Array, compare: str, bound: float) -> NDArray[np.bool_]:
     return np.asarray(_COMPARE[compare](values, bound))
 
 
-def status_of(verdicts: Sequence[Verdict]) -> str:
+class Judged(Protocol):
+    """A requirement that was judged: a `Verdict`, or one over many cases."""
+
+    @property
+    def outcome(self) -> str:
+        """``met``, ``missed`` or ``undecided``."""
+        ...
+
+
+def status_of(verdicts: Sequence[Judged]) -> str:
     """Return ``done`` where nothing is required, else ``failed``, ``undecided`` or ``passed``."""
     if not verdicts:
         return "done"
