@@ -237,7 +237,7 @@ _LATE = (
     "late = Late()\n"
     "from bywire.cli import main as room\n"
     "main, sys.argv = room.main, ['bywire', '--version']\n"
-    "room.main = lambda: (atexit.register(print, 'tidy'), main())\n"
+    "room.main = lambda: (atexit.register(print, 'tidy', sys.modules.get('dask', 1)), main())\n"
     "room."
 )
 
@@ -253,7 +253,7 @@ def test_nothing_of_a_library_runs_when_all_is_said_and_tidied_up(entry, status)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
     assert done.returncode == status
     if status == 0:
-        assert done.stdout.splitlines()[-1] == "tidy"
+        assert done.stdout.splitlines()[-1] == "tidy None"  # see `core.unneeded`
 
 
 def test_interrupt_while_graphs_are_built_is_not_lost(

@@ -20,6 +20,7 @@ from typing import Any
 from bywire.cli.output import INTERRUPTED, flush, message, open_streams
 from bywire.core.errors import BywireError, ModelError, ParameterError
 from bywire.core.interrupts import interrupts_noted
+from bywire.core.unneeded import leave_out_dask
 
 FAILED = 3
 GARBAGE = 50_000
@@ -40,6 +41,7 @@ def process() -> None:
             os._exit(status[0] if isinstance(status[0], int) else 0)
 
     atexit.register(leave)  # the first, and so the last that is called
+    leave_out_dask()
     try:
         main()
     except SystemExit as done:

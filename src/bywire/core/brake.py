@@ -24,6 +24,7 @@ from types import ModuleType
 
 from bywire.core.author_lines import said_with_line, warn_at_line
 from bywire.core.errors import FileError, ModelError
+from bywire.core.unneeded import allow_dask
 
 GROUP = "bywire.brakes"
 """entry points whose values name modules with a ``BRAKE``"""
@@ -81,6 +82,8 @@ def _installed() -> Mapping[str, Brake]:
         return not point.module.startswith("bywire."), point.name
 
     for point in sorted(entry_points(group=GROUP), key=order):
+        if not point.module.startswith("bywire."):
+            allow_dask()
         try:
             brake = _declared(importlib.import_module(point.module), point.value)
             _require_new(brake, brakes)
@@ -203,6 +206,7 @@ def _imported(place: Path, source: Path) -> ModuleType:
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module
+    allow_dask()
     try:
         spec.loader.exec_module(module)
     except BaseException as error:

@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 from bywire.core.brake import load_system, loaded_files
 from bywire.core.errors import ParameterError, RunError
+from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.chunk import Columns, computed_chunk
 from bywire.studies.plan import StudyPlan
@@ -182,6 +183,7 @@ def _as_completed(
 
 @contextmanager
 def _client(address: str) -> Iterator[Any]:
+    allow_dask()
     distributed = library("distributed", *_WHAT)
     try:
         client = distributed.Client(address, timeout=_SECONDS, set_as_default=False)
