@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -61,6 +62,8 @@ class Trajectory:
 
     Parameters
     ----------
+    run
+        What was computed.
     time, values
         Shapes (rows,) and (rows, signals).
     names
@@ -70,12 +73,11 @@ class Trajectory:
         ``interrupted`` when the user stopped it (rows end there).
     unsettled, repeated
         Substeps that hit the cap, and that took more than one pass.
-    doubt
-        Why the result may be wrong though every substep settled; empty where there is none.
     vector
         State vector at the end.
     """
 
+    run: Run
     time: Array
     values: Array
     names: tuple[str, ...]
@@ -84,7 +86,11 @@ class Trajectory:
     repeated: int
     engine: str
     vector: Array
-    doubt: str = ""
+
+    @cached_property
+    def doubt(self) -> str:
+        """Why the result may be wrong though every substep settled; empty where there is none."""
+        return doubt_of(self.run)
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (rows,)."""
@@ -160,6 +166,7 @@ def simulate(
     if status == "done" and counters[0]:
         status = "unsettled"
     return Trajectory(
+        run=run,
         time=schedule.record_times[:rows],
         values=values[:rows],
         names=wanted,
@@ -168,7 +175,6 @@ def simulate(
         repeated=int(counters[1]),
         engine=chosen.label,
         vector=vector,
-        doubt=doubt_of(run),
     )
 
 

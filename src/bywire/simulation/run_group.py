@@ -23,7 +23,6 @@ from bywire.simulation.ensemble import LaneKernel, lane_kernel
 from bywire.simulation.run import (
     Run,
     Trajectory,
-    doubt_of,
     initial_vector,
     sampled_stimulus,
     selected,
@@ -157,6 +156,7 @@ def _trajectory(
 ) -> Trajectory:  # fmt: skip
     unsettled, repeated = (int(n) for n in vector[kernel.layout.start["counters"] :][:2])
     return Trajectory(
+        run=run,
         time=schedule.record_times,
         values=values,
         names=names,
@@ -165,5 +165,4 @@ def _trajectory(
         repeated=repeated,
         engine=kernel.label,
         vector=vector.copy(),
-        doubt=doubt_of(run),
     )

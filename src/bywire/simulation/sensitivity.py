@@ -179,6 +179,7 @@ def simulate_with_sensitivities(
         derivatives[:, :, first : first + here] = rec_t[:, :, :here]
     counters = vector[kernel.layout.start["counters"] :]
     trajectory = Trajectory(
+        run=run,
         time=schedule.record_times,
         values=values,
         names=tuple(signals),
