@@ -83,6 +83,13 @@ def test_replaced_values_are_checked_again():
         made().replace({"short": 3.0})
 
 
+def test_groups_that_hold_no_changed_value_are_kept():
+    """A search makes thousands of sets a second."""
+    before = made()
+    assert before.replace({"share": 0.5}).inner is before.inner
+    assert before.replace({"inner.R": 0.4}).inner is not before.inner
+
+
 def test_nothing_can_be_assigned_or_added():
     with pytest.raises(pydantic.ValidationError, match="frozen"):
         made().share = 0.5

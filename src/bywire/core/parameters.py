@@ -51,8 +51,8 @@ class ParameterSet(BaseModel):
         return _validated(cls, {}, values)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values at dotted names, validated again."""
-        return _validated(type(self), _tree(self), values)
+        """Return a copy with other values at dotted names; the groups that hold them are validated."""
+        return _validated(type(self), _fields(self), values)
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
@@ -68,8 +68,14 @@ class ParameterSet(BaseModel):
 
     @cached_property
     def _values(self) -> dict[str, Any]:
-        """Leaves and choices by dotted name, looked up once: a set never changes."""
-        return dict(_walk(self, ""))
+        """Leaves and choices by dotted name; groups that several sets share look theirs up once."""
+        values: dict[str, Any] = {}
+        for name, value in _fields(self).items():
+            if isinstance(value, ParameterSet):
+                values |= {f"{name}.{inner}": v for inner, v in value._values.items()}
+            else:
+                values[name] = value
+        return values
 
     @cached_property
     def numbers_and_choices(self) -> tuple[dict[str, float], dict[str, Any]]:
@@ -174,15 +180,6 @@ def _node_notes(annotation: Any) -> Iterator[Any]:
             yield from note.metadata if isinstance(note, FieldInfo) else (note,)
 
 
-def _walk(node: ParameterSet, prefix: str) -> Iterator[tuple[str, Any]]:
-    for name in type(node).model_fields:
-        value = getattr(node, name)
-        if isinstance(value, ParameterSet):
-            yield from _walk(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value
-
-
 def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
@@ -217,24 +214,26 @@ def _plain(name: str, value: Any, texts: dict[str, str]) -> Any:
     return value
 
 
-def _tree(node: ParameterSet) -> dict[str, Any]:
-    """Return a set as nested dictionaries; searches make thousands of sets a second of it."""
+def _fields(node: ParameterSet) -> dict[str, Any]:
     kept = node.__dict__
-    return {
-        name: _tree(kept[name]) if isinstance(kept[name], ParameterSet) else kept[name]
-        for name in type(node).model_fields
-    }
+    return {name: kept[name] for name in type(node).model_fields}
 
 
 def _validated(cls: type[T], tree: dict[str, Any], values: Mapping[str, Any]) -> T:
-    """Return a set of a tree with other values at dotted names."""
+    """Return a set of a tree with other values at dotted names.
+
+    Groups of the tree that are sets stay as they are, unless a value in them changes: searches and
+    studies make thousands of sets a second.
+    """
     texts: dict[str, str] = {}
     for name, value in values.items():
         _require_known(cls, name)
         *groups, last = name.split(".")
         node = tree
         for group in groups:
-            node = node.setdefault(group, {})
+            inner = node.get(group, {})
+            node[group] = _fields(inner) if isinstance(inner, ParameterSet) else inner
+            node = node[group]
         node[last] = _plain(name, value, texts)
     try:
         return cls.model_validate(tree)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -48,7 +49,7 @@ class Effort:
         """No placeholder is used."""
         return {}
 
-    @property
+    @cached_property
     def defect(self) -> str:
         """Why no figure is defined."""
         given = (s for s in (self.current, self.power, self.energy) if s is not None)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -32,7 +33,7 @@ class Course:
         """Unit of the signal."""
         return {"level": self.unit}
 
-    @property
+    @cached_property
     def defect(self) -> str:
         """Why no figure is defined."""
         return defect(self.t, self.y)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import xarray as xr
@@ -47,7 +48,7 @@ class Occupation:
         """No placeholder is used."""
         return {}
 
-    @property
+    @cached_property
     def defect(self) -> str:
         """Why no figure is defined."""
         signals = (self.stuck, self.t_stuck, self.sat_current, self.sat_duty)

@@ -55,7 +55,7 @@ class Sweep:
         """Unit of the gain."""
         return {"gain": gain_unit(self.drive_unit, self.response_unit)}
 
-    @property
+    @cached_property
     def defect(self) -> str:
         """Why no figure is defined."""
         broken = defect(self.t, self.drive, self.response)

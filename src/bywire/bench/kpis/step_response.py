@@ -104,7 +104,7 @@ class StepResponse:
             return Undefined("the response changes by less than its ripple: no step is seen")
         return np.asarray((self.y - self.start) / height)
 
-    @property
+    @cached_property
     def steady(self) -> tuple[Array, Array] | Undefined:
         """Times and values in the window of the steady state."""
         t, last = self.t, float(self.t[-1])

@@ -60,7 +60,7 @@ class Tracking:
         """Unit of the signal."""
         return {"level": self.unit}
 
-    @property
+    @cached_property
     def defect(self) -> str:
         """Why no figure is defined."""
         return defect(self.t, self.y, self.demand)
