@@ -36,6 +36,7 @@ if TYPE_CHECKING:
     from bywire.api.run_study import resume_study, run_study, study_report
     from bywire.api.study import study
     from bywire.api.study_run import StudyRun
+    from bywire.api.study_surrogate import study_surrogates
     from bywire.api.trust import TrustStudy, trust
     from bywire.bench.bench import Bench
     from bywire.bench.bench_file import load
@@ -76,6 +77,7 @@ _HOMES = {
     "run_study": "api.run_study",
     "resume_study": "api.run_study",
     "study_report": "api.run_study",
+    "study_surrogates": "api.study_surrogate",
     "TrustStudy": "api.trust",
     "convert": "api.convert",
     "identify": "api.identify",
@@ -155,6 +157,7 @@ __all__ = [
     "simulate_with_sensitivities",
     "study",
     "study_report",
+    "study_surrogates",
     "trust",
     "write_measurement",
     "write_recording",

@@ -33,6 +33,9 @@ def test_from_the_file_to_the_report_and_on(bywire, study, tmp_path, monkeypatch
         assert bywire("study", "resume", out).status == 0
     status = bywire("study", "status", out, "--json").object
     assert status["kpis"]["peak_current"] == extended["kpis"]["peak_current"]
+    told = bywire("study", "surrogate", out, "--at", "motor.R_m=+1%", "--json").object
+    assert 15.0 < told["surrogates"]["peak_current"]["value"] < 25.0
+    refused(bywire("study", "surrogate", out, "--at", "motor.R_m=9ohm"), "9 ohm", "nothing beyond")
     assert bywire("run", out / "worst-peak_current.toml").status == 0
     no_half_files(out)
 

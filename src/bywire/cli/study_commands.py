@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from bywire.cli.options import JsonFlag
+from bywire.cli.options import JsonFlag, changes
 from bywire.cli.output_folder import folder
 from bywire.cli.show import show
 
@@ -107,6 +107,26 @@ def status_command(place: StudyFolder, json: JsonFlag = False) -> None:
     from bywire.api.run_study import study_report
 
     show(lambda _: study_report(place), None, json)
+
+
+@study_app.command("surrogate")
+def surrogate_command(
+    place: StudyFolder,
+    kpi: Annotated[
+        list[str] | None,
+        typer.Option(help="Key figure; by default those of requirements.", metavar="NAME"),
+    ] = None,
+    at: Annotated[
+        list[str] | None,
+        typer.Option("--at", help="Tell the figures here, e.g. motor.R_m=0.4ohm.",
+                     metavar="KEY=VALUE"),
+    ] = None,
+    json: JsonFlag = False,
+) -> None:  # fmt: skip
+    """Tell key figures between the cases of a study by polynomials, with their error."""
+    from bywire.api.study_surrogate import study_surrogates
+
+    show(lambda _: study_surrogates(place, kpi or (), changes(at, "--at")), None, json)
 
 
 def _resumed(

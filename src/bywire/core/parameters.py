@@ -51,7 +51,7 @@ class ParameterSet(BaseModel):
         return _validated(cls, {}, values)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values at dotted names; the groups that hold them are validated."""
+        """Return a copy with other values at dotted names; groups that hold them are validated."""
         return _validated(type(self), _fields(self), values)
 
     def flat(self) -> dict[str, Any]:

@@ -1,0 +1,154 @@
+"""Surrogates of a study's key figures: what they tell of values in between, and how far off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from bywire.api.run_study import kept_study
+from bywire.api.study_run import StudyRun
+from bywire.api.study_tables import shown_figures, varied_table
+from bywire.bench.relative_changes import share_of
+from bywire.bench.values import number
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Document, Section, TableBlock, spaced
+from bywire.report.tables import Cell, Column, Table
+from bywire.report.wording import amount, clean
+from bywire.studies.surrogate import Surrogate, surrogate_of
+
+_POOR = 0.5  # share of the variance below which a surrogate is no use
+
+
+@dataclass(frozen=True)
+class StudySurrogates(Answer):
+    """Surrogates of a study's key figures.
+
+    Parameters
+    ----------
+    study
+        The study that they are made of.
+    surrogates
+        By key figure; each is called with values of what varies [SI].
+    at
+        Values that were asked for [SI]; empty where none were.
+    refused
+        Key figures that have none, and why.
+    """
+
+    study: StudyRun
+    surrogates: Mapping[str, Surrogate]
+    at: Mapping[str, float]
+    refused: Mapping[str, str]
+
+    @property
+    def warnings(self) -> list[str]:
+        """Surrogates that tell little, and the study's own warnings."""
+        poor = [
+            f"the surrogate of {each.kpi} tells {100.0 * each.explained:.0f} % of the variance of "
+            "cases it has not seen: the rest is noise, or no polynomial"
+            for each in self.surrogates.values() if each.explained < _POOR
+        ]  # fmt: skip
+        none = [f"no surrogate of {kpi}: {why}" for kpi, why in self.refused.items()]
+        return [*poor, *none, *self.study.warnings]
+
+    def document(self) -> Document:
+        """Return how good the surrogates are, and what they say of the values asked for."""
+        plan = self.study.plan
+        table = TableBlock(self._table(), width=140)
+        return Document(
+            f"Surrogates of study {plan.name}",
+            f"polynomials of {len(plan.varied)} quantities, from {len(self.study.cases)} cases",
+            sections=[
+                Section("Key figures", [table]),
+                Section("What varies", [TableBlock(varied_table(plan))]),
+            ],
+            brief=spaced([table]),
+            data=self._data(),
+        )
+
+    def _table(self) -> Table:
+        heads = ["variance told", "rms error", "largest error", "degree", "terms", "cases"]
+        at = ["at these values"] if self.at else []
+        rows = []
+        for s in self.surrogates.values():
+            told = [amount(float(s(self.at)), s.unit)] if self.at else []
+            texts = [
+                *told, f"{100.0 * s.explained:.2f} %", amount(s.rms, s.unit),
+                amount(s.largest, s.unit), str(s.degree), str(s.terms), str(s.cases),
+            ]  # fmt: skip
+            rows.append((Cell(clean(s.kpi)), *map(Cell, texts)))
+        columns = (Column("name"), *(Column(head, numeric=True) for head in (*at, *heads)))
+        return Table(columns, tuple(rows))
+
+    def _data(self) -> dict[str, Any]:
+        return {
+            "study": self.study.plan.name,
+            "at": dict(self.at),
+            "surrogates": {
+                s.kpi: {
+                    "unit": s.unit, "variance_told": s.explained, "rms_error": s.rms,
+                    "largest_error": s.largest, "degree": s.degree, "terms": s.terms,
+                    "cases": s.cases, **({"value": float(s(self.at))} if self.at else {}),
+                }
+                for s in self.surrogates.values()
+            },
+            "warnings": self.warnings,
+        }  # fmt: skip
+
+
+@use_case
+def study_surrogates(
+    folder: str | Path,
+    kpis: Sequence[str] = (),
+    at: Mapping[str, Any] = MappingProxyType({}),
+) -> StudySurrogates:
+    """Return polynomials that tell key figures of a study between its cases; nothing is run.
+
+    Parameters
+    ----------
+    folder
+        Folder of the study.
+    kpis
+        Key figures; by default those that something is required of, or all.
+    at
+        Values of what varies at which to tell them: SI numbers, texts with units, or changes such
+        as ``"+5 %"`` of what the bench has; the others as in the bench.
+
+    Returns
+    -------
+    StudySurrogates
+        Each surrogate with its error in the key figure's unit; ``.surrogates["overshoot"]`` is
+        called with values or arrays [SI].
+
+    Raises
+    ------
+    InputError
+        When the folder holds no study, for names that are unknown, values beyond what the cases
+        have shown, too few cases, designs that do not show what lies between their points, and
+        structural choices among what varies.
+    """
+    report = kept_study(folder)
+    findings = report.findings
+    quantities = {v.name: v for v in report.plan.varied}
+    values: dict[str, float] = {}
+    for name, text in at.items():
+        if name not in quantities:
+            raise unknown_name("quantity of the study", name, quantities)
+        share = share_of(text)
+        change = (1.0 + share) * quantities[name].nominal if share is not None else text
+        values[name] = number(change, quantities[name].unit or "1", name)
+    surrogates: dict[str, Surrogate] = {}
+    refused: dict[str, str] = {}
+    for kpi in kpis or shown_figures(findings):
+        try:
+            surrogates[kpi] = surrogate_of(findings, kpi)
+        except ParameterError as error:
+            refused[kpi] = str(error)
+    if not surrogates:
+        why = "; ".join(dict.fromkeys(refused.values()))
+        raise ParameterError(why or f"{folder}: no case is computed yet")
+    return StudySurrogates(report, surrogates, values, refused)

@@ -1,0 +1,236 @@
+"""A surrogate: a key figure as a polynomial of what varies, and how far it is off.
+
+Polynomial chaos (R. G. Ghanem and P. D. Spanos, Stochastic Finite Elements, 1991), fitted to the
+cases of a study by OpenTURNS: terms are chosen by least angle regression (G. Blatman and
+B. Sudret, Journal of Computational Physics 230, 2011).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.typing import Array
+from bywire.core.units import shown
+from bywire.data.file_format import library
+from bywire.studies.findings import Findings
+from bywire.studies.plan import StudyPlan, Varied
+
+LIBRARY = ("surrogates of studies", "studies")
+FEWEST = 30
+"""cases of which a surrogate may be made"""
+_LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
+_FOLDS = 5  # a fifth of the cases is told by the others, in turn
+_LACKING = ("one-at-a-time", "corners", "morris")  # they do not show what lies between
+
+Polynomial = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """A key figure as a polynomial of what varies.
+
+    Parameters
+    ----------
+    kpi, unit
+        Key figure, and its unit.
+    nominal
+        What the bench has of each quantity [SI].
+    units
+        SI unit of each quantity.
+    low, high
+        Least and largest value of each quantity in the cases [SI].
+    cases
+        Cases that have the figure.
+    degree, terms
+        Of the polynomial.
+    rms, largest
+        Error of cases that the polynomial had not seen, each fifth told by the others: root mean
+        square, and largest, in ``unit``. The noise of the cases is in it.
+    explained
+        Share of the variance that it tells of cases it had not seen (Q2).
+    """
+
+    kpi: str
+    unit: str
+    nominal: Mapping[str, float]
+    units: Mapping[str, str]
+    low: Mapping[str, float]
+    high: Mapping[str, float]
+    cases: int
+    degree: int
+    terms: int
+    rms: float
+    largest: float
+    explained: float
+    polynomial: Polynomial = field(repr=False)
+
+    def __call__(self, values: Mapping[str, ArrayLike]) -> Array:
+        """Return the figure at values of what varies, in `unit`.
+
+        Parameters
+        ----------
+        values
+            Quantities by name [SI], numbers or arrays of one shape; the others as in the bench.
+
+        Raises
+        ------
+        UnknownNameError
+            For what did not vary.
+        ParameterError
+            Beyond what the cases have shown.
+        """
+        for name in values:
+            if name not in self.nominal:
+                raise unknown_name("quantity of the surrogate", name, self.nominal)
+        columns: list[Array] = []
+        for name, nominal in self.nominal.items():
+            column = np.asarray(values.get(name, nominal), dtype=float)
+            self._require_seen(name, column)
+            columns.append(column)
+        wide = np.broadcast_arrays(*columns)
+        points = np.column_stack([column.ravel() for column in wide])
+        return np.asarray(self.polynomial(points).reshape(wide[0].shape))
+
+    def _require_seen(self, name: str, values: Array) -> None:
+        low, high = self.low[name], self.high[name]
+        beyond = values[~((low <= values) & (values <= high))]
+        if beyond.size:
+            unit = self.units[name]
+            raise ParameterError(
+                f"{name} = {shown(float(beyond[0]), unit)}: the surrogate of {self.kpi} knows "
+                f"{shown(low, unit)} to {shown(high, unit)}, and nothing beyond"
+            )
+
+
+def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
+    """Return the surrogate of a key figure from the cases of a study.
+
+    The degree is the one that tells a fifth of the cases best which it has not seen.
+
+    Raises
+    ------
+    UnknownNameError
+        For a figure that the study does not have.
+    ParameterError
+        For designs that do not show what lies between their points, structural choices among what
+        varies, too few cases, and a figure that does not vary.
+    FileError
+        When OpenTURNS is not installed.
+    """
+    plan = findings.plan
+    _require_numbers(plan)
+    if kpi not in findings.units:
+        raise unknown_name("key figure", kpi, findings.units)
+    y = findings.figure(kpi)
+    known = np.isfinite(y)
+    columns = {v.name: np.asarray(findings.cases[v.name], dtype=float) for v in plan.varied}
+    x, y = np.column_stack(list(columns.values()))[known], y[known]
+    if y.size < FEWEST:
+        raise ParameterError(
+            f"{y.size} cases have {kpi}: a surrogate needs {FEWEST} of them at least"
+        )
+    if np.ptp(y) == 0.0:
+        raise ParameterError(f"{kpi} is the same in all cases: there is nothing to tell")
+    errors, best = min(
+        (_of_unseen(plan.varied, x, y, degree, 0) for degree in _degrees(x.shape)),
+        key=lambda told: float(np.mean(told[0] ** 2)),
+    )
+    others = [_of_unseen(plan.varied, x, y, best.degree, k)[0] for k in range(1, _FOLDS)]
+    errors = np.concatenate([errors, *others])
+    best = _fitted(plan.varied, x, y, best.degree)
+    nominal = _within(plan.varied, x)
+    return Surrogate(
+        kpi, findings.units[kpi], nominal, {v.name: v.unit for v in plan.varied},
+        dict(zip(nominal, x.min(axis=0).tolist(), strict=True)),
+        dict(zip(nominal, x.max(axis=0).tolist(), strict=True)),
+        y.size, best.degree, best.terms,
+        float(np.sqrt(np.mean(errors**2))), float(np.abs(errors).max()),
+        1.0 - float(np.mean(errors**2) / np.var(y)), best.polynomial,
+    )  # fmt: skip
+
+
+def _require_numbers(plan: StudyPlan) -> None:
+    if plan.design in _LACKING:
+        raise ParameterError(
+            f"the design {plan.design!r} does not show what lies between its points: a surrogate "
+            "takes 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'"
+        )
+    choices = [v.name for v in plan.varied if not v.unit]
+    if choices:
+        raise ParameterError(
+            f"{', '.join(choices)}: a choice has no polynomial; make a study for each of its values"
+        )
+
+
+def _within(varied: Sequence[Varied], x: Array) -> dict[str, float]:
+    """Return what the bench has of each quantity; where no case comes so far, the nearest."""
+    return {
+        v.name: float(np.clip(v.nominal, x[:, k].min(), x[:, k].max()))
+        for k, v in enumerate(varied)
+    }
+
+
+def _degrees(shape: tuple[int, ...]) -> list[int]:
+    """Return degrees whose polynomial has fewer terms than half of the cases it is fitted to."""
+    cases, quantities = shape
+    fit = [
+        degree for degree in range(1, _LARGEST + 1)
+        if math.comb(quantities + degree, degree) <= 0.5 * cases * (1.0 - 1.0 / _FOLDS)
+    ]  # fmt: skip
+    return fit or [1]
+
+
+@dataclass(frozen=True)
+class _Fit:
+    """A polynomial through cases, its degree, and how many terms it has."""
+
+    degree: int
+    terms: int
+    polynomial: Polynomial
+
+
+def _of_unseen(
+    varied: Sequence[Varied], x: Array, y: Array, degree: int, fifth: int
+) -> tuple[Array, _Fit]:
+    """Return the errors of a fifth of the cases, told by the others, and what told them."""
+    apart = np.arange(y.size) % _FOLDS == fifth
+    fit = _fitted(varied, x[~apart], y[~apart], degree)
+    return fit.polynomial(x[apart]) - y[apart], fit
+
+
+def _fitted(varied: Sequence[Varied], x: Array, y: Array, degree: int) -> _Fit:
+    ot: Any = library("openturns", *LIBRARY)
+    law = ot.JointDistribution([_marginal(ot, v, x[:, k]) for k, v in enumerate(varied)])
+    basis = ot.OrthogonalProductPolynomialFactory([law.getMarginal(k) for k in range(len(varied))])
+    count = basis.getEnumerateFunction().getStrataCumulatedCardinal(degree)
+    chosen = ot.LeastSquaresMetaModelSelectionFactory(ot.LARS(), ot.CorrectedLeaveOneOut())
+    algorithm = ot.FunctionalChaosAlgorithm(
+        ot.Sample(x), ot.Sample(y[:, None]), law, ot.FixedStrategy(basis, count),
+        ot.LeastSquaresStrategy(chosen),
+    )  # fmt: skip
+    algorithm.run()
+    result = algorithm.getResult()
+    model = result.getMetaModel()
+
+    def polynomial(points: Array) -> Array:
+        return np.asarray(model(ot.Sample(points)), dtype=float)[:, 0]
+
+    return _Fit(degree, result.getCoefficients().getSize(), polynomial)
+
+
+def _marginal(ot: Any, varied: Varied, values: NDArray[np.float64]) -> Any:
+    """Return the law whose polynomials a quantity has: any will do that is as wide."""
+    low, high = float(values.min()), float(values.max())
+    if low == high:
+        return ot.Uniform(low - 1.0, high + 1.0)
+    law = varied.distribution
+    if math.isfinite(law.low) and math.isfinite(law.high):
+        return ot.Uniform(min(low, law.low), max(high, law.high))
+    return ot.Normal(float(values.mean()), float(values.std()))
