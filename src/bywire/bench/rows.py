@@ -93,21 +93,32 @@ class Rows:
         notes: Callable[[], Mapping[str, Any]] = dict,
     ) -> None:
         self._notes = notes
-        self.data_vars = {
-            name: Row(self, name, values, attributes[name]) for name, values in signals.items()
-        }
-        clock = {"units": "s", "long_name": "time"}
-        self.variables = {**self.data_vars, TIME: Row(self, TIME, time, clock)}
+        self._values = {**signals, TIME: time}
+        self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
+        self._signals = tuple(signals)
         self.sizes = {TIME: time.size}
 
+    @property
+    def data_vars(self) -> Mapping[str, Row]:
+        """The signals by name."""
+        return _Named(self, self._signals)
+
+    @property
+    def variables(self) -> Mapping[str, Row]:
+        """The signals and their time, by name."""
+        return _Named(self, tuple(self._values))
+
     def __iter__(self) -> Iterator[str]:
-        return iter(self.data_vars)
+        return iter(self._signals)
 
     def __contains__(self, name: object) -> bool:
-        return name in self.variables
+        return name in self._values
 
     def __getitem__(self, name: Any) -> Any:
-        return self.variables[name] if isinstance(name, str) else self.dataset[name]
+        if not isinstance(name, str):
+            return self.dataset[name]
+        # None is kept: arrays of rows that held it in turn would wait for a search for garbage.
+        return Row(self, name, self._values[name], self._attributes[name])
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -122,9 +133,26 @@ class Rows:
     @cached_property
     def dataset(self) -> xr.Dataset:
         """The same as a Dataset."""
-        time = self.variables[TIME]
-        return xr.Dataset(
-            {name: (TIME, row.values, dict(row.attrs)) for name, row in self.data_vars.items()},
-            coords={TIME: (TIME, time.values, dict(time.attrs))},
-            attrs=self.attrs,
-        )
+        each = {
+            name: (TIME, values, dict(self._attributes[name]))
+            for name, values in self._values.items()
+        }
+        time = each.pop(TIME)
+        return xr.Dataset(each, coords={TIME: time}, attrs=self.attrs)
+
+
+class _Named(Mapping[str, Row]):
+    """Signals of rows by name."""
+
+    def __init__(self, rows: Rows, names: tuple[str, ...]) -> None:
+        self._rows, self._names = rows, names
+
+    def __getitem__(self, name: str) -> Row:
+        row: Row = self._rows[name]
+        return row
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)

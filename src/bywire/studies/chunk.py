@@ -5,6 +5,7 @@ It depends on the plan and its number alone, wherever and in whatever order it i
 
 from __future__ import annotations
 
+import gc
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -70,6 +71,9 @@ def computed_chunk(plan: StudyPlan, chunk: int, threads: int | None = None) -> C
     columns[FAILURE] = np.array(failures, dtype=object)
     said = ["; ".join(results[k].warnings) if k in results else "" for k in range(count)]
     columns[WARNINGS] = np.array(said, dtype=object)
+    # Models that were evaluated refer to themselves and to arrays: too few objects for Python to
+    # look for them soon, and too many megabytes to wait.
+    gc.collect(1)
     return columns
 
 

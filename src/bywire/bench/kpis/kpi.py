@@ -200,7 +200,7 @@ def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
     ParameterError
         When the signal has other dimensions than time.
     """
-    if name not in recording.variables:
+    if name not in recording:
         raise unknown_name("signal of the recording", name, map(str, recording.variables))
     variable = recording[name]
     if variable.dims != ("time",):

@@ -7,15 +7,18 @@ import subprocess
 import sys
 import tempfile
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 from bywire.bench.ensemble import changed
 from bywire.bench.running import run_of
 from bywire.benchmark.commands import environment
-from bywire.benchmark.result import Result, at_most
+from bywire.benchmark.result import Result, at_least, at_most
 from bywire.benchmark.suite import Part
+from bywire.core.unneeded import allow_dask
 from bywire.simulation.run_group import simulate_group
 from bywire.studies.chunk import computed_chunk
+from bywire.studies.executor import Cluster, Executor, Pool
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.study_file import read_study
 
@@ -30,6 +33,7 @@ overshoot = "<= 15 % with 90 %"
 """
 _CHUNKS = 4
 _ROUNDS = 3
+_STEADY = 32  # chunks over which rates are measured
 _CASES = 1024  # of the study whose memory is measured
 # The kernel's own mark of this program, its workers apart.
 _MEMORY = """
@@ -67,6 +71,8 @@ def studies() -> list[Result]:
         ]  # fmt: skip
         if Path("/proc/self/status").exists():
             results.append(_memory(path, Path(folder) / "out"))
+        if find_spec("distributed") is not None:
+            results.append(_efficiency(plan, cores))
     return results
 
 
@@ -98,6 +104,30 @@ def _memory(study: Path, out: Path) -> Result:
     )  # fmt: skip
     peak = float(done.stderr.split()[-1]) * 1024.0 / 1e6
     return at_most("study.memory", peak, 500.0, "MB", f"peak of a study of {_CASES} cases")
+
+
+def _efficiency(plan: StudyPlan, cores: int) -> Result:
+    """Compare workers of a cluster on this machine with plain processes, both once they run."""
+    allow_dask()
+    from distributed import LocalCluster
+
+    plain = _rate(Pool(cores), plan, cores)
+    with LocalCluster(n_workers=cores, threads_per_worker=1, dashboard_address=None) as cluster:
+        clustered = _rate(Cluster(cluster.scheduler_address), plan, cores)
+    return at_least(
+        "study.efficiency", clustered / plain, 0.95, "1",
+        f"cases a second of {cores} workers of dask.distributed over {cores} plain processes",
+    )  # fmt: skip
+
+
+def _rate(executor: Executor, plan: StudyPlan, cores: int) -> float:
+    """Return chunks a second [1/s], once each process has had two."""
+    computed = executor.computed(plan, range(2 * cores + _STEADY))
+    for _ in range(2 * cores):
+        next(computed)
+    begin = time.perf_counter()
+    count = sum(1 for _ in computed)
+    return count / (time.perf_counter() - begin)
 
 
 PART = Part("studies", studies)
