@@ -16,6 +16,7 @@ from bywire.benchmark.commands import environment
 from bywire.benchmark.result import Result, at_least, at_most
 from bywire.benchmark.suite import Part
 from bywire.core.unneeded import allow_dask
+from bywire.data.file_format import library
 from bywire.simulation.run_group import simulate_group
 from bywire.studies.chunk import computed_chunk
 from bywire.studies.executor import Cluster, Executor, Pool
@@ -109,10 +110,11 @@ def _memory(study: Path, out: Path) -> Result:
 def _efficiency(plan: StudyPlan, cores: int) -> Result:
     """Compare workers of a cluster on this machine with plain processes, both once they run."""
     allow_dask()
-    from distributed import LocalCluster
-
+    distributed = library("distributed", "clusters", "cluster")
     plain = _rate(Pool(cores), plan, cores)
-    with LocalCluster(n_workers=cores, threads_per_worker=1, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=cores, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
         clustered = _rate(Cluster(cluster.scheduler_address), plan, cores)
     return at_least(
         "study.efficiency", clustered / plain, 0.95, "1",
