@@ -8,6 +8,7 @@ from __future__ import annotations
 import gc
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -24,7 +25,22 @@ CASE, FAILURE, WARNINGS = "case", "failure", "warnings"
 Columns = dict[str, NDArray[Any]]
 
 
-def computed_chunk(plan: StudyPlan, chunk: int, threads: int | None = None) -> Columns:
+@dataclass(frozen=True)
+class PlacedChunk:
+    """A chunk whose values are not those that the plan lists: its number, and columns [SI]."""
+
+    number: int
+    values: Mapping[str, NDArray[Any]]
+
+
+def number_of(chunk: int | PlacedChunk) -> int:
+    """Return the number of a chunk."""
+    return chunk if isinstance(chunk, int) else chunk.number
+
+
+def computed_chunk(
+    plan: StudyPlan, chunk: int | PlacedChunk, threads: int | None = None
+) -> Columns:
     """Return the cases of a chunk.
 
     Parameters
@@ -32,7 +48,7 @@ def computed_chunk(plan: StudyPlan, chunk: int, threads: int | None = None) -> C
     plan
         The study.
     chunk
-        Number of the chunk, >= 0.
+        Number of the chunk, >= 0; with its values where the plan does not list them.
     threads
         Threads to use; all cores by default.
 
@@ -48,9 +64,9 @@ def computed_chunk(plan: StudyPlan, chunk: int, threads: int | None = None) -> C
     KeyboardInterrupt
         When interrupted.
     """
-    values = plan.values(chunk)
+    values = plan.values(chunk) if isinstance(chunk, int) else chunk.values
     count = len(next(iter(values.values())))
-    numbers = chunk * CHUNK + np.arange(count)
+    numbers = number_of(chunk) * CHUNK + np.arange(count)
     benches: dict[int, Bench] = {}
     failures = [""] * count
     for k in range(count):
@@ -85,8 +101,14 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
     InputError
         When the values contradict each other, or the experiment does not run with them.
     """
-    seed = plan.bench.seed + number if plan.is_sampled else None
-    return changed(plan.bench, values, seed)
+    return changed(plan.bench, values, plan.bench.seed + number if _is_noisy(plan, number) else None)
+
+
+def _is_noisy(plan: StudyPlan, number: int) -> bool:
+    """Return whether a case has noise of its own."""
+    if plan.rare is not None:
+        return plan.rare.has_own_noise(number // CHUNK)
+    return plan.is_sampled
 
 
 def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from bywire.core.errors import ParameterError
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SAMPLED
+from bywire.studies.rare_design import IMPORTANCE, SUBSET, RareDesign
 from bywire.studies.sensitivity_design import SENSITIVITY
 
 _DEPENDENT = "has cases that share values and are not independent"
@@ -19,6 +20,9 @@ def require_agreement(plan: StudyPlan) -> None:
         For these, and for a number of cases that the design does not admit.
     """
     if plan.is_sampled:
+        return
+    if plan.rare is not None:
+        _require_rare(plan, plan.rare)
         return
     is_indexed = plan.design in SENSITIVITY
     others = ", ".join(map(repr, SAMPLED))
@@ -39,3 +43,19 @@ def require_agreement(plan: StudyPlan) -> None:
                 "to meet the limit"
             )
     plan.points  # noqa: B018 - refuses what is too large, or too small for indices
+
+
+def _require_rare(plan: StudyPlan, design: RareDesign) -> None:
+    """Refuse rare failures of nothing, and the search of a design point among single values."""
+    if not plan.judged_demands:
+        raise ParameterError(
+            f"[requirements]: {plan.design!r} asks how probable it is that one is missed, and none "
+            "has a probability: write for instance \"<= 15 % with 99.99 %\""
+        )
+    singles = [each.name for each in plan.varied if each.distribution.is_discrete]
+    if singles and plan.design == IMPORTANCE:
+        raise ParameterError(
+            f"[vary] {', '.join(singles)}: {plan.design!r} follows derivatives, and single values "
+            f"have none: take {SUBSET!r}"
+        )
+    design.require_budget()

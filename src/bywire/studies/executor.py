@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from functools import partial
 from multiprocessing import active_children, get_context, parent_process
 from typing import Any, Protocol
@@ -17,7 +17,7 @@ from bywire.core.brake import load_system, loaded_files
 from bywire.core.errors import ParameterError, RunError
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
-from bywire.studies.chunk import Columns, computed_chunk
+from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, number_of
 from bywire.studies.plan import StudyPlan
 
 _AHEAD = 2  # chunks in flight for each worker, so that none waits for us
@@ -26,10 +26,15 @@ _WORTH = 8  # chunks from which on processes are worth their start
 _WHAT = ("studies on a cluster", "cluster")
 
 
+Chunks = Iterable[int | PlacedChunk]
+Compute = Callable[[Chunks], Iterator[tuple[int, Columns]]]
+"""yields the number and the columns of each chunk as soon as it is there, in any order"""
+
+
 class Executor(Protocol):
     """Computes chunks, in any order."""
 
-    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield the number and the columns of each chunk as soon as it is there.
 
         Raises
@@ -39,14 +44,23 @@ class Executor(Protocol):
         """
         ...
 
+    def opened(self, plan: StudyPlan) -> AbstractContextManager[Compute]:
+        """Return what computes chunks batch by batch, each one whole before the next."""
+        ...
+
 
 class InProcess:
     """The process itself, with lanes on all cores."""
 
-    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield each chunk; see `Executor`."""
         for chunk in chunks:
-            yield chunk, computed_chunk(plan, chunk)
+            yield number_of(chunk), computed_chunk(plan, chunk)
+
+    @contextmanager
+    def opened(self, plan: StudyPlan) -> Iterator[Compute]:
+        """Return what computes; see `Executor`."""
+        yield partial(self.computed, plan)
 
 
 class Pool:
@@ -61,14 +75,20 @@ class Pool:
     def __init__(self, workers: int) -> None:
         self.workers = workers
 
-    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield each chunk; see `Executor`."""
+        with self.opened(plan) as compute:
+            yield from compute(chunks)
+
+    @contextmanager
+    def opened(self, plan: StudyPlan) -> Iterator[Compute]:
+        """Return what computes; see `Executor`."""
         others = active_children()
         pool = ProcessPoolExecutor(
             self.workers, get_context("spawn"), initializer=_begin, initargs=(loaded_files(), plan)
         )
         try:
-            yield from _as_completed(pool, chunks, _AHEAD * self.workers)
+            yield partial(_as_completed, pool, _AHEAD * self.workers)
         except BrokenProcessPool:
             raise RunError(
                 "a process of the study was killed, most likely for want of memory: resume it, "
@@ -92,16 +112,25 @@ class Cluster:
     def __init__(self, address: str) -> None:
         self.address = address
 
-    def computed(self, plan: StudyPlan, chunks: Iterable[int]) -> Iterator[tuple[int, Columns]]:
+    def computed(self, plan: StudyPlan, chunks: Chunks) -> Iterator[tuple[int, Columns]]:
         """Yield each chunk; see `Executor`."""
+        with self.opened(plan) as compute:
+            yield from compute(chunks)
+
+    @contextmanager
+    def opened(self, plan: StudyPlan) -> Iterator[Compute]:
+        """Return what computes; see `Executor`."""
         with _client(self.address) as client:
             workers = len(client.scheduler_info()["workers"])
             if not workers:
                 raise RunError(f"the cluster at {self.address} has no workers: start some first")
-            yield from _of_cluster(client, plan, chunks)
+            client.run(_load, loaded_files())
+            yield partial(_of_cluster, client, plan)
 
 
-def executor_of(workers: int | None, cluster: str, chunks: int) -> Executor:
+def executor_of(
+    workers: int | None, cluster: str, chunks: int, together: int | None = None
+) -> Executor:
     """Return who computes: a cluster if one is named, else so many processes.
 
     Parameters
@@ -112,6 +141,8 @@ def executor_of(workers: int | None, cluster: str, chunks: int) -> Executor:
         Address of a Dask scheduler; empty for this machine.
     chunks
         How many chunks are left.
+    together
+        How many can be computed at once; all by default.
 
     Raises
     ------
@@ -124,7 +155,7 @@ def executor_of(workers: int | None, cluster: str, chunks: int) -> Executor:
         if workers is not None:
             raise ParameterError("workers of a cluster are the cluster's own: leave one out")
         return Cluster(cluster)
-    count = min(workers or os.cpu_count() or 1, chunks)
+    count = min(workers or os.cpu_count() or 1, together or chunks)
     is_worth = workers is not None or chunks >= _WORTH
     return Pool(count) if count > 1 and is_worth else InProcess()
 
@@ -149,7 +180,7 @@ def _end_with_parent() -> None:
         os._exit(1)
 
 
-def _computed(chunk: int) -> tuple[int, Columns]:
+def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
     return _single(_given[0], chunk)
 
 
@@ -159,12 +190,12 @@ def _load(files: tuple[str, ...]) -> None:
         load_system(file)
 
 
-def _single(plan: StudyPlan, chunk: int) -> tuple[int, Columns]:
-    return chunk, computed_chunk(plan, chunk, threads=1)
+def _single(plan: StudyPlan, chunk: int | PlacedChunk) -> tuple[int, Columns]:
+    return number_of(chunk), computed_chunk(plan, chunk, threads=1)
 
 
 def _as_completed(
-    pool: ProcessPoolExecutor, chunks: Iterable[int], ahead: int
+    pool: ProcessPoolExecutor, ahead: int, chunks: Chunks
 ) -> Iterator[tuple[int, Columns]]:
     """Yield what a pool has finished, with few jobs in flight."""
     left = iter(chunks)
@@ -199,10 +230,9 @@ def _client(address: str) -> Iterator[Any]:
 
 
 def _of_cluster(
-    client: Any, plan: StudyPlan, chunks: Iterable[int]
+    client: Any, plan: StudyPlan, chunks: Chunks
 ) -> Iterator[tuple[int, Columns]]:
     distributed = library("distributed", *_WHAT)
-    client.run(_load, loaded_files())
     futures = client.map(partial(_single, plan), list(chunks), pure=False)
     try:
         with client.as_current():

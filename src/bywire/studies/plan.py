@@ -22,6 +22,7 @@ from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.studies.distribution import Distribution
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
+from bywire.studies.rare_design import RARE, RareDesign, library_version
 from bywire.studies.sensitivity_design import SENSITIVITY, SensitivityDesign
 
 CHUNK = 64
@@ -89,9 +90,11 @@ class StudyPlan:
     varied
         What varies.
     design
-        One of `points.SAMPLED`, `points.SPANNED` or `sensitivity_design.SENSITIVITY`.
+        One of `points.SAMPLED`, `points.SPANNED`, `sensitivity_design.SENSITIVITY` or
+        `rare_design.RARE`.
     cases
-        Cases asked for; of indices, at most so many; of other listed points, all there are.
+        Cases asked for; of indices, and of each rare failure, at most so many; of other listed
+        points, all there are.
     seed
         Of the points.
     demands
@@ -100,6 +103,8 @@ class StudyPlan:
         Of all intervals, between 0 and 1.
     levels
         Values of each quantity of a grid, or of one at a time.
+    cases_per_level
+        Cases asked for in each level of subset simulation.
     correlations
         Pairs of names -> correlation of their normal scores.
     """
@@ -113,6 +118,7 @@ class StudyPlan:
     demands: tuple[Demand, ...] = ()
     confidence: float = 0.95
     levels: int = 5
+    cases_per_level: int = 2560
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
     @property
@@ -128,13 +134,34 @@ class StudyPlan:
         return SensitivityDesign(self.design, len(self.varied), self.cases, self.seed)
 
     @cached_property
+    def rare(self) -> RareDesign | None:
+        """The design of its rare failures; None of another study."""
+        if self.design not in RARE:
+            return None
+        judged = len(self.judged_demands)
+        return RareDesign(self.design, judged, self.cases_per_level, self.cases, self.seed)
+
+    @property
+    def judged_demands(self) -> tuple[Demand, ...]:
+        """What is judged; of rare failures, what is wanted with a probability."""
+        if self.design not in RARE:
+            return self.demands
+        return tuple(each for each in self.demands if each.probability is not None)
+
+    @cached_property
+    def scored(self) -> Sampled:
+        """The quantities over standard normal scores."""
+        each = [v.distribution for v in self.varied]
+        return Sampled(self.design, self.seed, each, self._factor)
+
+    @cached_property
     def points(self) -> Sampled | Spanned:
         """Where it is computed."""
         each = [v.distribution for v in self.varied]
         if self.sensitivity is not None:
             return Spanned(self.sensitivity.columns(each))
-        if self.is_sampled:
-            return Sampled(self.design, self.seed, each, self._factor)
+        if self.is_sampled or self.rare is not None:
+            return self.scored
         return spanned(self.design, each, [v.nominal for v in self.varied], self.levels)
 
     @property
@@ -157,14 +184,32 @@ class StudyPlan:
         units = {v.name: v.unit for v in self.varied if v.unit}
         return units | {name: leaves[name].unit.symbol for v in self.varied for name in v.together}
 
+    @cached_property
+    def column_units(self) -> Mapping[str, str]:
+        """Unit of every number of a case: what varies, and key figures."""
+        return {**self.units, **self.bench.definition.kpis_with(self.bench.chosen_options)}
+
     def values(self, chunk: int) -> dict[str, NDArray[Any]]:
         """Return the values of what varies, by name, in each case of a chunk [SI].
 
         Parameters that vary together with another follow it.
         """
+        return self._named(self.points.values(chunk, CHUNK))
+
+    def values_at(self, scores: Array) -> dict[str, NDArray[Any]]:
+        """Return the values of what varies, by name, at standard normal scores [SI].
+
+        Parameters
+        ----------
+        scores
+            Independent ones, shape (cases, quantities).
+        """
+        return self._named(self.scored.values_at(scores))
+
+    def _named(self, values: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
         columns: dict[str, NDArray[Any]] = {}
         flat = self.bench.par.flat()
-        for each, column in zip(self.varied, self.points.values(chunk, CHUNK), strict=True):
+        for each, column in zip(self.varied, values, strict=True):
             columns[each.name] = column
             columns |= {
                 follower: flat[follower] * (column.astype(float) / each.nominal)
@@ -206,6 +251,10 @@ class StudyPlan:
             said["groups"] = self.sensitivity.base
             points = self.sensitivity.probabilities.tobytes()
             said["points"] = hashlib.sha256(points).hexdigest()
+        if self.rare is not None:
+            # Where it goes depends on the requirements, and on how the library draws.
+            said["rare"] = [library_version(), self.rare.level]
+            said["requirements"] = [[each.kpi, each.limit] for each in self.judged_demands]
         text = json.dumps(said, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -25,6 +25,7 @@ SPANNED = ("grid", "corners", "one-at-a-time")
 """designs that go to the ends: what they show is what may happen, not how often"""
 MOST = 10_000_000
 """cases of one study"""
+_INSIDE = (2.0**-53, 1.0 - 2.0**-53)  # probabilities that have a finite quantile
 _CORNERS = 16  # quantities of which all corners are visited
 
 
@@ -52,10 +53,26 @@ class Sampled:
 
     def values(self, chunk: int, size: int) -> list[NDArray[np.generic]]:
         """Return the values of each quantity in a chunk of points, shape (size,) each."""
-        u = self._probabilities(chunk, size)
-        u = np.clip(u, 2.0**-53, 1.0 - 2.0**-53)
+        u = np.clip(self._probabilities(chunk, size), *_INSIDE)
         if self.factor is not None:
-            u = stats.norm.cdf(stats.norm.ppf(u) @ self.factor.T)
+            return self.values_at(stats.norm.ppf(u))
+        return self._quantiles(u)
+
+    def values_at(self, scores: Array) -> list[NDArray[np.generic]]:
+        """Return the values of each quantity at independent standard normal scores.
+
+        Parameters
+        ----------
+        scores
+            Shape (cases, quantities).
+        """
+        return self._quantiles(np.clip(stats.norm.cdf(self.correlated(scores)), *_INSIDE))
+
+    def correlated(self, scores: Array) -> Array:
+        """Return the normal scores of the quantities by independent ones."""
+        return scores if self.factor is None else scores @ self.factor.T
+
+    def _quantiles(self, u: Array) -> list[NDArray[np.generic]]:
         return [each.quantile(u[:, k]) for k, each in enumerate(self.distributions)]
 
     def _probabilities(self, chunk: int, size: int) -> Array:

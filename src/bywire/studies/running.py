@@ -6,7 +6,8 @@ from pathlib import Path
 
 from bywire.core.typing import Progress
 from bywire.studies.executor import executor_of
-from bywire.studies.plan import StudyPlan
+from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.rare_failures import rare_failures
 from bywire.studies.store import StudyStore
 
 
@@ -40,15 +41,19 @@ def complete(
         When interrupted; what is finished stays.
     """
     store.open(plan, source)
+    if plan.rare is not None:
+        together = plan.rare.together // CHUNK
+        executor = executor_of(workers, cluster, -(-plan.cases // CHUNK), together)
+        rare_failures(plan, store, executor, progress)
+        return
     missing = sorted(set(range(plan.chunks)) - store.finished())
     if not missing:
         return
-    units = {**plan.units, **plan.bench.definition.kpis_with(plan.bench.chosen_options)}
     done = plan.chunks - len(missing)
     label = f"{plan.total} cases"
     progress(label, done / plan.chunks)
     for count, (chunk, columns) in enumerate(
         executor_of(workers, cluster, len(missing)).computed(plan, missing), 1
     ):
-        store.write(chunk, columns, units)
+        store.write(chunk, columns, plan.column_units)
         progress(label, (done + count) / plan.chunks)

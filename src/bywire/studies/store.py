@@ -156,25 +156,31 @@ class StudyStore:
         """
         import pandas as pd
 
-        parquet = library("pyarrow.parquet", *_WHAT)
-        frames = []
-        for chunk in sorted(self.finished()):
-            if chunk >= chunks:
-                continue
-            try:
-                table = parquet.read_table(
-                    self.path(chunk), page_checksum_verification=True, use_threads=False
-                )
-                frames.append(pd.DataFrame({
-                    name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
-                    for name in table.column_names
-                }))  # fmt: skip
-            except Exception as error:  # the library raises what it likes of damaged files
-                raise FileError(
-                    f"{self.path(chunk)} is damaged ({type(error).__name__}): remove it, and "
-                    "'bywire study resume' computes it again"
-                ) from None
+        frames = [pd.DataFrame(self.columns(n)) for n in sorted(self.finished()) if n < chunks]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+    def columns(self, chunk: int) -> Columns:
+        """Return the cases of a chunk that is there.
+
+        Raises
+        ------
+        FileError
+            When its file is damaged.
+        """
+        parquet = library("pyarrow.parquet", *_WHAT)
+        try:
+            table = parquet.read_table(
+                self.path(chunk), page_checksum_verification=True, use_threads=False
+            )
+            return {
+                name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
+                for name in table.column_names
+            }
+        except Exception as error:  # the library raises what it likes of damaged files
+            raise FileError(
+                f"{self.path(chunk)} is damaged ({type(error).__name__}): remove it, and "
+                "'bywire study resume' computes it again"
+            ) from None
 
 
 def _unwritable(path: Path, error: OSError) -> FileError:

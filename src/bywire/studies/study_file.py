@@ -21,11 +21,12 @@ from bywire.studies.distribution import read_choice, read_distribution
 from bywire.studies.measured import varied_as_measured
 from bywire.studies.plan import Demand, StudyPlan, Varied, correlation_factor
 from bywire.studies.points import MOST, SAMPLED, SPANNED
+from bywire.studies.rare_design import DEFAULT_CASES, RARE, SUBSET
 from bywire.studies.sensitivity_design import LEVELS, SENSITIVITY
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
-_DESIGN = ("kind", "cases", "seed", "levels", "confidence")
-_KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY)
+_DESIGN = ("kind", "cases", "seed", "levels", "confidence", "cases_per_level")
+_KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *RARE)
 _WITH = re.compile(r"(.*\S)\s+with\s+(\S.*%)\s*", re.DOTALL)
 _WITH_LEVELS = ("grid", "one-at-a-time")
 _OPTION = "options."
@@ -225,7 +226,12 @@ def _design(section: Mapping[str, Any]) -> dict[str, Any]:
             raise unknown_name("[design] kind", str(section["kind"]), _KINDS)
         design["design"] = section["kind"]
     _require_of_use(design.get("design", StudyPlan.design), section)
-    for key, low, high in (("cases", 1, MOST), ("seed", 0, 2**63 - 1), ("levels", 2, 1000)):
+    if (default := DEFAULT_CASES.get(design.get("design", ""))) is not None:
+        design["cases"] = default
+    for key, low, high in (
+        ("cases", 1, MOST), ("seed", 0, 2**63 - 1), ("levels", 2, 1000),
+        ("cases_per_level", 1, MOST),
+    ):  # fmt: skip
         if key in section:
             design[key] = _whole(key, section[key], low, high)
     if "confidence" in section:
@@ -246,6 +252,11 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
             f"[design] levels: {kind!r} has none to choose"
             + (f", it steps on {LEVELS}" if kind == "morris" else "")
             + ": leave them out"
+        )
+    if "cases_per_level" in section and kind != SUBSET:
+        raise ParameterError(
+            f"[design] cases_per_level: {kind!r} has no levels to fill, {SUBSET!r} has: leave it "
+            "out"
         )
     if "cases" in section and kind in SPANNED:
         raise ParameterError(

@@ -1,0 +1,127 @@
+"""The rare failures of a study: each requirement's probability, and its most probable failing case."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from bywire.core.typing import Progress, silent
+from bywire.studies.distribution import NEVER
+from bywire.studies.executor import Executor
+from bywire.studies.failure_probability import FailureProbability
+from bywire.studies.importance_sampling import importance_sampling
+from bywire.studies.plan import CHUNK, Demand, StudyPlan
+from bywire.studies.rare_cases import RareCases, RequirementCases
+from bywire.studies.rare_design import SUBSET
+from bywire.studies.store import StudyStore
+from bywire.studies.subset_simulation import subset_simulation
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True)
+class Importance:
+    """How much a quantity has to do with a failure.
+
+    Parameters
+    ----------
+    quantity
+        Its name.
+    score
+        Normal score of where failures lie: standard deviations off the middle, with their sign.
+    factor
+        Importance factor: share of the squared distance, 0 to 1.
+    """
+
+    quantity: str
+    score: float
+    factor: float
+
+
+@dataclass(frozen=True)
+class RareFailure:
+    """The failure of a requirement.
+
+    Parameters
+    ----------
+    demand
+        The requirement.
+    found
+        How probable its failure is.
+    case
+        Number of the most probable failing case that was computed; None where none failed.
+    importance
+        Quantities, the most important first; none where it is not known where failures lie.
+    """
+
+    demand: Demand
+    found: FailureProbability
+    case: int | None
+    importance: tuple[Importance, ...]
+
+
+def rare_failures(
+    plan: StudyPlan, store: StudyStore, executor: Executor | None = None,
+    progress: Progress = silent,
+) -> tuple[tuple[RareFailure, ...], pd.DataFrame]:  # fmt: skip
+    """Return the rare failures of a study, and all of its cases.
+
+    Parameters
+    ----------
+    plan, store
+        The study and its folder.
+    executor
+        Who computes the cases that the folder lacks; None to say what it shows so far.
+    progress
+        Called with a label and the share of the budget that is used.
+
+    Raises
+    ------
+    FileError
+        When OpenTURNS is not installed, or the folder cannot be read or written.
+    RunError
+        When workers are lost.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    with RareCases(plan, store, executor, progress) as cases:
+        found = tuple(
+            _failure(plan, RequirementCases(cases, k)) for k in range(len(plan.judged_demands))
+        )
+    return found, cases.frame
+
+
+def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
+    design, count = cases.cases.design, len(plan.varied)
+    assert cases.demand.probability is not None
+    if design.kind == SUBSET:
+        negligible = min(NEVER, 1e-3 * (1.0 - cases.demand.probability))
+        found = subset_simulation(
+            cases.drawn, count, design.level, plan.seed, plan.confidence, negligible, cases.report
+        )
+    else:
+        found = importance_sampling(
+            cases.drawn, cases.searched, count, plan.cases, plan.seed, plan.confidence, CHUNK,
+            cases.report,
+        )  # fmt: skip
+    case = None if found.place is None else cases.numbers[found.place]
+    return RareFailure(cases.demand, found, case, _importance(plan, found))
+
+
+def _importance(plan: StudyPlan, found: FailureProbability) -> tuple[Importance, ...]:
+    """Return importance factors: those of Hasofer and Lind's design point, or of the mean failure.
+
+    Of correlated quantities they are of their own normal scores.
+    """
+    if found.center is None or not np.any(found.center):
+        return ()
+    scores = plan.scored.correlated(found.center)
+    shares = scores**2 / (scores @ scores)
+    each = [
+        Importance(v.name, float(score), float(part))
+        for v, score, part in zip(plan.varied, scores, shares, strict=True)
+    ]
+    return tuple(sorted(each, key=lambda i: -i.factor))
