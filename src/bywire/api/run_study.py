@@ -16,6 +16,7 @@ from bywire.report.answer import use_case
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SPANNED
+from bywire.studies.rare_failures import rare_failures
 from bywire.studies.running import complete
 from bywire.studies.store import StudyStore
 from bywire.studies.study_file import read_study
@@ -86,9 +87,9 @@ def _completed(
             plan, store, source, workers=workers, cluster=cluster, progress=progress or silent
         )
     except KeyboardInterrupt:
+        of = "" if plan.rare is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(
-            f"{len(store.finished())} of {plan.chunks} chunks are kept: bywire study resume "
-            f"{store.folder}"
+            f"{len(store.finished())}{of} chunks are kept: bywire study resume {store.folder}"
         ) from None
     return _run_of(plan, store, nominal)
 
@@ -196,14 +197,17 @@ def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyP
         if cases is not None:
             _refuse_cases(plan, cases)
         return plan
-    if plan.is_sampled:
+    if plan.is_sampled or plan.rare is not None:
         known = store.cases_of(plan)
         if cases is not None and cases < known:
             raise ParameterError(
                 f"cases = {cases}: {store.folder} has {known} already, and none are taken off: "
                 "name more of them, or another folder"
             )
-        return replace(plan, cases=max(cases or plan.cases, known))
+        extended = replace(plan, cases=max(cases or plan.cases, known))
+        if extended.rare is not None:
+            extended.rare.require_budget()
+        return extended
     asked = plan if cases is None else replace(plan, cases=cases)
     asked.points  # noqa: B018 - refuses too few before anything runs
     return asked
@@ -211,7 +215,7 @@ def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyP
 
 def _refuse_cases(plan: StudyPlan, cases: int) -> None:
     """Refuse to add cases to a design that has its own."""
-    if plan.is_sampled:
+    if plan.is_sampled or plan.rare is not None:
         return
     why = (
         "it lists them by quantities and levels" if plan.design in SPANNED
@@ -224,7 +228,12 @@ def _refuse_cases(plan: StudyPlan, cases: int) -> None:
 
 
 def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
-    findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
-    is_whole = len(findings.cases) == plan.total
+    if plan.rare is not None:
+        rare, cases = rare_failures(plan, store)
+        findings = Findings(plan, cases, nominal.kpis, rare)
+        is_whole = all(each.found.state != "unfinished" for each in rare)
+    else:
+        findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
+        is_whole = len(findings.cases) == plan.total
     status = status_of(findings.judgments) if is_whole else "unfinished"
     return StudyRun(plan, store.folder, findings, nominal, status)

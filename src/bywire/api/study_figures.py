@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from bywire.api.study_rare import rare_figures
 from bywire.api.study_sensitivity import sensitivity_figures
 from bywire.api.study_tables import shown_figures
 from bywire.bench.requirements import limit_of
@@ -36,6 +37,8 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     recordings
         Returns the recordings of the bench itself and of worst cases, by run and by what they are.
     """
+    if findings.rare:
+        return [*rare_figures(findings), *_scatters(findings), *_overlays(recordings)]
     band = "; the shaded band holds 90 % of them" if findings.plan.is_sampled else ""
     blocks: list[Block] = [
         FigureBlock(
@@ -53,15 +56,8 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
         ))  # fmt: skip
     if findings.plan.sensitivity is not None:
         blocks += sensitivity_figures(findings)
-    for judgment in findings.judgments:
-        name = judgment.demand.kpi
-        # Trajectories stand on a few levels: their points would be stripes.
-        if findings.plan.design != "morris" and findings.drivers(name):
-            blocks.append(FigureBlock(
-                partial(_scatter, findings, name),
-                f"{name.replace('_', ' ')} over what drives it most; crosses miss the limit.",
-                f"scatter-{name}",
-            ))  # fmt: skip
+    # Trajectories stand on a few levels: their points would be stripes.
+    blocks += _scatters(findings) if findings.plan.design != "morris" else []
     if findings.judgments and findings.plan.is_sampled:
         blocks.append(FigureBlock(
             partial(_convergence, findings),
@@ -75,6 +71,17 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
         ))  # fmt: skip
         blocks += _overlays(recordings)
     return blocks
+
+
+def _scatters(findings: Findings) -> list[Block]:
+    return [
+        FigureBlock(
+            partial(_scatter, findings, name),
+            f"{name.replace('_', ' ')} over what drives it most; crosses miss the limit.",
+            f"scatter-{name}",
+        )
+        for judgment in findings.judgments if findings.drivers(name := judgment.demand.kpi)
+    ]  # fmt: skip
 
 
 def _limit(findings: Findings, name: str) -> float | None:

@@ -10,6 +10,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from bywire.api.study_figures import study_figures
+from bywire.api.study_rare import (
+    failure_table,
+    importance_tables,
+    rare_data,
+    rare_notes,
+    state_texts,
+)
 from bywire.api.study_sensitivity import drivers_data, missing_indices, sensitivity_tables
 from bywire.api.study_tables import (
     correlated,
@@ -107,10 +114,15 @@ class StudyRun(Answer):
                 f"{len(failed)} of {len(self.cases)} cases have no result; they count as missing "
                 "every requirement"
             )
+        if self.findings.rare:
+            said += state_texts(self.findings)
         if self.status == "unfinished":
+            left = self.plan.total - len(self.cases)
             said.append(
-                f"{self.plan.total - len(self.cases)} of {self.plan.total} cases are not computed "
-                f"yet: bywire study resume {self.folder}"
+                f"not all cases that it asks for are computed yet: bywire study resume "
+                f"{self.folder}" if self.findings.rare else
+                f"{left} of {self.plan.total} cases are not computed yet: bywire study resume "
+                f"{self.folder}"
             )
         return said
 
@@ -136,6 +148,8 @@ class StudyRun(Answer):
         ]
 
     def _on_intervals(self) -> list[str]:
+        if self.plan.rare is not None:
+            return rare_notes(self.findings)
         if self.plan.sensitivity is not None:
             return [
                 f"{self.plan.design}: cases share values, so that shares of them are no "
@@ -171,12 +185,18 @@ class StudyRun(Answer):
             return self._empty()
         subject = Subject(plan.name, plan.bench.definition.summary, plan.bench.parameters,
                           plan.bench.par)  # fmt: skip
-        demands = TableBlock(demand_table(findings), width=120)
+        is_rare = bool(findings.rare)
+        table = failure_table(findings) if is_rare else demand_table(findings)
+        demands = TableBlock(table, width=120)
         spreads = TableBlock(spread_table(findings), width=140)
         is_indexed = plan.sensitivity is not None
-        drivers = sensitivity_tables(findings) if is_indexed else influence_tables(findings)
+        drivers = (
+            importance_tables(findings) if is_rare
+            else sensitivity_tables(findings) if is_indexed else influence_tables(findings)
+        )  # fmt: skip
         unindexed = [Listing(texts)] if (texts := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
+        most = "Most probable failing cases" if is_rare else "Worst cases"
         missing = self._failures()
         return Document(
             f"Study {plan.name}",
@@ -187,7 +207,7 @@ class StudyRun(Answer):
                 *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
                   else []),
                 Section("Figures", study_figures(findings, self._recordings)),
-                *([Section("Worst cases", [Listing(self._worst_texts())])] if judged else []),
+                *([Section(most, [Listing(self._worst_texts())])] if judged else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
                 Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
                 subject.provenance(f"Chunks of the study: {self.folder}."),
@@ -241,9 +261,14 @@ class StudyRun(Answer):
     def _worst_texts(self) -> list[str]:
         return [
             f"{each.demand.kpi} = {self._at_worst(each)} in case {self._named(each.worst)}; "
-            f"worst-{each.demand.kpi}.toml runs it"
+            f"{self._kind}-{each.demand.kpi}.toml runs it"
             for each in self.findings.judgments if each.worst is not None
         ]  # fmt: skip
+
+    @property
+    def _kind(self) -> str:
+        """What the shown case of a requirement is called."""
+        return "failing" if self.findings.rare else "worst"
 
     def _at_worst(self, judgment: Judgment) -> str:
         assert judgment.worst is not None
@@ -254,7 +279,7 @@ class StudyRun(Answer):
         assert judgment.worst is not None
         values = self.findings.values(judgment.worst)
         made = case_bench(self.plan, self.findings.number(judgment.worst), values)
-        return replace(made, name=f"worst {judgment.demand.kpi}")
+        return replace(made, name=f"{self._kind} {judgment.demand.kpi}")
 
     def _known(self) -> dict[str, Bench]:
         return {j.demand.kpi: self._bench_of(j) for j in self.findings.judgments
@@ -268,7 +293,7 @@ class StudyRun(Answer):
     def _recordings(self) -> dict[str, dict[str, xr.Dataset]]:
         """Return the recordings of the bench itself and of the worst cases, by run."""
         each = {"the bench itself": self.nominal} | {
-            f"worst {kpi}": result for kpi, result in self._results.items()
+            f"{self._kind} {kpi}": result for kpi, result in self._results.items()
         }
         return {
             label: {name: r.recordings[label] for name, r in each.items() if label in r.recordings}
@@ -277,10 +302,11 @@ class StudyRun(Answer):
 
     def _worst_benches(self) -> list[Attachment]:
         def write(bench: Bench, path: Path) -> Path:
-            path.write_text(bench_text(bench, f"Worst case of study {self.plan.name}"), "utf-8")
+            what = "Most probable failing" if self.findings.rare else "Worst"
+            path.write_text(bench_text(bench, f"{what} case of study {self.plan.name}"), "utf-8")
             return path
 
-        return [Attachment(f"worst-{kpi}.toml", partial(write, bench))
+        return [Attachment(f"{self._kind}-{kpi}.toml", partial(write, bench))
                 for kpi, bench in self._known().items()]  # fmt: skip
 
     def _worst_recordings(self) -> list[Attachment]:
@@ -289,7 +315,7 @@ class StudyRun(Answer):
 
         labels = list(self.nominal.recordings)
         return [
-            Attachment(f"worst-{kpi}{'' if len(labels) == 1 else '-' + label}.nc",
+            Attachment(f"{self._kind}-{kpi}{'' if len(labels) == 1 else '-' + label}.nc",
                        partial(write, kpi, label))
             for kpi in self._known() for label in labels
         ]  # fmt: skip
@@ -327,7 +353,11 @@ class StudyRun(Answer):
         """Return a requirement for JSON; of cases that were not drawn, without a probability."""
         demand, share = judgment.demand, judgment.share
         probability = {"probability": share.value, "low": share.low, "high": share.high}
-        return {
+        rare = {}
+        if judgment.failure is not None:
+            (of,) = [each for each in self.findings.rare if each.demand == demand]
+            rare = rare_data(judgment.failure, of)
+        return rare | {
             "kpi": demand.kpi, "limit": demand.limit, "wanted": demand.probability,
             "outcome": judgment.outcome, "met": share.count,
             **(probability if self.plan.is_sampled else {}),

@@ -12,11 +12,12 @@ from bywire.studies.plan import StudyPlan
 from bywire.studies.statistics import Influence, Outcome, Share
 
 _SHOWN = 5  # quantities that drive a key figure
-_OUTCOMES: dict[Outcome, tuple[str, Verdict]] = {
+OUTCOMES: dict[Outcome, tuple[str, Verdict]] = {
     "met": ("ok", "good"),
     "missed": ("failed", "bad"),
     "undecided": ("undecided", "bad"),
 }
+"""what tables say of an outcome"""
 
 
 def demand_table(findings: Findings) -> Table:
@@ -36,7 +37,7 @@ def demand_table(findings: Findings) -> Table:
                 Cell(f"{percent(each.share.low, each.share)} to "
                      f"{percent(each.share.high, each.share)}"),
             ]  # fmt: skip
-        text, verdict = _OUTCOMES[each.outcome]
+        text, verdict = OUTCOMES[each.outcome]
         if each.outcome == "met" and each.demand.probability is None:
             text = "ok in all"
         rows.append((*cells, Cell(text, verdict)))

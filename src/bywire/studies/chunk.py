@@ -101,7 +101,8 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
     InputError
         When the values contradict each other, or the experiment does not run with them.
     """
-    return changed(plan.bench, values, plan.bench.seed + number if _is_noisy(plan, number) else None)
+    seed = plan.bench.seed + number if _is_noisy(plan, number) else None
+    return changed(plan.bench, values, seed)
 
 
 def _is_noisy(plan: StudyPlan, number: int) -> bool:

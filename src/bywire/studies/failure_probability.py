@@ -94,6 +94,8 @@ class FailureProbability:
         How the estimate came about.
     runs
         Cases used.
+    span
+        Least and largest margin of which ``below`` has something to say; none where it has not.
     place, scores
         The most probable failing case: its place among the cases used, and its standard normal
         scores, independent ones; None where none failed.
@@ -111,6 +113,7 @@ class FailureProbability:
     below: Callable[[float], Interval]
     levels: tuple[Level, ...]
     runs: int
+    span: tuple[float, float] | None = None
     place: int | None = None
     scores: Array | None = None
     center: Array | None = None

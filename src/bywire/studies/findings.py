@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,9 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import is_met, limit_of
 from bywire.core.typing import Array
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.plan import Demand, StudyPlan
+from bywire.studies.rare_failures import RareFailure
 from bywire.studies.sensitivity import Sensitivity, sensitivity
 from bywire.studies.statistics import (
     Influence,
@@ -55,7 +57,11 @@ class Judgment:
         Whether it is met with the probability that is wanted; of one that every case has to meet,
         whether all do.
     worst
-        Row of the case that is worst of all; None where no case has the figure.
+        Row of the case that is worst of all, or of the most probable failing one of a rare failure;
+        None where no case has the figure.
+    failure
+        How probable it is that the requirement is missed, of a study of rare failures: shares of
+        its cases are no probabilities.
     """
 
     demand: Demand
@@ -64,6 +70,7 @@ class Judgment:
     undecided: int
     outcome: Outcome
     worst: int | None
+    failure: FailureProbability | None = None
 
 
 @dataclass(frozen=True)
@@ -109,11 +116,14 @@ class Findings:
         A row for each case that was computed; see `bywire.studies.chunk.computed_chunk`.
     nominal
         Key figures of the bench itself, with their error from the step.
+    rare
+        What a study of rare failures found; of another, nothing.
     """
 
     plan: StudyPlan
     cases: pd.DataFrame
     nominal: tuple[Kpi, ...]
+    rare: tuple[RareFailure, ...] = ()
 
     @cached_property
     def units(self) -> Mapping[str, str]:
@@ -128,6 +138,8 @@ class Findings:
     @cached_property
     def judgments(self) -> tuple[Judgment, ...]:
         """Every requirement, in the order of the file."""
+        if self.rare:
+            return tuple(map(self._rare_judgment, self.rare))
         return tuple(map(self._judgment, self.plan.demands))
 
     @cached_property
@@ -156,6 +168,10 @@ class Findings:
 
     def drivers(self, name: str) -> Sequence[str]:
         """Return the quantities that a key figure goes with, the strongest first; choices apart."""
+        if self.rare:
+            numbers = {v.name for v in self.plan.varied if v.unit}
+            return [i.quantity for each in self.rare if each.demand.kpi == name
+                    for i in each.importance if i.quantity in numbers]  # fmt: skip
         if self.plan.sensitivity is None:
             return [each.quantity for each in self.influences(name)]
         numbers = {v.name for v in self.plan.varied if v.unit}
@@ -194,13 +210,28 @@ class Findings:
         """Indices by key figure, as they were asked for: those of many cases take a second."""
         return {}
 
+    def _rare_judgment(self, rare: RareFailure) -> Judgment:
+        """Return a requirement of which shares of the cases say nothing."""
+        among, wanted = self._judgment(rare.demand), rare.demand.probability
+        assert wanted is not None
+        numbers = np.asarray(self.cases[CASE])
+        return replace(
+            among,
+            outcome=rare.found.outcome(wanted, self._error(rare.demand.kpi)),
+            worst=None if rare.case is None else int(np.flatnonzero(numbers == rare.case)[0]),
+            failure=rare.found,
+        )
+
+    def _error(self, name: str) -> float:
+        """Return what a key figure may be off by, in its unit; nothing where that is not known."""
+        error = {kpi.name: kpi.error for kpi in self.nominal}.get(name, math.nan)
+        return 0.0 if math.isnan(error) else error
+
     def _judgment(self, demand: Demand) -> Judgment:
-        values = self.figure(demand.kpi)
-        errors = {kpi.name: kpi.error for kpi in self.nominal}
-        error = errors.get(demand.kpi, math.nan)
+        values, error = self.figure(demand.kpi), self._error(demand.kpi)
         compare, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
         met = is_met(values, compare, bound)
-        near = np.abs(values - bound) <= (0.0 if math.isnan(error) else error)
+        near = np.abs(values - bound) <= error
         count, confidence = values.size, self.plan.confidence
         may, surely = (
             share(int(each.sum()), count, confidence) for each in (met | near, met & ~near)

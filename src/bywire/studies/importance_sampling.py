@@ -45,6 +45,12 @@ class _Drawn:
     margins: list[Array] = field(default_factory=list)
     weights: list[Array] = field(default_factory=list)
 
+    @property
+    def span(self) -> tuple[float, float]:
+        """Margins around failure, of which weights are alike."""
+        low, high = np.quantile(np.concatenate(self.margins), [0.05, 0.6])
+        return float(low), max(float(high), 0.0)
+
     def below(self, confidence: float, margin: float) -> Interval:
         """Return the probability of a margin <= one."""
         if not self.margins:
@@ -134,6 +140,7 @@ def importance_sampling(
     return FailureProbability(
         state, estimate, below if state == "done" else _unknown,
         (Level(0.0, estimate.value),), search.runs + trail.runs,
+        drawn.span if state == "done" else None,
         place=nearest[0] + search.runs if nearest else None,
         scores=nearest[1] if nearest else None,
         center=center if index > 0.0 else None, first_order=index, why=why,

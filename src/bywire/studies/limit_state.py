@@ -43,7 +43,7 @@ def margins_of(values: Array, compare: str, bound: float) -> Array:
     distance = values - bound if compare.startswith(">") else bound - values
     met = is_met(values, compare, bound)
     finite = np.clip(np.where(np.isnan(values), BEYOND, distance), BEYOND, -BEYOND)
-    return np.where(met, np.maximum(finite, _LEAST), np.minimum(finite, 0.0))
+    return np.asarray(np.where(met, np.maximum(finite, _LEAST), np.minimum(finite, 0.0)))
 
 
 @dataclass

@@ -173,7 +173,9 @@ class StudyPlan:
 
     @property
     def total(self) -> int:
-        """How many cases are computed."""
+        """How many cases are computed; of each rare failure, at most."""
+        if self.rare is not None:
+            return self.cases
         points = self.points
         return points.cases if isinstance(points, Spanned) else self.chunks * CHUNK
 

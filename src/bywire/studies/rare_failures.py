@@ -1,4 +1,4 @@
-"""The rare failures of a study: each requirement's probability, and its most probable failing case."""
+"""The rare failures of a study: how probable each is, and its most probable failing case."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from bywire.core.typing import Progress, silent
-from bywire.studies.distribution import NEVER
 from bywire.studies.executor import Executor
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.importance_sampling import importance_sampling
@@ -20,6 +19,8 @@ from bywire.studies.subset_simulation import subset_simulation
 
 if TYPE_CHECKING:
     import pandas as pd
+
+_NEGLIGIBLE = 1e-3  # of the probability of failure that is admitted: the verdict is clear
 
 
 @dataclass(frozen=True)
@@ -98,7 +99,7 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
     design, count = cases.cases.design, len(plan.varied)
     assert cases.demand.probability is not None
     if design.kind == SUBSET:
-        negligible = min(NEVER, 1e-3 * (1.0 - cases.demand.probability))
+        negligible = _NEGLIGIBLE * (1.0 - cases.demand.probability)
         found = subset_simulation(
             cases.drawn, count, design.level, plan.seed, plan.confidence, negligible, cases.report
         )

@@ -23,6 +23,7 @@ from bywire.studies.failure_probability import (
     interval,
 )
 from bywire.studies.limit_state import (
+    BEYOND,
     BudgetSpentError,
     Margins,
     Trail,
@@ -31,6 +32,7 @@ from bywire.studies.limit_state import (
 )
 from bywire.studies.rare_design import LIBRARY, STEPS
 
+_SEEN = 100  # cases of a level below which its tail is not shown
 
 
 @dataclass(frozen=True)
@@ -64,7 +66,8 @@ class _Subset:
 
     def _step(self, part: float) -> float:
         """Return the coefficient of variation of a part of the level (Au and Beck, eq. 28)."""
-        return math.sqrt((1.0 + max(self.correlation, 0.0)) * (1.0 - part) / (part * self.margins.size))
+        alike = 1.0 + max(self.correlation, 0.0)
+        return math.sqrt(alike * (1.0 - part) / (part * self.margins.size))
 
     def beyond(self, margin: float) -> tuple[float, float]:
         """Return entry and its variation of the next level, which begins at a margin."""
@@ -109,7 +112,7 @@ def subset_simulation(
     References
     ----------
     S.-K. Au and J. L. Beck, Estimation of small failure probabilities in high dimensions by subset
-    simulation, Probabilistic Engineering Mechanics 16, 2001; the bounds of the variation, section 5.
+    simulation, Probabilistic Engineering Mechanics 16, 2001; bounds of the variation, section 5.
     """
     trail = Trail(margins)
     ot = library("openturns", *LIBRARY)
@@ -175,6 +178,7 @@ def _found(
     nearest = trail.nearest
     return FailureProbability(
         state, estimate, below, levels, trail.runs,
+        _span(subsets, ends[-1]) if subsets else None,
         place=nearest[0] if nearest else None, scores=nearest[1] if nearest else None,
         center=_mean_failure(subsets[-1]) if state == "done" else None,
     )  # fmt: skip
@@ -191,6 +195,15 @@ def _below(subsets: list[_Subset], confidence: float, margin: float) -> Interval
 def _end_of(below: partial[Interval], end: float, estimate: Interval, margin: float) -> Interval:
     """Return what is known of a margin where failure was not come to."""
     return below(margin) if margin >= end else estimate
+
+
+def _span(subsets: list[_Subset], end: float) -> tuple[float, float] | None:
+    """Return margins from the hundredth worst case of the last level to the middle of all."""
+    last = subsets[-1].margins
+    known = last[last > BEYOND]
+    if known.size < _SEEN:
+        return None
+    return min(float(np.sort(known)[_SEEN - 1]), end), float(np.median(subsets[0].margins))
 
 
 def _mean_failure(last: _Subset) -> Array | None:

@@ -1,0 +1,185 @@
+"""What a study of rare failures shows: how probable they are, where they lie, how it went."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from bywire.api.study_tables import OUTCOMES
+from bywire.bench.requirements import limit_of
+from bywire.report.document import FigureBlock, TableBlock
+from bywire.report.tables import Cell, Column, Table, value_text
+from bywire.report.wording import amount, clean
+from bywire.studies.failure_probability import FailureProbability, Interval
+from bywire.studies.findings import Findings
+from bywire.studies.rare_design import IMPORTANCE, SUBSET
+from bywire.studies.rare_failures import RareFailure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_POINTS = 200  # of a curve
+
+
+def failure_table(findings: Findings) -> Table:
+    """Return the requirements: how probable failure is, by how many cases, and the verdict."""
+    confidence = f"{100.0 * findings.plan.confidence:g} %"
+    heads = ["probability of failure", f"{confidence} interval", "variation", "cases", "admitted"]
+    rows = []
+    for each in findings.judgments:
+        failure, wanted = each.failure, each.demand.probability
+        assert failure is not None
+        assert wanted is not None
+        text, verdict = OUTCOMES[each.outcome]
+        found = failure.estimate
+        rows.append((
+            Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
+            Cell(_value(found), value=found.value), Cell(_ends(found)),
+            Cell("-" if np.isnan(found.variation) else f"{100.0 * found.variation:.2g} %"),
+            Cell(str(failure.runs), value=failure.runs), Cell(f"{1.0 - wanted:.3g}"),
+            Cell(text, verdict),
+        ))  # fmt: skip
+    columns = [Column(head, numeric="interval" not in head) for head in heads]
+    return Table((Column("requirement"), *columns, Column("result")), tuple(rows))
+
+
+def importance_tables(findings: Findings) -> list[TableBlock]:
+    """Return where the failures of each requirement lie, by quantity."""
+    return [
+        TableBlock(_importance_table(findings, each), f"Where {each.demand.kpi} fails.",
+                   title=f"where {each.demand.kpi} fails")
+        for each in findings.rare if each.importance
+    ]  # fmt: skip
+
+
+def rare_figures(findings: Findings) -> list[FigureBlock]:
+    """Return the figure of probabilities over the limit; none where nothing was found."""
+    if not any(each.found.span for each in findings.rare):
+        return []
+    return [FigureBlock(
+        partial(_curves, findings),
+        "Probability that a key figure comes worse than a value, with its interval. Dotted, the "
+        "limit and the probability that is admitted.", "exceedance",
+    )]  # fmt: skip
+
+
+def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, Any]:
+    """Return a failure for JSON; margins are in the unit of the key figure."""
+    found = failure.estimate
+    return {
+        "state": failure.state,
+        "failure": {
+            "probability": found.value, "variation": found.variation,
+            "low": found.low, "high": found.high,
+        },
+        "cases": failure.runs,
+        "levels": [{"margin": x.margin, "probability": x.probability} for x in failure.levels],
+        "reliability_index": failure.first_order,
+        "failing_case": findings.case,
+        "importance": {i.quantity: {"score": i.score, "factor": i.factor}
+                       for i in findings.importance},
+    }  # fmt: skip
+
+
+def state_texts(findings: Findings) -> list[str]:
+    """Return of each requirement without an estimate why there is none, and what to do."""
+    return [f"{each.demand.kpi}: {text}" for each in findings.rare
+            if (text := _state_text(each, findings.plan.cases))]  # fmt: skip
+
+
+def rare_notes(findings: Findings) -> list[str]:
+    """Return what was rounded, what is not judged, and what intervals stand for."""
+    plan = findings.plan
+    design = plan.rare
+    assert design is not None
+    notes = []
+    if design.kind == SUBSET and design.level != design.asked:
+        notes.append(f"{design.level} cases in each level in place of {design.asked}: they come in "
+                     "whole chunks")  # fmt: skip
+    if unjudged := [each.text for each in plan.demands if each not in plan.judged_demands]:
+        notes.append(
+            f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
+            "where failures are say nothing of all cases"
+        )
+    if design.kind == IMPORTANCE:
+        notes.append("importance-sampling: failures far from the design point may be missed; "
+                     "'subset-simulation' looks for them everywhere")  # fmt: skip
+    return notes
+
+
+def _state_text(each: RareFailure, cases: int) -> str:
+    found = each.found
+    if found.state == "budget spent":
+        so_far = f"it is no more probable than {found.estimate.high:.2g}"
+        return (f"the budget of {cases} cases is spent before failure was come to ({so_far}): "
+                "extend the study")  # fmt: skip
+    if found.state == "negligible":
+        return "less than a thousandth of what is admitted: it was followed no further"
+    if found.state == "level":
+        return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
+    if found.state == "no design point":
+        return f"no design point was found, for {found.why}: take 'subset-simulation'"
+    return ""
+
+
+def _value(found: Interval) -> str:
+    if np.isnan(found.value):
+        return f"below {found.high:.2g}" if found.high < 1.0 else "not known"
+    return f"{found.value:.3g}"
+
+
+def _ends(found: Interval) -> str:
+    return f"{found.low:.2g} to {found.high:.2g}"
+
+
+def _importance_table(findings: Findings, each: RareFailure) -> Table:
+    plan = findings.plan
+    varied = {v.name: v for v in plan.varied}
+    values: dict[str, float | str] = {}
+    if each.case is not None:
+        (row,) = np.flatnonzero(np.asarray(findings.cases["case"]) == each.case)
+        values = findings.values(int(row))
+    rows = [
+        (
+            Cell(clean(i.quantity)),
+            Cell(_shown(values.get(i.quantity), varied[i.quantity].unit)),
+            Cell(value_text(varied[i.quantity].nominal, varied[i.quantity].unit or "1")),
+            Cell(f"{i.score:+.2f}", value=i.score), Cell(f"{i.factor:.2f}", value=i.factor),
+        )
+        for i in each.importance
+    ]  # fmt: skip
+    return Table((
+        Column("quantity"), Column("most probable failing case", numeric=True),
+        Column("in the bench", numeric=True), Column("standard deviations", numeric=True),
+        Column("importance", numeric=True),
+    ), tuple(rows))  # fmt: skip
+
+
+def _shown(value: float | str | None, unit: str) -> str:
+    if value is None:
+        return "-"
+    return value if isinstance(value, str) else amount(float(value), unit)
+
+
+def _curves(findings: Findings) -> Figure:
+    from bywire.report.study.exceedance import Curve, exceedance
+
+    return exceedance([_curve(findings, each, Curve) for each in findings.rare if each.found.span])
+
+
+def _curve(findings: Findings, each: RareFailure, make: Any) -> Any:
+    demand, unit = each.demand, findings.units[each.demand.kpi]
+    compare, bound = limit_of(demand.kpi, demand.limit, unit)
+    assert each.found.span is not None
+    assert demand.probability is not None
+    margins = np.linspace(*each.found.span, _POINTS)
+    sign = -1.0 if compare.startswith("<") else 1.0
+    found: Sequence[Interval] = [each.found.below(float(m)) for m in margins]
+    return make(
+        demand.kpi, unit, bound, 1.0 - demand.probability, bound + sign * margins,
+        np.array([f.value for f in found]), np.array([f.low for f in found]),
+        np.array([f.high for f in found]),
+    )  # fmt: skip

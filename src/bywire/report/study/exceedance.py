@@ -1,0 +1,63 @@
+"""Figure: how probable it is that a key figure comes worse than a value, down to rare ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bywire.core.typing import Array
+from bywire.report import style
+from bywire.report.line_role import Role
+from bywire.report.wording import in_display_unit
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A key figure and the probability that it comes worse.
+
+    Parameters
+    ----------
+    name, unit
+        The figure, in SI or ``"%"``.
+    limit, admitted
+        What it has to keep, and the probability with which it may not.
+    values
+        Shape (points,).
+    probability, low, high
+        Estimate and interval at each value; NaN where there is none.
+    """
+
+    name: str
+    unit: str
+    limit: float
+    admitted: float
+    values: Array
+    probability: Array
+    low: Array
+    high: Array
+
+
+def exceedance(curves: Sequence[Curve]) -> Figure:
+    """Draw every curve over a logarithmic probability, a panel each."""
+    figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves))
+    look = style.STROKES[Role.LIMIT]
+    for axes, each in zip(panels, curves, strict=True):
+        factor = in_display_unit(1.0, each.unit)[0]
+        known = each.probability > 0.0
+        values = factor * each.values[known]
+        axes.fill_between(values, each.low[known], each.high[known], color=style.SHADE,
+                          label="interval")  # fmt: skip
+        axes.plot(values, each.probability[known], color=style.BLUE, label="estimate")
+        axes.axvline(factor * each.limit, color=look.color, linestyle=look.linestyle,
+                     linewidth=look.linewidth, label="limit, admitted")  # fmt: skip
+        axes.axhline(each.admitted, color=look.color, linestyle=look.linestyle,
+                     linewidth=look.linewidth)  # fmt: skip
+        axes.set_yscale("log")
+        axes.set_ylabel("probability [-]")
+        axes.set_ylim(top=2.0, bottom=0.3 * float(np.min(each.probability[known], initial=0.1)))
+        axes.set_xlabel(style.axis_label(each.name.replace("_", " "), each.unit))
+    style.legend_above(panels[0])
+    return figure
