@@ -1,0 +1,232 @@
+"""Studies of rare failures: closed forms come back; kills, workers and budgets change nothing."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+import bywire
+from bywire.core.errors import FileError, InputError
+from bywire.studies.chunk import case_bench
+from bywire.studies.store import StudyStore
+from bywire.studies.study_file import read_study
+from undrawn import undrawn
+
+pytest.importorskip("openturns")
+
+AXIS = """
+experiment = "step"
+parameters = "spring-axis-one"
+[options]
+input = "F_set"
+output = "x"
+end = "100 N"
+duration = "0.6 s"
+record = "0.2 ms"
+[simulation]
+step = "0.1 ms"
+[set]
+F_c = "0 N"
+k_c = "1 nN/m"
+T_s = "0.1 ms"
+"""
+DAMPED = """
+bench = "bench.toml"
+[vary]
+d = { kind = "normal", sd = "15 %" }
+m = { kind = "normal", sd = "3 %" }
+[[correlation]]
+of = ["d", "m"]
+value = 0.5
+[design]
+kind = "KIND"
+cases = 2560
+MORE
+[requirements]
+overshoot = "<= LIMIT % with 99.8 %"
+"""
+BRAKE = """
+[vary]
+"motor.R_m" = { kind = "normal", sd = "4 %" }
+"motor.K_e" = "+-5 %"
+[design]
+kind = "subset-simulation"
+cases = 3000
+cases_per_level = 640
+[requirements]
+peak_current = "<= 19 A with 99.9 %"
+"""
+
+
+def overshoot(d, m):
+    """Of a mass on a spring without dry friction [%]."""
+    zeta = d / (2.0 * np.sqrt(1e4 * m))
+    return 100.0 * np.exp(-np.pi * zeta / np.sqrt(1.0 - zeta**2))
+
+
+def failure(limit: float) -> float:
+    """Return the probability of a larger overshoot: of d / sqrt(m) below a bound, by quadrature."""
+    root = 2.0 * math.sqrt(1e4) * abs(math.log(limit / 100.0))
+    edge = root / math.hypot(math.pi, math.log(limit / 100.0))
+    x, weights = np.polynomial.hermite_e.hermegauss(80)
+    m = 2.0 * (1.0 + 0.03 * x)
+    # Given the score x of the mass, that of the damping is normal around 0.5 x.
+    scores = ((edge * np.sqrt(m) - 60.0) / 9.0 - 0.5 * x) / math.sqrt(0.75)
+    return float(weights @ stats.norm.cdf(scores) / math.sqrt(2.0 * math.pi))
+
+
+@pytest.fixture
+def axis(tmp_path, spring_axis):
+    """Return a function that runs a study of the mass on a spring."""
+
+    def run(kind: str, limit: float, more: str = ""):
+        (tmp_path / "bench.toml").write_text(AXIS)
+        text = DAMPED.replace("KIND", kind).replace("LIMIT", f"{limit}").replace("MORE", more)
+        (tmp_path / "study.toml").write_text(text)
+        return bywire.run_study(tmp_path / "study.toml", tmp_path / "out", workers=1)
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("kind", "more"),
+    [("subset-simulation", "cases_per_level = 640"), ("importance-sampling", "")],
+)
+def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, more):
+    true, study = failure(70.0), axis(kind, 70.0, more)
+    assert 2e-4 < true < 2e-3
+    (rare,) = study.findings.rare
+    assert rare.found.estimate.low < true < rare.found.estimate.high
+    assert rare.found.runs == len(study.cases) <= 2560
+    if kind == "importance-sampling":
+        assert rare.found.estimate.variation < 0.06
+    assert study.status == {"met": "passed", "undecided": "undecided"}[
+        study.findings.judgments[0].outcome
+    ]
+    assert rare.importance[0].quantity == "d"
+    assert rare.importance[0].score < -2.5
+    bench = study.worst("overshoot")  # the most probable failing case
+    assert 70.0 < overshoot(bench.par.d, bench.par.m) < 73.0
+    with undrawn():
+        study.write(tmp_path / "out")
+    names = {path.name for path in (tmp_path / "out").iterdir()}
+    assert {"failing-overshoot.toml", "failing-overshoot.nc", "exceedance.png"} <= names
+    assert bywire.run(tmp_path / "out" / "failing-overshoot.toml").kpi("overshoot").value > 70.0
+    (said,) = json.loads((tmp_path / "out" / "report.json").read_text())["requirements"]
+    assert said["failure"]["probability"] == rare.found.estimate.value
+    assert said["importance"]["d"]["factor"] > 0.8
+    assert "probability of failure" in str(study)
+
+
+def interrupted(after: int):
+    """Return progress that interrupts after so many batches."""
+    calls = iter(range(after))
+
+    def progress(label: str, share: float) -> None:
+        if next(calls, None) is None:
+            raise KeyboardInterrupt
+
+    return progress
+
+
+def test_interrupted_resumed_and_by_workers_it_is_the_same_to_the_bit(study, tmp_path):
+    path = study(BRAKE)
+    whole = bywire.run_study(path, tmp_path / "whole", cases=1280, workers=1)
+    with pytest.raises(KeyboardInterrupt, match="resume"):
+        bywire.run_study(path, tmp_path / "out", cases=1280, workers=1, progress=interrupted(14))
+    partial = bywire.study_report(tmp_path / "out")
+    assert partial.status == "unfinished"
+    assert [x.probability for x in partial.findings.rare[0].found.levels] == [0.1]
+    assert any("not all cases" in text for text in partial.warnings)
+    StudyStore(tmp_path / "out").path(3).unlink()  # as one of several that were computed at once
+    written = StudyStore(tmp_path / "out").path(2).stat().st_mtime_ns
+    resumed = bywire.resume_study(tmp_path / "out", workers=2)  # of 1,280 cases
+    assert StudyStore(tmp_path / "out").path(2).stat().st_mtime_ns == written
+    pd.testing.assert_frame_equal(resumed.cases, whole.cases, check_exact=True)
+    first, second = (each.as_object()["requirements"] for each in (whole, resumed))
+    assert first == second
+    assert bywire.study_report(tmp_path / "out").as_object()["requirements"] == first
+
+
+def test_a_spent_budget_is_said_and_extended(study, tmp_path):
+    path, out = study(BRAKE.replace("19 A", "21 A")), tmp_path / "out"
+    spent = bywire.run_study(path, out, cases=700)
+    assert (len(spent.cases), spent.status) == (640, "undecided")
+    assert any("budget of 700 cases is spent" in text for text in spent.warnings)
+    more = bywire.resume_study(out, cases=800)
+    pd.testing.assert_frame_equal(more.cases[:640], spent.cases, check_exact=True)
+    assert len(more.cases) == 768
+
+
+def test_every_case_has_noise_of_its_own_but_those_of_a_search(study):
+    plan = read_study(study(BRAKE))
+    values = {"motor.R_m": 0.35, "motor.K_e": 0.03}
+    assert case_bench(plan, 7, values).seed == plan.bench.seed + 7
+    text = BRAKE.replace("subset-simulation", "importance-sampling")
+    plan = read_study(study(text.replace("cases_per_level = 640", "")))
+    assert case_bench(plan, 7, values).seed == plan.bench.seed
+    assert case_bench(plan, 1024 * 64, values).seed == plan.bench.seed + 1024 * 64
+
+
+def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
+    text = BRAKE + 'rise_time = "<= 30 ms with 90 %"\n'
+    found = bywire.run_study(study(text, bench=BENCH_OF_TWO), tmp_path / "out", cases=700)
+    first, second = found.findings.rare
+    assert (first.found.runs, second.found.runs) == (640, 640)
+    assert len(found.cases) == 640
+    assert any("not judged" in note and "overshoot" in note for note in found.notes)
+
+
+BENCH_OF_TWO = """
+experiment = "hard-braking"
+parameters = "dardanelli2010"
+[options]
+duration = "40 ms"
+settle = "10 ms"
+[requirements]
+overshoot = "<= 15 %"
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "why"),
+    [
+        (" with 99.9 %", "", "none has a probability"),
+        ("cases = 3000", "cases = 600", "at least 640"),
+        ('"subset-simulation"', '"importance-sampling"', "cases_per_level: 'importance-sampling'"),
+        ('"subset-simulation"', '"subset"', "did you mean 'subset-simulation'"),
+        ("cases_per_level = 640", "levels = 3", "levels"),
+        (
+            'kind = "subset-simulation"\ncases = 3000\ncases_per_level = 640',
+            'kind = "importance-sampling"', "adc.law",
+        ),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused(study, old, new, why):
+    text = BRAKE.replace("[design]", '"adc.law" = { values = ["ideal", "quantized"] }\n[design]')
+    with pytest.raises(InputError, match=why):
+        read_study(study(text.replace(old, new)))
+
+
+def test_cases_of_another_draw_are_refused(study, tmp_path):
+    path, out = study(BRAKE), tmp_path / "out"
+    bywire.run_study(path, out, cases=640)
+    store = StudyStore(out)
+    store.write(0, store.columns(1), {})
+    with pytest.raises(FileError, match="other cases than the study asks for"):
+        bywire.study_report(out)
+
+
+def test_a_study_of_another_limit_is_another(study, tmp_path):
+    path, out = study(BRAKE), tmp_path / "out"
+    bywire.run_study(path, out, cases=640)
+    path.write_text(path.read_text().replace("99.9 %", "99 %"))
+    assert bywire.study_report(out).findings.rare[0].demand.probability == 0.99
+    path.write_text(path.read_text().replace("19 A", "20 A"))
+    with pytest.raises(FileError, match="holds another study"):
+        bywire.study_report(out)
