@@ -93,6 +93,13 @@ def test_intervals_of_importance_sampling_hold_what_they_claim():
     assert np.mean([each.low <= true <= each.high for each in found]) >= 0.93
 
 
+def test_a_level_that_ends_just_before_failure_is_the_last():
+    found = subset(plane, 171)  # its threshold is 0.0002 above
+    assert found.state == "done"
+    assert found.estimate.low < CLOSED["plane"][1] < found.estimate.high
+    assert found.levels[-1].margin == 0.0
+
+
 def test_where_failures_lie():
     exact = WEIGHTS / np.linalg.norm(WEIGHTS)
     form = importance(plane, 1)

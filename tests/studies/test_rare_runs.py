@@ -26,14 +26,14 @@ parameters = "spring-axis-one"
 input = "F_set"
 output = "x"
 end = "100 N"
-duration = "0.6 s"
+duration = "1.2 s"
 record = "0.2 ms"
 [simulation]
-step = "0.1 ms"
+step = "0.2 ms"
 [set]
 F_c = "0 N"
 k_c = "1 nN/m"
-T_s = "0.1 ms"
+T_s = "0.2 ms"
 """
 DAMPED = """
 bench = "bench.toml"
@@ -102,7 +102,7 @@ def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, 
     assert 2e-4 < true < 2e-3
     (rare,) = study.findings.rare
     assert rare.found.estimate.low < true < rare.found.estimate.high
-    assert rare.found.runs == len(study.cases) <= 2560
+    assert len(study.cases) <= rare.found.runs <= 2560  # a search may ask for a case twice
     if kind == "importance-sampling":
         assert rare.found.estimate.variation < 0.06
     assert study.status == {"met": "passed", "undecided": "undecided"}[

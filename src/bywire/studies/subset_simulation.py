@@ -32,6 +32,7 @@ from bywire.studies.limit_state import (
 )
 from bywire.studies.rare_design import LIBRARY, STEPS
 
+_FEW = 10  # failing cases that make an estimate
 _SEEN = 100  # cases of a level below which its tail is not shown
 
 
@@ -141,7 +142,11 @@ def subset_simulation(
         state = "negligible"
     subsets, ends = _subsets(algorithm)
     if state == "done" and ends[-1] > 0.0:
-        state = "level"
+        # It ends where all cases are alike: a level too close to failure, or of single values.
+        if (subsets[-1].margins <= 0.0).sum() >= _FEW:
+            ends[-1] = 0.0
+        else:
+            state = "level"
     return _found(trail, state, subsets, ends, confidence)
 
 
