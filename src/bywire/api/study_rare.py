@@ -15,6 +15,7 @@ from bywire.report.tables import Cell, Column, Table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.failure_probability import FailureProbability, Interval
 from bywire.studies.findings import Findings
+from bywire.studies.plan import StudyPlan
 from bywire.studies.rare_design import IMPORTANCE, SUBSET
 from bywire.studies.rare_failures import RareFailure
 
@@ -87,7 +88,7 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
 def state_texts(findings: Findings) -> list[str]:
     """Return of each requirement without an estimate why there is none, and what to do."""
     return [f"{each.demand.kpi}: {text}" for each in findings.rare
-            if (text := _state_text(each, findings.plan.cases))]  # fmt: skip
+            if (text := _state_text(each, findings.plan))]  # fmt: skip
 
 
 def rare_notes(findings: Findings) -> list[str]:
@@ -104,17 +105,24 @@ def rare_notes(findings: Findings) -> list[str]:
             f"not judged, for no probability is wanted of it: {'; '.join(unjudged)}; cases that go "
             "where failures are say nothing of all cases"
         )
+    for each in findings.judgments if len(findings.cases) else ():
+        if each.outcome == "undecided" and each.failure and each.failure.state == "done":
+            more = (
+                "more cases_per_level, in another folder, narrow it" if design.kind == SUBSET
+                else "extend the study"
+            )  # fmt: skip
+            notes.append(f"{each.demand.kpi}: the interval holds what is admitted: {more}")
     if design.kind == IMPORTANCE:
         notes.append("importance-sampling: failures far from the design point may be missed; "
                      "'subset-simulation' looks for them everywhere")  # fmt: skip
     return notes
 
 
-def _state_text(each: RareFailure, cases: int) -> str:
+def _state_text(each: RareFailure, plan: StudyPlan) -> str:
     found = each.found
     if found.state == "budget spent":
         so_far = f"it is no more probable than {found.estimate.high:.2g}"
-        return (f"the budget of {cases} cases is spent before failure was come to ({so_far}): "
+        return (f"the budget of {plan.cases} cases is spent before failure was come to ({so_far}): "
                 "extend the study")  # fmt: skip
     if found.state == "negligible":
         return "less than a thousandth of what is admitted: it was followed no further"

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.api.study_cases import ShownCases
 from bywire.api.study_figures import study_figures
 from bywire.api.study_rare import (
     failure_table,
@@ -25,26 +26,20 @@ from bywire.api.study_tables import (
     spread_table,
     varied_table,
 )
-from bywire.bench import running
 from bywire.bench.bench import Bench
-from bywire.bench.bench_text import bench_text
 from bywire.bench.result import Result
 from bywire.core.errors import ParameterError
 from bywire.report.answer import Answer
 from bywire.report.document import (
-    Attachment,
     Banner,
     Block,
     Document,
     Listing,
     Section,
     TableBlock,
-    recording_file,
     spaced,
 )
 from bywire.report.subject import Subject
-from bywire.report.wording import amount
-from bywire.studies.chunk import case_bench
 from bywire.studies.findings import Findings, Judgment, Spread
 from bywire.studies.plan import CHUNK, StudyPlan
 
@@ -79,6 +74,10 @@ class StudyRun(Answer):
     findings: Findings
     nominal: Result
     status: str
+
+    @cached_property
+    def _shown(self) -> ShownCases:
+        return ShownCases(self.findings, self.nominal)
 
     @property
     def cases(self) -> pd.DataFrame:
@@ -168,15 +167,17 @@ class StudyRun(Answer):
     def worst(self, kpi: str) -> Bench:
         """Return the bench of the case that comes worst of all by a requirement.
 
+        Of a rare failure, that of the most probable failing case.
+
         Raises
         ------
         ParameterError
             When nothing is required of the key figure, or no case has it.
         """
-        for each in self.findings.judgments:
-            if each.demand.kpi == kpi and each.worst is not None:
-                return self._bench_of(each)
-        raise ParameterError(f"no worst case by {kpi!r}: nothing is required of it")
+        if kpi not in self._shown.benches:
+            raise ParameterError(f"no {self._shown.kind} case by {kpi!r}: "
+                                 "nothing is required of it, or no case is one")  # fmt: skip
+        return self._shown.benches[kpi]
 
     def document(self) -> Document:
         """Return verdicts, the spread of key figures, what drives them, worst cases, figures."""
@@ -194,9 +195,9 @@ class StudyRun(Answer):
             importance_tables(findings) if is_rare
             else sensitivity_tables(findings) if is_indexed else influence_tables(findings)
         )  # fmt: skip
-        unindexed = [Listing(texts)] if (texts := missing_indices(findings)) else []
+        unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
-        most = "Most probable failing cases" if is_rare else "Worst cases"
+        texts = self._shown.texts()
         missing = self._failures()
         return Document(
             f"Study {plan.name}",
@@ -206,8 +207,8 @@ class StudyRun(Answer):
                 Section("Key figures", [spreads]),
                 *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
                   else []),
-                Section("Figures", study_figures(findings, self._recordings)),
-                *([Section(most, [Listing(self._worst_texts())])] if judged else []),
+                Section("Figures", study_figures(findings, self._shown.recordings)),
+                *([Section(self._shown.title, [Listing(texts)])] if judged and texts else []),
                 *([Section("Cases without a result", [Listing(missing)])] if missing else []),
                 Section("What varies", [TableBlock(varied_table(plan)), *correlated(plan)]),
                 subject.provenance(f"Chunks of the study: {self.folder}."),
@@ -218,7 +219,7 @@ class StudyRun(Answer):
             ]),
             data=self._data(),
             banner=self._banner(),
-            attachments=[*self._worst_benches(), *self._worst_recordings()],
+            attachments=self._shown.attachments(),
             record="report.json",
             remarks=[
                 f"requirement {each.outcome}: {each.demand.text}"
@@ -246,79 +247,10 @@ class StudyRun(Answer):
     def _failures(self) -> list[str]:
         """Return the first cases without a result, with their values."""
         failed = self.findings.failures
-        texts = [f"case {self._named(row)}: {text}" for row, text in list(failed.items())[:_LISTED]]
+        shown = list(failed.items())[:_LISTED]
+        texts = [f"case {self._shown.named(row)}: {text}" for row, text in shown]
         rest = len(failed) - len(texts)
         return texts + ([f"and {rest} more"] if rest else [])
-
-    def _named(self, row: int) -> str:
-        units = self.plan.units
-        values = ", ".join(
-            f"{name} = {value if isinstance(value, str) else amount(value, units[name])}"
-            for name, value in self.findings.values(row).items()
-        )
-        return f"{self.findings.number(row)} ({values})"
-
-    def _worst_texts(self) -> list[str]:
-        return [
-            f"{each.demand.kpi} = {self._at_worst(each)} in case {self._named(each.worst)}; "
-            f"{self._kind}-{each.demand.kpi}.toml runs it"
-            for each in self.findings.judgments if each.worst is not None
-        ]  # fmt: skip
-
-    @property
-    def _kind(self) -> str:
-        """What the shown case of a requirement is called."""
-        return "failing" if self.findings.rare else "worst"
-
-    def _at_worst(self, judgment: Judgment) -> str:
-        assert judgment.worst is not None
-        name = judgment.demand.kpi
-        return amount(float(self.findings.figure(name)[judgment.worst]), self.findings.units[name])
-
-    def _bench_of(self, judgment: Judgment) -> Bench:
-        assert judgment.worst is not None
-        values = self.findings.values(judgment.worst)
-        made = case_bench(self.plan, self.findings.number(judgment.worst), values)
-        return replace(made, name=f"{self._kind} {judgment.demand.kpi}")
-
-    def _known(self) -> dict[str, Bench]:
-        return {j.demand.kpi: self._bench_of(j) for j in self.findings.judgments
-                if j.worst is not None}  # fmt: skip
-
-    @cached_property
-    def _results(self) -> dict[str, Result]:
-        """The worst cases, run again, by their key figure."""
-        return {kpi: running.run(bench) for kpi, bench in self._known().items()}
-
-    def _recordings(self) -> dict[str, dict[str, xr.Dataset]]:
-        """Return the recordings of the bench itself and of the worst cases, by run."""
-        each = {"the bench itself": self.nominal} | {
-            f"{self._kind} {kpi}": result for kpi, result in self._results.items()
-        }
-        return {
-            label: {name: r.recordings[label] for name, r in each.items() if label in r.recordings}
-            for label in self.nominal.recordings
-        }
-
-    def _worst_benches(self) -> list[Attachment]:
-        def write(bench: Bench, path: Path) -> Path:
-            what = "Most probable failing" if self.findings.rare else "Worst"
-            path.write_text(bench_text(bench, f"{what} case of study {self.plan.name}"), "utf-8")
-            return path
-
-        return [Attachment(f"{self._kind}-{kpi}.toml", partial(write, bench))
-                for kpi, bench in self._known().items()]  # fmt: skip
-
-    def _worst_recordings(self) -> list[Attachment]:
-        def write(kpi: str, label: str, path: Path) -> Path:
-            return recording_file(path.name, self._results[kpi].recordings[label]).write(path)
-
-        labels = list(self.nominal.recordings)
-        return [
-            Attachment(f"{self._kind}-{kpi}{'' if len(labels) == 1 else '-' + label}.nc",
-                       partial(write, kpi, label))
-            for kpi in self._known() for label in labels
-        ]  # fmt: skip
 
     def _data(self) -> dict[str, Any]:
         findings = self.findings

@@ -44,7 +44,7 @@ def interval(value: float, variation: float, confidence: float) -> Interval:
     --------
     >>> found = interval(1e-4, 0.3, 0.95)
     >>> round(found.low * 1e5, 2), round(found.high * 1e5, 2)
-    (5.63, 17.77)
+    (5.62, 17.78)
     """
     if not value > 0.0:
         return UNKNOWN

@@ -16,10 +16,10 @@ from numpy.typing import NDArray
 from bywire.bench.bench import Bench
 from bywire.core.brake import brakes, is_package
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import ParameterError
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
 from bywire.core.version import __version__
+from bywire.studies.correlation import correlation_factor
 from bywire.studies.distribution import Distribution
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
 from bywire.studies.rare_design import RARE, RareDesign, library_version
@@ -269,30 +269,3 @@ def _source_digest(module: str) -> str:
     for path in sorted(file.parent.rglob("*.py")) if is_package(brake) else [file]:
         digest.update(path.read_bytes())
     return digest.hexdigest()
-
-
-def correlation_factor(
-    names: Sequence[str], correlations: Mapping[tuple[str, str], float]
-) -> Array | None:
-    """Return the Cholesky factor of a correlation matrix; None where nothing is correlated.
-
-    Raises
-    ------
-    ParameterError
-        When no such quantities can exist: the matrix is not positive definite.
-    """
-    if not correlations:
-        return None
-    matrix = np.eye(len(names))
-    for (first, second), value in correlations.items():
-        i, k = names.index(first), names.index(second)
-        matrix[i, k] = matrix[k, i] = value
-    try:
-        return np.asarray(np.linalg.cholesky(matrix))
-    except np.linalg.LinAlgError:
-        least = float(np.linalg.eigvalsh(matrix)[0])
-        told = "; ".join(f"{a}, {b}: {value:g}" for (a, b), value in correlations.items())
-        raise ParameterError(
-            f"[[correlation]] {told}: no quantities can be correlated so, for the matrix is not "
-            f"positive definite (least eigenvalue {least:.2g}): take values closer to zero"
-        ) from None

@@ -16,10 +16,11 @@ from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.parameters import choice_fields, choices_of, leaf_fields
 from bywire.core.units import parse
 from bywire.data.toml_file import read_toml
+from bywire.studies.correlation import correlation_factor
 from bywire.studies.design_rules import require_agreement
 from bywire.studies.distribution import read_choice, read_distribution
 from bywire.studies.measured import varied_as_measured
-from bywire.studies.plan import Demand, StudyPlan, Varied, correlation_factor
+from bywire.studies.plan import Demand, StudyPlan, Varied
 from bywire.studies.points import MOST, SAMPLED, SPANNED
 from bywire.studies.rare_design import DEFAULT_CASES, RARE, SUBSET
 from bywire.studies.sensitivity_design import LEVELS, SENSITIVITY
