@@ -18,6 +18,7 @@ from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.rare_design import IMPORTANCE, SUBSET
 from bywire.studies.rare_failures import RareFailure
+from bywire.studies.statistics import Outcome
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -87,8 +88,11 @@ def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, A
 
 def state_texts(findings: Findings) -> list[str]:
     """Return of each requirement without an estimate why there is none, and what to do."""
-    return [f"{each.demand.kpi}: {text}" for each in findings.rare
-            if (text := _state_text(each, findings.plan))]  # fmt: skip
+    outcomes = {each.demand: each.outcome for each in findings.judgments}
+    return [
+        f"{each.demand.kpi}: {text}" for each in findings.rare
+        if (text := _state_text(each, findings.plan, outcomes[each.demand]))
+    ]  # fmt: skip
 
 
 def rare_notes(findings: Findings) -> list[str]:
@@ -118,12 +122,12 @@ def rare_notes(findings: Findings) -> list[str]:
     return notes
 
 
-def _state_text(each: RareFailure, plan: StudyPlan) -> str:
+def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
     found = each.found
     if found.state == "budget spent":
         so_far = f"it is no more probable than {found.estimate.high:.2g}"
-        return (f"the budget of {plan.cases} cases is spent before failure was come to ({so_far}): "
-                "extend the study")  # fmt: skip
+        return (f"the budget of {plan.cases} cases is spent before failure was come to ({so_far})"
+                + (": extend the study" if outcome == "undecided" else ""))  # fmt: skip
     if found.state == "negligible":
         return "less than a thousandth of what is admitted: it was followed no further"
     if found.state == "level":

@@ -113,7 +113,7 @@ class StudyRun(Answer):
                 f"{len(failed)} of {len(self.cases)} cases have no result; they count as missing "
                 "every requirement"
             )
-        if self.findings.rare:
+        if self.findings.rare and len(self.cases):
             said += state_texts(self.findings)
         if self.status == "unfinished":
             left = self.plan.total - len(self.cases)

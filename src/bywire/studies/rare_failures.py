@@ -117,7 +117,8 @@ def _importance(plan: StudyPlan, found: FailureProbability) -> tuple[Importance,
 
     Of correlated quantities they are of their own normal scores.
     """
-    if found.center is None or not np.any(found.center):
+    is_rare = found.estimate.value < 0.5  # else failures lie everywhere
+    if found.center is None or not np.any(found.center) or not is_rare:
         return ()
     scores = plan.scored.correlated(found.center)
     shares = scores**2 / (scores @ scores)
