@@ -174,6 +174,20 @@ def test_a_folder_of_another_study_is_refused(study, tmp_path):
         bywire.study_report(tmp_path)
 
 
+@pytest.mark.parametrize("design", ["monte-carlo", "subset-simulation"])
+def test_a_study_without_a_case_says_so(study, tmp_path, design):
+    if design != "monte-carlo":
+        pytest.importorskip("openturns")
+    text = f'[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "{design}"\ncases = 2560\n'
+    path = study(text + '[requirements]\npeak_current = "<= 19 A with 99 %"\n')
+    out = tmp_path / "out"
+    StudyStore(out).open(read_study(path), path)
+    nothing = bywire.study_report(out)
+    assert nothing.status == "unfinished"
+    assert "no case is computed yet" in str(nothing)
+    assert any("not computed yet" in t or "not all cases" in t for t in nothing.warnings)
+
+
 def test_a_damaged_chunk_is_named(study, tmp_path):
     path, out = study(), tmp_path / "out"
     bywire.run_study(path, out, cases=64)

@@ -181,14 +181,14 @@ class Findings:
     @property
     def failures(self) -> Mapping[int, str]:
         """Row -> why the case has no result."""
-        texts = self.cases[FAILURE]
+        texts = self.cases[FAILURE] if len(self.cases) else ()
         return {k: str(text) for k, text in enumerate(texts) if text}
 
     @property
     def warnings(self) -> Mapping[str, int]:
         """What runs warned of -> in how many cases; what differs in its numbers alone, once."""
         said: dict[str, list[str]] = {}
-        for text in self.cases[WARNINGS]:
+        for text in self.cases[WARNINGS] if len(self.cases) else ():
             for each in filter(None, str(text).split("; ")):
                 said.setdefault(_NUMBER.sub("#", each), []).append(each)
         return {
