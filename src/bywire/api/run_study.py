@@ -18,8 +18,10 @@ from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SPANNED
 from bywire.studies.rare_failures import rare_failures
 from bywire.studies.running import complete
+from bywire.studies.sought_design import WORST
 from bywire.studies.store import StudyStore
 from bywire.studies.study_file import read_study
+from bywire.studies.worst_cases import worst_cases
 
 
 @use_case
@@ -87,7 +89,7 @@ def _completed(
             plan, store, source, workers=workers, cluster=cluster, progress=progress or silent
         )
     except KeyboardInterrupt:
-        of = "" if plan.rare is not None else f" of {plan.chunks}"
+        of = "" if plan.sought is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(
             f"{len(store.finished())}{of} chunks are kept: bywire study resume {store.folder}"
         ) from None
@@ -197,7 +199,7 @@ def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyP
         if cases is not None:
             _refuse_cases(plan, cases)
         return plan
-    if plan.is_sampled or plan.rare is not None:
+    if plan.is_sampled or plan.sought is not None:
         known = store.cases_of(plan)
         if cases is not None and cases < known:
             raise ParameterError(
@@ -205,8 +207,8 @@ def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyP
                 "name more of them, or another folder"
             )
         extended = replace(plan, cases=max(cases or plan.cases, known))
-        if extended.rare is not None:
-            extended.rare.require_budget()
+        if extended.sought is not None:
+            extended.sought.require_budget()
         return extended
     asked = plan if cases is None else replace(plan, cases=cases)
     asked.points  # noqa: B018 - refuses too few before anything runs
@@ -215,7 +217,7 @@ def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyP
 
 def _refuse_cases(plan: StudyPlan, cases: int) -> None:
     """Refuse to add cases to a design that has its own."""
-    if plan.is_sampled or plan.rare is not None:
+    if plan.is_sampled or plan.sought is not None:
         return
     why = (
         "it lists them by quantities and levels" if plan.design in SPANNED
@@ -228,7 +230,11 @@ def _refuse_cases(plan: StudyPlan, cases: int) -> None:
 
 
 def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
-    if plan.rare is not None:
+    if plan.design == WORST:
+        searches, cases = worst_cases(plan, store)
+        findings = Findings(plan, cases, nominal.kpis, searches=searches)
+        is_whole = all(each.state != "unfinished" for each in searches)
+    elif plan.sought is not None:
         rare, cases = rare_failures(plan, store)
         findings = Findings(plan, cases, nominal.kpis, rare)
         is_whole = all(each.found.state != "unfinished" for each in rare)

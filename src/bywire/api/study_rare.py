@@ -16,8 +16,8 @@ from bywire.report.wording import amount, clean
 from bywire.studies.failure_probability import FailureProbability, Interval
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
-from bywire.studies.rare_design import IMPORTANCE, SUBSET
 from bywire.studies.rare_failures import RareFailure
+from bywire.studies.sought_design import IMPORTANCE, SUBSET
 from bywire.studies.statistics import Outcome
 
 if TYPE_CHECKING:
@@ -98,7 +98,7 @@ def state_texts(findings: Findings) -> list[str]:
 def rare_notes(findings: Findings) -> list[str]:
     """Return what was rounded, what is not judged, and what intervals stand for."""
     plan = findings.plan
-    design = plan.rare
+    design = plan.sought
     assert design is not None
     notes = []
     if design.kind == SUBSET and design.level != design.asked:
@@ -195,3 +195,19 @@ def _curve(findings: Findings, each: RareFailure, make: Any) -> Any:
         np.array([f.value for f in found]), np.array([f.low for f in found]),
         np.array([f.high for f in found]),
     )  # fmt: skip
+
+
+def search_notes(findings: Findings) -> list[str]:
+    """Return what a search for worst cases stands for, and where it did not come to its end."""
+    plan = findings.plan
+    spent = [
+        demand.kpi for demand, each in zip(plan.judged_demands, findings.searches, strict=False)
+        if each.state == "budget spent"
+    ]  # fmt: skip
+    notes = [f"{plan.design}: a search proves nothing: a worse case may be where it did not look"]
+    if spent:
+        notes.append(
+            f"{', '.join(spent)}: the budget of {plan.cases} cases is spent before the search came "
+            "to its end: extend the study"
+        )
+    return notes

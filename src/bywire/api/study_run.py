@@ -16,6 +16,7 @@ from bywire.api.study_rare import (
     importance_tables,
     rare_data,
     rare_notes,
+    search_notes,
     state_texts,
 )
 from bywire.api.study_sensitivity import drivers_data, missing_indices, sensitivity_tables
@@ -42,6 +43,7 @@ from bywire.report.document import (
 from bywire.report.subject import Subject
 from bywire.studies.findings import Findings, Judgment, Spread
 from bywire.studies.plan import CHUNK, StudyPlan
+from bywire.studies.sought_design import WORST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,7 +121,7 @@ class StudyRun(Answer):
             left = self.plan.total - len(self.cases)
             said.append(
                 f"not all cases that it asks for are computed yet: bywire study resume "
-                f"{self.folder}" if self.findings.rare else
+                f"{self.folder}" if self.plan.sought is not None else
                 f"{left} of {self.plan.total} cases are not computed yet: bywire study resume "
                 f"{self.folder}"
             )
@@ -147,7 +149,9 @@ class StudyRun(Answer):
         ]
 
     def _on_intervals(self) -> list[str]:
-        if self.plan.rare is not None:
+        if self.plan.design == WORST:
+            return search_notes(self.findings)
+        if self.plan.sought is not None:
             return rare_notes(self.findings)
         if self.plan.sensitivity is not None:
             return [

@@ -107,8 +107,8 @@ def case_bench(plan: StudyPlan, number: int, values: Mapping[str, Any]) -> Bench
 
 def _is_noisy(plan: StudyPlan, number: int) -> bool:
     """Return whether a case has noise of its own."""
-    if plan.rare is not None:
-        return plan.rare.has_own_noise(number // CHUNK)
+    if plan.sought is not None:
+        return plan.sought.has_own_noise(number // CHUNK)
     return plan.is_sampled
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from bywire.core.errors import ParameterError
 from bywire.studies.plan import StudyPlan
 from bywire.studies.points import SAMPLED
-from bywire.studies.rare_design import IMPORTANCE, SUBSET, RareDesign
 from bywire.studies.sensitivity_design import SENSITIVITY
+from bywire.studies.sought_design import IMPORTANCE, RARE, SUBSET, SoughtDesign
 
 _DEPENDENT = "has cases that share values and are not independent"
 
@@ -21,8 +21,8 @@ def require_agreement(plan: StudyPlan) -> None:
     """
     if plan.is_sampled:
         return
-    if plan.rare is not None:
-        _require_rare(plan, plan.rare)
+    if plan.sought is not None and plan.design in RARE:
+        _require_rare(plan, plan.sought)
         return
     is_indexed = plan.design in SENSITIVITY
     others = ", ".join(map(repr, SAMPLED))
@@ -42,10 +42,18 @@ def require_agreement(plan: StudyPlan) -> None:
                 f"have no probability: take {others}, or leave 'with ...' out: every case then has "
                 "to meet the limit"
             )
+    if plan.sought is not None:
+        if not plan.demands:
+            raise ParameterError(
+                f"[requirements]: {plan.design!r} searches for the worst case of each, and there "
+                "is none: write for instance overshoot = \"<= 15 %\""
+            )
+        plan.sought.require_budget()
+        return
     plan.points  # noqa: B018 - refuses what is too large, or too small for indices
 
 
-def _require_rare(plan: StudyPlan, design: RareDesign) -> None:
+def _require_rare(plan: StudyPlan, design: SoughtDesign) -> None:
     """Refuse rare failures of nothing, and the search of a design point among single values."""
     if not plan.judged_demands:
         raise ParameterError(

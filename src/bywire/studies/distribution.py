@@ -74,6 +74,13 @@ class Distribution:
         high = self.high if math.isfinite(self.high) else float(near[1])
         return np.asarray(np.linspace(low, high, count))
 
+    def between(self, places: Array) -> NDArray[Any]:
+        """Return values by their places between the ends of `levels`, 0 to 1."""
+        ends = self.levels(2)
+        if self.is_discrete:
+            return np.asarray(ends[np.minimum((places * ends.size).astype(int), ends.size - 1)])
+        return np.asarray(ends[0] + places * (ends[1] - ends[0]))
+
 
 def read_distribution(name: str, entry: Any, leaf: Leaf, nominal: float) -> Distribution:
     """Return how a number varies.

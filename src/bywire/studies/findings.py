@@ -30,6 +30,7 @@ from bywire.studies.statistics import (
     quantile,
     share,
 )
+from bywire.studies.worst_case import WorstCase
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -118,12 +119,15 @@ class Findings:
         Key figures of the bench itself, with their error from the step.
     rare
         What a study of rare failures found; of another, nothing.
+    searches
+        How searches for the worst case of each requirement ended; of another study, nothing.
     """
 
     plan: StudyPlan
     cases: pd.DataFrame
     nominal: tuple[Kpi, ...]
     rare: tuple[RareFailure, ...] = ()
+    searches: tuple[WorstCase, ...] = ()
 
     @cached_property
     def units(self) -> Mapping[str, str]:

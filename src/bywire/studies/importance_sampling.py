@@ -28,7 +28,7 @@ from bywire.studies.limit_state import (
     UnfinishedError,
     failing_event,
 )
-from bywire.studies.rare_design import LIBRARY, TOGETHER
+from bywire.studies.sought_design import LIBRARY, TOGETHER
 
 _STEP = 0.1  # of the differences, in scores: above the noise and the steps of a figure
 _ITERATIONS = 30

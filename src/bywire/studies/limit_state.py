@@ -12,7 +12,7 @@ import numpy as np
 from bywire.bench.requirements import is_met
 from bywire.core.typing import Array
 from bywire.data.file_format import library
-from bywire.studies.rare_design import LIBRARY
+from bywire.studies.sought_design import LIBRARY
 
 BEYOND = -1e300
 """margin of a case without the figure: it fails, and is beyond every level"""

@@ -22,8 +22,8 @@ from bywire.core.version import __version__
 from bywire.studies.correlation import correlation_factor
 from bywire.studies.distribution import Distribution
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
-from bywire.studies.rare_design import RARE, RareDesign, library_version
 from bywire.studies.sensitivity_design import SENSITIVITY, SensitivityDesign
+from bywire.studies.sought_design import RARE, SOUGHT, WORST, SoughtDesign, library_version
 
 CHUNK = 64
 """cases of a chunk, the piece of work that is computed, kept and counted as a whole"""
@@ -91,7 +91,7 @@ class StudyPlan:
         What varies.
     design
         One of `points.SAMPLED`, `points.SPANNED`, `sensitivity_design.SENSITIVITY` or
-        `rare_design.RARE`.
+        `sought_design.SOUGHT`.
     cases
         Cases asked for; of indices, and of each rare failure, at most so many; of other listed
         points, all there are.
@@ -134,12 +134,14 @@ class StudyPlan:
         return SensitivityDesign(self.design, len(self.varied), self.cases, self.seed)
 
     @cached_property
-    def rare(self) -> RareDesign | None:
-        """The design of its rare failures; None of another study."""
-        if self.design not in RARE:
+    def sought(self) -> SoughtDesign | None:
+        """The design whose cases follow from others; None of another study."""
+        if self.design not in SOUGHT:
             return None
-        judged = len(self.judged_demands)
-        return RareDesign(self.design, judged, self.cases_per_level, self.cases, self.seed)
+        return SoughtDesign(
+            self.design, len(self.judged_demands), self.cases_per_level, self.cases, self.seed,
+            len(self.varied),
+        )  # fmt: skip
 
     @property
     def judged_demands(self) -> tuple[Demand, ...]:
@@ -160,7 +162,7 @@ class StudyPlan:
         each = [v.distribution for v in self.varied]
         if self.sensitivity is not None:
             return Spanned(self.sensitivity.columns(each))
-        if self.is_sampled or self.rare is not None:
+        if self.is_sampled or self.sought is not None:
             return self.scored
         return spanned(self.design, each, [v.nominal for v in self.varied], self.levels)
 
@@ -174,7 +176,7 @@ class StudyPlan:
     @property
     def total(self) -> int:
         """How many cases are computed; of each rare failure, at most."""
-        if self.rare is not None:
+        if self.sought is not None:
             return self.cases
         points = self.points
         return points.cases if isinstance(points, Spanned) else self.chunks * CHUNK
@@ -199,13 +201,19 @@ class StudyPlan:
         return self._named(self.points.values(chunk, CHUNK))
 
     def values_at(self, scores: Array) -> dict[str, NDArray[Any]]:
-        """Return the values of what varies, by name, at standard normal scores [SI].
+        """Return the values of what varies, by name, where a design seeks [SI].
 
         Parameters
         ----------
         scores
-            Independent ones, shape (cases, quantities).
+            Independent standard normal ones, shape (cases, quantities); of a search for the worst
+            case, places between the ends, 0 to 1.
         """
+        if self.design == WORST:
+            return self._named([
+                v.distribution.between(column)
+                for v, column in zip(self.varied, scores.T, strict=True)
+            ])  # fmt: skip
         return self._named(self.scored.values_at(scores))
 
     def _named(self, values: Sequence[NDArray[Any]]) -> dict[str, NDArray[Any]]:
@@ -253,9 +261,9 @@ class StudyPlan:
             said["groups"] = self.sensitivity.base
             points = self.sensitivity.probabilities.tobytes()
             said["points"] = hashlib.sha256(points).hexdigest()
-        if self.rare is not None:
+        if self.sought is not None:
             # Where it goes depends on the requirements, and on how the library draws.
-            said["rare"] = [library_version(), self.rare.level]
+            said["sought"] = [library_version(self.design), self.sought.level]
             said["requirements"] = [[each.kpi, each.limit] for each in self.judged_demands]
         text = json.dumps(said, sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()

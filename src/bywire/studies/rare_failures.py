@@ -12,8 +12,8 @@ from bywire.studies.executor import Executor
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.importance_sampling import importance_sampling
 from bywire.studies.plan import CHUNK, Demand, StudyPlan
-from bywire.studies.rare_cases import RareCases, RequirementCases
-from bywire.studies.rare_design import SUBSET
+from bywire.studies.sought_cases import RequirementCases, SoughtCases
+from bywire.studies.sought_design import SUBSET
 from bywire.studies.store import StudyStore
 from bywire.studies.subset_simulation import subset_simulation
 
@@ -88,7 +88,7 @@ def rare_failures(
     KeyboardInterrupt
         When interrupted.
     """
-    with RareCases(plan, store, executor, progress) as cases:
+    with SoughtCases(plan, store, executor, progress) as cases:
         found = tuple(
             _failure(plan, RequirementCases(cases, k)) for k in range(len(plan.judged_demands))
         )

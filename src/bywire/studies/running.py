@@ -8,7 +8,9 @@ from bywire.core.typing import Progress
 from bywire.studies.executor import executor_of
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.rare_failures import rare_failures
+from bywire.studies.sought_design import WORST
 from bywire.studies.store import StudyStore
+from bywire.studies.worst_cases import worst_cases
 
 
 def complete(
@@ -41,10 +43,11 @@ def complete(
         When interrupted; what is finished stays.
     """
     store.open(plan, source)
-    if plan.rare is not None:
-        together = plan.rare.together // CHUNK
+    if plan.sought is not None:
+        together = plan.sought.together // CHUNK
         executor = executor_of(workers, cluster, -(-plan.cases // CHUNK), together)
-        rare_failures(plan, store, executor, progress)
+        seek = worst_cases if plan.design == WORST else rare_failures
+        seek(plan, store, executor, progress)
         return
     missing = sorted(set(range(plan.chunks)) - store.finished())
     if not missing:

@@ -22,12 +22,12 @@ from bywire.studies.distribution import read_choice, read_distribution
 from bywire.studies.measured import varied_as_measured
 from bywire.studies.plan import Demand, StudyPlan, Varied
 from bywire.studies.points import MOST, SAMPLED, SPANNED
-from bywire.studies.rare_design import DEFAULT_CASES, RARE, SUBSET
 from bywire.studies.sensitivity_design import LEVELS, SENSITIVITY
+from bywire.studies.sought_design import DEFAULT_CASES, SOUGHT, SUBSET
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
 _DESIGN = ("kind", "cases", "seed", "levels", "confidence", "cases_per_level")
-_KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *RARE)
+_KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *SOUGHT)
 _WITH = re.compile(r"(.*\S)\s+with\s+(\S.*%)\s*", re.DOTALL)
 _WITH_LEVELS = ("grid", "one-at-a-time")
 _OPTION = "options."

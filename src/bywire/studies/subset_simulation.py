@@ -30,7 +30,7 @@ from bywire.studies.limit_state import (
     UnfinishedError,
     failing_event,
 )
-from bywire.studies.rare_design import LIBRARY, STEPS
+from bywire.studies.sought_design import LIBRARY, STEPS
 
 _FEW = 10  # failing cases that make an estimate
 _SEEN = 100  # cases of a level below which its tail is not shown

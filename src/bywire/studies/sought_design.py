@@ -1,12 +1,14 @@
-"""Designs for rare failures: cases that go where a requirement is missed, found batch by batch.
+"""Designs that seek: which cases come next depends on what the ones before gave.
 
-Which cases come next depends on what the ones before gave. Noise is one of the things that vary,
-as in drawn cases: each case has its own.
+They go where a requirement is missed: to its rare failures, or to the worst case. In rare failures
+noise is one of the things that vary, as in drawn cases: each case has its own.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+
+import scipy
 
 from bywire.core.errors import ParameterError
 from bywire.data.file_format import library
@@ -15,9 +17,12 @@ from bywire.studies.points import MOST
 SUBSET, IMPORTANCE = "subset-simulation", "importance-sampling"
 RARE = (SUBSET, IMPORTANCE)
 """designs that answer how probable the rare failure of a requirement is"""
+WORST = "worst-case"
+"""design that searches the ends of what varies for the worst case of each requirement"""
+SOUGHT = (*RARE, WORST)
 LIBRARY = ("studies of rare failures", "studies")
 """who needs OpenTURNS, and the extra that brings it"""
-DEFAULT_CASES = {SUBSET: 25_600, IMPORTANCE: 4096}
+DEFAULT_CASES = {SUBSET: 25_600, IMPORTANCE: 4096, WORST: 4096}
 """most cases of each requirement where the file does not say"""
 TOGETHER = 1024
 """cases of a batch of importance sampling"""
@@ -28,21 +33,23 @@ _SEARCH = 1024  # chunks of a requirement that are kept for the search of its de
 
 
 @dataclass(frozen=True)
-class RareDesign:
-    """How the failure of each requirement is looked for; requirements take turns at chunks.
+class SoughtDesign:
+    """How cases are sought for each requirement; requirements take turns at chunks.
 
     Parameters
     ----------
     kind
-        One of `RARE`.
+        One of `SOUGHT`.
     requirements
-        How many are judged.
+        How many they are sought for.
     asked
         Cases asked for in each level of subset simulation.
     budget
         Most cases of each requirement.
     seed
         Of its random numbers.
+    quantities
+        How many vary.
     """
 
     kind: str
@@ -50,6 +57,7 @@ class RareDesign:
     asked: int
     budget: int
     seed: int
+    quantities: int
 
     @property
     def level(self) -> int:
@@ -59,6 +67,8 @@ class RareDesign:
     @property
     def together(self) -> int:
         """Cases that are computed at once."""
+        if self.kind == WORST:
+            return population(self.quantities)
         return self.level // STEPS if self.kind == SUBSET else TOGETHER
 
     @property
@@ -73,9 +83,10 @@ class RareDesign:
     def has_own_noise(self, chunk: int) -> bool:
         """Whether each case of a chunk has noise of its own.
 
-        Those of a search have the bench's: derivatives by differences would be of the noise.
+        Those of a search have the bench's: derivatives by differences would be of the noise, and
+        the worst case would be that of many draws.
         """
-        return chunk // self.requirements >= self.first_sampled
+        return self.kind != WORST and chunk // self.requirements >= self.first_sampled
 
     def require_budget(self) -> None:
         """Refuse a budget with which nothing can be said.
@@ -83,12 +94,13 @@ class RareDesign:
         Raises
         ------
         ParameterError
-            When it is below a single level, or larger than a study may be.
+            When it is below a single batch or level, or larger than a study may be.
         FileError
             When OpenTURNS is not installed.
         """
-        library("openturns", *LIBRARY)
-        least = self.level if self.kind == SUBSET else 640
+        if self.kind in RARE:
+            library("openturns", *LIBRARY)
+        least = {SUBSET: self.level, IMPORTANCE: _WHOLE}.get(self.kind, self.together)
         if self.budget < least:
             raise ParameterError(
                 f"[design] cases = {self.budget} is too few: {self.kind!r} needs at least {least} "
@@ -98,12 +110,20 @@ class RareDesign:
             raise ParameterError(f"[design] cases = {self.budget} is too many (at most {MOST:.0e})")
 
 
-def library_version() -> str:
-    """Return the version of OpenTURNS, for another may draw other points.
+def population(quantities: int) -> int:
+    """Return how many cases a generation of a search has: about a chunk for eight quantities.
+
+    A power of two, for a sequence that visits corners.
+    """
+    return 64 << (-(-quantities // 8) - 1).bit_length()
+
+
+def library_version(kind: str) -> str:
+    """Return the version of OpenTURNS, or SciPy's, for another may draw other points.
 
     Raises
     ------
     FileError
         When it is not installed.
     """
-    return str(library("openturns", *LIBRARY).__version__)
+    return str(scipy.__version__ if kind == WORST else library("openturns", *LIBRARY).__version__)

@@ -1,4 +1,4 @@
-"""The cases of rare failures: asked for batch by batch, looked up before they are computed.
+"""The cases of a design that seeks: asked for batch by batch, looked up before they are computed.
 
 A method is replayed from its seed each time, also for a report: what it asks for depends on the
 seed and on what cases gave, so that it asks for the same again, and finds it in the folder.
@@ -21,7 +21,7 @@ from bywire.studies.chunk import CASE, Columns, PlacedChunk
 from bywire.studies.executor import Compute, Executor
 from bywire.studies.limit_state import BudgetSpentError, UnfinishedError, margins_of
 from bywire.studies.plan import CHUNK, Demand, StudyPlan
-from bywire.studies.rare_design import RareDesign
+from bywire.studies.sought_design import SoughtDesign
 from bywire.studies.store import StudyStore
 
 if TYPE_CHECKING:
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
 
 
 @dataclass
-class RareCases:
-    """The cases of a study of rare failures.
+class SoughtCases:
+    """The cases of a study that seeks.
 
     Parameters
     ----------
@@ -51,17 +51,17 @@ class RareCases:
     _opened: ExitStack = field(default_factory=ExitStack)
     _compute: Compute | None = None
 
-    def __enter__(self) -> RareCases:
+    def __enter__(self) -> SoughtCases:
         return self
 
     def __exit__(self, *error: object) -> None:
         self._opened.close()
 
     @property
-    def design(self) -> RareDesign:
-        """How failures are looked for."""
-        assert self.plan.rare is not None
-        return self.plan.rare
+    def design(self) -> SoughtDesign:
+        """How cases are sought."""
+        assert self.plan.sought is not None
+        return self.plan.sought
 
     @property
     def frame(self) -> pd.DataFrame:
@@ -129,7 +129,7 @@ class RareCases:
 
 @dataclass
 class RequirementCases:
-    """The cases that the failure of a requirement asks for, in their order.
+    """The cases that are asked for because of a requirement, in their order.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ class RequirementCases:
         Number of the requirement among those judged.
     """
 
-    cases: RareCases
+    cases: SoughtCases
     requirement: int
     numbers: list[int] = field(default_factory=list)
     _searched: int = 0

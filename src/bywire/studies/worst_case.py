@@ -1,0 +1,89 @@
+"""The worst case within the ends of what varies: a search, which proves nothing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+from scipy import optimize
+from scipy.stats import qmc
+
+from bywire.core.typing import Array
+from bywire.studies.limit_state import BudgetSpentError, Margins, UnfinishedError
+from bywire.studies.sought_design import population
+
+_BEYOND_ENDS = 0.1  # of a range: worst cases lie at ends, which then have a share of their own
+_WORST = -1e12  # margin of a case without a figure: the worst, and one that has a mean
+_GENERATIONS = 10_000
+_TOGETHER = 1e-2  # share of the first generation's spread within which a generation is at one place
+
+
+@dataclass(frozen=True)
+class WorstCase:
+    """How a search for the worst case ended.
+
+    Parameters
+    ----------
+    state
+        ``done``: all of its cases came together; ``budget spent``; ``unfinished``: cases are not
+        computed yet.
+    margin
+        Least margin that was found, in the figure's unit; infinite without a case.
+    runs
+        Cases used.
+    """
+
+    state: Literal["done", "budget spent", "unfinished"]
+    margin: float
+    runs: int
+
+
+def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
+    """Search for the least margin by differential evolution, with SciPy.
+
+    Parameters
+    ----------
+    margins
+        Margins of a batch of points of the unit cube, shape (cases, quantities).
+    quantities
+        How many there are.
+    seed
+        Of the random numbers.
+
+    References
+    ----------
+    R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11, 1997.
+    """
+    found: list[Array] = []
+
+    def batch(columns: Array) -> Array:
+        # Of all at once, a column each; what lies beyond an end is the end.
+        points = np.clip(columns.T, 0.0, 1.0)
+        found.append(np.maximum(margins(points), _WORST))
+        return found[-1]
+
+    def is_over(intermediate_result: optimize.OptimizeResult) -> bool:
+        energies: Array = intermediate_result.population_energies
+        return bool(np.ptp(energies) <= _TOGETHER * np.ptp(found[0]))
+
+    rng = np.random.default_rng(seed)
+    half = population(quantities) // 2  # corners; all of them of few quantities
+    corners = qmc.Sobol(quantities, rng=rng).random(half).round()
+    first = np.vstack([corners, qmc.LatinHypercube(quantities, rng=rng).random(half)])
+    low, high = -_BEYOND_ENDS, 1.0 + _BEYOND_ENDS
+    state: Literal["done", "budget spent", "unfinished"] = "done"
+    try:
+        # Its own rule ends where margins differ little beside their mean: far from any limit.
+        search: Any = optimize.differential_evolution
+        search(
+            batch, [(low, high)] * quantities, init=low + (high - low) * first, rng=rng, tol=0.0,
+            maxiter=_GENERATIONS, polish=False, updating="deferred", vectorized=True,
+            strategy="rand1bin", callback=is_over,  # the best of all would draw them to one end
+        )  # fmt: skip
+    except BudgetSpentError:
+        state = "budget spent"
+    except UnfinishedError:
+        state = "unfinished"
+    least = min((float(each.min()) for each in found), default=np.inf)
+    return WorstCase(state, least, sum(map(len, found)))
