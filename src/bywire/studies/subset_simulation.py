@@ -85,8 +85,8 @@ def subset_simulation(
     Each level ends where a tenth of its cases is: from these, Markov chains (modified Metropolis)
     fill the next one, a step of all chains at once. Its coefficient of variation is summed over
     the levels, as of levels that depend on each other fully: its upper bound. Were they
-    independent, its square would be; intervals of 95 % then held the probability of a plane in 88 to
-    92 % of the simulations only. OpenTURNS' own leaves the first level out, too.
+    independent, its square would be; intervals of 95 % then held the probability of a plane in 88
+    to 92 % of the simulations only. OpenTURNS' own leaves the first level out, too.
 
     Parameters
     ----------
