@@ -23,6 +23,15 @@ def undrawn() -> Iterator[None]:
         yield
 
 
+@contextmanager
+def drawn_once() -> Iterator[None]:
+    """Have every figure laid out and drawn for its file, in few pixels, not again for a page."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(files, "PNG_DPI", 50)
+        patch.setattr(inline_figure, "figure_bytes", lambda figure, kind="png": _empty(kind))
+        yield
+
+
 @cache
 def _empty(kind: str) -> bytes:
     return _drawn(Figure((1.0, 1.0)), kind)

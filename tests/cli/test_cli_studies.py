@@ -29,7 +29,7 @@ def test_the_actuator_is_sized_with_figures_and_numbers(bywire, tmp_path):
 
 
 def test_the_drive_train_is_sized_and_what_is_infeasible_is_null(bywire, monkeypatch):
-    monkeypatch.setattr("bywire.brakes.wedge.studies.drive_train._ROUNDS", 1)
+    monkeypatch.setattr("bywire.brakes.wedge.studies.drive_train._ROUNDS", 0)
     found = bywire("study", "drive-train", *SMALL, "--json").object
     assert found["designs"]["worst_filtered"]["values"][-1][-1] is None
     assert found["kpis"]["given_t_90"]["value"] == pytest.approx(0.1, rel=0.01)
