@@ -58,7 +58,7 @@ def test_without_causes_a_run_is_the_linear_model_of_its_own_scheme() -> None:
 
 
 def test_agreement_shows_what_breaks_it() -> None:
-    loop, par = of("position")
+    loop, par = of("screw-position")
     one = replace(loop, causes={k: loop.causes[k] for k in ("encoder", "bearing friction")})
     rest = {k: v for c, off in loop.causes.items() if c not in one.causes for k, v in off.items()}
     found = agreement(one, par.replace(rest), 0.0, (5.0,), (1e-3, 0.25))

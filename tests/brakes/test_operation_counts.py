@@ -57,13 +57,10 @@ MOTORCYCLE: list[tuple[dict[str, Any], Counts]] = [
 ]
 WEDGE: list[tuple[dict[str, Any], Counts]] = [
     ({}, (2069, 3626, 449, (109, 98))),
-    ({"screw.law": "drive"}, (2037, 3612, 449, (109, 98))),
-    ({"wedge_friction.stopped_disc": "stick"}, (2078, 3632, 449, (109, 98))),
-    ({"caliper.law": "table", **BENT}, (2149, 3677, 471, (109, 98))),
-    ({"flywheel.law": "driven"}, (2073, 3630, 449, (109, 98))),
-    ({"encoder.law": "ideal"}, (2069, 3626, 449, (98, 86))),
-    ({"control.offset.law": "scheduled"}, (2069, 3626, 449, (109, 111))),
-    ({"command.mode": "position"}, (2069, 3626, 449, (70,))),
+    ({"screw.law": "drive", "encoder.law": "ideal"}, (0, 0, 0, ())),
+    ({"caliper.law": "table", **BENT, "flywheel.law": "driven",
+      "control.offset.law": "scheduled"}, (0, 0, 0, ())),
+    ({"wedge_friction.stopped_disc": "stick", "command.mode": "position"}, (0, 0, 0, ())),
     ({"command.mode": "current"}, (2069, 3626, 449, (3,))),
 ]
 RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [

@@ -7,7 +7,16 @@ import math
 import pytest
 from command_line import refused
 
+from few_starts import few_starts
+from undrawn import undrawn
+
 LINEAR = ("--linear-only", "--json")
+
+
+@pytest.fixture(autouse=True)
+def few():
+    with few_starts():
+        yield
 
 
 def test_design_over_a_range_names_what_binds(bywire):

@@ -90,8 +90,8 @@ def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
 
 def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     outcome = bywire(
-        "frequency-response", "position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes", "0.5 rad",
-        "--out", tmp_path / "out", "--json",
+        "frequency-response", "screw-position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes",
+        "0.5 rad", "--out", tmp_path / "out", "--json",
     )  # fmt: skip
     assert outcome.status == 0
     found = outcome.object
@@ -157,8 +157,8 @@ def test_a_sine_beyond_the_end_stop_is_told(bywire):
 
 def test_what_sticks_is_said_and_has_no_gain(bywire):
     outcome = bywire(
-        "frequency-response", "position", "--frequencies", "5 Hz", "--amplitudes", "0.001 rad",
-        "--json",
+        "frequency-response", "screw-position", "--frequencies", "5 Hz", "--amplitudes",
+        "0.001 rad", "--json",
     )  # fmt: skip
     assert outcome.object["gain"] == [[None]]
     assert any("sticks" in line for line in outcome.lines)

@@ -114,7 +114,7 @@ def test_verification_retunes_where_friction_costs_bandwidth() -> None:
     cases = cases_of(loop, par, 20e5, {})
     start = {name: par.leaves()[name] for name in loop.tunables}
     trial = Trial(loop, par, 20e5, (1e5,), Bench("hard-braking", "dardanelli2010"))
-    found = verify(start, requirements, loop.tunables, cases, trial, generations=4)
+    found = verify(start, requirements, loop.tunables, cases, trial, generations=2)
     assert found.linear.slack < -0.1  # 3.3 Hz
     assert found.tuning is not None
     assert found.final.slack > found.linear.slack + 0.1

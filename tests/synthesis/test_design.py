@@ -20,6 +20,7 @@ from bywire.simulation.run import simulate
 from bywire.synthesis.designer import Design, design
 from bywire.synthesis.linear_case import NOMINAL, LinearCase, cases_of
 from bywire.synthesis.requirement import FIGURES, read
+from few_starts import few_starts
 
 MEDIUM = first_orders("medium", 10.2e5, (0.096,), (1.25, 7.15, 0.104))
 PI = {"ecu.pressure.k_p": (1e-7, 1e-4), "ecu.pressure.k_i": (1e-6, 3e-3)}
@@ -59,7 +60,8 @@ def test_margins_of_a_design_are_those_of_simulation(name: str) -> None:
         "pressure": ("crossover >= 8 Hz", "phase margin >= 60 deg", "overshoot <= 10 %"),
         "current": ("bandwidth >= 100 Hz", "phase margin >= 60 deg", "disk margin >= 0.8"),
     }
-    found = designed(name, texts[name])
+    with few_starts():
+        found = designed(name, texts[name])
     assert found.status == "met"
     loop, par = of(name)
     gain = loop.gain(par.replace(found.gains), loop.at.default)
@@ -189,8 +191,9 @@ def test_an_interrupt_leaves_the_best_until_then() -> None:
 
 def test_the_same_seed_gives_the_same_gains() -> None:
     texts = ("bandwidth >= 100 Hz", "phase margin >= 60 deg")
-    first, second = (designed("current", texts, seed=4) for _ in range(2))
-    assert first.gains == second.gains
+    with few_starts():
+        first, second, other = (designed("current", texts, seed=seed) for seed in (4, 4, 5))
+    assert first.gains == second.gains != other.gains
 
 
 @pytest.mark.parametrize(

@@ -81,13 +81,13 @@ def motor(gains: Any) -> tuple[LinearModel, LinearModel]:
     num, den = PLANT
     over, ahead = (np.polymul(num, [p, k_i * T - p]) for p in (k_p, b * k_p))
     under = np.polymul(np.append(den, 0.0), [1.0, -1.0])
-    gain, closed = control.tf(over, under, T), control.tf(ahead, np.polyadd(under, over), T)
-    return plain(control.ss(gain)), plain(control.ss(closed))
+    return plain(over, under), plain(ahead, np.polyadd(under, over))
 
 
-def plain(one: Any) -> LinearModel:
-    n = one.nstates
-    return LinearModel("motor", one.A, one.B, one.C, one.D, tuple(f"x_{k}" for k in range(n)),
+def plain(num: Any, den: Any) -> LinearModel:
+    A, B, C, D = signal.tf2ss(num, den)
+    n = len(A)
+    return LinearModel("motor", A, B, C, D, tuple(f"x_{k}" for k in range(n)),
                        ("u",), ("y",), ("1",) * n, ("1",), ("1",), np.zeros(n), 5e-3)  # fmt: skip
 
 

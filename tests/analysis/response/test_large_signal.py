@@ -19,7 +19,7 @@ from bywire.analysis.response.large_signal import (
     with_widths,
 )
 from bywire.analysis.response.saturation import Saturation
-from bywire.core.catalog import parameters
+from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.synthesis.bench_figures import loop_gain
 
@@ -34,10 +34,10 @@ def response(variants, frequencies, amplitudes, **more):
     return frequency_response(points[0].run(), sweep, points=[one.run() for one in points])
 
 
-@pytest.mark.parametrize("name", ["moment", "screw-position"])
+@pytest.mark.parametrize("name", ["current", "screw-position"])
 def test_without_friction_the_figures_are_the_linear_ones(name):
     loop = LOOPS.find(name)
-    par = loop.smooth(parameters("roberts2003"))
+    par = loop.smooth(parameters(main_set(loop.assembly)))
     expected = margins(loop, par, loop.at.default)
     one = Variant(loop, par, loop.at.default)
     low, high = sorted((expected.crossover, expected.bandwidth))

@@ -185,10 +185,10 @@ class SensorTrusted(WedgeBrake):
 def test_control_without_standstill_logic_winds_up():
     """What the figure of the wind-up is for: a sensor on a standing disc reads zero."""
     bench = bywire.Bench("disc-stop", "roberts2003")
-    found = {}
-    for case in bench.cases():
-        made = as_run(replace(case, model=SensorTrusted()), bench.step)
-        found[case.label] = record(made, simulate(made), case.settle, case.keep, {})
+    case = next(one for one in bench.cases() if one.label == "drop")
+    made = as_run(replace(case, model=SensorTrusted()), bench.step)
+    stop = record(made, simulate(made), case.settle, case.keep, {})
+    found = {one.label: stop for one in bench.cases()}
     kpis = {k.name: k.value for k in bench.definition.judge(found, bench.chosen_options)}
     assert kpis["reference_change_drop"] > 5.0
     assert kpis["force_change_drop"] > 1000.0
