@@ -57,10 +57,11 @@ MOTORCYCLE: list[tuple[dict[str, Any], Counts]] = [
 ]
 WEDGE: list[tuple[dict[str, Any], Counts]] = [
     ({}, (2069, 3626, 449, (109, 98))),
-    ({"screw.law": "drive", "encoder.law": "ideal"}, (0, 0, 0, ())),
+    ({"screw.law": "drive", "encoder.law": "ideal"}, (2037, 3612, 449, (98, 86))),
     ({"caliper.law": "table", **BENT, "flywheel.law": "driven",
-      "control.offset.law": "scheduled"}, (0, 0, 0, ())),
-    ({"wedge_friction.stopped_disc": "stick", "command.mode": "position"}, (0, 0, 0, ())),
+      "control.offset.law": "scheduled"}, (2153, 3681, 471, (109, 111))),
+    ({"wedge_friction.stopped_disc": "stick", "command.mode": "position"},
+     (2078, 3632, 449, (70,))),
     ({"command.mode": "current"}, (2069, 3626, 449, (3,))),
 ]
 RIGS: list[tuple[type[Model], dict[str, Any], Counts]] = [

@@ -8,7 +8,6 @@ import pytest
 from command_line import refused
 
 from few_starts import few_starts
-from undrawn import undrawn
 
 LINEAR = ("--linear-only", "--json")
 

@@ -63,12 +63,13 @@ def test_files_become_a_bench_file(bywire: Bywire, bench: Path, tmp_path: Path) 
     mapping, out = tmp_path / "map.toml", tmp_path / "out"
     columns = {"p_mc": "pressure", "i": "i", "u": "u"}
     mapping.write_text("".join(f'[signals.{k}]\ncolumn = "{v}"\n' for k, v in columns.items()))
-    found = bywire(
-        "identify", "output-error", *files[:2], "--holdout", files[2], "--map", mapping, "--bench",
-        bench, "--input", "v_set=u", *OUTPUTS[:2], *UNKNOWNS, "--prior",
-        "motor.K_e=0.03 +- 0.01 N*m/A", "--loss", "huber", "--option", "between=linear",
-        "--starts", "2", "--out", out, "--json",
-    )  # fmt: skip
+    with undrawn():
+        found = bywire(
+            "identify", "output-error", *files[:2], "--holdout", files[2], "--map", mapping,
+            "--bench", bench, "--input", "v_set=u", *OUTPUTS[:2], *UNKNOWNS, "--prior",
+            "motor.K_e=0.03 +- 0.01 N*m/A", "--loss", "huber", "--option", "between=linear",
+            "--starts", "2", "--out", out, "--json",
+        )  # fmt: skip
     assert found.status == 0, found.err
     rows = found.object["estimates"]["output error"]["parameters"]
     for name, value in (("motor.R_m", 0.42), ("motor.K_e", 0.028), ("run1:start.p_start", 12e5)):

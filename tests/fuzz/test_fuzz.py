@@ -19,7 +19,7 @@ KILLED = 1261
 """seed of a case in which a braking that replaces a characteristic is interrupted after 1.3 s"""
 KILLED_STUDY = 38
 """seed of a case in which the client of two workers is killed after 3 s"""
-SECONDS = 2.0
+SECONDS = 1.0
 """of a processor, for each kind"""
 
 

@@ -172,7 +172,7 @@ def test_sticks_below_breakaway_and_slips_above(gear: Gear, sigma: int) -> None:
             duty = i * (plant.R_m + plant.R_bat * duty**2) / plant.V_bat
         return simulate(plant, lambda k, t, s: duty, t_end, PERIOD, x0, 1e-4)
 
-    below, above = at(0.9, 3.0), at(1.001, 2.0)
+    below, above = at(0.9, 10.0), at(1.001, 1.0)
     assert below["mode_changes"] == 0
     assert np.all(below["stuck"])
     assert np.ptp(below["theta"]) == 0.0

@@ -23,8 +23,8 @@ from bywire.simulation.run import Run
 
 
 def position(*frequencies: float) -> tuple[Run, Sweep]:
-    """Return the position loop of the wedge brake, and what to measure in it."""
-    loop = LOOPS.find("position")
+    """Return the position loop of a single screw, and what to measure in it."""
+    loop = LOOPS.find("screw-position")
     point = loop.point(parameters("roberts2003"), loop.at.default)
     whole = loop.whole(point.par)
     return point.run(), Sweep(loop.inputs, loop.output, frequencies, [0.25], whole=whole)
@@ -43,7 +43,7 @@ def window(stop: threading.Event | None = None, *, lanes: bool = True) -> Repeat
         return found[:, :, 0].astype(complex)
 
     return repeat(
-        run, matrix, stimuli, ("theta_1", "x"), figures, 1e-9, 3, lanes=lanes, stop=stop
+        run, matrix, stimuli, ("theta_1", "omega_1"), figures, 1e-9, 3, lanes=lanes, stop=stop
     )
 
 

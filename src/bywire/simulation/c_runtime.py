@@ -69,7 +69,27 @@ static inline int ANY(B m) {
   for (int l = 0; l < W; ++l) any |= m[l];
   return any != 0;
 }
-#if defined(__AVX2__)
+/* The header of all instructions takes longer to read than a small kernel to compile: GCC's own
+ * names, in functions as they stand there, do without it. */
+#if defined(__AVX2__) && defined(__GNUC__) && !defined(__clang__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_blendvpd256) && __has_builtin(__builtin_ia32_maxpd256) \
+    && __has_builtin(__builtin_ia32_roundpd256) && __has_builtin(__builtin_ia32_sqrtpd256)
+#define NAMED
+#endif
+#endif
+#if defined(NAMED)
+#define INLINE extern inline __attribute__((gnu_inline, always_inline, artificial)) V
+INLINE bw_select(V a, V b, V m) { return (V)__builtin_ia32_blendvpd256(a, b, m); }
+INLINE bw_max(V a, V b) { return (V)__builtin_ia32_maxpd256(a, b); }
+INLINE bw_min(V a, V b) { return (V)__builtin_ia32_minpd256(a, b); }
+INLINE bw_floor(V a) { return (V)__builtin_ia32_roundpd256(a, 1); }
+INLINE bw_sqrt(V a) { return (V)__builtin_ia32_sqrtpd256(a); }
+#define SELECT(m, a, b) bw_select(b, a, (V)(m))
+#define MAX(a, b) bw_max(a, b)
+#define MIN(a, b) bw_min(a, b)
+#define FLOOR(a) bw_floor(a)
+#define SQRT(a) bw_sqrt(a)
+#elif defined(__AVX2__)
 #include <immintrin.h>
 #define SELECT(m, a, b) _mm256_blendv_pd(b, a, (V)(m))
 #define MAX(a, b) _mm256_max_pd(a, b)

@@ -18,7 +18,7 @@ from systems.describing import SATURATION, Saturation, at_rest, saturation
 
 
 @pytest.mark.parametrize("kind", ["multisine", "chirp"])
-@pytest.mark.parametrize("name", ["screw-position", "current"])
+@pytest.mark.parametrize("name", ["screw-position", "drive-current"])
 def test_a_smooth_loop_answers_as_to_sines(kind, name) -> None:
     loop = LOOPS.find(name)
     par = loop.smooth(parameters(main_set(loop.assembly)))
