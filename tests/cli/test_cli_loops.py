@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from command_line import refused
 
-from undrawn import drawn_once, undrawn
+from undrawn import undrawn
 
 
 def test_linearize_prints_the_model_as_json(bywire):
@@ -34,8 +34,7 @@ def test_margins_over_a_range_name_the_worst(bywire):
 
 def test_margins_leave_figures_and_a_report(bywire, tmp_path):
     asked = ("margins", "moment", "--over", "control.moment.f_c=8 Hz, 40 Hz, 100 Hz", "--json")
-    with drawn_once():
-        outcome = bywire(*asked, "--out", tmp_path)
+    outcome = bywire(*asked, "--out", tmp_path)
     assert outcome.status == 0
     names = {Path(path).name for path in outcome.object["files"]}
     drawn = {"loop-gain", "nyquist", "nichols", "sensitivity"}

@@ -35,22 +35,53 @@ typedef int64_t I __attribute__((vector_size(8 * W), aligned(8 * W)));
 typedef double M __attribute__((vector_size(8 * W), aligned(8), may_alias));  // in memory
 #define SET(x) ((V){0} + (x))
 #if defined(__AVX512F__)
+typedef unsigned char B;
+#if defined(__GNUC__) && !defined(__clang__) && defined(__has_builtin)
+#if __has_builtin(__builtin_ia32_cmppd512_mask) && __has_builtin(__builtin_ia32_maxpd512_mask)
+#define NAMED
+#endif
+#endif
+#if defined(NAMED)
+#define INLINE extern inline __attribute__((gnu_inline, always_inline, artificial))
+INLINE V any_value(void) { V y = y; return y; }
+INLINE B bw_lt(V a, V b) { return __builtin_ia32_cmppd512_mask(a, b, 0x11, (B)-1, 4); }
+INLINE B bw_le(V a, V b) { return __builtin_ia32_cmppd512_mask(a, b, 0x12, (B)-1, 4); }
+INLINE B bw_eq(V a, V b) { return __builtin_ia32_cmppd512_mask(a, b, 0x00, (B)-1, 4); }
+INLINE B bw_ne(V a, V b) { return __builtin_ia32_cmppd512_mask(a, b, 0x04, (B)-1, 4); }
+INLINE V bw_select(B m, V a, V b) { return (V)__builtin_ia32_blendmpd_512_mask(a, b, m); }
+INLINE V bw_max(V a, V b) { return (V)__builtin_ia32_maxpd512_mask(a, b, any_value(), (B)-1, 4); }
+INLINE V bw_min(V a, V b) { return (V)__builtin_ia32_minpd512_mask(a, b, any_value(), (B)-1, 4); }
+INLINE V bw_floor(V a) { return (V)__builtin_ia32_rndscalepd_mask(a, 9, any_value(), (B)-1, 4); }
+INLINE V bw_sqrt(V a) { return (V)__builtin_ia32_sqrtpd512_mask(a, any_value(), (B)-1, 4); }
+INLINE V bw_rcp14(V a) { return (V)__builtin_ia32_rcp14pd512_mask(a, any_value(), (B)-1); }
+#define LT(a, b) bw_lt(a, b)
+#define LE(a, b) bw_le(a, b)
+#define EQ(a, b) bw_eq(a, b)
+#define NE(a, b) bw_ne(a, b)
+#define SELECT(m, a, b) bw_select(m, b, a)
+#define MAX(a, b) bw_max(a, b)
+#define MIN(a, b) bw_min(a, b)
+#define FLOOR(a) bw_floor(a)
+#define SQRT(a) bw_sqrt(a)
+#define ESTIMATED(a) bw_rcp14(a)
+#else
 #include <immintrin.h>
-typedef __mmask8 B;
 #define LT(a, b) _mm512_cmp_pd_mask(a, b, _CMP_LT_OQ)
 #define LE(a, b) _mm512_cmp_pd_mask(a, b, _CMP_LE_OQ)
 #define EQ(a, b) _mm512_cmp_pd_mask(a, b, _CMP_EQ_OQ)
 #define NE(a, b) _mm512_cmp_pd_mask(a, b, _CMP_NEQ_UQ)
-#define NOT(m) ((B)~(m))
 #define SELECT(m, a, b) _mm512_mask_blend_pd(m, b, a)
 #define MAX(a, b) _mm512_max_pd(a, b)
 #define MIN(a, b) _mm512_min_pd(a, b)
 #define FLOOR(a) _mm512_roundscale_pd(a, 0x09)
 #define SQRT(a) _mm512_sqrt_pd(a)
+#define ESTIMATED(a) _mm512_rcp14_pd(a)
+#endif
+#define NOT(m) ((B)~(m))
 #define LANE(m, l) (((m) >> (l)) & 1)
 /* An estimate of 14 bits and two Newton steps: half the time of a division, to 1 ulp. */
 static inline V INVERSE(V a) {
-  V y = _mm512_rcp14_pd(a);
+  V y = ESTIMATED(a);
   y = y + y * (1.0 - a * y);
   return y + y * (1.0 - a * y);
 }
