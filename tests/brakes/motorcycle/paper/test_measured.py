@@ -14,24 +14,30 @@ from bywire.brakes.motorcycle.paper.dardanelli2010_measured import (
     _best,
     reproduce,
 )
-from bywire.brakes.motorcycle.paper.measured.estimation import LOSS, _slopes, estimated, problem
+from bywire.brakes.motorcycle.paper.measured.estimation import estimated, settled
+from bywire.brakes.motorcycle.paper.measured.misfit import LOSS, misfit, problem, slopes
 from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS, allowances
-from bywire.brakes.motorcycle.paper.measured.unknowns import FREE, HELD, TIED, brake, prior
-from bywire.brakes.motorcycle.paper.runs import parameters
-from bywire.brakes.motorcycle.sets.dardanelli2010_measured import (
-    ESTIMATED,
-    MOVED_ALONG,
-    NOT_TOLD,
+from bywire.brakes.motorcycle.paper.measured.unknowns import (
+    FREE,
+    HELD,
+    TIED,
+    brake,
+    prior,
+    unknowns,
 )
+from bywire.brakes.motorcycle.paper.runs import parameters
+from bywire.brakes.motorcycle.sets.dardanelli2010_measured import ESTIMATED, NOT_TOLD
 from bywire.brakes.motorcycle.trim import travel_at
 from bywire.core.errors import ParameterError, SolverError
 from bywire.identification.loss import rho
 from bywire.reproduction.reproduction import Reproduction
 
+# At the lowest minimum two overshoots are met, and what they cost is not: T1 above 10 bar, k_brk_p
+# of Table 3 and Fig. 7's peak.
 UNEXPLAINED = {
-    *(f"table4.{region}.{key}" for region in ("low", "medium", "high")
-      for key in ("T2", "overshoot")),
-    "fig5.p_max", "fig5.i_max", "fig5.loop_area_ratio",
+    *(f"table4.{region}.T2" for region in ("low", "medium", "high")),
+    "table4.low.overshoot", "table4.medium.T1", "table4.high.T1", "table3.k_brk_p",
+    "fig5.p_max", "fig5.i_max", "fig5.loop_area_ratio", "fig7.peak",
 }  # fmt: skip
 
 
@@ -45,7 +51,7 @@ def best(page) -> Appraisal:
     return _best()
 
 
-def test_gains_and_first_poles_of_table4_are_explained_and_the_rest_is_said(page):
+def test_gains_of_table4_and_fig6_are_explained_and_the_rest_is_said(page):
     left = {item.id for item in page.items if item.parameter_set == "" and item.agrees is False}
     assert left == UNEXPLAINED
     explained = set().union(*({i.id for i in cause.explained(page.items)} for cause in page.causes))
@@ -63,7 +69,8 @@ def test_the_stored_set_is_a_minimum(best):
     firm = np.abs(best.jacobian).max(axis=0) > 10.0  # a tolerance for 10 % of the parameter
     assert firm.sum() > 5
     worse = 0.5 * rho(best.beside[:, firm] ** 2, LOSS)[0].sum(axis=2) - best.misfit
-    assert (worse.max(axis=0) > 1e-4 * best.misfit).all()
+    # A side that lacks a figure (A_mc 1 % smaller: the loop without dither) leaves it to the other.
+    assert (np.nanmax(worse, axis=0) > 1e-4 * best.misfit).all()
 
 
 def test_intervals_and_tellers_stand_beside_every_estimated_value(best):
@@ -77,7 +84,7 @@ def test_intervals_and_tellers_stand_beside_every_estimated_value(best):
 
 def test_what_nothing_tells_stays_where_table1_has_it(best):
     kept = {k.unknown.name: k for k in best.estimate.kept}
-    assert set(kept) == {*NOT_TOLD, *MOVED_ALONG}
+    assert set(kept) == set(NOT_TOLD)
     assert set(kept) | set(ESTIMATED) == set(FREE)
     own, before = parameters(NAME).leaves(), prior().leaves()
     for name in (*NOT_TOLD, *HELD):
@@ -137,10 +144,10 @@ def test_air_that_leaves_no_stroke_is_refused():
 
 
 def test_a_trial_step_to_no_brake_is_one_that_cannot_be_computed():
-    misfit = problem()
-    soft = [1e5 if u.name == "caliper.K_pd" else u.start for u in misfit.unknowns]
+    whole = problem()
+    soft = [1e5 if u.name == "caliper.K_pd" else u.start for u in whole.unknowns]
     with pytest.raises(SolverError, match="stiffer pads"):
-        misfit.evaluate(np.array(soft))
+        whole.evaluate(np.array(soft))
 
 
 def test_a_side_that_lacks_a_figure_leaves_its_slope_to_the_other():
@@ -153,17 +160,43 @@ def test_a_side_that_lacks_a_figure_leaves_its_slope_to_the_other():
     lower = np.array([residual([0.9, 2.0]), residual([1.0, 1.8])])
     upper = np.array([residual([1.1, 2.0]), residual([1.0, 2.2])])
     lower[0, 0] = upper[1, 0] = np.nan
-    slopes = _slopes(x, residual(x), lower, upper, ends)
-    assert slopes == pytest.approx(np.array([[3.0, 1.0], [1.0, -1.0]]))
+    found = slopes(x, residual(x), lower, upper, ends)
+    assert found == pytest.approx(np.array([[3.0, 1.0], [1.0, -1.0]]))
     upper[0, 0] = np.nan
-    assert np.isnan(_slopes(x, residual(x), lower, upper, ends)[0, 0])
+    assert np.isnan(slopes(x, residual(x), lower, upper, ends)[0, 0])
+
+
+def test_overshoot_is_no_slow_pair(page):
+    """A slow pair's would be seven times as high with Fig. 6's step as with one of 0.05 A."""
+    found = {item.id: item.computed for item in page.items if item.kind == "ours"}
+    assert 1.0 < found["step.overshoot"] / found["step.small.overshoot"] < 2.0
+    assert found["step.overshoot_by_table3"] < 0.1 * found["step.overshoot"]
+
+
+def test_bounds_that_the_stored_set_lies_at_are_said(best):
+    assert best.estimate.at_bounds() == {"gear.eta_g": 1.0, "master_cylinder.k_damp": 0.0}
+    assert all("lies at its bound" in best.estimate.vague()[name]
+               for name in best.estimate.at_bounds())  # fmt: skip
 
 
 @pytest.mark.trust
-def test_other_starts_lead_to_the_stored_set(best):
+def test_holding_and_searching_agree_at_the_stored_set(best):
+    own = parameters(NAME).leaves()
+    again = settled(np.array([own[u.name] for u in unknowns()]))
+    assert again.misfit == pytest.approx(best.misfit, rel=0.01)
+    assert again.estimate.names == best.estimate.names
+    for value, stored, (low, high) in zip(again.estimate.values, best.estimate.values,
+                                          best.estimate.intervals(), strict=True):  # fmt: skip
+        assert abs(value - stored) < 0.05 * (high - low)
+
+
+@pytest.mark.trust
+def test_other_starts_lead_no_lower(best):
+    """They end at other minima, higher ones, as those of seed 1 did; what they tell is near by."""
     again = estimated(starts=4, seed=7)
+    assert misfit(again.residuals) > 0.99 * best.misfit
     ends = dict(zip(best.estimate.names, best.estimate.intervals(), strict=True))
-    assert set(again.names) == set(ends)
-    for name, value in zip(again.names, again.values, strict=True):
+    assert len(set(again.names) & set(ends)) > 8
+    for name in set(again.names) & set(ends):
         low, high = ends[name]
-        assert abs(value - best.estimate[name]) < 0.25 * (high - low)
+        assert abs(again[name] - best.estimate[name]) < 0.25 * (high - low)

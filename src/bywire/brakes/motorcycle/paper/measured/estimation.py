@@ -1,223 +1,24 @@
-"""All free parameters from all statements at once: misfit in tolerances, several starts."""
+"""All free parameters from all statements at once: several starts, and what is told held apart."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
-from bywire.brakes.motorcycle.paper.measured.experiments import computed
-from bywire.brakes.motorcycle.paper.measured.statements import STATEMENTS
+from bywire.brakes.motorcycle.paper.measured.appraisal import Appraisal, appraised
+from bywire.brakes.motorcycle.paper.measured.misfit import LOSS, problem, sized
 from bywire.brakes.motorcycle.paper.measured.unknowns import brake, unknowns
-from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.core.errors import ParameterError, SolverError
 from bywire.core.typing import Array, Progress
 from bywire.identification.estimate import Estimate
-from bywire.identification.least_squares import estimate
-from bywire.identification.leftover import Part
-from bywire.identification.loss import Loss, influence, rho
+from bywire.identification.least_squares import estimate, solve
 from bywire.identification.multistart import search
-from bywire.identification.problem import Problem
-from bywire.identification.unknown import Unknown, moved, scattered
+from bywire.identification.unknown import moved, scattered
 
-Par = MotorcycleParameters
-
-LOSS: Loss = "soft_l1"
-"""how large residuals count: the statements contradict each other, and by squares the one that is
-furthest off would decide over all others"""
 SPREAD = 0.3
 """how far from Table 1 the other starts are, at most, as a share of it"""
 
-_RESOLVED = 1e-4  # of the misfit: less is the roughness that stick and slip leave
-_STEP = 0.01  # of an unknown's scale: beyond it the gain bends, below it stick and slip show
-
-
-def predicted(brakes: Sequence[Par]) -> list[dict[str, float]]:
-    """Return what each brake gives for every statement, by its name, in its unit.
-
-    Parameters
-    ----------
-    brakes
-        Parameter sets of one structure, which differ in numbers alone.
-
-    Raises
-    ------
-    SolverError
-        When a trajectory leaves the numbers.
-    """
-    rows = computed(brakes)
-    for par, row in zip(brakes, rows, strict=True):
-        row |= {f"table3.{name}": float(value) for name, value in par.seal.flat().items()}
-    return [{s.name: row[s.name] for s in STATEMENTS} for row in rows]
-
-
-def residuals(brakes: Sequence[Par]) -> Array:
-    """Return computed less stated over the tolerance, shape (brakes, statements)."""
-    return np.array([[s.residual(row[s.name]) for s in STATEMENTS] for row in predicted(brakes)])
-
-
-def problem(free: tuple[Unknown, ...] | None = None, step: float = _STEP) -> Problem:
-    """Return the misfit as a function of the free parameters.
-
-    Derivatives are differences to both sides, within the bounds; all brakes that they take are
-    computed side by side.
-
-    Parameters
-    ----------
-    free
-        Unknowns; all of them by default.
-    step
-        Of the differences, as a share of each unknown's scale.
-    """
-    free = unknowns() if free is None else free
-    last: dict[bytes, tuple[Array, Array]] = {}  # what is held back at its value costs no runs
-
-    def evaluate(values: Array) -> tuple[Array, Array]:
-        if (key := values.tobytes()) not in last:
-            found = fresh(values)
-            last.clear()
-            last[key] = found
-        return last[key]
-
-    def fresh(values: Array) -> tuple[Array, Array]:
-        try:
-            r, lower, upper, ends = _around(free, values, step)
-        except ParameterError as error:  # a trial step too far: a shorter one follows
-            raise SolverError(str(error)) from error
-        return r, _slopes(values, r, lower, upper, ends)
-
-    parts = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
-    return Problem(free, evaluate, parts=parts, resolved=_RESOLVED)
-
-
-def _slopes(
-    values: Array, r: Array, lower: Array, upper: Array, ends: tuple[Array, Array]
-) -> Array:
-    """Return how residuals change, shape (statements, unknowns): by both sides.
-
-    Where one side does not have what a statement is of, such as a loop of a piston that sticks, the
-    other side tells alone.
-    """
-    sides = []
-    for side, end in zip((lower, upper), ends, strict=True):
-        known = np.isfinite(side)
-        at = np.where(known, end[:, None], values[:, None])
-        sides.append((np.where(known, side, r), at))
-    (below, low), (above, high) = sides
-    with np.errstate(invalid="ignore"):  # where no side does: it is not defined
-        return np.asarray(((above - below) / (high - low)).T)
-
-
-def _around(
-    free: Sequence[Unknown], values: Array, step: float
-) -> tuple[Array, Array, Array, tuple[Array, Array]]:
-    """Return the residuals, those below and above in each unknown, and its values there."""
-    size = step * np.array([u.scale for u in free])
-    low, high = (np.array([getattr(u, end) for u in free]) for end in ("low", "high"))
-    ends = np.maximum(values - size, low), np.minimum(values + size, high)
-    rows = [values]
-    for end in ends:
-        rows += list(np.where(np.eye(values.size, dtype=bool), end, values))
-    r = residuals([brake(_named(free, row)) for row in rows])
-    lower, upper = r[1 : 1 + values.size], r[1 + values.size :]
-    return r[0], lower, upper, ends
-
-
-def _named(free: Sequence[Unknown], values: Array) -> Mapping[str, float]:
-    return {u.name: float(v) for u, v in zip(free, values, strict=True)}
-
-
-def appraised(par: Par) -> Appraisal:
-    """Return what the statements tell of a brake's free parameters, taken for the best ones.
-
-    What they do not tell counts as kept where the brake has it.
-
-    Raises
-    ------
-    SolverError
-        When a trajectory leaves the numbers.
-    """
-    values = np.array([par.leaves()[u.name] for u in unknowns()])
-    free = moved(_sized(values), values)
-    r, lower, upper, ends = _around(free, values, _STEP)
-    J = _slopes(values, r, lower, upper, ends)
-    parts = tuple(Part(s.name, "", 1, s.fact.unit, s.tolerance) for s in STATEMENTS)
-    best = estimate(Problem(free, lambda _: (r, J), parts=parts), LOSS, values, search=False)
-    told = [[u.name for u in free].index(name) for name in best.names]
-    scale = np.array([u.scale for u in best.unknowns])
-    return Appraisal(best, r, J[:, told] * scale, np.stack((lower[told], upper[told])))
-
-
-@dataclass(frozen=True)
-class Appraisal:
-    """A brake's free parameters as an estimate.
-
-    Parameters
-    ----------
-    estimate
-        Those that the statements tell, with intervals, and those that they do not.
-    residuals
-        In tolerances, shape (statements,).
-    jacobian
-        Of the residuals by what is told, per unknown's scale, shape (statements, p).
-    beside
-        Residuals with each of them 1 % of its scale lower, and higher, shape (2, p, statements).
-    """
-
-    estimate: Estimate
-    residuals: Array
-    jacobian: Array
-    beside: Array
-
-    @property
-    def computed(self) -> dict[str, float]:
-        """What the brake gives for every statement, by its name, in its unit."""
-        rows = zip(STATEMENTS, self.residuals, strict=True)
-        return {s.name: s.fact.value + s.tolerance * float(r) for s, r in rows}
-
-    @property
-    def misfit(self) -> float:
-        """What is minimized: half the sum of the losses."""
-        return _misfit(self.residuals)
-
-    def gain(self) -> float:
-        """Return the largest share of the misfit that moving one parameter by 1 % would gain.
-
-        At a minimum there is none but the roughness that stick and slip leave.
-        """
-        misfits = [_misfit(r) for side in self.beside for r in side]
-        return 1.0 - float(np.nanmin(misfits)) / self.misfit
-
-    def tellers(self, name: str, most: int = 3) -> tuple[str, ...]:
-        """Return the statements that move a parameter most when they move by their tolerance.
-
-        Parameters
-        ----------
-        name
-            Of the parameter.
-        most
-            Statements at most; those of less than a third of the first are left out.
-        """
-        _, slopes = influence(self.residuals, LOSS)
-        weighed = self.jacobian * slopes[:, None]
-        moved = np.linalg.pinv(self.jacobian.T @ weighed) @ weighed.T
-        row = np.abs(moved[self.estimate.names.index(name)])
-        order = [k for k in np.argsort(-row)[:most] if row[k] > row.max() / 3.0]
-        return tuple(STATEMENTS[k].name for k in order)
-
-
-def _misfit(r: Array) -> float:
-    return 0.5 * float(rho(r**2, LOSS)[0].sum())
-
-
-def _sized(values: Array) -> tuple[Unknown, ...]:
-    """Return the unknowns with the larger of prior and estimate as their usual magnitude."""
-    return tuple(
-        replace(u, scale=max(u.scale, abs(float(v))))
-        for u, v in zip(unknowns(), values, strict=True)
-    )
+_ROUNDS = 6  # of holding and searching: two were enough
 
 
 def estimated(
@@ -225,7 +26,9 @@ def estimated(
 ) -> Estimate:
     """Return the free parameters that explain the statements best.
 
-    What the statements do not tell is kept at Table 1 and named with the reason.
+    From where the best start led, what is told least goes back to Table 1 and the rest is searched
+    on, until all is told; from there everything is free once more, and then `settled`. What the
+    statements do not tell is kept at Table 1 and named with the reason.
 
     Parameters
     ----------
@@ -250,5 +53,61 @@ def estimated(
     """
     begin = scattered(unknowns(), starts, SPREAD, seed)
     led = search(problem(), begin, LOSS, progress, store)
-    best = estimate(problem(_sized(led.best.values)), LOSS, led.best.values)
+    first = estimate(problem(sized(led.best.values)), LOSS, led.best.values)
+    table1 = {u.name: u.start for u in unknowns()}
+    told = table1 | dict(zip(first.names, first.values.tolist(), strict=True))
+    best = settled(searched(np.array([told[name] for name in table1]), ())).estimate
     return best.noted((f"{led.reached} of {starts} starts met the lowest minimum",))
+
+
+def settled(values: Array) -> Appraisal:
+    """Return the minimum near by at which nothing moves that the statements do not tell.
+
+    They are asked what they do not tell there; that goes back to Table 1, and the rest is searched
+    on. It ends where holding and searching agree: what is not told at the minimum is what was held.
+    Where they turn in a circle, the lowest minimum of it counts.
+
+    Parameters
+    ----------
+    values
+        Of all free parameters, in the order of `unknowns`, SI.
+
+    Raises
+    ------
+    SolverError
+        When a trajectory leaves the numbers.
+    """
+    found: list[Appraisal] = []
+    seen: list[tuple[int, ...]] = []
+    for _ in range(_ROUNDS):
+        here = appraised(brake(_named(values)))
+        found.append(here)
+        held = _untold(here)
+        if held in seen:
+            break
+        seen.append(held)
+        values = searched(values, held)
+    return min(found[1:], key=lambda each: each.misfit)
+
+
+def searched(values: Array, held: tuple[int, ...]) -> Array:
+    """Return the minimum near by with some of the unknowns, by their index, at Table 1."""
+    table1 = np.array([u.start for u in unknowns()])
+    free = np.setdiff1d(np.arange(values.size), held)
+    begin = np.where(np.isin(np.arange(values.size), held), table1, values)
+    whole = problem(moved(sized(values), begin))
+    for index in sorted(held, reverse=True):
+        whole = whole.held(index)
+    end = begin.copy()
+    end[free] = solve(whole, begin[free], LOSS).values
+    return end
+
+
+def _untold(here: Appraisal) -> tuple[int, ...]:
+    """Return the indices of what the statements do not tell."""
+    names = [u.name for u in unknowns()]
+    return tuple(sorted(names.index(kept.unknown.name) for kept in here.estimate.kept))
+
+
+def _named(values: Array) -> dict[str, float]:
+    return {u.name: float(v) for u, v in zip(unknowns(), values, strict=True)}

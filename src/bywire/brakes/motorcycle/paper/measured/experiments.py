@@ -130,6 +130,16 @@ def _region(brakes: Sequence[Par], name: str) -> list[dict[str, float]]:
     return rows
 
 
+def overshoots(par: Par, name: str, heights: Sequence[float]) -> list[float]:
+    """Return by how much steps of the current [A] in a region overshoot their ends [bar]."""
+    ideal, p = par.replace({"adc.law": "ideal"}), facts.REGIONS[name]
+    (start,) = _settled([ideal], p)
+    i = holding_current(start, ideal)
+    runs = [_driven(ideal, start, partial(_step, i, i + h), _AFTER, _SETTLE) for h in heights]
+    levels = (_levels(step, ideal) for step in _together(runs, ("p_mc",)))
+    return [(peak - after) / _BAR for _, after, peak in levels]
+
+
 def _levels(step: Trajectory, par: Par) -> tuple[float, float, float]:
     """Return the pressure [Pa] before a step, at its end, and its highest, dither averaged."""
     t = step.time - _SETTLE
@@ -185,6 +195,13 @@ def _ramps(brakes: Sequence[Par]) -> list[dict[str, float]]:
             "fig5.loop_area_ratio": 100.0 * dithered / without,
         })  # fmt: skip
     return rows
+
+
+def stuck_at(par: Par) -> float:
+    """Return the highest pressure [bar] of the ramp (17) without dither."""
+    options = friction_ramp.Options.model_validate(friction_ramp.EXPERIMENT.defaults.model_dump())
+    without = friction_ramp.cases(par.replace({"adc.law": "ideal"}), options)[0]
+    return float(_runs([without], ("p_mc",))[0]["p_mc"].max()) / _BAR
 
 
 def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]:
