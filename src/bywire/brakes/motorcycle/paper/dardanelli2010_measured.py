@@ -153,9 +153,8 @@ def beyond(runs: Runs) -> Part:
     )  # fmt: skip
     text = (
         "A slow pair overshoots by a share of the step. This brake's steps overshoot by nearly the "
-        "same pressure whatever their height: the dither that Table 3's friction needs at "
-        "the larger k_brk_p takes so much damping away that the piston swings beyond and is "
-        "caught. It is as large as Table 4's at the height of Fig. 6, and no slow pair."
+        "same pressure whatever their height, and hardly with k_brk_p as printed, by which the ECU "
+        "sets the dither. At the height of Fig. 6 it is as much as Table 4's, and no slow pair."
     )
     return Part("What no statement is of", text, items)
 
