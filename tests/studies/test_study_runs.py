@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import signal
 import sys
@@ -14,9 +15,9 @@ import pytest
 from scipy import stats
 
 import bywire
-from bywire.core.errors import FileError, ParameterError, RunError
+from bywire.core.errors import FileError, InputError, ParameterError, RunError
 from bywire.studies.executor import Cluster, InProcess, Pool, executor_of
-from bywire.studies.store import StudyStore
+from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 
 DAMPED = """
@@ -29,6 +30,7 @@ cases = 512
 [requirements]
 overshoot = "<= 60 % with 98 %"
 """
+VARY = '[vary]\n"motor.R_m" = "+-5 %"\n'
 AXIS = """
 experiment = "step"
 parameters = "spring-axis-one"
@@ -80,7 +82,7 @@ def test_who_computes_changes_no_bit(study, tmp_path, monkeypatch):
     frames = []
     for name, executor in (("own", InProcess()), ("pool", Pool(2))):
         store = StudyStore(tmp_path / name)
-        store.open(plan, tmp_path / "study.toml")
+        store.open(plan, Origin(tmp_path / "study.toml"))
         chunks = [2, 0, 1] if name == "own" else [0, 1, 2]  # in whatever order
         for chunk, columns in executor.computed(plan, chunks):
             store.write(chunk, columns, {})
@@ -183,7 +185,7 @@ def test_a_study_without_a_case_says_so(study, tmp_path, design):
     text = f'[vary]\n"motor.R_m" = "+-5 %"\n[design]\nkind = "{design}"\ncases = 2560\n'
     path = study(text + '[requirements]\npeak_current = "<= 19 A with 99 %"\n')
     out = tmp_path / "out"
-    StudyStore(out).open(read_study(path), path)
+    StudyStore(out).open(read_study(path), Origin(path))
     nothing = bywire.study_report(out)
     assert nothing.status == "unfinished"
     assert "no case is computed yet" in str(nothing)
@@ -219,3 +221,47 @@ def test_results_in_python(study, tmp_path):
     assert "probability" in result._repr_html_()
     with pytest.raises(ParameterError, match="no worst case"):
         result.worst("overshoot")
+
+
+def test_a_damaged_chunk_is_computed_again_and_that_is_said(study, tmp_path):
+    path = study(VARY)
+    before = bywire.run_study(path, tmp_path / "out", cases=128, workers=1)
+    store = StudyStore(tmp_path / "out")
+    store.path(1).write_bytes(store.path(1).read_bytes()[:200])
+    with pytest.raises(FileError, match=r"000001\.parquet is damaged.*study resume"):
+        bywire.study_report(tmp_path / "out")
+    after = bywire.resume_study(tmp_path / "out", workers=1)
+    pd.testing.assert_frame_equal(before.cases, after.cases, check_exact=True)
+    assert "1 damaged files of chunks are computed again" in after.notes
+
+
+def test_a_study_is_kept_with_its_changes_and_another_says_how_it_differs(study, tmp_path):
+    path, out = study(VARY), tmp_path / "out"
+    run = bywire.run_study(path, out, {"seal.T_pr": "+10 %"}, cases=64, workers=1)
+    assert bywire.study_report(out).plan.bench.par == run.plan.bench.par
+    with pytest.raises(FileError, match=r"parameters seal\.T_pr: 0\.0022\d*, now 0\.002\)"):
+        bywire.run_study(path, out, workers=1)
+    with pytest.raises(ParameterError, match="name a study file"):
+        bywire.run_study({"bench": "hard-braking"})
+
+
+def test_time_is_a_budget(study, tmp_path):
+    path = study(VARY + '[design]\ntime = "1 us"\n')
+    first = bywire.run_study(path, tmp_path / "out", cases=128, workers=1)
+    assert (len(first.cases), first.status) == (64, "unfinished")
+    assert "its file gives it 1e-06 s at a time" in first.warnings[-1]
+    assert bywire.resume_study(tmp_path / "out", workers=1).status == "passed"
+    with pytest.raises(ParameterError, match="budget of 'worst-case' is its 'cases'"):
+        read_study(study(VARY + "[design]\nkind = 'worst-case'\ntime = '1 s'\n"))
+
+
+def test_a_study_of_a_loaded_brake_says_which_it_was(tmp_path, spring_axis):
+    (tmp_path / "bench.toml").write_text(AXIS)
+    (tmp_path / "study.toml").write_text(DAMPED.replace("KIND", "monte-carlo"))
+    bywire.run_study(tmp_path / "study.toml", tmp_path / "out", cases=64, workers=1)
+    record = json.loads((tmp_path / "out" / "study.json").read_text())
+    record["systems"] = ["elsewhere/axis.py"]  # not loaded by now
+    (tmp_path / "out" / "study.json").write_text(json.dumps(record))
+    (tmp_path / "study.toml").write_text(DAMPED.replace("bench.toml", "unknown-step"))
+    with pytest.raises(InputError, match=r"run with system elsewhere/axis\.py"):
+        bywire.study_report(tmp_path / "out")

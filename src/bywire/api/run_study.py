@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 
 from bywire.api.study_run import StudyRun
 from bywire.bench import running
 from bywire.bench.requirements import status_of
 from bywire.bench.result import Result
 from bywire.bench.running import Progress
-from bywire.core.errors import FileError, ParameterError
+from bywire.core.brake import loaded_files
+from bywire.core.errors import FileError, InputError, ParameterError, quoted
 from bywire.core.typing import silent
 from bywire.report.answer import use_case
 from bywire.studies.findings import Findings
@@ -19,7 +22,7 @@ from bywire.studies.points import SPANNED
 from bywire.studies.rare_failures import rare_failures
 from bywire.studies.running import complete
 from bywire.studies.sought_design import WORST
-from bywire.studies.store import StudyStore
+from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 from bywire.studies.worst_cases import worst_cases
 
@@ -28,6 +31,7 @@ from bywire.studies.worst_cases import worst_cases
 def run_study(
     study: str | Path,
     out: str | Path | None = None,
+    overrides: Mapping[str, str] = MappingProxyType({}),
     *,
     cases: int | None = None,
     workers: int | None = None,
@@ -45,6 +49,8 @@ def run_study(
         Study file; see ``docs/studies.md``.
     out
         Its folder; by default the name of the file, without its ending, in the current folder.
+    overrides
+        Changes of the bench, as texts with units; kept with the study.
     cases
         Cases in place of the file's; more of them extend what is there. Where the folder has more
         than the file asks for, all are judged.
@@ -71,29 +77,30 @@ def run_study(
     KeyboardInterrupt
         When interrupted; finished chunks stay.
     """
+    if not isinstance(study, (str, Path)):
+        raise ParameterError(f"study = {quoted(study)}: name a study file, see docs/studies.md")
     source = Path(study)
-    folder = Path(out) if out is not None else Path(source.stem)
-    store = StudyStore(folder)
-    plan = _with_cases(read_study(source), store, cases)
-    return _completed(plan, store, source, workers, cluster, progress)
+    store = StudyStore(Path(out) if out is not None else Path(source.stem))
+    plan = _with_cases(read_study(source, overrides), store, cases)
+    return _completed(Origin(source, overrides), plan, store, workers, cluster, progress)
 
 
 def _completed(
-    plan: StudyPlan, store: StudyStore, source: Path, workers: int | None, cluster: str,
+    origin: Origin, plan: StudyPlan, store: StudyStore, workers: int | None, cluster: str,
     progress: Progress | None,
 ) -> StudyRun:  # fmt: skip
     """Return a study with all of its cases, those that were missing computed."""
     nominal = running.run(plan.bench, estimate_error=True)
     try:
-        complete(
-            plan, store, source, workers=workers, cluster=cluster, progress=progress or silent
+        damaged = complete(
+            plan, store, origin, workers=workers, cluster=cluster, progress=progress or silent
         )
     except KeyboardInterrupt:
         of = "" if plan.sought is not None else f" of {plan.chunks}"
         raise KeyboardInterrupt(
             f"{len(store.finished())}{of} chunks are kept: bywire study resume {store.folder}"
         ) from None
-    return _run_of(plan, store, nominal)
+    return replace(_run_of(plan, store, nominal), damaged=damaged)
 
 
 @use_case
@@ -132,11 +139,11 @@ def resume_study(
         When interrupted; finished chunks stay.
     """
     store = StudyStore(Path(folder))
-    plan, source = _kept(store)
+    plan, origin = _kept(store)
     if cases is not None:
         _refuse_cases(plan, cases)
         plan = _with_cases(plan, store, cases)
-    return _completed(plan, store, source, workers, cluster, progress)
+    return _completed(origin, plan, store, workers, cluster, progress)
 
 
 @use_case
@@ -171,18 +178,26 @@ def kept_study(folder: str | Path) -> StudyRun:
     return _run_of(plan, store, running.run(plan.bench, estimate_error=True))
 
 
-def _kept(store: StudyStore) -> tuple[StudyPlan, Path]:
-    """Return the study of a folder, with as many cases as were asked for, and its file."""
+def _kept(store: StudyStore) -> tuple[StudyPlan, Origin]:
+    """Return the study of a folder, with as many cases as were asked for, and its origin."""
     said = store.record()
-    source = Path(said["source"])
-    if not source.is_file():
+    origin = Origin(Path(said["source"]), said["set"])
+    if not origin.file.is_file():
         raise FileError(
-            f"the study file {source} of {store.folder} is gone: run it from where it is now, "
+            f"the study file {origin.file} of {store.folder} is gone: run it from where it is now, "
             f"bywire study run FILE --out {store.folder}"
         )
-    plan = read_study(source)
+    try:
+        plan = read_study(origin.file, origin.overrides)
+    except InputError as error:
+        unloaded = [path for path in said["systems"] if path not in loaded_files()]
+        if not unloaded:
+            raise
+        raise type(error)(
+            f"{error}; the study was run with --system {' --system '.join(unloaded)}"
+        ) from None
     is_listed = plan.design in SPANNED
-    return (plan if is_listed else replace(plan, cases=int(said["cases"]))), source
+    return (plan if is_listed else replace(plan, cases=int(said["cases"]))), origin
 
 
 def _with_cases(plan: StudyPlan, store: StudyStore, cases: int | None) -> StudyPlan:

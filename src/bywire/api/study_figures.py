@@ -54,6 +54,12 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
             "What drives the key figures: rank correlations with their intervals. Pale: not "
             "distinct from none.", "influences",
         ))  # fmt: skip
+    if any(findings.effects(name) for name in figures):
+        blocks.append(FigureBlock(
+            partial(_tornado, findings),
+            "How far each quantity alone moves the key figures from what the bench itself gives; "
+            "marks are its levels, dotted the limit.", "tornado",
+        ))  # fmt: skip
     if findings.plan.sensitivity is not None:
         blocks += sensitivity_figures(findings)
     # Trajectories stand on a few levels: their points would be stripes.
@@ -108,6 +114,14 @@ def _influences(findings: Findings) -> Figure:
 
     each = {name: findings.influences(name) for name in shown_figures(findings)}
     return influence_bars({name: found for name, found in each.items() if found})
+
+
+def _tornado(findings: Findings) -> Figure:
+    from bywire.report.study.tornado import tornado
+
+    each = {name: findings.effects(name) for name in shown_figures(findings)}
+    limits = {name: limit for name in each if (limit := _limit(findings, name)) is not None}
+    return tornado({name: found for name, found in each.items() if found}, findings.units, limits)
 
 
 def _scatter(findings: Findings, name: str) -> Figure:

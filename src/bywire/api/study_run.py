@@ -15,14 +15,13 @@ from bywire.api.study_rare import (
     failure_table,
     importance_tables,
     rare_data,
-    rare_notes,
-    search_notes,
-    state_texts,
 )
+from bywire.api.study_remarks import failure_texts, noted, unfinished, warned
 from bywire.api.study_sensitivity import drivers_data, missing_indices, sensitivity_tables
 from bywire.api.study_tables import (
     correlated,
     demand_table,
+    effect_tables,
     influence_tables,
     spread_table,
     varied_table,
@@ -42,14 +41,12 @@ from bywire.report.document import (
 )
 from bywire.report.subject import Subject
 from bywire.studies.findings import Findings, Judgment, Spread
-from bywire.studies.plan import CHUNK, StudyPlan
-from bywire.studies.sought_design import WORST
+from bywire.studies.plan import StudyPlan
 
 if TYPE_CHECKING:
     import pandas as pd
     import xarray as xr
 
-_LISTED = 10  # cases without a result that are named
 
 
 @dataclass(frozen=True)
@@ -69,6 +66,8 @@ class StudyRun(Answer):
     status
         ``passed``, ``failed`` or ``undecided`` by the requirements, ``done`` where there are none,
         ``unfinished`` where cases are missing.
+    damaged
+        Chunks whose files could not be read, and that were computed again.
     """
 
     plan: StudyPlan
@@ -76,6 +75,7 @@ class StudyRun(Answer):
     findings: Findings
     nominal: Result
     status: str
+    damaged: int = 0
 
     @cached_property
     def _shown(self) -> ShownCases:
@@ -107,66 +107,16 @@ class StudyRun(Answer):
     @property
     def warnings(self) -> list[str]:
         """What the runs warned of, cases without a result, and what is still to be computed."""
-        said = [f"{text} ({count} of {len(self.cases)} cases)"
-                for text, count in self.findings.warnings.items()]  # fmt: skip
-        said += self.nominal.warnings if not said else []
-        if failed := self.findings.failures:
-            said.append(
-                f"{len(failed)} of {len(self.cases)} cases have no result; they count as missing "
-                "every requirement"
-            )
-        if self.findings.rare and len(self.cases):
-            said += state_texts(self.findings)
+        said = warned(self.findings, self.nominal.warnings)
         if self.status == "unfinished":
-            left = self.plan.total - len(self.cases)
-            said.append(
-                f"not all cases that it asks for are computed yet: bywire study resume "
-                f"{self.folder}" if self.plan.sought is not None else
-                f"{left} of {self.plan.total} cases are not computed yet: bywire study resume "
-                f"{self.folder}"
-            )
+            resume = f"bywire study resume {self.folder}"
+            said.append(unfinished(self.plan, len(self.cases), resume))
         return said
 
     @property
     def notes(self) -> list[str]:
-        """What was rounded, what the intervals stand for, and what nothing is said of."""
-        return [*self._rounding(), *self._on_intervals(), *self._on_choices()]
-
-    def _rounding(self) -> list[str]:
-        plan = self.plan
-        if plan.total == plan.cases or not (plan.is_sampled or plan.sensitivity is not None):
-            return []
-        what = "whole groups" if plan.sensitivity is not None else f"whole chunks of {CHUNK}"
-        return [f"{plan.total} cases in place of {plan.cases}: they come in {what}"]
-
-    def _on_choices(self) -> list[str]:
-        choices = [v.name for v in self.plan.varied if not v.unit]
-        if not choices or not self.plan.is_sampled:
-            return []
-        return [
-            f"{', '.join(choices)}: a choice has no rank correlation; 'sobol-indices' tells what "
-            "it does"
-        ]
-
-    def _on_intervals(self) -> list[str]:
-        if self.plan.design == WORST:
-            return search_notes(self.findings)
-        if self.plan.sought is not None:
-            return rare_notes(self.findings)
-        if self.plan.sensitivity is not None:
-            return [
-                f"{self.plan.design}: cases share values, so that shares of them are no "
-                "probabilities",
-                *(missing_indices(self.findings) if len(self.cases) else []),
-            ]
-        if not self.plan.is_sampled:
-            return [f"{self.plan.design}: what may happen, and not how often"]
-        if self.plan.design == "monte-carlo":
-            return []
-        return [
-            f"{self.plan.design}: intervals are those of independent cases, which scatter more as "
-            "a rule"
-        ]
+        """What was rounded or repaired, what intervals stand for, what nothing is said of."""
+        return noted(self.findings, self.damaged)
 
     def worst(self, kpi: str) -> Bench:
         """Return the bench of the case that comes worst of all by a requirement.
@@ -197,12 +147,13 @@ class StudyRun(Answer):
         is_indexed = plan.sensitivity is not None
         drivers = (
             importance_tables(findings) if is_rare
-            else sensitivity_tables(findings) if is_indexed else influence_tables(findings)
+            else sensitivity_tables(findings) if is_indexed
+            else influence_tables(findings) + effect_tables(findings)
         )  # fmt: skip
         unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
         texts = self._shown.texts()
-        missing = self._failures()
+        missing = failure_texts(findings, self._shown.named)
         return Document(
             f"Study {plan.name}",
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
@@ -246,15 +197,7 @@ class StudyRun(Answer):
             text += f", {open_} undecided"
         if self.holds:
             return Banner(text, "good")
-        return Banner(text, "bad" if "missed" in outcomes else "none")
-
-    def _failures(self) -> list[str]:
-        """Return the first cases without a result, with their values."""
-        failed = self.findings.failures
-        shown = list(failed.items())[:_LISTED]
-        texts = [f"case {self._shown.named(row)}: {text}" for row, text in shown]
-        rest = len(failed) - len(texts)
-        return texts + ([f"and {rest} more"] if rest else [])
+        return Banner(text, "bad" if "missed" in outcomes else "open")
 
     def _data(self) -> dict[str, Any]:
         findings = self.findings

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from bywire.report.document import Listing, TableBlock
 from bywire.report.tables import Cell, Column, Table, Verdict, text_table, value_text
 from bywire.report.wording import amount, clean
+from bywire.studies.effects import Effect
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan
 from bywire.studies.statistics import Influence, Outcome, Share
@@ -15,7 +16,7 @@ _SHOWN = 5  # quantities that drive a key figure
 OUTCOMES: dict[Outcome, tuple[str, Verdict]] = {
     "met": ("ok", "good"),
     "missed": ("failed", "bad"),
-    "undecided": ("undecided", "bad"),
+    "undecided": ("undecided", "open"),
 }
 """what tables say of an outcome"""
 
@@ -103,6 +104,29 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
         TableBlock(_influence_table(found), f"What drives {name}.", title=f"what drives {name}")
         for name, found in each.items() if found
     ]  # fmt: skip
+
+
+def effect_tables(findings: Findings) -> list[TableBlock]:
+    """Return what each quantity alone does to key figures of requirements, or to all."""
+    each = {name: findings.effects(name) for name in shown_figures(findings)}
+    return [
+        TableBlock(_effect_table(found, findings.units[name]),
+                   f"What each quantity alone does to {name}.", title=f"what moves {name}")
+        for name, found in each.items() if found
+    ]  # fmt: skip
+
+
+def _effect_table(effects: Sequence[Effect], unit: str) -> Table:
+    heads = ("from", "to", "at the first", "at the last", "least", "largest", "swing")
+    rows = []
+    for each in effects:
+        ends = [value_text(each.values[k], each.unit or "1") for k in (0, -1)]
+        figures = [float(each.figures[0]), float(each.figures[-1]), each.least, each.largest]
+        rows.append((
+            Cell(each.quantity), *map(Cell, ends),
+            *(Cell(amount(v, unit), value=v) for v in (*figures, each.swing)),
+        ))  # fmt: skip
+    return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 
 
 def shown_figures(findings: Findings) -> list[str]:

@@ -8,9 +8,10 @@ from typing import Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from bywire.cli.options import JsonFlag, changes
+from bywire.cli.options import BenchChanges, JsonFlag, changes
 from bywire.cli.output_folder import folder
 from bywire.cli.show import show
+from bywire.core.errors import ParameterError
 
 _SIZE = "size"
 
@@ -20,6 +21,8 @@ class _StudyGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:  # types of typer's own click
         """Return the command of the first word; see click."""
+        if args and args[0].endswith(".toml"):
+            raise ParameterError(f"a study file is run by 'bywire study run {args[0]}'")
         if args and not args[0].startswith("-") and args[0] not in self.commands:
             args = [_SIZE, *args]
         return super().resolve_command(ctx, args)
@@ -55,6 +58,7 @@ def study_run_command(
         typer.Option("--out", help="Folder of the study; by default named as the file.",
                      parser=folder, metavar="PATH"),
     ] = None,
+    overrides: BenchChanges = None,
     cases: Cases = None,
     workers: Workers = None,
     cluster: ClusterAddress = "",
@@ -66,7 +70,8 @@ def study_run_command(
     place = out if out is not None else Path(study.stem)
     show(
         lambda progress: run_study(
-            study, place, cases=cases, workers=workers, cluster=cluster, progress=progress
+            study, place, changes(overrides), cases=cases, workers=workers, cluster=cluster,
+            progress=progress,
         ),
         place, json,
     )  # fmt: skip

@@ -97,10 +97,10 @@ class Section:
 
 @dataclass(frozen=True)
 class Banner:
-    """The outcome in one line at the top: ``good``, ``bad`` or neither."""
+    """The outcome in one line at the top: ``good``, ``bad``, ``open`` or neither."""
 
     text: str
-    verdict: Literal["good", "bad", "none"] = "none"
+    verdict: Literal["good", "bad", "open", "none"] = "none"
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from bywire.report.result_folder import listed
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
 
-_MARKS = {"good": "✓ ", "bad": "✗ ", "none": ""}
+_MARKS = {"good": "✓ ", "bad": "✗ ", "open": "? ", "none": ""}
 
 
 def write_page(
@@ -127,8 +127,8 @@ def _text(text: str) -> str:
 
 
 def _banner(banner: Banner) -> str:
-    mark = {"good": "✓ ", "bad": "✗ ", "none": ""}[banner.verdict]
-    return f'<div class="status {banner.verdict}" role="status">{mark}{_text(banner.text)}</div>'
+    text = _MARKS[banner.verdict] + _text(banner.text)
+    return f'<div class="status {banner.verdict}" role="status">{text}</div>'
 
 
 def _contents(sections: Sequence[Section]) -> str:

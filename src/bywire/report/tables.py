@@ -9,12 +9,12 @@ from typing import Literal
 
 from bywire.report.wording import amount, clean, error_text, measured_amount, unit_text
 
-Verdict = Literal["good", "bad", "none"]
+Verdict = Literal["good", "bad", "open", "none"]
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Text of a cell, whether it tells of something good or bad, and the value behind it.
+    """Text of a cell, whether it tells of something good, bad or open, and the value behind it.
 
     Parameters
     ----------
@@ -239,7 +239,7 @@ _OUTCOMES = {
     "": Cell("-"),
     "met": Cell("ok", "good"),
     "missed": Cell("failed", "bad"),
-    "undecided": Cell("undecided", "bad"),
+    "undecided": Cell("undecided", "open"),
 }
 
 

@@ -246,7 +246,8 @@ def _lognormal(entry: _Entry) -> Distribution:
     variation = entry.width("sd", median) / median
     sigma = math.sqrt(math.log1p(variation**2))
     text = f"log-normal, median {entry.amount(median)}, sd {100.0 * variation:.3g} %"
-    return _frozen(entry, stats.lognorm(sigma, scale=median), text)
+    # It ends at zero, but as it ends where it has no end: not within any standard deviation.
+    return replace(_frozen(entry, stats.lognorm(sigma, scale=median), text), low=-math.inf)
 
 
 def _triangular(entry: _Entry) -> Distribution:

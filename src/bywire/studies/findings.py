@@ -16,6 +16,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.requirements import is_met, limit_of
 from bywire.core.typing import Array
 from bywire.studies.chunk import CASE, FAILURE, WARNINGS
+from bywire.studies.effects import ONE, Effect, effects
 from bywire.studies.failure_probability import FailureProbability
 from bywire.studies.plan import Demand, StudyPlan
 from bywire.studies.rare_failures import RareFailure
@@ -170,6 +171,13 @@ class Findings:
             known[name] = sensitivity(design, names, self.figure(name), self.plan.confidence)
         return known[name]
 
+    def effects(self, name: str) -> Sequence[Effect]:
+        """Return what each quantity alone does to a key figure, where the design shows that."""
+        if self.plan.design != ONE or not len(self.cases):
+            return []
+        columns = [self.cases[v.name].tolist() for v in self.plan.varied]
+        return effects(self.plan.varied, self.plan.levels, columns, self.figure(name))
+
     def drivers(self, name: str) -> Sequence[str]:
         """Return the quantities that a key figure goes with, the strongest first; choices apart."""
         if self.rare:
@@ -187,6 +195,15 @@ class Findings:
         """Row -> why the case has no result."""
         texts = self.cases[FAILURE] if len(self.cases) else ()
         return {k: str(text) for k, text in enumerate(texts) if text}
+
+    @property
+    def reasons(self) -> Mapping[str, Sequence[int]]:
+        """Why cases have no result -> their rows; what differs in its numbers alone, once."""
+        said: dict[str, list[int]] = {}
+        for row, text in self.failures.items():
+            said.setdefault(_NUMBER.sub("#", text), []).append(row)
+        failures = self.failures
+        return {failures[rows[0]]: rows for rows in said.values()}
 
     @property
     def warnings(self) -> Mapping[str, int]:

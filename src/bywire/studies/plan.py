@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.core.brake import brakes, is_package
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import leaf_fields
 from bywire.core.typing import Array
 from bywire.core.version import __version__
 from bywire.studies.correlation import correlation_factor
 from bywire.studies.distribution import Distribution
+from bywire.studies.identity import as_json, digest_of, source_digest
 from bywire.studies.points import SAMPLED, Sampled, Spanned, spanned
 from bywire.studies.sensitivity_design import SENSITIVITY, SensitivityDesign
 from bywire.studies.sought_design import RARE, SOUGHT, WORST, SoughtDesign, library_version
@@ -103,6 +102,8 @@ class StudyPlan:
         Of all intervals, between 0 and 1.
     levels
         Values of each quantity of a grid, or of one at a time.
+    time
+        How long cases are computed at most [s], each time that the study is run or resumed.
     cases_per_level
         Cases asked for in each level of subset simulation.
     correlations
@@ -118,6 +119,7 @@ class StudyPlan:
     demands: tuple[Demand, ...] = ()
     confidence: float = 0.95
     levels: int = 5
+    time: float = math.inf
     cases_per_level: int = 2560
     correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
 
@@ -231,13 +233,18 @@ class StudyPlan:
     def _factor(self) -> Array | None:
         return correlation_factor([v.name for v in self.varied], self.correlations)
 
-    @cached_property
+    @property
     def digest(self) -> str:
-        """What tells a study from another: all that its cases' figures depend on."""
+        """What tells a study from another."""
+        return digest_of(self.identity)
+
+    @cached_property
+    def identity(self) -> Mapping[str, Any]:
+        """All that the figures of its cases depend on."""
         bench = self.bench
-        said = {
+        said: dict[str, Any] = {
             "version": __version__,
-            "brake": _source_digest(PARAMETER_SETS.owner(bench.parameters)),
+            "brake": source_digest(PARAMETER_SETS.owner(bench.parameters)),
             "experiment": bench.experiment,
             "system": bench.system,
             "parameters": bench.par.flat(),
@@ -247,12 +254,13 @@ class StudyPlan:
                 for name, each in bench.chosen_stimuli.items()
             },
             "step": bench.step, "record": bench.record, "noise": bench.seed,
-            "varied": [
-                [v.name, v.distribution.kind, v.together,
-                 v.distribution.quantile(np.linspace(0.01, 0.99, 9)).tolist()]
+            "order": [v.name for v in self.varied],
+            "varied": {
+                v.name: [v.distribution.text, v.together,
+                         v.distribution.quantile(np.linspace(0.01, 0.99, 9)).tolist()]
                 for v in self.varied
-            ],
-            "correlations": sorted([*names, value] for names, value in self.correlations.items()),
+            },
+            "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
             "design": self.design, "seed": self.seed, "chunk": CHUNK,
             "levels": 0 if self.is_sampled else self.levels,
         }  # fmt: skip
@@ -263,17 +271,7 @@ class StudyPlan:
             said["points"] = hashlib.sha256(points).hexdigest()
         if self.sought is not None:
             # Where it goes depends on the requirements, and on how the library draws.
-            said["sought"] = [library_version(self.design), self.sought.level]
-            said["requirements"] = [[each.kpi, each.limit] for each in self.judged_demands]
-        text = json.dumps(said, sort_keys=True, default=str)
-        return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _source_digest(module: str) -> str:
-    """Return what tells the code of a brake, by its module, from another's."""
-    brake = next(each for each in brakes().values() if each.module == module)
-    file = Path(brake.file)
-    digest = hashlib.sha256()
-    for path in sorted(file.parent.rglob("*.py")) if is_package(brake) else [file]:
-        digest.update(path.read_bytes())
-    return digest.hexdigest()
+            said["points"] = library_version(self.design)
+            said["cases_per_level"] = self.sought.level
+            said["requirements"] = {each.kpi: each.limit for each in self.judged_demands}
+        return as_json(said)

@@ -8,16 +8,18 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from bywire.core.brake import loaded_files
 from bywire.core.errors import FileError
 from bywire.core.scratch import replacing, sweep
 from bywire.data.file_format import library
 from bywire.studies.chunk import Columns
+from bywire.studies.identity import differing
 from bywire.studies.plan import CHUNK, StudyPlan
 
 if TYPE_CHECKING:
@@ -27,8 +29,24 @@ RECORD = "study.json"
 """file that says which study a folder holds"""
 CHUNKS = "chunks"
 """folder of the chunks"""
-_SAID = {"digest": str, "source": str, "cases": int}
+_SAID = {"digest": str, "source": str, "cases": int, "set": dict, "systems": list, "study": dict}
 _WHAT = ("the files of a study", "studies")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a study was read from.
+
+    Parameters
+    ----------
+    file
+        Study file.
+    overrides
+        Changes of its bench, as ``--set`` takes them.
+    """
+
+    file: Path
+    overrides: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -43,7 +61,7 @@ class StudyStore:
 
     folder: Path
 
-    def open(self, plan: StudyPlan, source: Path) -> None:
+    def open(self, plan: StudyPlan, origin: Origin) -> None:
         """Make the folder one of a study, or refuse that of another.
 
         Raises
@@ -57,8 +75,10 @@ class StudyStore:
             (self.folder / CHUNKS).mkdir(parents=True, exist_ok=True)
             sweep(self.folder / CHUNKS)
             said = {
-                "digest": plan.digest, "source": str(source.resolve()), "name": plan.name,
+                "digest": plan.digest, "source": str(origin.file.resolve()), "name": plan.name,
                 "cases": max(plan.total, known.get("cases", 0)), "chunk": CHUNK,
+                "set": dict(origin.overrides), "systems": list(loaded_files()),
+                "study": plan.identity,
             }  # fmt: skip
             with replacing(self.folder / RECORD) as fresh:
                 fresh.write_text(json.dumps(said, indent=2) + "\n", encoding="utf-8")
@@ -82,10 +102,10 @@ class StudyStore:
         """
         known = self.record()
         if known["digest"] != plan.digest:
+            differs = differing(known["study"], plan.identity)
             raise FileError(
-                f"{self.folder} holds another study, or one of another version of bywire or of its "
-                "bench: what is computed there does not belong to this one; name another folder "
-                "with --out, or remove it"
+                f"{self.folder} holds another study{differs and f' ({differs})'}: what is computed "
+                "there does not belong to this one; name another folder with --out, or remove it"
             )
         return known
 
@@ -123,6 +143,24 @@ class StudyStore:
             int(path.stem) for path in (self.folder / CHUNKS).glob("*.parquet")
             if path.stem.isdecimal()
         }  # fmt: skip
+
+    def drop_damaged(self) -> int:
+        """Take away files of chunks that cannot be read, so that they are computed again.
+
+        Returns
+        -------
+        int
+            How many there were.
+        """
+        library("pyarrow", *_WHAT)  # without it nothing can be read, and nothing is damaged
+        damaged = 0
+        for chunk in self.finished():
+            try:
+                self.columns(chunk)
+            except FileError:
+                self.path(chunk).unlink()
+                damaged += 1
+        return damaged
 
     def write(self, chunk: int, columns: Columns, units: Mapping[str, str]) -> None:
         """Keep a chunk, whole or not at all.
@@ -178,8 +216,8 @@ class StudyStore:
             }
         except Exception as error:  # the library raises what it likes of damaged files
             raise FileError(
-                f"{self.path(chunk)} is damaged ({type(error).__name__}): remove it, and "
-                "'bywire study resume' computes it again"
+                f"{self.path(chunk)} is damaged ({type(error).__name__}): 'bywire study resume "
+                f"{self.folder}' computes it again"
             ) from None
 
 

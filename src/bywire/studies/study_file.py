@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from bywire.bench import bench_file
@@ -26,14 +27,16 @@ from bywire.studies.sensitivity_design import LEVELS, SENSITIVITY
 from bywire.studies.sought_design import DEFAULT_CASES, SOUGHT, SUBSET
 
 _KEYS = ("name", "bench", "vary", "measured", "correlation", "design", "set", "requirements")
-_DESIGN = ("kind", "cases", "seed", "levels", "confidence", "cases_per_level")
+_DESIGN = ("kind", "cases", "seed", "levels", "confidence", "cases_per_level", "time")
 _KINDS = (*SAMPLED, *SPANNED, *SENSITIVITY, *SOUGHT)
 _WITH = re.compile(r"(.*\S)\s+with\s+(\S.*%)\s*", re.DOTALL)
 _WITH_LEVELS = ("grid", "one-at-a-time")
 _OPTION = "options."
 
 
-def read_study(path: str | Path) -> StudyPlan:
+def read_study(
+    path: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
+) -> StudyPlan:
     """Read a study file.
 
     Parameters
@@ -41,6 +44,8 @@ def read_study(path: str | Path) -> StudyPlan:
     path
         TOML file with ``bench``, the section ``[vary]``, and ``[design]``, ``[[correlation]]``,
         ``[set]`` and ``[requirements]`` as wanted; see ``docs/studies.md``.
+    overrides
+        Further changes of the bench, which count more than those of ``[set]``.
 
     Raises
     ------
@@ -52,12 +57,14 @@ def read_study(path: str | Path) -> StudyPlan:
     file = Path(path)
     content = read_toml(file, "study file")
     try:
-        return _plan(content, file)
+        return _plan(content, file, overrides)
     except InputError as error:
         raise type(error)(f"{file}: {error}") from None
 
 
-def _plan(content: Mapping[str, Any], file: Path) -> StudyPlan:
+def _plan(
+    content: Mapping[str, Any], file: Path, overrides: Mapping[str, str]
+) -> StudyPlan:
     for key in content:
         if key not in _KEYS:
             raise unknown_name("key of a study file", key, _KEYS)
@@ -67,7 +74,7 @@ def _plan(content: Mapping[str, Any], file: Path) -> StudyPlan:
     name = content.get("name", file.stem)
     if not isinstance(name, str) or not name.strip():
         raise ParameterError(f"name = {quoted(name)}: a text is wanted")
-    bench = _bench(content, file.parent)
+    bench = _bench(content, file.parent, overrides)
     demands = tuple(_demands(bench, content.get("requirements", {})))
     limits = {demand.kpi: demand.limit for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or name)
@@ -81,7 +88,9 @@ def _plan(content: Mapping[str, Any], file: Path) -> StudyPlan:
     return plan
 
 
-def _bench(content: Mapping[str, Any], folder: Path) -> Bench:
+def _bench(
+    content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
+) -> Bench:
     source = content.get("bench")
     if not isinstance(source, str) or not source.strip():
         raise ParameterError(
@@ -94,7 +103,7 @@ def _bench(content: Mapping[str, Any], folder: Path) -> Bench:
         if not isinstance(value, str):
             raise ParameterError(f"[set] {key} = {quoted(value)}: write the value as a text, "
                                  "with its unit, as --set takes it")  # fmt: skip
-    return bench_file.read(there, changes)
+    return bench_file.read(there, {**changes, **overrides})
 
 
 def _demands(bench: Bench, section: Mapping[str, Any]) -> Iterator[Demand]:
@@ -243,6 +252,10 @@ def _design(section: Mapping[str, Any]) -> dict[str, Any]:
                 "below 100 %"
             )
         design["confidence"] = share
+    if "time" in section:
+        design["time"] = parse(section["time"], "s", "[design] time")
+        if not design["time"] > 0.0:
+            raise ParameterError(f"[design] time = {quoted(section['time'])} must be above zero")
     return design
 
 
@@ -259,6 +272,8 @@ def _require_of_use(kind: str, section: Mapping[str, Any]) -> None:
             f"[design] cases_per_level: {kind!r} has no levels to fill, {SUBSET!r} has: leave it "
             "out"
         )
+    if "time" in section and kind in SOUGHT:
+        raise ParameterError(f"[design] time: the budget of {kind!r} is its 'cases': leave it out")
     if "cases" in section and kind in SPANNED:
         raise ParameterError(
             f"[design] cases: {kind!r} lists its cases by quantities and levels: leave them out"

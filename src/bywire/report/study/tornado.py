@@ -1,0 +1,73 @@
+"""Figure: how far each quantity alone moves the key figures, the farthest on top."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from bywire.report import style
+from bywire.report.wording import in_display_unit
+from bywire.studies.effects import Effect
+
+_MOST = 8  # quantities of a panel
+_BAR = 0.28  # height of a quantity [inch]
+
+
+def tornado(
+    effects: Mapping[str, Sequence[Effect]], units: Mapping[str, str],
+    limits: Mapping[str, float],
+) -> Figure:  # fmt: skip
+    """Draw the swings of every key figure around what the bench itself gives.
+
+    Parameters
+    ----------
+    effects
+        Key figure -> what each quantity does to it, the largest swing first; at least one.
+    units
+        SI unit of every key figure, or ``"%"``.
+    limits
+        Limits of the key figures that have one, in their unit.
+    """
+    shown = {name: each[:_MOST] for name, each in effects.items()}
+    counts = [len(each) for each in shown.values()]
+    figure = Figure(
+        figsize=(style.WIDTH, 0.4 + 0.75 * len(counts) + _BAR * sum(counts)),
+        layout="constrained", facecolor="white",
+    )  # fmt: skip
+    panels = figure.subplots(
+        len(counts), 1, squeeze=False, gridspec_kw={"height_ratios": [c + 0.5 for c in counts]}
+    )[:, 0]
+    for axes, (name, each) in zip(panels, shown.items(), strict=True):
+        style.dress(axes)
+        axes.set_title(style.plain(name.replace("_", " ")), fontsize=style.TEXT_SIZE, loc="left")
+        _draw(axes, each, in_display_unit(1.0, units[name])[0], limits.get(name))
+        axes.set_xlabel(style.axis_label(name.replace("_", " "), units[name]))
+    handles = [
+        Patch(color=style.BLUE, label="quantity below the bench's"),
+        Patch(color=style.ORANGE, label="above"),
+    ]
+    figure.legend(handles=handles, loc="outside upper right", ncols=2, frameon=False,
+                  fontsize=style.TEXT_SIZE)  # fmt: skip
+    return figure
+
+
+def _draw(axes: Axes, effects: Sequence[Effect], factor: float, limit: float | None) -> None:
+    """Draw of each quantity what its lower and its upper end make, from the bench's own figure."""
+    middle = factor * effects[0].nominal
+    for place, effect in zip(range(len(effects))[::-1], effects, strict=True):
+        for end, color in ((0, style.BLUE), (-1, style.ORANGE)):
+            at = factor * float(effect.figures[end])
+            if np.isfinite(at):
+                axes.barh(place, at - middle, left=middle, height=0.7, color=color)
+        known = factor * effect.figures[np.isfinite(effect.figures)]
+        axes.plot(known, np.full(known.size, place), "|", color=style.BLACK, markersize=6.0)
+    axes.set_yticks(
+        range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects]
+    )
+    axes.axvline(middle, color=style.GRAY, linewidth=0.8)
+    if limit is not None:
+        axes.axvline(factor * limit, color=style.BLACK, linewidth=1.0, linestyle=":")

@@ -1,0 +1,78 @@
+"""What tells a study from another: all that figures of its cases depend on, and how two differ."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bywire.core.brake import brakes, is_package
+
+_SHOWN = 3  # entries that are named, of those that differ
+_WORDS = {"version": "the version of bywire", "brake": "the code of the brake",
+          "points": "how the library draws"}  # fmt: skip
+"""entries whose values say nothing to a reader"""
+
+
+def source_digest(module: str) -> str:
+    """Return what tells the code of a brake, by its module, from another's."""
+    brake = next(each for each in brakes().values() if each.module == module)
+    file = Path(brake.file)
+    digest = hashlib.sha256()
+    for path in sorted(file.parent.rglob("*.py")) if is_package(brake) else [file]:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()
+
+
+def as_json(identity: Mapping[str, Any]) -> dict[str, Any]:
+    """Return an identity as it is kept: of nothing but what JSON has."""
+    kept: dict[str, Any] = json.loads(json.dumps(identity, sort_keys=True, default=str))
+    return kept
+
+
+def digest_of(identity: Mapping[str, Any]) -> str:
+    """Return what tells an identity from any other."""
+    text = json.dumps(identity, sort_keys=True, default=str)
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def differing(before: Mapping[str, Any], now: Mapping[str, Any]) -> str:
+    """Return which entries of two identities differ, for a reader; empty where that is not known.
+
+    Examples
+    --------
+    >>> differing({"seed": 1, "parameters": {"motor.R_m": 0.35}}, {"seed": 2, "parameters": {}})
+    'parameters motor.R_m: 0.35, now nothing; seed: 1, now 2'
+    """
+    if not before:
+        return ""
+    old, new = dict(_entries(before)), dict(_entries(now))
+    names = [name for name in sorted({*old, *new}) if old.get(name) != new.get(name)]
+    texts = [_difference(name, old, new) for name in names[:_SHOWN]]
+    rest = [f"and {len(names) - _SHOWN} more"] if len(names) > _SHOWN else []
+    return "; ".join(texts + rest)
+
+
+def _difference(name: str, old: Mapping[str, Any], new: Mapping[str, Any]) -> str:
+    if name in _WORDS:
+        return _WORDS[name]
+    return f"{name}: {_shown(old.get(name))}, now {_shown(new.get(name))}"
+
+
+def _shown(value: Any) -> str:
+    told = value[0] if isinstance(value, list) and value else value  # of what varies, how
+    text = "nothing" if told is None else str(told)
+    return text if len(text) <= 40 else f"{text[:37]}..."
+
+
+def _entries(identity: Mapping[str, Any]) -> list[tuple[str, Any]]:
+    """Return the entries with those of groups in words of their own."""
+    entries: list[tuple[str, Any]] = []
+    for key, value in identity.items():
+        if isinstance(value, Mapping):
+            entries += [(f"{key} {inner}", each) for inner, each in value.items()]
+        else:
+            entries.append((key, value))
+    return entries

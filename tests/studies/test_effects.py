@@ -1,0 +1,48 @@
+"""What each quantity alone does: swings of a closed form, the largest first; choices too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from bywire.studies.findings import Findings
+from bywire.studies.study_file import read_study
+
+TEXT = """
+[vary]
+"motor.R_m" = "+-5 %"
+"motor.K_e" = { kind = "log-normal", sd = "4 %" }
+"adc.law" = { kind = "discrete", values = ["ideal", "quantized"] }
+[design]
+kind = "one-at-a-time"
+levels = 3
+"""
+
+
+@pytest.fixture
+def findings(study):
+    plan = read_study(study(TEXT))
+    cases = pd.DataFrame(plan.values(0))
+    flat = plan.bench.par.flat()
+    bent = (cases["motor.K_e"] / flat["motor.K_e"] - 1.0) ** 2  # least in the middle
+    figure = 20.0 + 40.0 * (cases["motor.R_m"] / flat["motor.R_m"] - 1.0) + 50.0 * bent
+    return Findings(plan, cases.assign(peak_current=figure + (cases["adc.law"] == "ideal")), ())
+
+
+def test_swings_are_those_of_the_figure(findings):
+    resistance, law, constant = findings.effects("peak_current")
+    ranked = [e.quantity for e in (resistance, law, constant)]
+    assert ranked == ["motor.R_m", "adc.law", "motor.K_e"]
+    assert resistance.swing == pytest.approx(4.0)
+    assert (resistance.figures[0], resistance.figures[-1]) == pytest.approx((18.0, 22.0))
+    assert law.values == ["ideal", "quantized"]
+    assert law.figures.tolist() == [21.0, 20.0]
+    assert constant.least == pytest.approx(20.0)  # where both ends are above
+    ends = np.exp(np.array([-3.0, 3.0]) * np.sqrt(np.log1p(0.04**2)))  # not zero, where it ends
+    assert constant.figures[[0, -1]] == pytest.approx(20.0 + 50.0 * (ends - 1.0) ** 2, rel=1e-6)
+
+
+def test_what_is_not_computed_yet_has_none(findings):
+    some = Findings(findings.plan, findings.cases[:5], ())
+    assert [e.quantity for e in some.effects("peak_current")] == ["motor.R_m"]
