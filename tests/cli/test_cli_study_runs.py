@@ -62,7 +62,7 @@ def test_bad_input_is_one_error(bywire, study, tmp_path):
     study.write_text(STUDY.replace("motor.R_m", "motor.R_x"))
     refused(bywire("study", "run", study), "motor.R_m", str(study))
     refused(bywire("study", "status", tmp_path), "holds no study")
-    refused(bywire("study", "tolerances.toml"), "unknown study")
+    refused(bywire("study", "tolerances.toml"), "bywire study run tolerances.toml")
 
 
 def test_help_names_both_kinds_of_studies(bywire):
