@@ -14,6 +14,7 @@ from bywire.api.study_tables import shown_figures
 from bywire.bench.requirements import limit_of
 from bywire.report.document import Block, FigureBlock
 from bywire.studies.findings import Findings
+from bywire.studies.plan import CHUNK
 from bywire.studies.statistics import running_share
 
 if TYPE_CHECKING:
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 _DRIVERS = 3  # quantities that a key figure is drawn over
 _AXES = 9  # of parallel coordinates
 _PANELS = 4  # requirements whose convergence is drawn
+_SHARES = 240  # points of a convergence, spaced by equal ratios
 
 Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
@@ -144,9 +146,9 @@ def _convergence(findings: Findings) -> Figure:
 
     shown = findings.judgments[:_PANELS]
     return convergence(
-        {j.demand.text: running_share(j.met, findings.plan.confidence) for j in shown},
-        {j.demand.text: j.demand.probability for j in shown},
-    )
+        {j.demand.text: running_share(j.met, findings.plan.confidence, _SHARES) for j in shown},
+        {j.demand.text: j.demand.probability for j in shown}, first=CHUNK,
+    )  # fmt: skip
 
 
 def _parallel(findings: Findings) -> Figure:
@@ -159,7 +161,8 @@ def _parallel(findings: Findings) -> Figure:
     axes = [Axis(n, units[n], np.asarray(findings.cases[n], dtype=float)) for n in names]
     axes += [Axis(n, findings.units[n], findings.figure(n)) for n in figures]
     met = np.all([j.met for j in findings.judgments], axis=0)
-    return parallel_coordinates(axes, met)
+    limits = {name: limit for name in figures if (limit := _limit(findings, name)) is not None}
+    return parallel_coordinates(axes, met, limits)
 
 
 def _overlays(recordings: Recordings) -> list[Block]:

@@ -14,10 +14,12 @@ from matplotlib.patches import Patch
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.line_role import Role
-from bywire.report.wording import amount, in_display_unit
+from bywire.report.study.readable_axis import beyond, few_labels, limit_text, scale_of
 
 _COLUMNS = 2
 _HEIGHT = 1.5  # of a panel [inch]
+_ROOM = 2.7  # width of a panel [inch]
+_HEADROOM = 1.25  # for the text above the bars
 _BINS = 60  # at most
 
 
@@ -61,48 +63,45 @@ def histograms(spreads: Mapping[str, Spread], has_band: bool = True) -> Figure:
     )
     grid = figure.subplots(rows, _COLUMNS, squeeze=False)
     bound, own = style.STROKES[Role.LIMIT], style.STROKES[Role.SET_POINT]
+    has_limit = False
     for axes, (name, spread) in zip(grid.flat, spreads.items(), strict=False):
         style.dress(axes)
-        factor = in_display_unit(1.0, spread.unit)[0]
-        values = factor * spread.values[np.isfinite(spread.values)]
+        scale = scale_of(spread.values, spread.unit)
+        values = scale.factor * spread.values[np.isfinite(spread.values)]
         axes.hist(values, bins=_bins(values), color=style.BLUE, alpha=0.75)
         if has_band:
             axes.axvspan(*np.quantile(values, (0.05, 0.95)), color=style.SHADE, zorder=0)
         for at, look in ((spread.nominal, own), (spread.limit, bound)):
             if at is None or not np.isfinite(at):
                 continue
-            if look is bound and (far := _beyond(factor * at, values)):
-                text = f"limit {amount(at, spread.unit)}"
+            if look is bound and (far := beyond(scale.factor * at, values)):
+                text = limit_text(at, spread.unit)
+                axes.set_ylim(top=_HEADROOM * axes.get_ylim()[1])
                 axes.text(
-                    0.99 if far > 0 else 0.01, 0.9, f"{text} →" if far > 0 else f"← {text}",
+                    0.99 if far > 0 else 0.01, 0.98, f"{text} →" if far > 0 else f"← {text}",
                     transform=axes.transAxes, ha="right" if far > 0 else "left",
-                    color=look.color, fontsize=style.TEXT_SIZE,
+                    va="top", color=look.color, fontsize=style.TEXT_SIZE,
                 )  # fmt: skip
                 continue
-            axes.axvline(factor * at, color=look.color, linestyle=look.linestyle,
+            has_limit |= look is bound
+            axes.axvline(scale.factor * at, color=look.color, linestyle=look.linestyle,
                          linewidth=look.linewidth)  # fmt: skip
         style.few_ticks(axes, 3)
-        axes.set_xlabel(style.axis_label(name.replace("_", " "), spread.unit))
+        few_labels(axes.xaxis, _ROOM)
+        axes.set_xlabel(scale.label(name.replace("_", " ")))
         axes.set_ylabel("cases")
     for spare in list(grid.flat)[len(spreads) :]:
         spare.set_visible(False)
     lines: list[Artist] = [
         Line2D([], [], color=own.color, linestyle="--", label="the bench itself")
     ]
-    if any(spread.limit is not None for spread in spreads.values()):
+    if has_limit:
         lines.append(Line2D([], [], color=bound.color, linestyle=":", label="limit"))
     if has_band:
         lines.append(Patch(color=style.SHADE, label="90 % of the cases"))
     figure.legend(handles=lines, loc="outside upper left", ncols=3, frameon=False,
                   fontsize=style.TEXT_SIZE)  # fmt: skip
     return figure
-
-
-def _beyond(limit: float, values: Array) -> int:
-    """Return on which side a limit lies so far off that it would squeeze the histogram; 0: none."""
-    low, high = float(values.min()), float(values.max())
-    reach = max(high - low, 1e-12)
-    return int(limit > high + reach) - int(limit < low - reach)
 
 
 def _bins(values: Array) -> int:

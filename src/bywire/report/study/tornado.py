@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from bywire.report import style
-from bywire.report.wording import in_display_unit
+from bywire.report.study.readable_axis import beyond, few_labels, limit_text, scale_of
 from bywire.studies.effects import Effect
 
 _MOST = 8  # quantities of a panel
@@ -30,7 +32,7 @@ def tornado(
     units
         SI unit of every key figure, or ``"%"``.
     limits
-        Limits of the key figures that have one, in their unit.
+        Limits of the key figures that have one, in their unit; only named where they lie far off.
     """
     shown = {name: each[:_MOST] for name, each in effects.items()}
     counts = [len(each) for each in shown.values()]
@@ -41,21 +43,37 @@ def tornado(
     panels = figure.subplots(
         len(counts), 1, squeeze=False, gridspec_kw={"height_ratios": [c + 0.5 for c in counts]}
     )[:, 0]
+    has_limit = False
     for axes, (name, each) in zip(panels, shown.items(), strict=True):
         style.dress(axes)
         axes.set_title(style.plain(name.replace("_", " ")), fontsize=style.TEXT_SIZE, loc="left")
-        _draw(axes, each, in_display_unit(1.0, units[name])[0], limits.get(name))
-        axes.set_xlabel(style.axis_label(name.replace("_", " "), units[name]))
-    handles = [
+        figures = np.concatenate([[e.nominal, *e.figures] for e in each])
+        figures = figures[np.isfinite(figures)]
+        scale = scale_of(figures, units[name])
+        _draw(axes, each, scale.factor)
+        if (limit := limits.get(name)) is not None:
+            if far := beyond(limit, figures):
+                text = limit_text(limit, units[name])
+                axes.set_title(f"{text} →" if far > 0 else f"← {text}", loc="right",
+                               fontsize=style.TEXT_SIZE)  # fmt: skip
+            else:
+                has_limit = True
+                axes.axvline(scale.factor * limit, color=style.BLACK, linewidth=1.0, linestyle=":")
+        few_labels(axes.xaxis, style.WIDTH - 2.5)
+        axes.set_xlabel(scale.label(name.replace("_", " ")))
+    handles: list[Artist] = [
         Patch(color=style.BLUE, label="quantity below the bench's"),
         Patch(color=style.ORANGE, label="above"),
     ]
-    figure.legend(handles=handles, loc="outside upper right", ncols=2, frameon=False,
+    if has_limit:
+        handles.append(Line2D([], [], color=style.BLACK, linewidth=1.0, linestyle=":",
+                              label="limit"))  # fmt: skip
+    figure.legend(handles=handles, loc="outside upper right", ncols=3, frameon=False,
                   fontsize=style.TEXT_SIZE)  # fmt: skip
     return figure
 
 
-def _draw(axes: Axes, effects: Sequence[Effect], factor: float, limit: float | None) -> None:
+def _draw(axes: Axes, effects: Sequence[Effect], factor: float) -> None:
     """Draw of each quantity what its lower and its upper end make, from the bench's own figure."""
     middle = factor * effects[0].nominal
     for place, effect in zip(range(len(effects))[::-1], effects, strict=True):
@@ -69,5 +87,3 @@ def _draw(axes: Axes, effects: Sequence[Effect], factor: float, limit: float | N
         range(len(effects))[::-1], [style.plain(each.quantity, 40) for each in effects]
     )
     axes.axvline(middle, color=style.GRAY, linewidth=0.8)
-    if limit is not None:
-        axes.axvline(factor * limit, color=style.BLACK, linewidth=1.0, linestyle=":")
