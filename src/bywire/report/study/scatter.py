@@ -108,7 +108,7 @@ def scatter(
                            label="meets the limit")),
         (bad.size, Line2D([], [], color=look.color, marker="x", markersize=4.5, linestyle="none",
                           label="misses the limit")),
-        (not far, Line2D([], [], color=look.color, linestyle=look.linestyle, label="limit")),
+        (not far, Line2D([], [], color=look.color, linestyle=":", label="limit")),
     ]  # fmt: skip
     _legend(figure, [handle for is_drawn, handle in entries if is_drawn])
     return figure

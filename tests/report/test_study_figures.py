@@ -1,0 +1,199 @@
+"""Figures of studies can be read: labels apart, limits named, entries for all that is drawn."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.text import Text
+
+from bywire.report.study.convergence import convergence
+from bywire.report.study.histograms import Spread, histograms
+from bywire.report.study.readable_axis import scale_of
+from bywire.report.study.scatter import Axis, parallel_coordinates, scatter
+from bywire.report.study.tornado import tornado
+from bywire.studies.effects import Effect
+from bywire.studies.statistics import running_share
+
+RNG = np.random.default_rng(1)
+CASES = 200
+UNIT = RNG.uniform(size=CASES)
+DRIVERS = [
+    Axis("caliper.K_pd", "N/m", 1.1e6 * (1.0 + 0.1 * UNIT)),
+    Axis("motor.R_m", "ohm", 0.35 + 1e-7 * RNG.uniform(size=CASES)),
+    Axis("motor.J", "kg*m**2", 3e-5 * RNG.uniform(0.9, 1.1, CASES)),
+]
+ERROR = Axis("steady_state_error", "Pa", 500.0 * UNIT)
+
+
+def drawn(figure: Figure) -> Figure:
+    FigureCanvasAgg(figure).draw()
+    return figure
+
+
+def labels(axes: Axes) -> list[Text]:
+    low, high = axes.get_xlim()
+    return [
+        tick.label1 for tick in axes.xaxis.get_major_ticks()
+        if low <= tick.get_loc() <= high and tick.label1.get_visible() and tick.label1.get_text()
+    ]  # fmt: skip
+
+
+def assert_readable(figure: Figure) -> None:
+    """Labels of all abscissas never touch, and nothing stands beside an axis."""
+    shown = [label for axes in figure.axes if axes.get_visible() for label in labels(axes)]
+    for one, other in combinations(shown, 2):
+        assert not one.get_window_extent().overlaps(other.get_window_extent()), (one, other)
+    for axes in figure.axes:
+        assert len(labels(axes)) <= 5
+        assert not axes.xaxis.get_offset_text().get_text()
+        assert not axes.yaxis.get_offset_text().get_text()
+
+
+def entries(figure: Figure) -> list[str]:
+    return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def texts(axes: Axes) -> list[str]:
+    return [text.get_text() for text in axes.texts]
+
+
+@pytest.mark.parametrize(
+    ("middle", "spread"), [(0.0115, 1e-3), (19.0, 1.0), (3e-7, 2e-7), (2e6, 3e5), (0.35, 1e-8)]
+)
+@pytest.mark.parametrize("unit", ["1", "Pa", "s"])
+def test_labels_of_a_histogram_never_touch(middle: float, spread: float, unit: str) -> None:
+    values = middle + spread * (UNIT - 0.5)
+    assert_readable(drawn(histograms({
+        name: Spread(values, unit, middle) for name in ("share_sat_current", "share_sat_duty")
+    })))  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("largest", "symbol", "unit", "shown"),
+    [
+        (0.0686, "s", "ms", 68.6), (1.2, "s", "s", 1.2), (25e5, "Pa", "bar", 25.0),
+        (773.0, "Pa", "10⁻³ bar", 7.73), (3e-5, "kg*m**2", "10⁻⁶ kg·m²", 30.0),
+        (2e6, "1", "10⁶", 2.0), (0.0, "1", "", 0.0), (6.2, "%", "%", 6.2),
+    ],
+)  # fmt: skip
+def test_scales_spare_the_reader_powers_of_ten(
+    largest: float, symbol: str, unit: str, shown: float
+) -> None:
+    scale = scale_of(np.array([-0.1 * largest, np.nan, largest]), symbol)
+    assert scale.unit == unit
+    assert scale.factor * largest == pytest.approx(shown, rel=1e-12)
+
+
+def test_a_histogram_names_a_limit_that_lies_far_off() -> None:
+    far, near = Spread(ERROR.values, "Pa", 250.0, 1e4), Spread(ERROR.values, "Pa", 250.0, 600.0)
+    figure = drawn(histograms({"far": far, "near": near}))
+    assert texts(figure.axes[0]) == ["limit 0.1 bar →"]
+    assert texts(figure.axes[1]) == []
+    assert "limit" in entries(figure)
+    assert "limit" not in entries(histograms({"far": far}))
+
+
+@pytest.mark.parametrize(
+    ("limit", "named"), [(1e4, ["limit 0.1 bar ↑"]), (-1e4, ["limit -0.1 bar ↓"]), (600.0, [])]
+)
+def test_points_of_a_scatter_fill_it_however_far_the_limit(limit: float, named: list[str]) -> None:
+    figure = drawn(scatter(ERROR, DRIVERS, limit, ERROR.values <= limit))
+    assert_readable(figure)
+    low, high = figure.axes[0].get_ylim()
+    assert (low <= 1e-2 * limit <= high) == (not named)  # in 10⁻³ bar
+    assert np.ptp(ERROR.shown) > 0.7 * (high - low)
+    assert texts(figure.axes[0]) == named
+    assert ("limit" in entries(figure)) == (not named)
+
+
+def test_entries_of_a_scatter_are_what_is_drawn() -> None:
+    mixed = scatter(ERROR, DRIVERS, 300.0, ERROR.values <= 300.0)
+    assert entries(mixed) == ["meets the limit", "misses the limit", "limit"]
+    undefined = Axis(ERROR.name, "Pa", np.where(ERROR.values > 300.0, np.nan, ERROR.values))
+    assert "misses the limit" not in entries(scatter(undefined, DRIVERS, 300.0, UNIT < 0.6))
+
+
+def test_many_points_are_small_and_translucent() -> None:
+    def marker(cases: int) -> tuple[float, float]:
+        own = Axis("ripple", "Pa", np.linspace(1.0, 2.0, cases))
+        axes = scatter(own, [own], 3.0, np.ones(cases, dtype=bool)).axes[0]
+        return axes.lines[0].get_markersize(), axes.lines[0].get_alpha() or 1.0
+
+    (few_size, few_alpha), (size, alpha) = marker(1000), marker(1001)
+    assert size < few_size
+    assert alpha < few_alpha
+
+
+def test_a_convergence_shows_what_decides() -> None:
+    met = np.ones(256, dtype=bool)
+    met[[70, 130]] = False
+    shares = running_share(met, 0.95, 240)
+    figure = drawn(convergence({"a": shares, "b": shares}, {"a": 0.99, "b": None}, first=64))
+    assert entries(figure) == ["estimate", "interval", "wanted"]
+    assert_readable(figure)
+    for axes in figure.axes:
+        low, high = axes.get_ylim()
+        assert 85.0 < low < 100.0 * min(s.low for s in shares if s.cases >= 128)
+        assert 100.0 < high < 101.0
+        assert axes.get_xlim() == (pytest.approx(64, abs=2), 256)
+
+
+@pytest.mark.parametrize("wanted", [None, 0.5, 0.999])
+@pytest.mark.parametrize("share", [0.0, 0.4, 1.0])
+@pytest.mark.parametrize("cases", [1, 64, 1000])
+def test_a_convergence_holds_its_estimate_and_what_is_wanted(
+    cases: int, share: float, wanted: float | None
+) -> None:
+    shares = running_share(np.arange(cases) < share * cases, 0.95, 240)
+    axes = convergence({"a": shares}, {"a": wanted}, first=64).axes[0]
+    low, high = axes.get_ylim()
+    last = shares[-1]
+    for value in (last.value, last.low, last.high, last.value if wanted is None else wanted):
+        assert low < 100.0 * value < high
+
+
+def test_parallel_coordinates_say_what_lines_are_and_where_limits_lie() -> None:
+    met = ERROR.values <= 300.0
+    rise = Axis("rise_time", "s", 0.06 + 0.01 * UNIT)
+    figure = drawn(parallel_coordinates(
+        [*DRIVERS, ERROR, rise], met, {"steady_state_error": 300.0, "rise_time": 0.1}
+    ))  # fmt: skip
+    assert entries(figure) == ["meets all requirements", "misses a requirement", "limit"]
+    axes = figure.axes[0]
+    assert [t for t in texts(axes) if "limit" in t] == ["limit 100 ↑"]
+    mark = next(line for line in axes.lines if line.get_zorder() == 4.0)
+    least, most = np.min(ERROR.values), np.max(ERROR.values)
+    np.testing.assert_allclose(mark.get_ydata(), (300.0 - least) / (most - least))
+    lines = [line for line in axes.lines if len(line.get_xdata()) == 5]  # type: ignore[arg-type]
+    top = max(float(np.max(line.get_ydata())) for line in lines)
+    for text in axes.texts:
+        assert not 0.0 <= text.get_position()[1] <= top, "a line crosses what is written"
+        assert text.get_bbox_patch() is not None
+    for one, other in combinations(axes.texts, 2):
+        assert not one.get_window_extent().overlaps(other.get_window_extent())
+
+
+def test_a_figure_that_no_case_has_leaves_parallel_coordinates() -> None:
+    nothing = Axis("settling_time", "s", np.full(CASES, np.nan))
+    figure = parallel_coordinates([*DRIVERS, nothing], np.zeros(CASES, dtype=bool), {})
+    assert len(figure.axes[0].get_xticks()) == len(DRIVERS)
+    assert entries(figure) == ["misses a requirement"]
+
+
+def test_a_tornado_is_not_squeezed_by_a_limit_far_off() -> None:
+    effect = Effect("motor.R_m", "ohm", [0.3, 0.4], np.array([200.0, 500.0]), 300.0)
+    effects, units = {"steady_state_error": [effect]}, {"steady_state_error": "Pa"}
+    figure = drawn(tornado(effects, units, {"steady_state_error": 1e4}))
+    assert_readable(figure)
+    axes = figure.axes[0]
+    assert axes.get_title(loc="right") == "limit 0.1 bar →"
+    assert axes.get_xlim()[1] < 6.0
+    assert axes.get_xlabel() == "steady state error [10⁻³ bar]"
+    near = tornado(effects, units, {"steady_state_error": 600.0})
+    assert "limit" in entries(near)
+    assert near.axes[0].get_title(loc="right") == ""
