@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 _DRIVERS = 3  # quantities that a key figure is drawn over
 _AXES = 9  # of parallel coordinates
 _PANELS = 4  # requirements whose convergence is drawn
-_SHARES = 240  # points of a convergence, spaced by equal ratios
+_SHARES = 100  # points of a convergence, spaced by equal ratios
 
 Recordings = Callable[[], Mapping[str, Mapping[str, "xr.Dataset"]]]
 
