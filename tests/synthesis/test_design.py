@@ -224,7 +224,7 @@ def test_limits_in_other_units() -> None:
 
 def test_problems_that_are_refused() -> None:
     loop, par = of("moment")
-    with pytest.raises(ParameterError, match="cannot also be a range"):
+    with pytest.raises(ParameterError, match="cannot also vary"):
         cases_of(loop, par, 200.0, {"control.moment.f_c": [5.0]})
     with pytest.raises(UnknownNameError, match="mu_B"):
         cases_of(loop, par, 200.0, {"wedge.mu_b": [0.3]})

@@ -17,6 +17,13 @@ from bywire.analysis.loop import LOOPS
 from bywire.analysis.loop_curves import loop_curve
 from bywire.analysis.margins import figures_at
 from bywire.api import design_parts, schedule_parts
+from bywire.api.design_drawn import (
+    DRAWN,
+    Probability,
+    drawn_models,
+    probability_of,
+    probability_wanted,
+)
 from bywire.api.design_inputs import (
     Spans,
     for_ecu,
@@ -29,6 +36,7 @@ from bywire.api.design_inputs import (
 from bywire.api.loop_case import LoopCase, loop_case, over_range, spread
 from bywire.api.verification_parts import Part
 from bywire.bench.running import Progress
+from bywire.core.errors import ParameterError
 from bywire.core.units import shown
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
@@ -204,9 +212,24 @@ class DesignAnswer(Answer):
 
 @dataclass(frozen=True)
 class LoopDesign(DesignAnswer):
-    """Gains of a loop from requirements; ``designed`` is the linear design."""
+    """Gains of a loop from requirements.
+
+    Parameters
+    ----------
+    designed
+        The linear design.
+    probability
+        How probably its requirements are met over drawn models; None where none were drawn.
+    """
 
     designed: Design
+    probability: Probability | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the requirements are met, on the bench too, and as probably as is wanted."""
+        is_probable = self.probability is None or self.probability.outcome in (None, "met")
+        return super().holds and is_probable
 
     @property
     def linear(self) -> Design:
@@ -220,11 +243,13 @@ class LoopDesign(DesignAnswer):
 
     def parts(self) -> Sequence[Part]:
         """Return tables and sentences of the result."""
-        return design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
+        parts = design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
+        return parts if self.probability is None else [*parts, *self.probability.parts()]
 
     def data(self) -> dict[str, Any]:
         """Return everything as plain data."""
-        return design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
+        data = design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
+        return data | ({} if self.probability is None else {"drawn": self.probability.data()})
 
 
 @dataclass(frozen=True)
@@ -270,6 +295,9 @@ def design(
     schedule: bool = False,
     linear_only: bool = False,
     free_derivative: bool = False,
+    vary: str | Path = "",
+    drawn: int = DRAWN,
+    probability: str = "",
     seed: int = 0,
     progress: Progress | None = None,
 ) -> LoopDesign | LoopScheduleDesign:
@@ -295,6 +323,13 @@ def design(
     free_derivative
         Whether the derivative's filter may be faster than the sampling and the set point be
         differentiated: better figures of gains that one would hardly put into an ECU.
+    vary
+        Study file: the gains are chosen for models that are drawn as its cases are, and judged by
+        others.
+    drawn
+        How many models they are chosen for.
+    probability
+        With which all requirements are to be met together, for instance ``"99 %"``.
     seed
         Of the searches.
     progress
@@ -311,6 +346,10 @@ def design(
     InputError
         For names that are unknown, values out of range, and requirements that make no sense.
     """
+    if schedule and vary:
+        raise ParameterError("schedule and vary: gains by region are not chosen for drawn models")
+    if probability_wanted(probability) is not None and not vary:
+        raise ParameterError("probability needs drawn models: name a study file, --vary FILE")
     if schedule:
         return _scheduled(
             loop, parameters, at, overrides, requirements_of(requirements, require), over,
@@ -321,14 +360,18 @@ def design(
     case, overrides, limits = for_ecu(case, overrides, free_derivative)
     tunables = left_to_choose(loop, narrowed(tunables_of(case), limits), overrides)
     ranges = dict(over_range(text, case)[::2] for text in over)
+    models = drawn_models(case, vary, drawn) if vary else None
     cases = cases_of(case.loop, case.par, case.value, ranges)
+    cases += () if models is None else models.cases
     trial = None if linear_only else trial_of(case, overrides, amplitudes)
     start = {name: case.par.leaves()[name] for name in tunables}
     tried = None
     designed = designer.design(tunables, wanted, cases, start, seed=seed, progress=progress)
     if trial is not None and designed.status == "met":
         tried = verify(designed.gains, wanted, tunables, cases, trial, seed=seed, progress=progress)
-    return LoopDesign(case, overrides, wanted, limits, tried, designed)
+    final = designed.gains if tried is None else tried.final.gains
+    told = None if models is None else probability_of(models, wanted, final, probability, progress)
+    return LoopDesign(case, overrides, wanted, limits, tried, designed, told)
 
 
 def _scheduled(

@@ -73,10 +73,19 @@ def design_command(
             "set point.",
         ),
     ] = False,
+    vary: Annotated[
+        str,
+        typer.Option(help="Study file: gains for models drawn as its cases are, judged by others.",
+                     metavar="FILE"),
+    ] = "",
+    drawn: Annotated[int, typer.Option(help="Models drawn for the gains.")] = 64,
+    probability: Annotated[
+        str, typer.Option(help="Of all requirements together, e.g. '99 %'; needs --vary.")
+    ] = "",
     seed: Annotated[int, typer.Option(help="Seed of the searches.", min=0)] = 0,
     out: OutFolder = None,
     json: JsonFlag = False,
-) -> None:
+) -> None:  # fmt: skip
     """Choose a loop's gains from requirements; exit status 1 when they cannot be met."""
     from bywire.api.design import design
 
@@ -84,7 +93,8 @@ def design_command(
         lambda progress: design(
             loop, parameters, at, changes(set_), require=require or (), requirements=requirements,
             over=over or (), amplitudes=amplitudes, schedule=schedule, linear_only=linear_only,
-            free_derivative=free_derivative, seed=seed, progress=progress,
+            free_derivative=free_derivative, vary=vary, drawn=drawn, probability=probability,
+            seed=seed, progress=progress,
         ),
         out, json,
     )  # fmt: skip

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -93,25 +94,26 @@ def cases_of(
         When a tunable is among them, there are too many combinations, or one does not exist.
     """
     for name in over:
-        if name in loop.tunables or _scheduled(loop, name):
-            raise ParameterError(f"{name} is what the design chooses: it cannot also be a range")
+        require_given(loop, name)
         loop.require_number(par, name)
     combinations = list(product(*over.values())) if over else []
     if len(combinations) > _MOST:
         raise ParameterError(
             f"the ranges have {len(combinations)} combinations: {_MOST} at most, take fewer values"
         )
-    cases = [_case(loop, NOMINAL, par, {}, value)]
+    cases = [case_of(loop, NOMINAL, par, {}, value)]
     for combination in combinations:
         values = dict(zip(over, combination, strict=True))
         label = ", ".join(_shown(loop, par, name, number) for name, number in values.items())
         at = values.pop(loop.at.name, value)
-        try:
-            loop.point(par.replace(values), at)
-        except InputError as error:
-            raise ParameterError(f"{label}: {error}") from None
-        cases.append(_case(loop, label, par, values, at))
+        cases.append(existing_case(loop, label, par, values, at))
     return tuple(cases)
+
+
+def require_given(loop: Loop, name: str) -> None:
+    """Refuse what the design chooses, of what varies."""
+    if name in loop.tunables or _scheduled(loop, name):
+        raise ParameterError(f"{name} is what the design chooses: it cannot also vary")
 
 
 def _shown(loop: Loop, par: ParameterSet, name: str, value: float) -> str:
@@ -127,12 +129,30 @@ def _scheduled(loop: Loop, name: str) -> bool:
     return any(name in region for region in regions)
 
 
-def _case(
-    loop: Loop, label: str, par: ParameterSet, changes: Mapping[str, float], value: float
+def existing_case(
+    loop: Loop, label: str, par: ParameterSet, changes: Mapping[str, Any], at: float
 ) -> LinearCase:
+    """Return a model of a loop with other parameters.
+
+    Raises
+    ------
+    ParameterError
+        With its label, when it does not exist.
+    """
+    try:
+        loop.point(par.replace(changes), at)
+    except InputError as error:
+        raise ParameterError(f"{label}: {error}") from None
+    return case_of(loop, label, par, changes, at)
+
+
+def case_of(
+    loop: Loop, label: str, par: ParameterSet, changes: Mapping[str, Any], at: float
+) -> LinearCase:
+    """Return a model of a loop with other parameters, that exists."""
     base = par.replace(changes)
 
     def build(gains: Mapping[str, float]) -> tuple[LinearModel, LinearModel]:
-        return loop.gain_and_closed(base.replace(gains), value)
+        return loop.gain_and_closed(base.replace(gains), at)
 
-    return LinearCase(label, build, changes, value)
+    return LinearCase(label, build, changes, at)
