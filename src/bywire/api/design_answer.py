@@ -1,0 +1,267 @@
+"""What a design of gains, or of a gain schedule, says: result, figures, and a bench file."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from bywire.analysis.loop_curves import loop_curve
+from bywire.analysis.margins import figures_at
+from bywire.api import design_parts, schedule_parts
+from bywire.api.design_drawn import Probability
+from bywire.api.design_inputs import Spans
+from bywire.api.loop_case import LoopCase
+from bywire.api.verification_parts import Part
+from bywire.core.units import shown
+from bywire.report.answer import Answer
+from bywire.report.document import (
+    Attachment,
+    Banner,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+)
+from bywire.synthesis.outcome import Across, Design, ScheduleDesign, Status, bench_text
+from bywire.synthesis.requirement import Requirement
+from bywire.synthesis.verification import Verification
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from bywire.report.design_curves import DesignCurve
+
+_STEPS, _SETTLED = 5.0, 1.2  # what is drawn of a step: periods of the bandwidth, settling times
+
+
+@dataclass(frozen=True)
+class DesignAnswer(Answer):
+    """What designs of gains and of gain schedules have in common.
+
+    Parameters
+    ----------
+    case
+        The loop, its parameters before the design, and its operating point.
+    overrides
+        Parameters that were set beforehand.
+    requirements
+        What was required.
+    limits
+        Spans [SI] that were kept to so that an ECU can run the gains; none of ``free_derivative``.
+    tried
+        The design on the nonlinear bench; None where that was left out, or nothing is feasible.
+    """
+
+    case: LoopCase
+    overrides: Mapping[str, Any]
+    requirements: tuple[Requirement, ...]
+    limits: Spans
+    tried: Verification | None
+
+    @property
+    @abstractmethod
+    def linear(self) -> Design | ScheduleDesign:
+        """The design on the linear model."""
+
+    @property
+    @abstractmethod
+    def points(self) -> str:
+        """The operating points in words."""
+
+    @abstractmethod
+    def parts(self) -> Sequence[Part]:
+        """Return tables and sentences of the result, in their order."""
+
+    @abstractmethod
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+
+    @property
+    def gains(self) -> Mapping[str, float]:
+        """The gains [SI] by dotted name: those of the bench where it retuned them."""
+        return self.linear.gains if self.tried is None else self.tried.final.gains
+
+    @property
+    def status(self) -> Status:
+        """``met``, ``infeasible`` or ``interrupted``."""
+        tuning = None if self.tried is None else self.tried.tuning
+        return "interrupted" if tuning is not None and tuning.interrupted else self.linear.status
+
+    @property
+    def partial(self) -> str:
+        """What an interrupted design still shows."""
+        return "what is shown is the best until then"
+
+    @property
+    def holds(self) -> bool:
+        """Whether the requirements are met, on the bench too where that was tried."""
+        return self.linear.status == "met" and (self.tried is None or self.tried.met)
+
+    def document(self) -> Document:
+        """Return result, figures, and the gains as a bench file."""
+        loop, status, tried = self.case.loop, self.linear.status, self.tried
+        parts = [*self.parts(), *design_parts.limit_lines(self.case, self.limits)]
+        state = status if status != "met" or tried is None or tried.met else "not met"
+        where = "on the linear model" if tried is None else "on the nonlinear bench"
+        required = Listing([requirement.text for requirement in self.requirements])
+        return Document(
+            f"Design of loop {loop.name}",
+            self.case.subject.line,
+            sections=lambda: [
+                Section("Requirements", [required]),
+                Section("Result", design_parts.as_blocks(parts)),
+                Section("Figures", self._figures()),
+                self.case.subject.provenance("Parameters as they were before the design."),
+            ],
+            brief=[part if isinstance(part, str) else TableBlock(part) for part in parts],
+            data={**self.data(), "kept_for_the_ecu": {k: list(v) for k, v in self.limits.items()}},
+            banner=Banner(f"requirements {state} {where}", "good" if self.holds else "bad"),
+            attachments=[Attachment(f"{loop.name}-design.toml", self._write_bench)],
+            remarks=self._remarks(),
+        )
+
+    def _remarks(self) -> list[str]:
+        if self.status == "infeasible":
+            return ["no gains meet the requirements together: see what excludes what"]
+        if self.status == "met" and not self.holds:
+            return ["the linear requirements are met, those on the nonlinear bench are not"]
+        return []
+
+    def _write_bench(self, path: Path) -> Path:
+        """Write the gains as a bench file."""
+        from bywire.report.files import write_bytes
+
+        case, tried = self.case, self.tried
+        state = self.linear.status if tried is None or tried.met else "not met on the bench"
+        text = bench_text(
+            f"loop {case.loop.name} at {case.loop.at.name} = {self.points}, requirements {state}",
+            case.loop.proof, case.name, self.overrides, case.par, self.gains,
+        )  # fmt: skip
+        return write_bytes(path, text.encode())
+
+    @cached_property
+    def _curves(self) -> list[DesignCurve]:
+        every: dict[str, Mapping[str, float]] = {
+            "as given": {}, "linear design": self.linear.gains
+        }  # fmt: skip
+        if self.tried is not None and self.tried.tuning is not None:
+            every["retuned on the bench"] = self.gains
+        return [_curve(self.case, label, gains) for label, gains in every.items()]
+
+    def _figures(self) -> list[FigureBlock]:
+        limits = {(each.figure, each.sense): each.limit for each in self.requirements}
+        captions = {
+            "loop-gain": "Loop gain of the nominal linear model; phase margins as the spans in "
+            "which they are read.",
+            "sensitivity": "Sensitivity S = 1/(1 + L) and complementary sensitivity T = L/(1 + L), "
+            "with the limits that are usually asked for (Skogestad and Postlethwaite, section "
+            "2.4.3).",
+            "step": "Unit step of the nominal linear model, at the sampling instants.",
+        }
+        return [
+            FigureBlock(
+                partial(self._draw, kind, limits), text, f"{self.case.loop.name}-design-{kind}"
+            )
+            for kind, text in captions.items()
+        ]
+
+    def _draw(self, kind: str, limits: Mapping[tuple[str, int], float]) -> Figure:
+        from bywire.report.design_curves import loop_gains, sensitivities, steps
+
+        if kind == "loop-gain":
+            return loop_gains(self._curves, limits.get(("phase_margin", 1)))
+        if kind == "sensitivity":
+            return sensitivities(self._curves)
+        return steps(self._curves, limits.get(("overshoot", -1)))
+
+
+@dataclass(frozen=True)
+class LoopDesign(DesignAnswer):
+    """Gains of a loop from requirements.
+
+    Parameters
+    ----------
+    designed
+        The linear design.
+    probability
+        How probably its requirements are met over drawn models; None where none were drawn.
+    """
+
+    designed: Design
+    probability: Probability | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the requirements are met, on the bench too, and as probably as is wanted."""
+        is_probable = self.probability is None or self.probability.outcome in (None, "met")
+        return super().holds and is_probable
+
+    @property
+    def linear(self) -> Design:
+        """The design on the linear model."""
+        return self.designed
+
+    @property
+    def points(self) -> str:
+        """The operating point in words."""
+        return shown(self.case.value, self.case.loop.at.unit)
+
+    def parts(self) -> Sequence[Part]:
+        """Return tables and sentences of the result."""
+        parts = design_parts.as_parts(self.case, self.requirements, self.designed, self.tried)
+        return parts if self.probability is None else [*parts, *self.probability.parts()]
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        data = design_parts.as_object(self.case, self.requirements, self.designed, self.tried)
+        return data | ({} if self.probability is None else {"drawn": self.probability.data()})
+
+
+@dataclass(frozen=True)
+class LoopScheduleDesign(DesignAnswer):
+    """Gains of a loop by region; ``retuned`` is the loop across the regions with the bench's."""
+
+    designed: ScheduleDesign
+    retuned: tuple[Across, ...]
+
+    @property
+    def linear(self) -> ScheduleDesign:
+        """The design on the linear model."""
+        return self.designed
+
+    @property
+    def points(self) -> str:
+        """The operating points in words."""
+        unit = self.case.loop.at.unit
+        return ", ".join(shown(v, unit) for values in self.designed.points.values() for v in values)
+
+    def parts(self) -> Sequence[Part]:
+        """Return tables and sentences of the result."""
+        return schedule_parts.as_parts(self.case, self.designed, self.tried, self.retuned)
+
+    def data(self) -> dict[str, Any]:
+        """Return everything as plain data."""
+        return schedule_parts.as_object(
+            self.case, self.requirements, self.designed, self.tried, self.retuned
+        )
+
+
+def _curve(case: LoopCase, label: str, gains: Mapping[str, float]) -> DesignCurve:
+    from bywire.report.design_curves import DesignCurve
+
+    figures = figures_at(case.loop, case.par.replace(gains), case.value)
+    step: NDArray[np.float64] = np.zeros(1)
+    span = 0.0
+    if figures.is_stable:
+        step, settling = figures.step, figures.settling_time
+        span = max(_STEPS / figures.bandwidth, _SETTLED * settling if settling < np.inf else 0.0)
+    time = np.arange(step.size, dtype=float) * figures.closed.period
+    return DesignCurve(label, loop_curve(case.loop, figures), time, step, span)
