@@ -72,3 +72,17 @@ def test_the_running_estimate_ends_with_all_cases():
     met = np.arange(300) % 10 > 0
     last = running_share(met, 0.95)[-1]
     assert (last.count, last.cases) == (270, 300)
+
+
+def test_what_a_correlated_quantity_only_inherits_is_no_influence():
+    """Of two that go together, one drives the figure."""
+    rng = np.random.default_rng(3)
+    x = rng.multivariate_normal([0.0, 0.0], [[1.0, -0.6], [-0.6, 1.0]], 4000)
+    figure = x[:, 0] + 0.5 * rng.standard_normal(4000)
+    columns = [x[:, 0], x[:, 1]]
+    plain = {i.quantity: i for i in influences(["a", "b"], columns, figure, 0.95)}
+    apart = influences(["a", "b"], columns, figure, 0.95, is_partial=True)
+    partial = {i.quantity: i for i in apart}
+    assert plain["b"].correlation == pytest.approx(-0.52, abs=0.04)
+    assert not partial["b"].is_distinct
+    assert partial["a"].correlation == pytest.approx(0.8 / np.hypot(0.8, 0.5), abs=0.03)

@@ -93,7 +93,7 @@ def test_what_it_does_not_know_is_refused(findings):
         surrogate_of(findings(lambda cases: 1.0), "peak_current")
     with pytest.raises(UnknownNameError, match="peak_current"):
         surrogate_of(findings(figure), "peak_curent")
-    with pytest.raises(ParameterError, match="between its points"):
+    with pytest.raises(ParameterError, match="between them"):
         surrogate_of(findings(figure, 1, "[design]\nkind = 'corners'\n"), "peak_current")
 
 

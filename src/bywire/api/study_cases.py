@@ -63,8 +63,8 @@ class ShownCases:
     def texts(self) -> list[str]:
         """Return each case in words."""
         return [
-            f"{(kpi := each.demand.kpi)} = {self._figure(kpi, row)} in case {self.named(row)}; "
-            f"{self.kind}-{kpi}.toml runs it"
+            f"{(kpi := each.demand.kpi)} = {self._figure(kpi, row)}{self._doubt(each, row)} "
+            f"in case {self.named(row)}; {self.kind}-{kpi}.toml runs it"
             for each in self.findings.judgments if (row := each.worst) is not None
         ]  # fmt: skip
 
@@ -102,6 +102,11 @@ class ShownCases:
         plan, findings = self.findings.plan, self.findings
         made = case_bench(plan, findings.number(row), findings.values(row))
         return replace(made, name=f"{self.kind} {judgment.demand.kpi}")
+
+    def _doubt(self, judgment: Judgment, row: int) -> str:
+        """Return that a case is too close to the limit to be told from one that meets it."""
+        is_close = self.findings.is_close(judgment.demand)[row]
+        return " (closer to the limit than its error)" if is_close else ""
 
     def _figure(self, name: str, row: int) -> str:
         return amount(float(self.findings.figure(name)[row]), self.findings.units[name])

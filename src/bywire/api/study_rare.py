@@ -150,21 +150,17 @@ def _ends(found: Interval) -> str:
 def _importance_table(findings: Findings, each: RareFailure) -> Table:
     plan = findings.plan
     varied = {v.name: v for v in plan.varied}
-    values: dict[str, float | str] = {}
-    if each.case is not None:
-        (row,) = np.flatnonzero(np.asarray(findings.cases["case"]) == each.case)
-        values = findings.values(int(row))
     rows = [
         (
             Cell(clean(i.quantity)),
-            Cell(_shown(values.get(i.quantity), varied[i.quantity].unit)),
+            Cell(_shown(each.point.get(i.quantity), varied[i.quantity].unit)),
             Cell(value_text(varied[i.quantity].nominal, varied[i.quantity].unit or "1")),
             Cell(f"{i.score:+.2f}", value=i.score), Cell(f"{i.factor:.2f}", value=i.factor),
         )
         for i in each.importance
     ]  # fmt: skip
     return Table((
-        Column("quantity"), Column("most probable failing case", numeric=True),
+        Column("quantity"), Column("where failures lie", numeric=True),
         Column("in the bench", numeric=True), Column("standard deviations", numeric=True),
         Column("importance", numeric=True),
     ), tuple(rows))  # fmt: skip

@@ -49,7 +49,7 @@ if TYPE_CHECKING:
 
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StudyRun(Answer):
     """What a study found; as far as it is computed.
 
@@ -83,8 +83,13 @@ class StudyRun(Answer):
 
     @property
     def cases(self) -> pd.DataFrame:
-        """Every case: what varied [SI], key figures, why there is none, what the run warned of."""
-        return self.findings.cases
+        """Every case: what varied [SI], key figures, why there is none, what the run warned of.
+
+        ``.attrs["units"]`` has the unit of each column.
+        """
+        cases = self.findings.cases
+        cases.attrs["units"] = dict(self.plan.column_units)
+        return cases
 
     @property
     def data(self) -> xr.Dataset:
@@ -133,6 +138,9 @@ class StudyRun(Answer):
                                  "nothing is required of it, or no case is one")  # fmt: skip
         return self._shown.benches[kpi]
 
+    def __repr__(self) -> str:
+        return f"<StudyRun {self.plan.name}: {len(self.cases)} cases, {self.status}>"
+
     def document(self) -> Document:
         """Return verdicts, the spread of key figures, what drives them, worst cases, figures."""
         plan, findings = self.plan, self.findings
@@ -153,12 +161,14 @@ class StudyRun(Answer):
         unindexed = [Listing(said)] if (said := missing_indices(findings)) else []
         judged: list[Block] = [demands] if plan.demands else []
         texts = self._shown.texts()
+        remarks = [*(f"Warning: {text}." for text in self.warnings), *self.notes]
         missing = failure_texts(findings, self._shown.named)
         return Document(
             f"Study {plan.name}",
             f"{len(self.cases)} cases ({plan.design}, seed {plan.seed}) of {subject.line}",
             sections=lambda: [
                 *([Section("Requirements", judged)] if judged else []),
+                *([Section("What else to know", [Listing(remarks)])] if remarks else []),
                 Section("Key figures", [spreads]),
                 *([Section("What drives them", [*drivers, *unindexed])] if drivers or unindexed
                   else []),

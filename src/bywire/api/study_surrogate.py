@@ -55,6 +55,16 @@ class StudySurrogates(Answer):
         none = [f"no surrogate of {kpi}: {why}" for kpi, why in self.refused.items()]
         return [*poor, *none, *self.study.warnings]
 
+    @property
+    def notes(self) -> list[str]:
+        """That quantities stay where they are although the study has them go together."""
+        pairs = [pair for pair in self.study.plan.correlations if (pair[0] in self.at) !=
+                 (pair[1] in self.at)]  # fmt: skip
+        return [
+            f"{' and '.join(pair)} are correlated, and one of them stays as in the bench: give both"
+            for pair in pairs
+        ]
+
     def document(self) -> Document:
         """Return how good the surrogates are, and what they say of the values asked for."""
         plan = self.study.plan

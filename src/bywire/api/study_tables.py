@@ -100,8 +100,10 @@ def influence_tables(findings: Findings) -> list[TableBlock]:
     if not findings.plan.is_sampled:
         return []
     each = {name: findings.influences(name) for name in shown_figures(findings)}
+    is_partial = bool(findings.plan.correlations)
     return [
-        TableBlock(_influence_table(found), f"What drives {name}.", title=f"what drives {name}")
+        TableBlock(_influence_table(found, is_partial), f"What drives {name}.",
+                   title=f"what drives {name}")
         for name, found in each.items() if found
     ]  # fmt: skip
 
@@ -136,7 +138,7 @@ def shown_figures(findings: Findings) -> list[str]:
     return [name for name in required if name in known] or known
 
 
-def _influence_table(influences: Sequence[Influence]) -> Table:
+def _influence_table(influences: Sequence[Influence], is_partial: bool) -> Table:
     rows = [
         (
             i.quantity, f"{i.correlation:+.2f}", f"{i.low:+.2f} to {i.high:+.2f}",
@@ -144,4 +146,5 @@ def _influence_table(influences: Sequence[Influence]) -> Table:
         )
         for i in influences[:_SHOWN]
     ]  # fmt: skip
-    return text_table(["quantity", "rank correlation", "interval", "drives it"], rows)
+    heading = f"{'partial ' * is_partial}rank correlation"
+    return text_table(["quantity", heading, "interval", "drives it"], rows)

@@ -52,7 +52,8 @@ class Judgment:
     met
         Whether each case meets it, shape (cases,); a case without a result does not.
     share
-        How often, and the interval of the probability.
+        How often, and the interval of the probability, whatever cases that are too close to the
+        limit are.
     undecided
         Cases no further from the limit than their figure may be off by the step.
     outcome
@@ -160,7 +161,9 @@ class Findings:
         """Return how a key figure goes with what varies, the strongest first; choices apart."""
         varied = [v.name for v in self.plan.varied if v.unit]
         columns = [np.asarray(self.cases[each], dtype=float) for each in varied]
-        return influences(varied, columns, self.figure(name), self.plan.confidence)
+        return influences(
+            varied, columns, self.figure(name), self.plan.confidence, bool(self.plan.correlations)
+        )
 
     def sensitivity(self, name: str) -> Sensitivity:
         """Return the indices of a key figure, in a study whose design is made for them."""
@@ -248,11 +251,15 @@ class Findings:
         error = {kpi.name: kpi.error for kpi in self.nominal}.get(name, math.nan)
         return 0.0 if math.isnan(error) else error
 
+    def is_close(self, demand: Demand) -> NDArray[np.bool_]:
+        """Return which cases are no further from a limit than their figure may be off."""
+        _, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
+        return np.asarray(np.abs(self.figure(demand.kpi) - bound) <= self._error(demand.kpi))
+
     def _judgment(self, demand: Demand) -> Judgment:
-        values, error = self.figure(demand.kpi), self._error(demand.kpi)
+        values, near = self.figure(demand.kpi), self.is_close(demand)
         compare, bound = limit_of(demand.kpi, demand.limit, self.units[demand.kpi])
         met = is_met(values, compare, bound)
-        near = np.abs(values - bound) <= error
         count, confidence = values.size, self.plan.confidence
         may, surely = (
             share(int(each.sum()), count, confidence) for each in (met | near, met & ~near)
@@ -266,9 +273,8 @@ class Findings:
         sign = -1.0 if compare.startswith("<") else 1.0
         known = np.isfinite(values)
         worst = int(np.argmin(np.where(known, sign * values, np.inf))) if known.any() else None
-        return Judgment(
-            demand, met, share(int(met.sum()), count, confidence), int(near.sum()), outcome, worst
-        )
+        told = replace(share(int(met.sum()), count, confidence), low=surely.low, high=may.high)
+        return Judgment(demand, met, told, int(near.sum()), outcome, worst)
 
     def _spread(self, name: str, unit: str, nominal: float) -> Spread:
         values = self.figure(name)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -56,12 +57,16 @@ class RareFailure:
         Number of the most probable failing case that was computed; None where none failed.
     importance
         Quantities, the most important first; none where it is not known where failures lie.
+    point
+        Values of what varies where failures lie [SI]: at the design point, or at the mean normal
+        scores of failing cases; empty where that is not known.
     """
 
     demand: Demand
     found: FailureProbability
     case: int | None
     importance: tuple[Importance, ...]
+    point: Mapping[str, Any]
 
 
 def rare_failures(
@@ -109,7 +114,12 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
             cases.report,
         )  # fmt: skip
     case = None if found.place is None else cases.numbers[found.place]
-    return RareFailure(cases.demand, found, case, _importance(plan, found))
+    importance = _importance(plan, found)
+    point = {}
+    if importance and found.center is not None:
+        values = plan.values_at(np.asarray(found.center)[None, :])
+        point = {name: column[0].item() for name, column in values.items()}
+    return RareFailure(cases.demand, found, case, importance, point)
 
 
 def _importance(plan: StudyPlan, found: FailureProbability) -> tuple[Importance, ...]:

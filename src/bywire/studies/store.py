@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -177,7 +178,7 @@ class StudyStore:
             pa.field(name, array.type, metadata={b"unit": units.get(name, "1").encode()})
             for name, array in arrays.items()
         ]
-        table = pa.table(list(arrays.values()), schema=pa.schema(fields))
+        table = pa.table(list(arrays.values()), schema=pa.schema(fields, self._marks(chunk)))
         try:
             with replacing(self.path(chunk)) as fresh:
                 parquet.write_table(table, fresh, write_page_checksum=True)
@@ -210,7 +211,7 @@ class StudyStore:
             table = parquet.read_table(
                 self.path(chunk), page_checksum_verification=True, use_threads=False
             )
-            return {
+            columns = {
                 name: np.asarray(table.column(name).to_numpy(zero_copy_only=False))
                 for name in table.column_names
             }
@@ -219,6 +220,21 @@ class StudyStore:
                 f"{self.path(chunk)} is damaged ({type(error).__name__}): 'bywire study resume "
                 f"{self.folder}' computes it again"
             ) from None
+        marks = table.schema.metadata or {}
+        if any(marks.get(key) != value for key, value in self._marks(chunk).items()):
+            raise FileError(
+                f"{self.path(chunk)} is of another study, or another chunk of this one: 'bywire "
+                f"study resume {self.folder}' computes it again"
+            )
+        return columns
+
+    def _marks(self, chunk: int) -> dict[bytes, bytes]:
+        """Return what tells a chunk's file from any other."""
+        return {b"study": self._digest, b"chunk": str(chunk).encode()}
+
+    @cached_property
+    def _digest(self) -> bytes:
+        return str(self.record()["digest"]).encode()
 
 
 def _unwritable(path: Path, error: OSError) -> FileError:

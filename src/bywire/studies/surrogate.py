@@ -15,19 +15,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.data.file_format import library
 from bywire.studies.findings import Findings
 from bywire.studies.plan import StudyPlan, Varied
+from bywire.studies.sought_design import SOUGHT
 
 LIBRARY = ("surrogates of studies", "studies")
 FEWEST = 30
 """cases of which a surrogate may be made"""
 _LARGEST = 4  # degree: with five quantities the fifth gains little, and takes ten times as long
 _FOLDS = 5  # a fifth of the cases is told by the others, in turn
-_LACKING = ("one-at-a-time", "corners", "morris")  # they do not show what lies between
+_LACKING = ("one-at-a-time", "corners", "morris", *SOUGHT)  # they show no more than some places
 
 Polynomial = Callable[[Array], Array]
 
@@ -91,10 +92,18 @@ class Surrogate:
                 raise unknown_name("quantity of the surrogate", name, self.nominal)
         columns: list[Array] = []
         for name, nominal in self.nominal.items():
-            column = np.asarray(values.get(name, nominal), dtype=float)
+            try:
+                column = np.asarray(values.get(name, nominal), dtype=float)
+            except (TypeError, ValueError):
+                raise ParameterError(
+                    f"{name} = {quoted(values[name])}: SI numbers are wanted"
+                ) from None
             self._require_seen(name, column)
             columns.append(column)
-        wide = np.broadcast_arrays(*columns)
+        try:
+            wide = np.broadcast_arrays(*columns)
+        except ValueError:
+            raise ParameterError("values of quantities must have the same shape") from None
         points = np.column_stack([column.ravel() for column in wide])
         return np.asarray(self.polynomial(points).reshape(wide[0].shape))
 
@@ -159,7 +168,7 @@ def surrogate_of(findings: Findings, kpi: str) -> Surrogate:
 def _require_numbers(plan: StudyPlan) -> None:
     if plan.design in _LACKING:
         raise ParameterError(
-            f"the design {plan.design!r} does not show what lies between its points: a surrogate "
+            f"the cases of {plan.design!r} do not show what lies between them: a surrogate "
             "takes 'monte-carlo', 'latin-hypercube', 'sobol', 'sobol-indices' or 'grid'"
         )
     choices = [v.name for v in plan.varied if not v.unit]
