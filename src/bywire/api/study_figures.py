@@ -53,7 +53,8 @@ def study_figures(findings: Findings, recordings: Recordings) -> list[Block]:
     if findings.plan.is_sampled and any(findings.influences(name) for name in figures):
         blocks.append(FigureBlock(
             partial(_influences, findings),
-            "What drives the key figures: rank correlations with their intervals. Pale: not "
+            f"What drives the key figures: {'partial ' * bool(findings.plan.correlations)}rank "
+            "correlations with their intervals. Pale: not "
             "distinct from none.", "influences",
         ))  # fmt: skip
     if any(findings.effects(name) for name in figures):
