@@ -181,7 +181,7 @@ def _end_with_parent() -> None:
 
 
 def _computed(chunk: int | PlacedChunk) -> tuple[int, Columns]:
-    return _single(_given[0], chunk)
+    return _single(chunk, _given[0])
 
 
 def _load(files: tuple[str, ...]) -> None:
@@ -190,7 +190,7 @@ def _load(files: tuple[str, ...]) -> None:
         load_system(file)
 
 
-def _single(plan: StudyPlan, chunk: int | PlacedChunk) -> tuple[int, Columns]:
+def _single(chunk: int | PlacedChunk, plan: StudyPlan) -> tuple[int, Columns]:
     return number_of(chunk), computed_chunk(plan, chunk, threads=1)
 
 
@@ -233,7 +233,9 @@ def _of_cluster(
     client: Any, plan: StudyPlan, chunks: Chunks
 ) -> Iterator[tuple[int, Columns]]:
     distributed = library("distributed", *_WHAT)
-    futures = client.map(partial(_single, plan), list(chunks), pure=False)
+    # Once to every worker, where it stays: with each task its bench would be made anew.
+    kept = client.scatter(plan, broadcast=True, hash=False)
+    futures = client.map(_single, list(chunks), plan=kept, pure=False)
     try:
         with client.as_current():
             completed = distributed.as_completed(futures)

@@ -34,7 +34,7 @@ overshoot = "<= 15 % with 90 %"
 """
 _CHUNKS = 4
 _ROUNDS = 3
-_STEADY = 32  # chunks over which rates are measured
+_WARM, _STEADY = 4, 32  # chunks of each process beforehand, and those over which rates are measured
 _CASES = 1024  # of the study whose memory is measured
 # The kernel's own mark of this program, its workers apart.
 _MEMORY = """
@@ -123,9 +123,9 @@ def _efficiency(plan: StudyPlan, cores: int) -> Result:
 
 
 def _rate(executor: Executor, plan: StudyPlan, cores: int) -> float:
-    """Return chunks a second [1/s], once each process has had two."""
-    computed = executor.computed(plan, range(2 * cores + _STEADY))
-    for _ in range(2 * cores):
+    """Return chunks a second [1/s], once each process has had several."""
+    computed = executor.computed(plan, range(_WARM * cores + _STEADY))
+    for _ in range(_WARM * cores):
         next(computed)
     begin = time.perf_counter()
     count = sum(1 for _ in computed)
