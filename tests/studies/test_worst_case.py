@@ -76,6 +76,8 @@ def test_a_study_finds_the_worst_bench(study, tmp_path):
     assert found.status == ends.status
     assert found.worst("peak_current").seed == found.plan.bench.seed
     assert any("proves nothing" in note for note in found.notes)
+    (shown,) = found.tables()["Requirements"]["worst found"]
+    assert shown == found.cases["peak_current"].max()  # and no share of what it went through
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,9 @@ from bywire.report.document import Listing, TableBlock
 from bywire.report.tables import Cell, Column, Table, Verdict, text_table, value_text
 from bywire.report.wording import amount, clean
 from bywire.studies.effects import Effect
-from bywire.studies.findings import Findings
+from bywire.studies.findings import Findings, Judgment
 from bywire.studies.plan import StudyPlan
+from bywire.studies.sought_design import WORST
 from bywire.studies.statistics import Influence, Outcome, Share
 
 _SHOWN = 5  # quantities that drive a key figure
@@ -25,13 +26,17 @@ def demand_table(findings: Findings) -> Table:
     """Return the requirements: how often they are met, how probable that is, and the verdict."""
     confidence = f"{100.0 * findings.plan.confidence:g} %"
     is_sampled = findings.plan.is_sampled
-    columns = [Column("requirement"), Column("cases that meet it", numeric=True)]
+    is_search = findings.plan.design == WORST  # how many of its cases it went through says nothing
+    counted = "worst found" if is_search else "cases that meet it"
+    columns = [Column("requirement"), Column(counted, numeric=True)]
     columns += [Column("probability", numeric=True), Column(f"{confidence} interval")] * is_sampled
     rows = []
     for each in findings.judgments:
         count = f"{each.share.count} of {each.share.cases}"
         count += f" ({each.undecided} too close)" if each.undecided else ""
         cells = [Cell(clean(each.demand.text)), Cell(count, value=each.share.count)]
+        if is_search:
+            cells[1] = _worst(findings, each)
         if is_sampled:
             cells += [
                 Cell(percent(each.share.value, each.share), value=each.share.value),
@@ -43,6 +48,14 @@ def demand_table(findings: Findings) -> Table:
             text = "ok in all"
         rows.append((*cells, Cell(text, verdict)))
     return Table((*columns, Column("result")), tuple(rows))
+
+
+def _worst(findings: Findings, judgment: Judgment) -> Cell:
+    if judgment.worst is None:
+        return Cell("-")
+    kpi = judgment.demand.kpi
+    value = float(findings.figure(kpi)[judgment.worst])
+    return Cell(amount(value, findings.units[kpi]), value=value)
 
 
 def percent(value: float, of: Share) -> str:
