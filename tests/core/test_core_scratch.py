@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import signal
 import subprocess
@@ -104,3 +105,21 @@ def test_without_locks_only_what_is_old_goes(tmp_path, monkeypatch):
     with scratch_folder(tmp_path):
         assert young.exists()
     assert list(tmp_path.iterdir()) == [young]
+
+
+def test_a_folder_that_goes_while_others_are_listed_is_no_trouble(tmp_path, monkeypatch):
+    """Two processes that compile side by side: one ends between the other's two looks."""
+    left = tmp_path / f"{scratch.PREFIX}gone"
+    left.mkdir()
+    seen = Path.stat
+
+    def gone(path, **how):
+        if path == left:
+            with contextlib.suppress(OSError):
+                os.rmdir(left)
+        return seen(path, **how)
+
+    monkeypatch.setattr(Path, "stat", gone)
+    with scratch_folder(tmp_path) as folder:
+        assert folder.is_dir()
+    assert not os.path.lexists(left)

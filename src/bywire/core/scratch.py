@@ -126,12 +126,12 @@ def sweep(parent: Path) -> None:
 def _remove_left(folder: Path) -> None:
     try:
         status = folder.stat(follow_symlinks=False)
-        if sys.platform == "win32":
-            lock = None
-        elif status.st_uid != os.getuid():
-            return
-        else:
-            lock = _lock(folder)
+    except OSError:
+        return  # gone since it was listed: its process has ended in between
+    if sys.platform != "win32" and status.st_uid != os.getuid():
+        return
+    try:
+        lock = None if sys.platform == "win32" else _lock(folder)
     except BlockingIOError:
         return  # in use
     except OSError:
