@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import bywire
@@ -66,6 +68,10 @@ def test_gains_hold_as_probably_as_is_wanted(study, monkeypatch):
     beyond = probability_of(told.drawn, more, found.gains, "90 %", None)
     assert beyond.judged.met == (sum(each >= 1.001 * margins[48] for each in margins),)
     assert 20 < beyond.judged.all_met < 48
+    missed = replace(found, probability=replace(beyond, drawn=replace(told.drawn, lacking=3)))
+    assert not missed.holds
+    assert missed.document().remarks == ["all requirements with 90 %: missed"]
+    assert "3 more that were drawn" in str(missed)
     assert beyond.outcome == "missed"
 
 

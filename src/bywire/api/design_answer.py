@@ -204,6 +204,11 @@ class LoopDesign(DesignAnswer):
         is_probable = self.probability is None or self.probability.outcome in (None, "met")
         return super().holds and is_probable
 
+    def _remarks(self) -> list[str]:
+        if self.holds or not super().holds or self.probability is None:
+            return super()._remarks()
+        return [self.probability.verdict]
+
     @property
     def linear(self) -> Design:
         """The design on the linear model."""

@@ -108,9 +108,15 @@ class Probability:
         if self.judged.unstable:
             lines.append(f"{self.judged.unstable} of them are unstable, or do not exist: they "
                          "count as missing every requirement")  # fmt: skip
-        if self.wanted is not None:
-            lines.append(f"all requirements with {100.0 * self.wanted:.10g} %: {self.outcome}")
-        return lines
+        if self.drawn.lacking:
+            lines.append(f"{self.drawn.lacking} more that were drawn for the gains do not exist")
+        return [*lines, self.verdict] if self.wanted is not None else lines
+
+    @property
+    def verdict(self) -> str:
+        """Whether all requirements are met as probably as wanted, in words."""
+        wanted = "" if self.wanted is None else f" with {100.0 * self.wanted:.10g} %"
+        return f"all requirements{wanted}: {self.outcome or 'no probability is wanted'}"
 
     def _words(self, told: Share) -> tuple[str, str, str]:
         return (
