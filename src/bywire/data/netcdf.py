@@ -93,33 +93,46 @@ def read_recording(path: str | Path) -> xr.Dataset:
 
 
 class RecordingSource:
-    """An open recording: numbers of any shape as columns, what else it holds as notes."""
+    """An open recording: numbers of any shape as columns, what else it holds as notes.
 
-    def __init__(self, file: xr.Dataset) -> None:
-        self._file = file
-        numbers = {str(name): v for name, v in file.variables.items() if v.dtype.kind in "iufbmM"}
+    Parameters
+    ----------
+    variables
+        What the file holds, decoded.
+    attributes
+        Of the whole file.
+    coords
+        Names of variables that others stand over.
+    """
+
+    def __init__(
+        self, variables: Mapping[str, xr.Variable], attributes: Mapping[Any, Any],
+        coords: Sequence[str],
+    ) -> None:  # fmt: skip
+        self._variables = variables
+        numbers = {name: v for name, v in variables.items() if v.dtype.kind in "iufbmM"}
         self.columns: Mapping[str, Column] = {
             name: Column(name, length=variable.size) for name, variable in numbers.items()
         }
         self.notes = {
-            "attrs": _plain(file.attrs),
-            "coords": [str(name) for name in file.coords],
+            "attrs": _plain(attributes),
+            "coords": list(coords),
             "variables": {
-                str(name): {
+                name: {
                     "dims": list(variable.dims),
                     "shape": list(variable.shape),
                     "kind": variable.dtype.str,
                     "attrs": _plain(variable.attrs),
                     "texts": None if name in numbers else variable.values.astype(str).tolist(),
                 }
-                for name, variable in file.variables.items()
+                for name, variable in variables.items()
             },
         }
 
     def pieces(self, names: Sequence[str]) -> Iterator[tuple[str, int, NDArray[Any]]]:
         """Yield numbers row by row; those of eight bytes as they lie in memory."""
         for name in names:
-            flat = np.ascontiguousarray(self._file.variables[name].values).reshape(-1)
+            flat = np.ascontiguousarray(self._variables[name].values).reshape(-1)
             plain = flat.view(np.float64) if flat.itemsize == 8 else flat
             for begin in range(0, flat.size, _VALUES):
                 yield name, begin, plain[begin : begin + _VALUES]
@@ -160,8 +173,18 @@ def _dataset(source: LimitedSource) -> xr.Dataset:
 
 @contextmanager
 def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
-    with xr.open_dataset(path, engine="netcdf4", cache=False) as file:
-        yield RecordingSource(file)
+    # Not open_dataset: for the indexes that it makes, which nobody asks here, it loads libraries of
+    # other kinds of arrays, after the fork and so for each file anew: half a second.
+    store = xr.backends.NetCDF4DataStore.open(path)  # type: ignore[no-untyped-call]
+    try:
+        stored, attributes = store.load()
+        variables, attributes, named = xr.conventions.decode_cf_variables(stored, attributes)
+        recorded = {str(name): variable for name, variable in variables.items()}
+        coords = [name for name, variable in recorded.items()
+                  if variable.dims == (name,) or name in named]  # fmt: skip
+        yield RecordingSource(recorded, attributes, coords)
+    finally:
+        store.close()
 
 
 FORMAT = FileFormat(

@@ -115,5 +115,6 @@ def _notes(attributes: Mapping[str, Any]) -> dict[bytes, bytes]:
 FORMAT = FileFormat(
     "parquet", "a Parquet file", (".parquet", ".pq"),
     lambda head: head[:4] == b"PAR1", _open, _write,
-    libraries=("pyarrow.parquet", "pyarrow.compute"),
+    # The last is loaded by the first numbers that pyarrow hands over: once, and not for each file.
+    libraries=("pyarrow.parquet", "pyarrow.compute", "pandas"),
 )  # fmt: skip
