@@ -76,6 +76,7 @@ def demo() -> int:
 
 def test() -> int:
     """Run all checks, the quick ones first and types beside them; stop at the first that fails."""
+    os.environ.setdefault("BYWIRE_CC_QUICK", "1")  # hundreds of kernels, each for short runs
     with tempfile.TemporaryFile("w+") as said:
         types = subprocess.Popen(**command(*TYPES), stdout=said, stderr=subprocess.STDOUT)
         try:

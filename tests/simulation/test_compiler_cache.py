@@ -20,7 +20,14 @@ from bywire.core.errors import CompilerError
 from bywire.simulation import compiler as compiler_module
 from bywire.simulation import engine as engine_module
 from bywire.simulation import kernel_cache
-from bywire.simulation.compiler import PLAIN, Compiler, compile_library, find_compiler, load_library
+from bywire.simulation.compiler import (
+    PLAIN,
+    VECTOR,
+    Compiler,
+    compile_library,
+    find_compiler,
+    load_library,
+)
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
@@ -202,7 +209,22 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
     try:
         named = script(tmp_path / "mycc", "echo 'my compiler 7'")
         monkeypatch.setenv("BYWIRE_CC", str(named))
-        assert find_compiler() == Compiler((str(named),), "my compiler 7")
+        monkeypatch.delenv("BYWIRE_CC_QUICK", raising=False)
+        usual = find_compiler()
+        assert usual == Compiler((str(named),), "my compiler 7")
+        for flags in (PLAIN, VECTOR):
+            assert flags[0] == "-O2"
+            assert usual.flags(flags) == flags
+        find_compiler.cache_clear()
+        monkeypatch.setenv("BYWIRE_CC_QUICK", "1")
+        quick = find_compiler()
+        assert quick == Compiler((str(named),), "my compiler 7, quick", quick=True)
+        assert "-O1" in quick.flags(VECTOR)
+        assert "-O2" not in quick.flags(VECTOR)
+        find_compiler.cache_clear()
+        monkeypatch.setenv("BYWIRE_CC_QUICK", "very")
+        with pytest.raises(CompilerError, match="BYWIRE_CC_QUICK = 'very' is not admissible"):
+            find_compiler()
         find_compiler.cache_clear()
         monkeypatch.setenv("BYWIRE_CC", str(tmp_path / "missing"))
         with pytest.raises(CompilerError, match="missing' names no program"):

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.core.signals import signals_of
+from bywire.simulation import engine as engine_module
+from bywire.simulation.compiler import find_compiler
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
@@ -118,6 +120,25 @@ def test_lanes(path: Path, compiled: Trajectory, count: int) -> None:
         assert_same(path, single, ensemble.values[k])
         assert np.abs(single.values - compiled.values).max() > 0.0
         assert (ensemble.unsettled[k], ensemble.repeated[k]) == (single.unsettled, single.repeated)
+
+
+def test_quick_compiles_give_the_same_digits(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What tests run is what users run: not even fused products and sums may differ."""
+    run, varied = PATHS["braking"].run, {"seal.T_pr": np.array([11.0, 12.0])}
+    results = []
+    try:
+        for quick in "01":
+            monkeypatch.setenv("BYWIRE_CC_QUICK", quick)
+            monkeypatch.setattr(engine_module, "_PREPARED", {})
+            find_compiler.cache_clear()
+            single, lanes = simulate(run), simulate_ensemble(run, varied, ["p_mc", "omega"])
+            assert single.engine.endswith(", quick") == (quick == "1")
+            results.append((single.values, lanes.values))
+    finally:
+        monkeypatch.undo()
+        find_compiler.cache_clear()
+    for usual, quick in zip(*results, strict=True):
+        np.testing.assert_array_equal(usual, quick)
 
 
 def test_tangent_kernel_computes_the_same_run(path: Path, compiled: Trajectory) -> None:

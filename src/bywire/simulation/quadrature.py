@@ -8,7 +8,7 @@ share; the frame's end multiplies the sums.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 from bywire.simulation.expressions import needed
@@ -88,7 +88,7 @@ def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
 
 def _moving(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
     """Return what the roots need that changes in every substep."""
-    return needed(graph, roots, lambda n: level[n] < 2)
+    return needed(graph, roots, level.rare())
 
 
 def _summed(graph: Graph, terms: Terms) -> Node:
@@ -105,17 +105,30 @@ class Levels:
     def __init__(self, graph: Graph, of_leaf: dict[str, int]) -> None:
         self._graph, self._of_leaf = graph, of_leaf
         self._known: list[int] = []
+        self._rare: list[bool] = []
 
     def __getitem__(self, node: Node) -> int:
-        while len(self._known) <= node:
-            new = len(self._known)
+        if len(self._known) <= node:
+            self._extend()
+        return self._known[node]
+
+    def rare(self) -> Callable[[Node], bool]:
+        """Return what tells of every node until now whether it changes less than every substep."""
+        self._extend()
+        return self._rare.__getitem__
+
+    def _extend(self) -> None:
+        known = self._known
+        for new in range(len(known), len(self._graph.nodes)):
             operation = self._graph.nodes[new]
             if operation.op == "leaf":
-                self._known.append(self._of_leaf.get(operation.args[0], 2))
+                level = self._of_leaf.get(operation.args[0], 2)
+            elif operation.op == "const":
+                level = 0
             else:
-                arguments = self._graph.arguments(new)
-                self._known.append(max((self._known[a] for a in arguments), default=0))
-        return self._known[node]
+                level = max([known[a] for a in operation.args])
+            known.append(level)
+            self._rare.append(level < 2)
 
 
 class _Expansion:

@@ -7,6 +7,7 @@ anything in [lo_k, hi_k] where w_k = 0, find the end-of-step velocities w.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from itertools import product
 from typing import Any
 
@@ -96,6 +97,17 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
     m = c.shape[0]
     if m == 0:
         return Projection(ca.SX(0, 1), ca.SX(0, 1), ca.SX(0))
+    return Projection(*_exact(m)(S, c, low, high))
+
+
+@cache
+def _exact(m: int) -> Any:
+    """Return the projection of m rows as a function of S, c, low, high.
+
+    Evaluated on symbols: writing out all combinations for every model takes half of its set-up.
+    """
+    S = ca.SX.sym("S", m, m)
+    c, low, high = (ca.SX.sym(name, m) for name in ("c", "low", "high"))
     # Where both bounds are one force, that acts at zero, too: a velocity that happens to end there
     # does not rest, and its derivatives are those of a moving one.
     forced = [ca.if_else(low[k] < high[k], 0, 1) for k in range(m)]
@@ -111,7 +123,8 @@ def project_exact(S: Any, c: Any, low: Any, high: Any) -> Projection:
     # Forces that are no numbers must not pass for rest, and compilers need not compare them right:
     # the misfit of what was chosen tells, of which nothing else is added.
     best = best + _misfit(S, c, low, high, best) * NOTHING
-    return Projection(best, _within(S @ best - c, low, high), best_misfit > RESIDUAL)
+    results = [best, _within(S @ best - c, low, high), best_misfit > RESIDUAL]
+    return ca.Function("exact_projection", [S, c, low, high], results)
 
 
 def _row(S: Any, c: Any, low: Any, high: Any, w: Any, k: int) -> Any:
