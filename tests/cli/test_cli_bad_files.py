@@ -78,11 +78,11 @@ def test_what_editors_of_other_systems_write_is_read(bywire, bench, mark, end):
     assert bywire("run", path).status == 0
 
 
-def test_file_name_that_is_no_text(process, tmp_path):
+def test_file_name_that_is_no_text(bywire, tmp_path):
     path = os.fsencode(tmp_path) + b"/\xff.toml"
     with open(path, "wb") as stream:
         stream.write(b'experiment = "stribeck"\nparameters = "dardanelli2010"\n')
-    status, out, err = process("run", os.fsdecode(path), "--out", tmp_path / "out", "--json")
+    status, out, err = bywire("run", os.fsdecode(path), "--out", tmp_path / "out", "--json")
     assert (status, "Traceback" in err) == (0, False)
     assert '"bench": "?"' in out
     assert (tmp_path / "out" / "report.html").exists()

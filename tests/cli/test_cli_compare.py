@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from command_line import no_half_files, refused
 
-from undrawn import undrawn
-
 QUICK = ("--set", "options.duration=40ms", "--set", "options.settle=10ms")
 
 
 def test_folder_and_experiment_beside_each_other(bywire, tmp_path):
     changed = ("hard-braking", *QUICK, "--set", "motor.R_m=0.4ohm")
-    with undrawn():
-        bywire("run", *changed, "--out", tmp_path / "a")
-        given = (tmp_path / "a", "hard-braking", *QUICK)
-        outcome = bywire("compare", *given, "--out", tmp_path / "out")
+    bywire("run", *changed, "--out", tmp_path / "a")
+    given = (tmp_path / "a", "hard-braking", *QUICK)
+    outcome = bywire("compare", *given, "--out", tmp_path / "out")
     assert outcome.status == 0
     assert "motor.R_m  0.4 Ω" in outcome.out
     assert "change" in outcome.out
@@ -32,8 +29,7 @@ def test_what_was_run_in_a_folder_of_an_experiments_name(bywire, tmp_path, monke
     (tmp_path / "hard-braking").mkdir()
     run_now = bywire("compare", "hard-braking", "hard-braking", *QUICK, "--json").object
     assert {each["source"] for each in run_now["runs"]} == {"hard-braking, run now"}
-    with undrawn():
-        bywire("run", "hard-braking", *QUICK, "--out", "hard-braking")
+    bywire("run", "hard-braking", *QUICK, "--out", "hard-braking")
     kept = bywire("compare", "hard-braking", "hard-braking", "--json").object
     assert {each["source"] for each in kept["runs"]} == {"hard-braking"}
 

@@ -38,6 +38,7 @@ def test_design_over_a_range_names_what_binds(bywire):
     assert margins["phase"] == pytest.approx(found["linear"]["nominal"]["phase_margin"], rel=1e-3)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_requirements_from_a_file_and_a_bench_file_that_runs(bywire, tmp_path):
     file = tmp_path / "requirements.toml"
     file.write_text(

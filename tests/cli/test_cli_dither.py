@@ -10,6 +10,7 @@ SMALL = ("--set", "pressures=20 bar", "--set", "gains=3", "--set", "gain_min=0.9
          "--set", "settle=2 s", "--set", "compare=none")  # fmt: skip
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_dithered_loop_stands_beside_the_one_without_friction(bywire, tmp_path):
     out = tmp_path / "out"
     outcome = bywire("linearize", "pressure", "--dither", "--out", out, "--json")

@@ -14,11 +14,11 @@ from bywire.core.catalog import parameters
 from bywire.core.scratch import UNFINISHED
 from bywire.identification.method import METHODS
 from bywire.identification.parameter_file import parameter_file
-from undrawn import undrawn
 
 Bywire = Callable[..., Outcome]
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_simulated_measurement_can_be_fed_back(bywire: Bywire, tmp_path: Path) -> None:
     out = tmp_path / "first"
     first = bywire("identify", "seal-friction", "--synthetic", "2", "--out", out, "--json")
@@ -46,8 +46,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
     bywire: Bywire, tmp_path: Path
 ) -> None:
     arguments = ("identify", "motor-winding", "--synthetic", "1", "--option", "duration=0.2 s")
-    with undrawn():
-        good = bywire(*arguments, "--out", tmp_path / "good")
+    good = bywire(*arguments, "--out", tmp_path / "good")
     assert good.status == 0
     assert "does not replay it" in good.err
     said = (tmp_path / "good" / "parameters.toml").read_text()
@@ -55,8 +54,7 @@ def test_a_bench_file_says_what_failed_and_what_it_cannot_do(
     assert "does not replay it" in said
     data = tmp_path / "good" / "measurement.nc"
     other = ("--set", "anti_alias.f_aa=120 Hz", "--out", tmp_path / "wrong")
-    with undrawn():
-        wrong = bywire("identify", "motor-winding", data, *other, "--json")
+    wrong = bywire("identify", "motor-winding", data, *other, "--json")
     assert wrong.status == 1
     first = (tmp_path / "wrong" / "parameters.toml").read_text().splitlines()[0]
     assert first.startswith("# CHECK FAILED, do not use it as it is: residual_over_noise = ")
@@ -73,8 +71,7 @@ def test_options_that_only_simulate_are_options() -> None:
 
 def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path: Path) -> None:
     seal = ("identify", "seal-friction")
-    with undrawn():
-        assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
+    assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
     data, other = tmp_path / "measurement.nc", tmp_path / "notes.txt"
     other.write_text("the user's own")
     refused(bywire("identify", "friction-model", "--synthetic", "1", "--out", tmp_path),
@@ -84,9 +81,8 @@ def test_an_older_result_does_not_stay_beside_a_new_one(bywire: Bywire, tmp_path
     bad.write_text("t [s],F [N],x [m],p [Pa]\n" + "".join(f"{k},1,0,2\n" for k in range(50)))
     refused(bywire(*seal, bad, "--out", tmp_path))
     assert {path.name for path in tmp_path.iterdir()} == {"notes.txt", "still.csv"}
-    with undrawn():
-        assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
-        again = bywire(*seal, data, "--out", tmp_path)
+    assert bywire(*seal, "--synthetic", "1", "--out", tmp_path).status == 0
+    again = bywire(*seal, data, "--out", tmp_path)
     assert again.status == 0
     assert data.exists()
     assert "no parameters.toml is written" in again.err

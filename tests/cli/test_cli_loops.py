@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from command_line import refused
 
-from undrawn import undrawn
-
 
 def test_linearize_prints_the_model_as_json(bywire):
     found = bywire("linearize", "moment", "--json").object
@@ -32,13 +30,14 @@ def test_margins_over_a_range_name_the_worst(bywire):
     assert "bar" in table.out
 
 
+@pytest.mark.usefixtures("drawn")
 def test_margins_leave_figures_and_a_report(bywire, tmp_path):
     asked = ("margins", "moment", "--over", "control.moment.f_c=8 Hz, 40 Hz, 100 Hz", "--json")
     outcome = bywire(*asked, "--out", tmp_path)
     assert outcome.status == 0
     names = {Path(path).name for path in outcome.object["files"]}
-    drawn = {"loop-gain", "nyquist", "nichols", "sensitivity"}
-    assert names == {"report.html", *(f"moment-{name}.png" for name in drawn)}
+    figures = {"loop-gain", "nyquist", "nichols", "sensitivity"}
+    assert names == {"report.html", *(f"moment-{name}.png" for name in figures)}
     assert {path.name for path in tmp_path.iterdir()} == names
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert "1 of 3 loops unstable" in page
@@ -47,8 +46,7 @@ def test_margins_leave_figures_and_a_report(bywire, tmp_path):
 
 def test_a_locus_names_the_border(bywire, tmp_path):
     asked = ("linearize", "moment", "--locus", "control.moment.f_c=50 Hz:90 Hz:5", "--json")
-    with undrawn():
-        outcome = bywire(*asked, "--out", tmp_path)
+    outcome = bywire(*asked, "--out", tmp_path)
     assert outcome.status == 0
     (border,) = outcome.object["locus"]["borders"]
     assert 50.0 < border["value"] < 90.0
@@ -60,6 +58,7 @@ def test_a_locus_names_the_border(bywire, tmp_path):
     assert f"unstable above control.moment.f_c = {border['value']:.4g} Hz" in page
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_locus_of_a_plant_shows_the_neutral_point(bywire, tmp_path):
     outcome = bywire(
         "linearize", "wedge-rigid", "--locus", "wedge.mu_B=0.3:0.4:3", "--out", tmp_path, "--json"
@@ -71,6 +70,7 @@ def test_the_locus_of_a_plant_shows_the_neutral_point(bywire, tmp_path):
     assert "unstable above wedge.mu_B" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("drawn")
 def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
     asked = ("agreement", "screw-position", "--frequencies", "5 Hz", "--out", tmp_path, "--json")
     outcome = bywire(*asked)
@@ -81,11 +81,11 @@ def test_agreement_by_cause_with_its_report(bywire, tmp_path, monkeypatch):
     assert found["largest"] == ["bearing friction"]
     assert "agree" in (tmp_path / "report.html").read_text(encoding="utf-8")
     monkeypatch.setattr("bywire.analysis.agreement.GAIN", -1.0)
-    with undrawn():
-        assert bywire(*asked).status == 1
+    assert bywire(*asked).status == 1
     assert "DO NOT agree" in (tmp_path / "report.html").read_text(encoding="utf-8")
 
 
+@pytest.mark.usefixtures("drawn")
 def test_frequency_response_beside_the_linear_one(bywire, tmp_path):
     outcome = bywire(
         "frequency-response", "screw-position", "--frequencies", "5 Hz, 10 Hz", "--amplitudes",
@@ -116,6 +116,7 @@ def test_all_frequencies_at_once(bywire, excitation):
     assert all(0.9 < share <= 1.0 for share in found["coherence"][0])
 
 
+@pytest.mark.usefixtures("drawn")
 def test_bandwidths_over_a_range_name_the_worst_case(bywire, tmp_path):
     asked = (
         "frequency-response", "screw-position", "--frequencies", "20 Hz:70 Hz:4", "--amplitudes",

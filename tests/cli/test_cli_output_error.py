@@ -12,7 +12,6 @@ from command_line import Outcome, no_half_files, refused
 
 import bywire
 from bywire.bench.bench_file import load
-from undrawn import undrawn
 
 Bywire = Callable[..., Outcome]
 
@@ -63,13 +62,12 @@ def test_files_become_a_bench_file(bywire: Bywire, bench: Path, tmp_path: Path) 
     mapping, out = tmp_path / "map.toml", tmp_path / "out"
     columns = {"p_mc": "pressure", "i": "i", "u": "u"}
     mapping.write_text("".join(f'[signals.{k}]\ncolumn = "{v}"\n' for k, v in columns.items()))
-    with undrawn():
-        found = bywire(
-            "identify", "output-error", *files[:2], "--holdout", files[2], "--map", mapping,
-            "--bench", bench, "--input", "v_set=u", *OUTPUTS[:2], *UNKNOWNS, "--prior",
-            "motor.K_e=0.03 +- 0.01 N*m/A", "--loss", "huber", "--option", "between=linear",
-            "--starts", "2", "--out", out, "--json",
-        )  # fmt: skip
+    found = bywire(
+        "identify", "output-error", *files[:2], "--holdout", files[2], "--map", mapping,
+        "--bench", bench, "--input", "v_set=u", *OUTPUTS[:2], *UNKNOWNS, "--prior",
+        "motor.K_e=0.03 +- 0.01 N*m/A", "--loss", "huber", "--option", "between=linear",
+        "--starts", "2", "--out", out, "--json",
+    )  # fmt: skip
     assert found.status == 0, found.err
     rows = found.object["estimates"]["output error"]["parameters"]
     for name, value in (("motor.R_m", 0.42), ("motor.K_e", 0.028), ("run1:start.p_start", 12e5)):
@@ -106,8 +104,7 @@ def test_a_closed_loop_simulated_and_fed_back(bywire: Bywire, tmp_path: Path) ->
     )  # fmt: skip
     out = tmp_path / "out"
     given = ("identify", "output-error", "--synthetic", "1", *common)
-    with undrawn():
-        first = bywire(*given, "--out", out, "--json")
+    first = bywire(*given, "--out", out, "--json")
     assert first.status == 0, first.err
     estimate = first.object["estimates"]["output error"]
     for name, value in (("motor.R_m", 0.35), ("motor.K_e", 0.0304)):

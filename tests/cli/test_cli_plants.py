@@ -20,6 +20,7 @@ def test_a_plant_as_json_with_its_error_and_a_reduced_model(bywire):
     assert len(found["transfer_functions"]) == len(found["inputs"]) * len(found["outputs"])
 
 
+@pytest.mark.usefixtures("drawn")
 def test_texts_and_figures(bywire, tmp_path):
     outcome = bywire(
         "linearize", "motorcycle-plant", "--at", "2 A", "--reduce", "50 Hz", "--out",

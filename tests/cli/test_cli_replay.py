@@ -28,6 +28,7 @@ def stop(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_measurement(run, tmp_path_factory.mktemp("replay") / "stop.csv")
 
 
+@pytest.mark.usefixtures("drawn")
 def test_right_parameters_pass_and_the_report_is_complete(
     bywire: Bywire, stop: Path, tmp_path: Path
 ) -> None:

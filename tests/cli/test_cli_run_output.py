@@ -114,6 +114,7 @@ def test_older_results_stay_when_the_new_bench_is_refused(bywire, bench, tmp_pat
     assert {p.name: p.read_bytes() for p in out.iterdir()} == before
 
 
+@pytest.mark.usefixtures("drawn")
 def test_end_stop_is_a_warning_and_the_run_is_done(bywire, bench, tmp_path):
     text = OPEN_LOOP + '[options]\nduration = "200 ms"\n' + STEP
     outcome = bywire("run", bench(text), "--out", tmp_path / "out", "--json")

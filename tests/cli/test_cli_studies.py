@@ -8,6 +8,7 @@ from command_line import no_half_files, refused
 SMALL = ("--set", "slopes=3", "--set", "leads=3", "--set", "mu_B=0.25, 0.45")
 
 
+@pytest.mark.usefixtures("drawn")
 def test_the_actuator_is_sized_with_figures_and_numbers(bywire, tmp_path):
     out = tmp_path / "out"
     outcome = bywire(

@@ -5,8 +5,6 @@ from __future__ import annotations
 import pytest
 from command_line import BRAKING, QUICK, no_half_files, refused
 
-from undrawn import undrawn
-
 STUDY = 'bench = "bench.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n[design]\ncases = 64\n'
 
 
@@ -20,17 +18,16 @@ def study(bench, tmp_path):
 
 def test_from_the_file_to_the_report_and_on(bywire, study, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    with undrawn():
-        outcome = bywire("study", "run", study)
-        assert outcome.status == 0
-        assert "64 of 64" in outcome.out
-        out = tmp_path / "tolerances"
-        names = {path.name for path in out.iterdir()}
-        assert {"report.html", "report.json", "study.json", "histograms.png", "convergence.png",
-                "worst-peak_current.toml", "worst-peak_current.nc"} <= names  # fmt: skip
-        extended = bywire("study", "extend", out, "--cases", "128", "--json").object
-        assert (extended["cases"], extended["status"]) == (128, "passed")
-        assert bywire("study", "resume", out).status == 0
+    outcome = bywire("study", "run", study)
+    assert outcome.status == 0
+    assert "64 of 64" in outcome.out
+    out = tmp_path / "tolerances"
+    names = {path.name for path in out.iterdir()}
+    assert {"report.html", "report.json", "study.json", "histograms.png", "convergence.png",
+            "worst-peak_current.toml", "worst-peak_current.nc"} <= names  # fmt: skip
+    extended = bywire("study", "extend", out, "--cases", "128", "--json").object
+    assert (extended["cases"], extended["status"]) == (128, "passed")
+    assert bywire("study", "resume", out).status == 0
     status = bywire("study", "status", out, "--json").object
     assert status["kpis"]["peak_current"] == extended["kpis"]["peak_current"]
     told = bywire("study", "surrogate", out, "--at", "motor.R_m=+1%", "--json").object
@@ -42,16 +39,14 @@ def test_from_the_file_to_the_report_and_on(bywire, study, tmp_path, monkeypatch
 
 def test_what_every_case_has_to_meet_and_one_does_not(bywire, study, tmp_path):
     study.write_text(STUDY)  # the bench's own requirement
-    with undrawn():
-        outcome = bywire("study", "run", study, "--out", tmp_path / "out")
+    outcome = bywire("study", "run", study, "--out", tmp_path / "out")
     assert outcome.status == 1
     assert "bywire: requirement missed: peak_current <= 18.57 A" in outcome.lines
 
 
 def test_an_unfinished_study_says_so(bywire, study, tmp_path):
     out = tmp_path / "out"
-    with undrawn():
-        bywire("study", "run", study, "--out", out, "--cases", "128")
+    bywire("study", "run", study, "--out", out, "--cases", "128")
     (out / "chunks" / "000001.parquet").unlink()
     outcome = bywire("study", "status", out)
     assert outcome.status == 1

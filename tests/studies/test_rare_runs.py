@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import math
+import shutil
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -19,6 +21,15 @@ from undrawn import undrawn
 
 pytest.importorskip("openturns")
 
+BENCH = """
+experiment = "hard-braking"
+parameters = "dardanelli2010"
+[options]
+duration = "40 ms"
+settle = "10 ms"
+[requirements]
+overshoot = "<= 15 %"
+"""
 AXIS = """
 experiment = "step"
 parameters = "spring-axis-one"
@@ -27,7 +38,7 @@ input = "F_set"
 output = "x"
 end = "100 N"
 duration = "1.2 s"
-record = "0.2 ms"
+record = "0.6 ms"
 [simulation]
 step = "0.2 ms"
 [set]
@@ -45,7 +56,6 @@ of = ["d", "m"]
 value = 0.5
 [design]
 kind = "KIND"
-cases = 2560
 MORE
 [requirements]
 overshoot = "<= LIMIT % with 99.8 %"
@@ -94,29 +104,33 @@ def axis(tmp_path, spring_axis):
 
 
 @pytest.mark.parametrize(
-    ("kind", "more"),
-    [("subset-simulation", "cases_per_level = 640"), ("importance-sampling", "")],
+    ("kind", "limit", "more"),
+    [
+        ("subset-simulation", 67.0, "cases = 1920\ncases_per_level = 640"),
+        ("importance-sampling", 70.0, "cases = 1280"),
+    ],
 )
-def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, more):
-    true, study = failure(70.0), axis(kind, 70.0, more)
-    assert 2e-4 < true < 2e-3
+def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, limit, more):
+    true, study = failure(limit), axis(kind, limit, more)
+    assert 2e-4 < true < 5e-3
     (rare,) = study.findings.rare
     assert rare.found.estimate.low < true < rare.found.estimate.high
-    assert len(study.cases) <= rare.found.runs <= 2560  # a search may ask for a case twice
+    assert len(study.cases) <= rare.found.runs <= 1920  # a search may ask for a case twice
     if kind == "importance-sampling":
-        assert rare.found.estimate.variation < 0.06
-    assert study.status == {"met": "passed", "undecided": "undecided"}[
+        assert rare.found.runs <= 1280
+        assert rare.found.estimate.variation < 0.08
+    assert study.status == {"met": "passed", "missed": "failed", "undecided": "undecided"}[
         study.findings.judgments[0].outcome
     ]
     assert rare.importance[0].quantity == "d"
     assert rare.importance[0].score < -2.5
     bench = study.worst("overshoot")  # the most probable failing case
-    assert 70.0 < overshoot(bench.par.d, bench.par.m) < 73.0
+    assert limit < overshoot(bench.par.d, bench.par.m) < limit + 3.0
     with undrawn():
         study.write(tmp_path / "out")
     names = {path.name for path in (tmp_path / "out").iterdir()}
     assert {"failing-overshoot.toml", "failing-overshoot.nc", "exceedance.png"} <= names
-    assert bywire.run(tmp_path / "out" / "failing-overshoot.toml").kpi("overshoot").value > 70.0
+    assert bywire.run(tmp_path / "out" / "failing-overshoot.toml").kpi("overshoot").value > limit
     (said,) = json.loads((tmp_path / "out" / "report.json").read_text())["requirements"]
     assert said["failure"]["probability"] == rare.found.estimate.value
     assert said["importance"]["d"]["factor"] > 0.8
@@ -134,32 +148,54 @@ def interrupted(after: int):
     return progress
 
 
-def test_interrupted_resumed_and_by_workers_it_is_the_same_to_the_bit(study, tmp_path):
-    path = study(BRAKE)
-    whole = bywire.run_study(path, tmp_path / "whole", cases=1280, workers=1)
+@pytest.fixture(scope="module")
+def first_level(tmp_path_factory):
+    """Return the folder of a study whose budget is spent when its first level is computed."""
+    folder = tmp_path_factory.mktemp("rare")
+    (folder / "bench.toml").write_text(BENCH)
+    (folder / "study.toml").write_text('bench = "bench.toml"\n' + BRAKE)
+    bywire.run_study(folder / "study.toml", folder / "out", cases=700, workers=1)
+    return folder
+
+
+@pytest.fixture
+def spent(first_level, tmp_path):
+    """Return a folder of that study for a test of its own."""
+    folder = Path(shutil.copytree(first_level, tmp_path / "spent"))
+    record = folder / "out" / "study.json"
+    record.write_text(record.read_text().replace(str(first_level), str(folder)))
+    return folder
+
+
+def test_interrupted_resumed_and_by_workers_it_is_the_same_to_the_bit(spent, tmp_path):
+    out, whole = spent / "out", tmp_path / "whole"
+    shutil.copytree(out, whole)
+    whole = bywire.resume_study(whole, cases=900, workers=1)
+    assert len(whole.cases) == 896
     with pytest.raises(KeyboardInterrupt, match="resume"):
-        bywire.run_study(path, tmp_path / "out", cases=1280, workers=1, progress=interrupted(14))
-    partial = bywire.study_report(tmp_path / "out")
+        bywire.resume_study(out, cases=900, workers=1, progress=interrupted(12))
+    partial = bywire.study_report(out)
     assert partial.status == "unfinished"
+    assert len(partial.cases) == 768
     assert [x.probability for x in partial.findings.rare[0].found.levels] == [0.1]
     assert any("not all cases" in text for text in partial.warnings)
-    StudyStore(tmp_path / "out").path(3).unlink()  # as one of several that were computed at once
-    written = StudyStore(tmp_path / "out").path(2).stat().st_mtime_ns
-    resumed = bywire.resume_study(tmp_path / "out", workers=2)  # of 1,280 cases
-    assert StudyStore(tmp_path / "out").path(2).stat().st_mtime_ns == written
+    StudyStore(out).path(3).unlink()  # as one of several that were computed at once
+    written = StudyStore(out).path(2).stat().st_mtime_ns
+    resumed = bywire.resume_study(out, workers=2)  # of 900 cases
+    assert StudyStore(out).path(2).stat().st_mtime_ns == written
     pd.testing.assert_frame_equal(resumed.cases, whole.cases, check_exact=True)
     first, second = (each.as_object()["requirements"] for each in (whole, resumed))
     assert first == second
-    assert bywire.study_report(tmp_path / "out").as_object()["requirements"] == first
+    assert bywire.study_report(out).as_object()["requirements"] == first
 
 
-def test_a_spent_budget_is_said_and_extended(study, tmp_path):
-    path, out = study(BRAKE.replace("19 A", "21 A")), tmp_path / "out"
-    spent = bywire.run_study(path, out, cases=700)
-    assert (len(spent.cases), spent.status) == (640, "undecided")
-    assert any("budget of 700 cases is spent" in text for text in spent.warnings)
+def test_a_spent_budget_is_said_and_extended(spent):
+    out = spent / "out"
+    before = bywire.study_report(out)
+    assert (len(before.cases), before.status) == (640, "undecided")
+    assert any("budget of 700 cases is spent" in text for text in before.warnings)
     more = bywire.resume_study(out, cases=800)
-    pd.testing.assert_frame_equal(more.cases[:640], spent.cases, check_exact=True)
+    pd.testing.assert_frame_equal(more.cases[:640], before.cases, check_exact=True)
     assert len(more.cases) == 768
 
 
@@ -175,22 +211,11 @@ def test_every_case_has_noise_of_its_own_but_those_of_a_search(study):
 
 def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
     text = BRAKE + 'rise_time = "<= 30 ms with 90 %"\n'
-    found = bywire.run_study(study(text, bench=BENCH_OF_TWO), tmp_path / "out", cases=700)
+    found = bywire.run_study(study(text, bench=BENCH), tmp_path / "out", cases=700)
     first, second = found.findings.rare
     assert (first.found.runs, second.found.runs) == (640, 640)
     assert len(found.cases) == 640
     assert any("not judged" in note and "overshoot" in note for note in found.notes)
-
-
-BENCH_OF_TWO = """
-experiment = "hard-braking"
-parameters = "dardanelli2010"
-[options]
-duration = "40 ms"
-settle = "10 ms"
-[requirements]
-overshoot = "<= 15 %"
-"""
 
 
 @pytest.mark.parametrize(
@@ -213,18 +238,15 @@ def test_what_does_not_fit_is_refused(study, old, new, why):
         read_study(study(text.replace(old, new)))
 
 
-def test_cases_of_another_draw_are_refused(study, tmp_path):
-    path, out = study(BRAKE), tmp_path / "out"
-    bywire.run_study(path, out, cases=640)
-    store = StudyStore(out)
+def test_cases_of_another_draw_are_refused(spent):
+    store = StudyStore(spent / "out")
     store.write(0, store.columns(1), {})
     with pytest.raises(FileError, match="other cases than the study asks for"):
-        bywire.study_report(out)
+        bywire.study_report(spent / "out")
 
 
-def test_a_study_of_another_limit_is_another(study, tmp_path):
-    path, out = study(BRAKE), tmp_path / "out"
-    bywire.run_study(path, out, cases=640)
+def test_a_study_of_another_limit_is_another(spent):
+    path, out = spent / "study.toml", spent / "out"
     path.write_text(path.read_text().replace("99.9 %", "99 %"))
     assert bywire.study_report(out).findings.rare[0].demand.probability == 0.99
     path.write_text(path.read_text().replace("19 A", "20 A"))

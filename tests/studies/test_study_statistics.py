@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from bywire.studies.statistics import influences, judged, quantile, running_share, share
 
@@ -14,6 +15,18 @@ def test_shares_cover_at_least_as_often_as_they_claim():
     counts = np.random.default_rng(1).binomial(200, 0.93, REPEATS)
     held = [(s := share(int(n), 200, 0.9)).low <= 0.93 <= s.high for n in counts]
     assert np.mean(held) >= 0.9
+
+
+@pytest.mark.parametrize(("count", "cases"), [(0, 1), (1, 1), (3, 64), (199, 200), (7, 10**6)])
+def test_shares_and_quantiles_have_the_ends_that_scipy_looks_for(count, cases):
+    for confidence in (0.5, 0.95, 0.999):
+        found = share(count, cases, confidence)
+        ends = stats.binomtest(count, cases).proportion_ci(confidence)
+        assert (found.low, found.high) == pytest.approx((ends.low, ends.high), rel=1e-6, abs=1e-11)
+    values = np.random.default_rng(count).standard_normal(min(cases, 200))
+    made = quantile(values, 0.9, 0.95)
+    same = stats.quantile_test(values, p=0.9).confidence_interval(0.95)
+    np.testing.assert_array_equal([made.low, made.high], [same.low, same.high])
 
 
 @pytest.mark.parametrize("probability", [0.05, 0.5, 0.95])

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import stats
+from scipy import special, stats
 
 from bywire.core.typing import Array
 
@@ -64,7 +64,11 @@ def share(count: int, cases: int, confidence: float) -> Share:
     """
     if not cases:
         return Share(0, 0, 0.0, 1.0)
-    low, high = stats.binomtest(count, cases).proportion_ci(confidence, method="exact")
+    beyond = 0.5 * (1.0 - confidence)
+    # As quantiles of beta distributions: stats.binomtest looks for the same ends a hundred times
+    # as long.
+    low = special.betaincinv(count, cases - count + 1, beyond) if count else 0.0
+    high = special.betaincinv(count + 1, cases - count, 1.0 - beyond) if count < cases else 1.0
     return Share(count, cases, float(low), float(high))
 
 
@@ -111,11 +115,14 @@ def quantile(values: Array, probability: float, confidence: float) -> Quantile:
     """
     if not values.size:
         return Quantile(probability, math.nan, math.nan, math.nan)
-    test = stats.quantile_test(values, p=probability)
-    interval: Any = test.confidence_interval(confidence)  # its stub says float
+    beyond = 0.5 * (1.0 - confidence)
+    below = int(stats.binom.ppf(beyond, values.size, probability)) - 1
+    above = int(stats.binom.isf(beyond, values.size, probability))
+    ordered = np.sort(values)
     return Quantile(
-        probability, float(np.quantile(values, probability)), float(interval.low),
-        float(interval.high),
+        probability, float(np.quantile(values, probability)),
+        float(ordered[below]) if below >= 0 else math.nan,
+        float(ordered[above]) if above < values.size else math.nan,
     )  # fmt: skip
 
 
