@@ -10,6 +10,7 @@ import pytest
 
 import bywire
 from bywire.bench import ensemble
+from bywire.bench.key_figures import key_figures_of
 from bywire.bench.running import run
 from bywire.core.errors import ParameterError, UnknownNameError
 
@@ -77,7 +78,7 @@ def test_an_experiment_of_several_runs():
 def test_what_cannot_run_side_by_side_runs_one_by_one(bench, monkeypatch):
     found = bywire.simulate_ensemble(bench, {"options.duration": [0.05, 0.06]})
     assert [r.recording.sizes["time"] for r in found.results] == [61, 71]
-    monkeypatch.setattr(ensemble, "fit_lanes", lambda runs: False)
+    monkeypatch.setattr("bywire.bench.side_by_side.fit_lanes", lambda runs: False)
     alone = bywire.simulate_ensemble(bench, {"motor.R_m": [0.25]})
     assert "lanes" not in alone.results[0].recording.attrs["engine"]
 
@@ -102,11 +103,26 @@ def test_key_figures_and_warnings_without_recordings_are_the_same():
     """The piston of a release rests on its stop, which the run warns of."""
     bench = bywire.Bench("release", "dardanelli2010")
     benches = [bench.varied({"motor.R_m": value}, {}) for value in (0.3, 0.4)]
-    figures = ensemble.key_figures_of(benches)
-    for ours, result in zip(figures, ensemble.run_benches(benches), strict=True):
-        assert ours.kpis == result.kpis
-        assert list(ours.warnings) == result.warnings
-        assert any("retracted stop" in text for text in ours.warnings)
+    figures = key_figures_of(benches)
+    for k, result in enumerate(ensemble.run_benches(benches)):
+        assert figures.kpis(k) == result.kpis
+        assert list(figures.warnings[k]) == result.warnings
+        assert any("retracted stop" in text for text in figures.warnings[k])
+
+
+def test_warnings_of_cases_need_no_more_than_the_signals_that_are_watched(bench):
+    """The ranges of both sensors and of the pipe's law, which differ from case to case."""
+    changes = [
+        {"current_sensor.i_high": 4.0},
+        {"current_sensor.i_high": 4.5, "pipeline.Re_max": 1.0},
+        {"pressure_sensor.p_high": 8e5},
+        {},
+    ]
+    benches = [bench.varied(each, {}) for each in changes]
+    figures = key_figures_of(benches)
+    for texts, result in zip(figures.warnings, ensemble.run_benches(benches), strict=True):
+        assert list(texts) == result.warnings
+    assert [len(texts) for texts in figures.warnings] == [1, 2, 1, 0]
 
 
 def test_a_varied_bench_is_the_one_that_is_made_anew(bench):

@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 import bywire
+from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.key_figures import key_figures_of
 from bywire.bench.rows import Rows
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.brake import brakes
@@ -101,6 +103,18 @@ def _rows(recording):
     signals = {str(n): v.values for n, v in recording.items()}
     attributes = {n: recording[n].attrs for n in signals}
     return Rows(recording["time"].values, signals, attributes, lambda: recording.attrs)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_figures_of_many_cases_are_those_of_their_recordings(results, name):
+    """By families of all at once, of no more signals than they need; by hand one by one."""
+    bench = results[name].bench
+    first = next(iter(bench.par.leaves()))
+    larger = bench.varied({first: 1.02 * bench.par.leaves()[first]}, {})
+    figures = key_figures_of([bench, larger])
+    for k, recorded in enumerate(run_benches([bench, larger])):
+        assert figures.kpis(k) == recorded.kpis  # to the last digit, reasons too
+        assert list(figures.warnings[k]) == recorded.warnings
 
 
 @pytest.mark.parametrize(("name", "parameters"), PAIRS)

@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bywire.bench.bench import Bench
     from bywire.bench.experiment import Case, Experiment, Recordings, as_run, fixed
     from bywire.bench.kpis import effort, hysteresis, occupation, step_response
+    from bywire.bench.kpis.cases import FamilyJudge
     from bywire.bench.kpis.kpi import Figures, Kpi, Undefined, measure
     from bywire.bench.kpis.registry import evaluate, units_of
     from bywire.bench.result import Result
@@ -140,6 +141,7 @@ _HOMES = {
     "bench.bench": "Bench",
     "bench.result": "Result",
     "bench.experiment": "Case Experiment Recordings as_run fixed",
+    "bench.kpis.cases": "FamilyJudge",
     "bench.kpis.kpi": "Figures Kpi Undefined measure",
     "bench.kpis.registry": "evaluate units_of",
     "bench.stimuli.registry": "Stimulus",
@@ -192,17 +194,18 @@ _PLACES = {
 
 __all__ = [
     "LOOPS", "METHODS", "Angle", "Area", "Array", "Assembly", "Bench", "Bounds", "Brake",
-    "BreakawayFactor", "Case", "Check", "CitedSet", "Conductance", "ContactCompliance", "Current",
-    "Curve", "Cut", "Damping", "Density", "Duration", "DutyPerCurrent", "DutyPerCurrentTime",
-    "Effort", "Energy", "Estimate", "Exhibit", "Experiment", "Fact", "Factor", "FigureKind",
-    "Figures", "Findings", "Force", "Fraction", "Frequency", "Gain", "GearRatio", "Identified",
-    "Inductance", "Inertia", "Integral", "InternalResistance", "Item", "Kpi", "Length", "LineRole",
-    "LinearModel", "Loop", "Map", "Mark", "Mass", "Matrix", "Method", "Model", "ModelError",
-    "Nodes", "Overlap", "Panel", "Panels", "ParameterError", "ParameterSet", "Part", "Plant",
-    "PlantPoint", "Point", "Position", "Power", "Pressure", "Problem", "Progress", "Quantity",
-    "Recordings", "Reproduction", "Resistance", "Result", "Role", "RootCause", "RotaryDamping",
-    "Run", "Runs", "Shown", "ShownFigure", "Signal", "SignedCurrent", "Source", "SourcePart",
-    "Speed", "Stiffness", "Stimulus", "Study", "Task", "TimeConstant", "Torque", "TorqueConstant",
+    "BreakawayFactor", "Case", "Check", "CitedSet", "Conductance", "ContactCompliance",
+    "Current", "Curve", "Cut", "Damping", "Density", "Duration", "DutyPerCurrent",
+    "DutyPerCurrentTime", "Effort", "Energy", "Estimate", "Exhibit", "Experiment", "Fact",
+    "Factor", "FamilyJudge", "FigureKind", "Figures", "Findings", "Force", "Fraction",
+    "Frequency", "Gain", "GearRatio", "Identified", "Inductance", "Inertia", "Integral",
+    "InternalResistance", "Item", "Kpi", "Length", "LineRole", "LinearModel", "Loop", "Map",
+    "Mark", "Mass", "Matrix", "Method", "Model", "ModelError", "Nodes", "Overlap", "Panel",
+    "Panels", "ParameterError", "ParameterSet", "Part", "Plant", "PlantPoint", "Point",
+    "Position", "Power", "Pressure", "Problem", "Progress", "Quantity", "Recordings",
+    "Reproduction", "Resistance", "Result", "Role", "RootCause", "RotaryDamping", "Run", "Runs",
+    "Shown", "ShownFigure", "Signal", "SignedCurrent", "Source", "SourcePart", "Speed",
+    "Stiffness", "Stimulus", "Study", "Task", "TimeConstant", "Torque", "TorqueConstant",
     "Trace", "Undefined", "Unit", "Unknown", "Voltage", "Volume", "Weight", "Wire", "as_run",
     "calibrated", "chosen", "closed_loop", "compared", "derived", "differentiated", "effort",
     "estimate", "evaluate", "fixed", "found", "hysteresis", "kpis", "lack_of_fit", "linearize",

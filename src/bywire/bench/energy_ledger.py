@@ -30,7 +30,8 @@ class Posting:
     name, label
         Variable, and what people read.
     energy
-        In J, signed: a source that takes energy back and a loss below zero are negative.
+        In J, signed: a source that takes energy back and a loss below zero are negative. Of the
+        rows of several runs an array of shape (runs,), as everything that follows from it.
     """
 
     name: str
@@ -48,14 +49,24 @@ class Ledger:
     @property
     def turnover(self) -> float:
         """Energy that was given by all that gave [J]."""
-        given = sum(max(posting.energy, 0.0) for posting in self.sources)
-        return given + sum(max(-posting.energy, 0.0) for posting in self.sinks)
+        given: float = sum(_positive(posting.energy) for posting in self.sources)
+        return given + sum(_positive(-posting.energy) for posting in self.sinks)
 
     @property
     def closing_error(self) -> float:
         """What the sources gave less what the sinks took [J]: the error of the books."""
         given = sum(posting.energy for posting in self.sources)
         return given - sum(posting.energy for posting in self.sinks)
+
+
+def _positive(energy: float) -> float:
+    return _plain(np.maximum(energy, 0.0))
+
+
+def _plain(energy: Any) -> float:
+    """Return the energy of one run as a float, those of several as they are."""
+    several: Any = energy
+    return float(energy) if np.ndim(energy) == 0 else several
 
 
 def role_attributes(role: Role | None) -> dict[str, str]:
@@ -164,7 +175,8 @@ def _changes(recording: xr.Dataset) -> dict[str, float]:
         # Its variables: to give an array its coordinates costs more than all the books.
         name, variable = str(key), recording.variables[key]
         if name.startswith(("E_", "W_")) and variable.ndim == 1:
-            changes[name] = float(variable.values[-1] - variable.values[0])
+            values = variable.values
+            changes[name] = _plain(values[..., -1] - values[..., 0])
     return changes
 
 
@@ -179,8 +191,9 @@ def _split(recording: xr.Dataset) -> dict[str, float]:
     for name in (name for name, role in every.items() if role and role.split and still):
         names = (name, still, "time")
         energy, stuck, time = (np.diff(recording.variables[each].values) for each in names)
-        holding = float(np.sum(energy * np.clip(stuck / time, 0.0, 1.0)))
-        ends = recording.variables[name].values[[0, -1]]
-        whole = float(ends[1] - ends[0])
-        changes |= {f"{name}_moving": whole - holding, f"{name}_holding": holding}
+        holding = np.sum(energy * np.clip(stuck / time, 0.0, 1.0), axis=-1)
+        values = recording.variables[name].values
+        whole = values[..., -1] - values[..., 0]
+        changes[f"{name}_moving"] = _plain(whole - holding)
+        changes[f"{name}_holding"] = _plain(holding)
     return changes

@@ -2,29 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any, overload
+from typing import overload
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case
-from bywire.bench.extent import check_memory
-from bywire.bench.kpis.kpi import Kpi
 from bywire.bench.result import Result
-from bywire.bench.running import (
-    Progress,
-    judged,
-    recording_of,
-    rows_recorded,
-    run_of,
-    static_recordings,
-)
+from bywire.bench.running import Progress, judged, recording_of, static_recordings
+from bywire.bench.side_by_side import rounds
 from bywire.bench.step_error import NO_ESTIMATE, OTHER_STEPS, unestimated
 from bywire.core.errors import InputError, ParameterError, unknown_name
 from bywire.core.leaf import Leaf
@@ -32,8 +22,7 @@ from bywire.core.parameters import choice_fields, leaf_fields
 from bywire.core.typing import Array
 from bywire.simulation import ensemble
 from bywire.simulation.ensemble import Ensemble
-from bywire.simulation.run import Run, Trajectory, simulate
-from bywire.simulation.run_group import fit_lanes, simulate_group
+from bywire.simulation.run import Run
 from bywire.simulation.variations import Variations
 
 _OPTION = "options."
@@ -244,82 +233,13 @@ def run_benches(
     )
 
 
-@dataclass(frozen=True)
-class KeyFigures:
-    """What a bench gave, without recordings: its key figures, and what its runs warned of."""
-
-    kpis: tuple[Kpi, ...]
-    warnings: tuple[str, ...]
-
-
-def key_figures_of(
-    benches: Sequence[Bench], threads: int | None = None
-) -> tuple[KeyFigures, ...]:
-    """Return the key figures of several benches of one experiment, as `run_benches` gives them.
-
-    Nothing is recorded for anybody to look at, which takes most of the time of short runs.
-
-    Raises
-    ------
-    StepError
-        When the runs do not fit into this machine together.
-    RunError
-        When a run fails.
-    KeyboardInterrupt
-        When interrupted.
-    """
-    recordings: list[dict[str, Any]] = [static_recordings(bench) for bench in benches]
-    warnings: list[list[str]] = [[] for _ in benches]
-    for k, case, run, trajectory in _runs(benches, None, "auto", threads):
-        recordings[k][case.label], said = rows_recorded(benches[k], case, run, trajectory)
-        has_several = len(benches[k].cases()) > 1
-        warnings[k] += [f"{case.label}: {text}" if has_several else text for text in said]
-    return tuple(
-        KeyFigures(bench.definition.judge(made, bench.chosen_options), tuple(said))
-        for bench, made, said in zip(benches, recordings, warnings, strict=True)
-    )
-
-
 def _recordings(
     benches: Sequence[Bench], progress: Progress | None, engine: str, threads: int | None
 ) -> list[dict[str, xr.Dataset]]:
     """Return the recordings of each bench by label."""
     recordings = [static_recordings(bench) for bench in benches]
-    for k, case, run, trajectory in _runs(benches, progress, engine, threads):
-        recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
+    for made in rounds(benches, progress, engine, threads):
+        given = zip(made.places, made.cases, made.runs, made.trajectories, strict=True)
+        for k, case, run, trajectory in given:
+            recordings[k][case.label] = recording_of(benches[k], case, run, trajectory)
     return recordings
-
-
-def _runs(
-    benches: Sequence[Bench], progress: Progress | None, engine: str, threads: int | None
-) -> Iterator[tuple[int, Case, Run, Trajectory]]:
-    """Yield every run of every bench, by the bench's place, with its case and what it gave."""
-    cases = [bench.cases() for bench in benches]
-    for number in range(max(len(each) for each in cases)):
-        present = [k for k, each in enumerate(cases) if number < len(each)]
-        runs = [run_of(benches[k], cases[k][number], number) for k in present]
-        check_memory(runs[0], len(runs) * len(runs[0].model.Output._fields))
-        label = cases[present[0]][number].label
-        report = None if progress is None else partial(progress, label)
-        trajectories = _trajectories(runs, report, engine, threads)
-        for k, run, trajectory in zip(present, runs, trajectories, strict=True):
-            yield k, cases[k][number], run, trajectory
-
-
-def _trajectories(
-    runs: Sequence[Run], report: Any, engine: str, threads: int | None
-) -> Sequence[Trajectory]:
-    if engine != "virtual-machine" and len(runs) > 1 and fit_lanes(runs):
-        return simulate_group(runs, threads=threads, progress=report)
-    computed = []
-    for k, run in enumerate(runs):
-        share = None if report is None else partial(_share, report, k, len(runs))
-        trajectory = simulate(run, engine=engine, progress=share)
-        if trajectory.status == "interrupted":
-            raise KeyboardInterrupt
-        computed.append(trajectory)
-    return computed
-
-
-def _share(report: Any, k: int, count: int, share: float) -> None:
-    report((k + share) / count)

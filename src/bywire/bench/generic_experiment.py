@@ -10,17 +10,16 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import chain
 from types import MappingProxyType
 from typing import Annotated, Any
 
 from pydantic import Field, create_model
 from pydantic.fields import FieldInfo
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, recorded, units_of
+from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.registry import recorded, units_of
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.core.errors import ModelError, ParameterError, quoted, unknown_name
 from bywire.core.model import Model
@@ -122,10 +121,8 @@ class Subject:
             )  # fmt: skip
             return (case,)
 
-        def judge(recordings: Recordings, options: Any) -> tuple[Kpi, ...]:
-            run = recordings["run"]
-            kpis = [evaluate(family, run, of(options)).values() for family, of in judged.items()]
-            return (*chain.from_iterable(kpis), *self.judged(run))
+        def settings(options: Any) -> dict[str, Any]:
+            return {**{family: of(options) for family, of in judged.items()}, **_TOTALS}
 
         units = units_of(*judged, resolved={"level": self.units["output"], **resolved})
         return Experiment(
@@ -135,7 +132,7 @@ class Subject:
             options=self.options,
             defaults=self.defaults,
             cases=cases,
-            judge=judge,
+            judge=FamilyJudge(settings, left_out=units_of(*_TOTALS).keys() - self.totals().keys()),
             kpis={**units, **self.totals()},
             figures=self.figures(*figures),
             beside=lambda _: others,
@@ -150,16 +147,6 @@ class Subject:
             for family, setting in _TOTALS.items()
             for name, unit in recorded(family, setting, signals).items()
         }
-
-    def judged(self, recording: Any) -> tuple[Kpi, ...]:
-        """Return the key figures of `totals`."""
-        wanted = self.totals()
-        return tuple(
-            kpi
-            for family, setting in _TOTALS.items()
-            for name, kpi in evaluate(family, recording, setting).items()
-            if name in wanted
-        )
 
     def figures(self, *kinds: str) -> tuple[str, ...]:
         """Return kinds of figures, and the energy balance where the model records energies."""

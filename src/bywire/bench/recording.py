@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pandas as pd
@@ -17,7 +17,8 @@ from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
-from bywire.simulation.run import Run, Trajectory
+from bywire.simulation.run import Run, Trajectory, doubts_of
+from bywire.simulation.run_group import RunGroup
 
 _OPEN = 1e-5  # of the energies, that the balance of a run may leave open
 _NOTHING = 1e-9  # J, that nobody misses: rounding of what is stored while nothing moves
@@ -49,14 +50,14 @@ def record(
     recording = xr.Dataset(variables, coords={"time": ("time", axis, {"units": "s"})})
     recording["time"].attrs["long_name"] = "time"
     recording.attrs = {
-        **_notes(run, trajectory),
+        **run_notes(run, trajectory),
         "warnings": "; ".join(watch(recording, run, trajectory)),
         **notes,
     }
     return recording
 
 
-def _notes(run: Run, trajectory: Trajectory) -> dict[str, Any]:
+def run_notes(run: Run, trajectory: Trajectory) -> dict[str, Any]:
     """Return what a recording says of its run, but for the warnings."""
     return {
         "bywire_version": __version__,
@@ -87,8 +88,17 @@ def rows_of(
     signals = {name: kept[name] for name in attributes if name in kept}
     return Rows(
         np.round(time[begin:], 12), signals, attributes,
-        lambda: {**_notes(run, trajectory), **notes()},
+        lambda: {**run_notes(run, trajectory), **notes()},
     )  # fmt: skip
+
+
+def rows_of_group(group: RunGroup, settle: float) -> Rows:
+    """Return what recordings of several runs hold, of those rows that were computed."""
+    signals = dict(zip(group.names, group.values, strict=True))
+    attributes = _attributes_of(group.runs[0].model.Output)
+    return Rows(
+        np.round(group.time - settle, 12), signals, {name: attributes[name] for name in signals}
+    )
 
 
 @cache
@@ -104,18 +114,31 @@ def _attributes(signal: Signal) -> dict[str, str]:
 
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:
     """Return what the user should know of a recording: validity left, stops met, solver trouble."""
-    doubts: list[str] = []
     if not recording.sizes["time"]:  # interrupted before the first row
-        return doubts
-    if trajectory.doubt:
-        doubts.append(trajectory.doubt.replace("; ", ", "))  # what joins the warnings
-    if trajectory.unsettled:
+        return []
+    doubts = _solver_doubts(trajectory.doubt, trajectory.unsettled)
+    return [*doubts, *open_books(recording), *run.model.watch(recording, run.par)]
+
+
+def watch_cases(rows: Rows, runs: Sequence[Run], unsettled: Sequence[int]) -> list[list[str]]:
+    """Return what `watch` says of each of several runs of one structure and plan.
+
+    ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts.
+    """
+    solver = map(_solver_doubts, doubts_of(runs), unsettled)
+    books = open_books_of_cases(cast(xr.Dataset, rows), len(runs))
+    return [
+        [*doubts, *book, *run.model.watch(rows.case(k), run.par)]
+        for k, (doubts, book, run) in enumerate(zip(solver, books, runs, strict=True))
+    ]
+
+
+def _solver_doubts(doubt: str, unsettled: int) -> list[str]:
+    doubts = [doubt.replace("; ", ", ")] if doubt else []  # what joins the warnings
+    if unsettled:
         doubts.append(
-            f"{trajectory.unsettled} substeps hit the cap of the contact iteration: "
-            "take a smaller step"
+            f"{unsettled} substeps hit the cap of the contact iteration: take a smaller step"
         )
-    doubts += open_books(recording)
-    doubts += run.model.watch(recording, run.par)
     return doubts
 
 
@@ -125,22 +148,36 @@ def open_books(recording: xr.Dataset) -> list[str]:
     The scheme closes it to a few parts in 1e8, the remainder of nonlinear elements. Where
     parameters are so extreme that numbers cancel, it does not.
     """
+    return open_books_of_cases(recording, 1)[0]
+
+
+def open_books_of_cases(recording: xr.Dataset, cases: int) -> list[list[str]]:
+    """Return what `open_books` says of each of several runs, of the rows of all."""
     books = actuator_ledger(recording)
     if not (books.sources and books.sinks):
-        return []
-    left = abs(books.closing_error)
-    if left <= _OPEN * books.turnover + _NOTHING:
-        return []
+        return [[] for _ in range(cases)]
+    error, turned = (
+        np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover)
+    )
     return [
-        f"the energy balance is open by {left:.3g} J of {books.turnover:.3g} J that were turned "
-        "over: do not believe this run, take a smaller step, and look for a parameter that is "
-        "extreme"
+        []
+        if abs(left) <= _OPEN * total + _NOTHING
+        else [
+            f"the energy balance is open by {abs(left):.3g} J of {total:.3g} J that were turned "
+            "over: do not believe this run, take a smaller step, and look for a parameter that is "
+            "extreme"
+        ]
+        for left, total in zip(error.tolist(), turned.tolist(), strict=True)
     ]
 
 
 def energy_signals(run: Run) -> tuple[str, ...]:
     """Return the outputs of a run's model that stand in the books of its energy."""
-    return tuple(name for name in run.model.Output._fields if name.startswith(("E_", "W_")))
+    return tuple(
+        name
+        for name, signal in signals_of(run.model.Output).items()
+        if name.startswith(("E_", "W_")) or signal.role is not None
+    )
 
 
 def open_books_of(run: Run, trajectory: Trajectory) -> list[str]:

@@ -71,14 +71,16 @@ class Row(NDArrayOperatorsMixin):
 
 
 class Rows:
-    """What a run recorded.
+    """What a run recorded, or several side by side.
+
+    Those of several runs answer families of key figures and books alone: take a `case` for others.
 
     Parameters
     ----------
     time
         Times [s], shape (time,).
     signals
-        Values by name, shape (time,) each.
+        Values by name, shape (time,) each; of several runs (runs, time).
     attributes
         Unit, label and role of each signal, as a recording has them.
     notes
@@ -97,6 +99,20 @@ class Rows:
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
         self._signals = tuple(signals)
         self.sizes = {TIME: time.size}
+
+    def case(self, k: int, notes: Callable[[], Mapping[str, Any]] = dict) -> Rows:
+        """Return the rows of one run of several."""
+        signals = {name: self._values[name][k] for name in self._signals}
+        return Rows(self._values[TIME], signals, self._attributes, notes)
+
+    def with_signals(
+        self, signals: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
+    ) -> Rows:
+        """Return the rows with further signals; see `Rows` for both."""
+        every = {name: self._values[name] for name in self._signals}
+        return Rows(
+            self._values[TIME], {**every, **signals}, {**self._attributes, **attributes}
+        )
 
     @property
     def data_vars(self) -> Mapping[str, Row]:

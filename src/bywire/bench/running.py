@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
@@ -16,9 +16,10 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case, as_run
 from bywire.bench.extent import check_extent
 from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.recording import record, rows_of, watch
+from bywire.bench.recording import record, rows_of, run_notes, watch
 from bywire.bench.requirements import judge, status_of
 from bywire.bench.result import Result
+from bywire.bench.rows import Rows
 from bywire.bench.step_error import (
     NO_ESTIMATE,
     OTHER_STEPS,
@@ -164,6 +165,17 @@ def rows_recorded(
     return _finished(bench, case, recording), warnings
 
 
+def rows_of_case(
+    bench: Bench, case: Case, rows: Rows, group: Sequence[Trajectory], k: int
+) -> xr.Dataset:
+    """Return what `recording_of` would hold of one of several runs, of the rows of all."""
+
+    def notes() -> dict[str, Any]:
+        return {**run_notes(group[k].run, group[k]), **_case_notes(bench, case)}
+
+    return _finished(bench, case, cast(xr.Dataset, rows.case(k, notes)))
+
+
 def judged(
     bench: Bench,
     recordings: Mapping[str, xr.Dataset],
@@ -204,12 +216,22 @@ def _bench_notes(bench: Bench) -> dict[str, str]:
 def _with_inputs(recording: xr.Dataset, case: Case) -> xr.Dataset:
     """Return a recording with what drove the model, where the model does not record that."""
     time = recording["time"].values
-    signals = signals_of(case.model.Stimulus)
     given = {name: y for name, y in case.stimulus(time).items() if name not in recording}
-    return recording.assign({
-        name: ("time", y, {"units": signals[name].unit, "long_name": signals[name].label})
-        for name, y in given.items()
-    })  # fmt: skip
+    attributes = _stimulus_attributes(case)
+    return recording.assign({name: ("time", y, attributes[name]) for name, y in given.items()})
+
+
+def inputs_recorded(rows: Rows, cases: Sequence[Case], wanted: Collection[str]) -> Rows:
+    """Return the rows of several runs with what drove them of the wanted signals they lack."""
+    each = [case.stimulus(rows["time"].values) for case in cases]
+    lacking = [name for name in each[0] if name in wanted and name not in rows]
+    given = {name: np.array([stimuli[name] for stimuli in each]) for name in lacking}
+    return rows.with_signals(given, _stimulus_attributes(cases[0])) if given else rows
+
+
+def _stimulus_attributes(case: Case) -> dict[str, dict[str, str]]:
+    signals = signals_of(case.model.Stimulus)
+    return {n: {"units": each.unit, "long_name": each.label} for n, each in signals.items()}
 
 
 def _described(stimuli: Mapping[str, Stimulus]) -> dict[str, Any]:

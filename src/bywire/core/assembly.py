@@ -14,13 +14,12 @@ from functools import cache
 from itertools import islice, repeat
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
 
-import numpy as np
-
 from bywire.core.errors import ModelError, unknown_name
 from bywire.core.gathering import AnyPart, contacts, gather, stores
 from bywire.core.model import Bounds, Matrix, Model
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
+from bywire.core.watching import warnings_of, watched_by_elements
 from bywire.core.wired import Instant, Wired, instant_of, line
 from bywire.core.wires import Integral, Shown, Wire
 
@@ -285,19 +284,11 @@ class Assembly(Model, Generic[ParT, MemoryT]):
 
         Of signals that are not recorded nothing is known, and nothing said.
         """
+        return warnings_of(self, recording, par)
 
-        def rows(kind: Any) -> Any:
-            return kind._make(
-                recording[name].values if name in recording else _NAN for name in kind._fields
-            )
-
-        watched = [part for part in self.parts.values() if part.has("watch")]
-        warnings: list[str] = []
-        with np.errstate(all="ignore"):
-            w = self.at(rows(self.State), rows(self.Memory), par) if watched else None
-            for part in watched:
-                warnings += _wired(w, part).call(part.element.watch, t=recording["time"].values)
-        return warnings
+    def watched(self, par: Any) -> tuple[str, ...] | None:
+        """Return the signals that ``watch`` looks at; None where it is written by hand."""
+        return watched_by_elements(self, par) if type(self).watch is Assembly.watch else None
 
     def _nothing(self) -> Any:
         """Return a memory that is not known: where it does not count, nobody must see it."""

@@ -184,6 +184,13 @@ class Model(Protocol):
         """
         return []
 
+    def watched(self, par: Any) -> tuple[str, ...] | None:
+        """Return the recorded signals that ``watch`` looks at; None where that is not known.
+
+        Studies record no others, beside those of key figures and of the books of energy.
+        """
+        return None
+
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
     """Yield the complete models that a module defines."""

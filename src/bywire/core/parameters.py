@@ -25,6 +25,7 @@ from bywire.core.refusals import refusals
 from bywire.core.units import Written
 
 T = TypeVar("T", bound="ParameterSet")
+_Named = tuple[dict[str, Any], dict[str, float], dict[str, Any]]
 
 
 class ParameterSet(BaseModel):
@@ -56,7 +57,7 @@ class ParameterSet(BaseModel):
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
-        return dict(self._values)
+        return dict(self._named("")[0])
 
     def leaves(self) -> dict[str, float]:
         """Return the numbers by dotted name, tables spread as ``name.0``, ``name.1``, ..."""
@@ -66,23 +67,33 @@ class ParameterSet(BaseModel):
         """Return the structural choices by dotted name, with the length of every table."""
         return dict(self.numbers_and_choices[1])
 
-    @cached_property
-    def _values(self) -> dict[str, Any]:
-        """Leaves and choices by dotted name; groups that several sets share look theirs up once."""
-        values: dict[str, Any] = {}
-        for name, value in _fields(self).items():
-            if isinstance(value, ParameterSet):
-                values |= {f"{name}.{inner}": v for inner, v in value._values.items()}
-            else:
-                values[name] = value
-        return values
+    @property
+    def numbers_and_choices(self) -> tuple[dict[str, float], dict[str, Any]]:
+        """Leaves and choices, tables spread; not to be changed."""
+        return self._named("")[1:]
 
     @cached_property
-    def numbers_and_choices(self) -> tuple[dict[str, float], dict[str, Any]]:
-        """Leaves and choices, tables spread."""
+    def _known(self) -> dict[str, _Named]:
+        return {}
+
+    def _named(self, prefix: str) -> _Named:
+        """Return all values by dotted name, the numbers of them with tables spread, the choices.
+
+        ``prefix``: what goes before the names. Groups that several sets share look theirs up once.
+        """
+        if prefix in self._known:
+            return self._known[prefix]
+        values: dict[str, Any] = {}
         numbers: dict[str, float] = {}
         choices: dict[str, Any] = {}
-        for name, value in self._values.items():
+        for field, value in _fields(self).items():
+            name = prefix + field
+            if isinstance(value, ParameterSet):
+                inner = value._named(f"{name}.")
+                for all_of_them, its_own in zip((values, numbers, choices), inner, strict=True):
+                    all_of_them.update(its_own)
+                continue
+            values[name] = value
             if isinstance(value, tuple):
                 numbers |= {f"{name}.{k}": float(v) for k, v in enumerate(value)}
                 choices[name] = len(value)
@@ -90,7 +101,8 @@ class ParameterSet(BaseModel):
                 numbers[name] = float(value)
             else:
                 choices[name] = value
-        return numbers, choices
+        self._known[prefix] = values, numbers, choices
+        return values, numbers, choices
 
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure that carries other objects as its numbers.

@@ -31,7 +31,7 @@ def first(t: Array, happens: Any, text: str, after: str = "") -> list[str]:
     text, after
         What is said before and behind the time.
     """
-    rows = np.broadcast_to(np.asarray(happens, dtype=bool), t.shape)
-    if not rows.any():
+    if not np.any(happens):
         return []
+    rows = np.broadcast_to(np.asarray(happens, dtype=bool), t.shape)
     return [f"{text} at t = {float(t[int(np.argmax(rows))]):.4g} s{after}"]

@@ -90,8 +90,13 @@ class Wired(Generic[X, U, F, P]):
         """Return what a function of the element gives, its arguments taken by their names."""
         return function(*(
             more[name] if name in more else self._argument(name, function)
-            for name in _arguments(function)
+            for name in arguments(function)
         ))  # fmt: skip
+
+    def felt(self, function: Callable[..., Any]) -> dict[str, Any]:
+        """Return those arguments of a function of the element that are no parameters, by name."""
+        wanted = [name for name in arguments(function) if name in ("x", "xe", "u", "f")]
+        return {name: self._argument(name, function) for name in wanted}
 
     def _argument(self, name: str, function: Callable[..., Any]) -> Any:
         if name == "x":
@@ -160,7 +165,8 @@ def instant_of(instance: Any, where: str) -> Instant:
 
 
 @cache
-def _arguments(function: Callable[..., Any]) -> tuple[str, ...]:
+def arguments(function: Callable[..., Any]) -> tuple[str, ...]:
+    """Return the names of a function's arguments."""
     return tuple(inspect.signature(function).parameters)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import warnings
 from collections.abc import Callable, Mapping
-from functools import cache, wraps
+from functools import cache, lru_cache, wraps
 from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
 
 import numpy as np
@@ -170,10 +170,14 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
 
 def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
     """Return what tells models of different structure apart: type, own fields, choices."""
-    structure = tuple(sorted((k, str(v)) for k, v in par.choices().items()))
     fields = sorted(getattr(model, "__dict__", {}).items())
     own = tuple((name, _fingerprint(value)) for name, value in fields)
-    return (type(model), own, type(par), structure)
+    return (type(model), own, type(par), _in_order(tuple(par.choices().items())))
+
+
+@lru_cache(maxsize=256)
+def _in_order(choices: tuple[tuple[str, Any], ...]) -> tuple[tuple[str, str], ...]:
+    return tuple(sorted((name, str(value)) for name, value in choices))
 
 
 def _fingerprint(value: object) -> object:

@@ -90,7 +90,7 @@ class Trajectory:
     @cached_property
     def doubt(self) -> str:
         """Why the result may be wrong though every substep settled; empty where there is none."""
-        return doubt_of(self.run)
+        return doubts_of([self.run])[0]
 
     def __getitem__(self, name: str) -> Array:
         """Return one signal, shape (rows,)."""
@@ -178,14 +178,22 @@ def simulate(
     )
 
 
-def doubt_of(run: Run) -> str:
-    """Return why the step may be too long for the contacts, judged at the start."""
-    if not run.model.compliance(run.par):
-        return ""
-    jacobians = prepare(run.model, run.par).contact_jacobians
-    p = np.array(list(run.par.leaves().values()))
-    opened, *closed = map(np.array, jacobians(np.array(run.state), np.array(run.memory), p))
-    return unresolved(opened, closed, run.step)
+def doubts_of(runs: Sequence[Run]) -> list[str]:
+    """Return why the step may be too long for the contacts, judged at the start of each run.
+
+    ``runs``: of one structure and one step.
+    """
+    first = runs[0]
+    if not first.model.compliance(first.par):
+        return [""] * len(runs)
+    jacobians = prepare(first.model, first.par).contact_jacobians
+    each = [(run.state, run.memory, list(run.par.leaves().values())) for run in runs]
+    columns = [np.array(rows, dtype=np.float64).T for rows in zip(*each, strict=True)]
+    size = len(first.state)
+    opened, *closed = (
+        J.full().reshape(size, len(runs), size).swapaxes(0, 1) for J in jacobians(*columns)
+    )
+    return unresolved(opened, closed, first.step)
 
 
 def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
@@ -197,9 +205,9 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
         When one of them is not finite.
     """
     rows = np.ascontiguousarray(run.stimulus(schedule.stimulus_times), dtype=np.float64)
-    holes = np.argwhere(~np.isfinite(rows))
-    if holes.size:
-        row, signal = holes[0]
+    is_finite = np.isfinite(rows)
+    if not is_finite.all():
+        row, signal = np.argwhere(~is_finite)[0]
         raise ParameterError(
             f"the stimulus {run.model.Stimulus._fields[signal]} is {rows[row, signal]} at "
             f"t = {schedule.stimulus_times[row]:g} s: it must be finite all through the run"

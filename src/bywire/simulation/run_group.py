@@ -10,9 +10,12 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
@@ -44,12 +47,73 @@ def fit_lanes(runs: Sequence[Run]) -> bool:
     )
 
 
+@dataclass(frozen=True)
+class RunGroup(Sequence[Trajectory]):
+    """What runs gave side by side: a sequence of their trajectories, kept together.
+
+    Parameters
+    ----------
+    runs
+        What was computed.
+    time
+        Times of the rows [s], shape (rows,).
+    values
+        Signals, each of all runs in one piece, shape (signals, runs, rows).
+    names
+        Signals, in the order of the first axis.
+    vectors
+        State vectors at the end, shape (entries, runs).
+    kernel
+        What computed them.
+    """
+
+    runs: tuple[Run, ...]
+    time: Array
+    values: Array
+    names: tuple[str, ...]
+    vectors: Array
+    kernel: LaneKernel
+
+    @property
+    def unsettled(self) -> NDArray[np.int64]:
+        """Substeps of each run that hit the cap of the contact iteration, shape (runs,)."""
+        return np.asarray(self.vectors[self.kernel.layout.start["counters"]], dtype=np.int64)
+
+    def __len__(self) -> int:
+        return len(self.runs)
+
+    @overload
+    def __getitem__(self, k: int) -> Trajectory: ...
+
+    @overload
+    def __getitem__(self, k: slice) -> tuple[Trajectory, ...]: ...
+
+    def __getitem__(self, k: int | slice) -> Trajectory | tuple[Trajectory, ...]:
+        if isinstance(k, slice):
+            return tuple(self)[k]
+        unsettled, repeated = (
+            int(n) for n in self.vectors[self.kernel.layout.start["counters"] :, k][:2]
+        )
+        return Trajectory(
+            run=self.runs[k],
+            time=self.time,
+            values=self.values[:, k].T,
+            names=self.names,
+            status="unsettled" if unsettled else "done",
+            unsettled=unsettled,
+            repeated=repeated,
+            engine=self.kernel.label,
+            vector=self.vectors[:, k].copy(),
+        )
+
+
 def simulate_group(
     runs: Sequence[Run],
     signals: Sequence[str] | None = None,
     threads: int | None = None,
     progress: Callable[[float], None] | None = None,
-) -> tuple[Trajectory, ...]:
+    first: int = 0,
+) -> RunGroup:
     """Compute runs that `fit_lanes`, each with its parameters, initial values and stimulus.
 
     Parameters
@@ -62,6 +126,8 @@ def simulate_group(
         Threads to use, >= 1; all cores by default.
     progress
         Called with the finished share, 0 to 1, now and then.
+    first
+        Rows at the beginning that are not recorded, for instance those of a settling time.
 
     Raises
     ------
@@ -86,33 +152,37 @@ def simulate_group(
     wanted = names if signals is None else tuple(signals)
     kernel = lane_kernel(prepared, compiler, tuple(selected(names, wanted).tolist()))
     schedule = runs[0].schedule()
-    shape = (kernel.lanes, schedule.rows, len(wanted))
-    groups = [runs[k : k + kernel.lanes] for k in range(0, len(runs), kernel.lanes)]
-    watch = _Watch(len(groups), progress)
+    edges = _edges(schedule, first)
+    watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
+    values = np.empty((len(wanted), len(runs), schedule.rows - first))
 
-    def computed(group: Sequence[Run]) -> tuple[Array, Array]:
-        values = np.empty(shape)
-        return values, _advanced(kernel, schedule, group, values, watch)
+    def computed(begin: int) -> Array:
+        cases = slice(begin, begin + kernel.lanes)
+        return _advanced(kernel, schedule, runs[cases], values[:, cases], edges, first, watch)
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         try:
-            results = list(pool.map(computed, groups))
+            vectors = list(pool.map(computed, range(0, len(runs), kernel.lanes)))
         except BaseException:
             watch.stop.set()
             raise
-    return tuple(
-        _trajectory(run, schedule, kernel, wanted, values[lane], vector[:, lane])
-        for group, (values, vector) in zip(groups, results, strict=True)
-        for lane, run in enumerate(group)
-    )
+    vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
+    return RunGroup(tuple(runs), schedule.record_times[first:], values, wanted, vector, kernel)
+
+
+def _edges(schedule: Schedule, first: int) -> list[int]:
+    """Return the frames at which pieces of a run begin and end; one at the first row recorded."""
+    every = schedule.record_frames
+    edges = {*np.linspace(0, schedule.frames // every, _CHUNKS + 1).astype(int).tolist(), first}
+    return [each * every for each in sorted(edges)]
 
 
 class _Watch:
     """Progress of several threads, and whether they shall stop."""
 
-    def __init__(self, groups: int, progress: Callable[[float], None] | None) -> None:
+    def __init__(self, pieces: int, progress: Callable[[float], None] | None) -> None:
         self.stop = threading.Event()
-        self._pieces, self._done = groups * _CHUNKS, 0
+        self._pieces, self._done = pieces, 0
         self._progress, self._lock = progress, threading.Lock()
 
     def piece(self) -> None:
@@ -123,8 +193,9 @@ class _Watch:
 
 
 def _advanced(
-    kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], values: Array, watch: _Watch
-) -> Array:
+    kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], values: Array,
+    edges: Sequence[int], skipped: int, watch: _Watch,
+) -> Array:  # fmt: skip
     """Carry a group to the end of its runs; fill ``values``, return the state vectors."""
     filled = [*group, *[group[-1]] * (kernel.lanes - len(group))]  # idle lanes repeat the last
     parameters = np.array([list(run.par.leaves().values()) for run in filled]).T.copy()
@@ -132,37 +203,23 @@ def _advanced(
     each = [sampled_stimulus(run, schedule) for run in group]
     stimulus = each[0]
     if any(not np.array_equal(rows, stimulus) for rows in each[1:]):
-        stimulus = np.stack([*each, *[each[-1]] * (kernel.lanes - len(group))], axis=2)
+        stimulus = np.empty((*stimulus.shape, kernel.lanes))
+        for lane in range(kernel.lanes):
+            stimulus[:, :, lane] = each[min(lane, len(each) - 1)]
     every = schedule.record_frames
-    edges = np.unique(np.linspace(0, schedule.frames // every, _CHUNKS + 1).astype(int)) * every
-    edges[-1] = schedule.frames
+    silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the very first row
     for begin, end in pairwise(edges):
         if watch.stop.is_set():
             break
-        first = int(begin) // every
-        last = schedule.rows if end == schedule.frames else int(end) // every
-        rows = np.empty((kernel.lanes, last - first, values.shape[2]))  # a kernel fills a block
-        kernel.advance(schedule, parameters, stimulus, vector, rows, int(end), int(begin))
-        values[:, first:last] = rows
+        first = begin // every - skipped
+        last = (schedule.rows if end == schedule.frames else end // every) - skipped
+        recorded = first >= 0
+        rows = np.empty((kernel.lanes, last - first if recorded else 1, values.shape[0]))
+        plan = schedule if recorded else silent
+        kernel.advance(plan, parameters, stimulus, vector, rows, end, begin)
+        if recorded:  # a kernel fills a block: here the rows of a signal come into one piece
+            values[:, :, first:last] = rows[: len(group)].transpose(2, 0, 1)
         require_finite(kernel.layout, vector, f"one of {len(group)} runs left the numbers before "
                        f"t = {end * schedule.frame:g} s")  # fmt: skip
         watch.piece()
     return vector
-
-
-def _trajectory(
-    run: Run, schedule: Schedule, kernel: LaneKernel, names: tuple[str, ...], values: Array,
-    vector: Array,
-) -> Trajectory:  # fmt: skip
-    unsettled, repeated = (int(n) for n in vector[kernel.layout.start["counters"] :][:2])
-    return Trajectory(
-        run=run,
-        time=schedule.record_times,
-        values=values,
-        names=names,
-        status="unsettled" if unsettled else "done",
-        unsettled=unsettled,
-        repeated=repeated,
-        engine=kernel.label,
-        vector=vector.copy(),
-    )

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -97,11 +98,18 @@ def plan(duration: float, step: float, periods: Mapping[str, float], record: flo
         When the step does not divide a sample time or the recording interval, or is much too
         short for it.
     """
+    return _planned(duration, step, tuple(periods.items()), record)
+
+
+@lru_cache(maxsize=256)  # the cases of a study ask for the same one, several times each
+def _planned(
+    duration: float, step: float, periods: tuple[tuple[str, float], ...], record: float
+) -> Schedule:
     if not (math.isfinite(step) and step > 0):
         raise StepError(f"step = {step:g} s is not admissible: it must be > 0 s, usually 20 us")
     if not (math.isfinite(duration) and duration > 0):
         raise StepError(f"duration = {duration:g} s is not admissible: it must be > 0 s")
-    counts = {name: _whole(period, step, name) for name, period in periods.items()}
+    counts = {name: _whole(period, step, name) for name, period in periods}
     recorded = _whole(record, step, "recording")
     frame = math.gcd(recorded, *counts.values())
     rows = math.ceil(duration / record - _TOLERANCE)

@@ -49,32 +49,41 @@ def _stiffness(C: Any) -> Any:
 
 def unresolved(
     opened: NDArray[np.float64], closed: Sequence[NDArray[np.float64]], step: float
-) -> str:
-    """Return what is wrong with a step for the closed contacts; empty where nothing is.
+) -> list[str]:
+    """Return what is wrong with a step for the closed contacts of each case; empty for nothing.
 
     Parameters
     ----------
     opened, closed
-        Jacobians of dx/dt [1/s], shape (nx, nx) each, closed at one load or several.
+        Jacobians of dx/dt [1/s], shape (cases, nx, nx) each, closed at one load or several.
     step
         Substep [s].
     """
-    # Without contacts nothing changes by closing them, and nothing need be decomposed.
-    found = (_too_fast(opened, J, step) for J in closed if not np.array_equal(opened, J))
-    return next((text for text in found if text), "")
+    texts = [""] * len(opened)
+    for J in closed:
+        # Without contacts nothing changes by closing them, and nothing need be decomposed.
+        changed = (opened != J).any((1, 2)) & np.isfinite(opened + J).all((1, 2))
+        cases = [k for k in np.flatnonzero(changed) if not texts[k]]
+        for k, text in zip(cases, _too_fast(opened[cases], J[cases], step), strict=True):
+            texts[k] = text
+    return texts
 
 
-def _too_fast(opened: NDArray[np.float64], closed: NDArray[np.float64], step: float) -> str:
-    if not (np.all(np.isfinite(opened)) and np.all(np.isfinite(closed))):
-        return ""
-    fastest = np.abs(np.linalg.eigvals(opened).imag).max(initial=0.0)
-    for mode in np.linalg.eigvals(closed):
-        omega = abs(mode)
-        swings = abs(mode.imag) > 1.2 * fastest and -mode.real < DAMPED * omega
-        if swings and step * omega > SAFE:
-            return (
-                f"a closed contact swings at {omega / (2 * np.pi):.4g} Hz, too fast for steps of "
-                f"{step * 1e6:g} us: rebounds may be wrong; take steps of at most "
-                f"{SAFE / omega * 1e6:.2g} us, a softer contact, or more damping"
+def _too_fast(
+    opened: NDArray[np.float64], closed: NDArray[np.float64], step: float
+) -> list[str]:
+    modes = np.linalg.eigvals(closed)
+    omega = np.abs(modes)
+    likely = (modes.imag != 0.0) & (-modes.real < DAMPED * omega) & (step * omega > SAFE)
+    texts = [""] * len(modes)
+    for k in np.flatnonzero(likely.any(axis=1)):
+        fastest = np.abs(np.linalg.eigvals(opened[k]).imag).max(initial=0.0)
+        swings = likely[k] & (np.abs(modes[k].imag) > 1.2 * fastest)
+        if swings.any():
+            swinging = omega[k][swings][0]
+            texts[k] = (
+                f"a closed contact swings at {swinging / (2 * np.pi):.4g} Hz, too fast for steps "
+                f"of {step * 1e6:g} us: rebounds may be wrong; take steps of at most "
+                f"{SAFE / swinging * 1e6:.2g} us, a softer contact, or more damping"
             )
-    return ""
+    return texts

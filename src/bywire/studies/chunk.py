@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
-from bywire.bench.ensemble import KeyFigures, changed, key_figures_of
+from bywire.bench.ensemble import changed
+from bywire.bench.key_figures import key_figures_of
 from bywire.core.errors import BywireError
 from bywire.studies.plan import CHUNK, StudyPlan
 
@@ -75,18 +76,13 @@ def computed_chunk(
             benches[k] = case_bench(plan, int(numbers[k]), given)
         except BywireError as error:
             failures[k] = str(error)
-    results: dict[int, KeyFigures] = {}
-    for group in _alike(benches):
-        results |= _results({k: benches[k] for k in group}, failures, threads)
     names = plan.bench.definition.kpis_with(plan.bench.chosen_options)
     columns: Columns = {CASE: numbers, **values}
     columns |= {name: np.full(count, math.nan) for name in names}
-    for k, result in results.items():
-        for kpi in result.kpis:
-            columns[kpi.name][k] = kpi.value
-    columns[FAILURE] = np.array(failures, dtype=object)
-    said = ["; ".join(results[k].warnings) if k in results else "" for k in range(count)]
-    columns[WARNINGS] = np.array(said, dtype=object)
+    columns |= {name: np.full(count, "", dtype=object) for name in (FAILURE, WARNINGS)}
+    columns[FAILURE][:] = failures
+    for group in _alike(benches):
+        _fill(columns, group, benches, threads)
     # Models that were evaluated refer to themselves and to arrays: too few objects for Python to
     # look for them soon, and too many megabytes to wait.
     gc.collect(1)
@@ -121,17 +117,20 @@ def _alike(benches: Mapping[int, Bench]) -> list[list[int]]:
     return list(groups.values())
 
 
-def _results(
-    benches: Mapping[int, Bench], failures: list[str], threads: int | None
-) -> dict[int, KeyFigures]:
-    """Return the results of cases; where they fail together, each for itself says why."""
-    cases: Sequence[int] = list(benches)
+def _fill(
+    columns: Columns, cases: Sequence[int], benches: Mapping[int, Bench], threads: int | None
+) -> None:
+    """Put what cases give into their rows; where they fail together, each for itself says why."""
     try:
-        return dict(zip(cases, key_figures_of(list(benches.values()), threads), strict=True))
+        given = key_figures_of([benches[k] for k in cases], threads)
     except BywireError as error:
         if len(cases) == 1:
-            failures[cases[0]] = str(error)
-            return {}
-    middle = len(cases) // 2
-    halves = ({k: benches[k] for k in part} for part in (cases[:middle], cases[middle:]))
-    return {k: result for half in halves for k, result in _results(half, failures, threads).items()}
+            columns[FAILURE][cases[0]] = str(error)
+            return
+        middle = len(cases) // 2
+        _fill(columns, cases[:middle], benches, threads)
+        _fill(columns, cases[middle:], benches, threads)
+        return
+    for figure in given.figures:
+        columns[figure.name][cases] = figure.values
+    columns[WARNINGS][cases] = ["; ".join(texts) for texts in given.warnings]

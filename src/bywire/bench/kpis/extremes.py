@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import defect, measure, signal
+from bywire.bench.kpis.kpi import measure
+from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 
@@ -17,12 +19,14 @@ from bywire.core.typing import Array
 class Setting:
     """Name of the signal in the recording."""
 
+    BY_CASE: ClassVar[tuple[str, ...]] = ()
+
     signal: str
 
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Samples of a signal: times [s] and values of shape ``(n,)``, and its SI unit."""
+    """Samples of a signal: times [s], shape ``(n,)``, values, ``(..., n)``, and its SI unit."""
 
     t: Array
     y: Array
@@ -57,12 +61,12 @@ def select(recording: xr.Dataset, setting: Setting) -> Course:
 
 
 @measure("level")
-def output_max(data: Course) -> float:
+def output_max(data: Course) -> Array:
     """Largest value of the output, over the recorded samples."""
-    return float(np.max(data.y))
+    return np.asarray(np.max(data.y, axis=-1))
 
 
 @measure("level")
-def output_min(data: Course) -> float:
+def output_min(data: Course) -> Array:
     """Smallest value of the output, over the recorded samples."""
-    return float(np.min(data.y))
+    return np.asarray(np.min(data.y, axis=-1))

@@ -17,7 +17,8 @@ from functools import cached_property
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Undefined, defect, measure, signal
+from bywire.bench.kpis.kpi import Undefined, measure
+from bywire.bench.kpis.samples import defect, signal
 from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.core.typing import Array
 

@@ -3,6 +3,10 @@
 A family (one file) has a data class with what its figures need and one function per figure,
 declared with `measure`. A figure that is not defined for a recording is NaN with a reason in
 its note, never an exception and never a number that stands for something else.
+
+The functions of a family whose ``Setting`` declares ``BY_CASE`` take the signals of many cases as
+those of one: shape ``(..., n)``, time last. They give `Values`, NaN for the cases that do not
+define the figure. One run is the case without leading axes.
 """
 
 from __future__ import annotations
@@ -11,12 +15,11 @@ import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Generic, Protocol, SupportsFloat, TypeVar
+from typing import Any, Generic, Protocol, SupportsFloat, TypeVar
 
 import numpy as np
-import xarray as xr
 
-from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.errors import unknown_name
 from bywire.core.typing import Array
 
 
@@ -116,6 +119,56 @@ class Undefined:
     reason: str
 
 
+Why = tuple[Any, Callable[[Any], str]]
+"""where a figure is not defined, shape ``(...)``, and ``say(case)``, the reason for one of these"""
+
+
+class Values:
+    """A figure of one case, or of many.
+
+    Parameters
+    ----------
+    values
+        Shape ``(...)``.
+    reasons
+        What makes a case undefined; of several the first is told.
+    """
+
+    def __init__(self, values: Any, *reasons: Why) -> None:
+        self.reasons = reasons
+        self.values = np.asarray(values, dtype=np.float64)
+        for wrong, _ in reasons:
+            self.values = np.where(wrong, math.nan, self.values)
+
+    def reason(self, case: Any = ()) -> str:
+        """Return why the figure of a case is not defined; empty where it is."""
+        for wrong, say in self.reasons:
+            where = np.asarray(wrong)
+            if where[case] if where.ndim else where:
+                return say(case)
+        return ""
+
+
+@dataclass(frozen=True)
+class KpiOfCases:
+    """A key figure of many cases; fields as of `Kpi`.
+
+    ``values``: shape ``(cases,)``; ``told``: ``told(case)``, the note of a case.
+    """
+
+    name: str
+    values: Array
+    unit: str
+    definition: str
+    told: Callable[[Any], str]
+
+    def case(self, k: Any) -> Kpi:
+        """Return the figure of one case."""
+        value = float(self.values[k])
+        known = math.nan if math.isnan(value) else value  # the NaN that is the same as itself
+        return Kpi(self.name, known, self.unit, self.definition, self.told(k))
+
+
 class Data(Protocol):
     """What a family computes its figures from."""
 
@@ -146,15 +199,18 @@ class Measure(Generic[D]):
     unit
         SI unit, ``"%"``, or a placeholder that the data resolve, for instance ``"level"``.
     function
-        Returns the value, or why there is none. Its name and its docstring's first line are
-        the figure's name and definition.
+        Returns the value, or why there is none; of many cases their values, or `Values`. Its name
+        and its docstring's first line are the figure's name and definition.
     needs
         Fields of the family's setting that name signals, one of which at least it needs; none
         where the family cannot do without any of them.
     """
 
     def __init__(
-        self, unit: str, function: Callable[[D], float | Undefined], needs: tuple[str, ...] = ()
+        self,
+        unit: str,
+        function: Callable[[D], float | Undefined | Values | Array],
+        needs: tuple[str, ...] = (),
     ) -> None:
         self.name = function.__name__
         self.unit = unit
@@ -165,75 +221,27 @@ class Measure(Generic[D]):
 
     def __call__(self, data: D) -> Kpi:
         """Return the figure; NaN with a reason where the data do not define it."""
-        unit = data.units.get(self.unit, self.unit)
-        value = Undefined(data.defect) if data.defect else self.__wrapped__(data)
+        return self.of_cases(data).case(())
+
+    def of_cases(self, data: D) -> KpiOfCases:
+        """Return the figure of all cases that the data hold."""
+        unit, note = data.units.get(self.unit, self.unit), data.note
+        value: Any = Undefined(data.defect) if data.defect else self.__wrapped__(data)
         if isinstance(value, Undefined):
-            return Kpi(self.name, math.nan, unit, self.definition, value.reason)
-        return Kpi(self.name, float(value), unit, self.definition, data.note)
+            reason = value.reason
+            value = Values(math.nan, (True, lambda _: reason))
+        figure = value if isinstance(value, Values) else Values(value)
+        return KpiOfCases(
+            self.name, figure.values, unit, self.definition, lambda k: figure.reason(k) or note
+        )
 
 
 def measure(
     unit: str, needs: tuple[str, ...] = ()
-) -> Callable[[Callable[[D], float | Undefined]], Measure[D]]:
+) -> Callable[[Callable[[D], float | Undefined | Values | Array]], Measure[D]]:
     """Declare a function as a key figure with a unit, and what it needs; see `Measure`."""
 
-    def declare(function: Callable[[D], float | Undefined]) -> Measure[D]:
+    def declare(function: Callable[[D], float | Undefined | Values | Array]) -> Measure[D]:
         return Measure(unit, function, needs)
 
     return declare
-
-
-def signal(recording: xr.Dataset, name: str) -> tuple[Array, str]:
-    """Return one signal of a recording and its unit.
-
-    Returns
-    -------
-    values
-        Shape ``(time,)``.
-    unit
-        SI unit, ``"1"`` where none is recorded.
-
-    Raises
-    ------
-    UnknownNameError
-        When the recording does not hold the signal.
-    ParameterError
-        When the signal has other dimensions than time.
-    """
-    if name not in recording:
-        raise unknown_name("signal of the recording", name, map(str, recording.variables))
-    variable = recording[name]
-    if variable.dims != ("time",):
-        raise ParameterError(
-            f"signal {name!r} has the dimensions {variable.dims}: key figures need time alone; "
-            "select one case first, for instance recording.isel(case=0)"
-        )
-    return np.asarray(variable.values, dtype=np.float64), str(variable.attrs.get("units", "1"))
-
-
-def defect(t: Array, *signals: Array) -> str:
-    """Return why samples are unusable, or an empty text.
-
-    Parameters
-    ----------
-    t
-        Times [s], shape ``(n,)``.
-    signals
-        Signals over these times, shape ``(n,)`` each.
-    """
-    if t.size < 2:
-        return f"{t.size} samples are too few: two at least are needed"
-    if not np.all(np.isfinite(t)) or np.any(np.diff(t) <= 0):
-        return "the times do not increase"
-    for values in signals:
-        if values.shape != t.shape:
-            return f"{values.size} values do not fit {t.size} times"
-        bad = ~np.isfinite(values)
-        if np.any(bad):
-            return f"not a number at {t[np.argmax(bad)]:g} s"
-    return ""
-
-
-def integral(t: Array, y: Array) -> float:
-    """Return the integral over time by the trapezoidal rule, exact for straight pieces."""
-    return float(np.sum(0.5 * (y[1:] + y[:-1]) * np.diff(t)))

@@ -5,17 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Undefined, defect, integral, measure, signal
+from bywire.bench.kpis.kpi import Undefined, Values, measure
+from bywire.bench.kpis.samples import defect, integral, signal
 from bywire.core.typing import Array
 
 
 @dataclass(frozen=True)
 class Setting:
     """Names of the signals in the recording."""
+
+    BY_CASE: ClassVar[tuple[str, ...]] = ()
 
     stuck: str = "stuck"
     t_stuck: str = "t_stuck"
@@ -32,9 +36,9 @@ class Occupation:
     t
         Times [s], increasing, shape ``(n,)``.
     stuck, sat_current, sat_duty
-        1 while in the mode, else 0; shape ``(n,)``, or None where it is not recorded.
+        1 while in the mode, else 0; shape ``(..., n)``, or None where it is not recorded.
     t_stuck
-        Time stuck since the start [s], shape ``(n,)``, or None.
+        Time stuck since the start [s], shape ``(..., n)``, or None.
     """
 
     t: Array
@@ -69,19 +73,21 @@ def select(recording: xr.Dataset, setting: Setting) -> Occupation:
 
 
 @measure("1", needs=("t_stuck", "stuck"))
-def share_stuck(data: Occupation) -> float | Undefined:
+def share_stuck(data: Occupation) -> Array | Values | Undefined:
     """Share of the time during which the shaft is stuck.
 
     From the time stuck that the engine integrates, where it is recorded: short sticking between
     two samples counts. Else from the samples of the mode, as `share_sat_current`.
     """
     if data.t_stuck is not None:
-        return float((data.t_stuck[-1] - data.t_stuck[0]) / (data.t[-1] - data.t[0]))
+        return np.asarray(
+            (data.t_stuck[..., -1] - data.t_stuck[..., 0]) / (data.t[-1] - data.t[0])
+        )
     return _share(data.t, data.stuck, "stuck")
 
 
 @measure("1", needs=("sat_current",))
-def share_sat_current(data: Occupation) -> float | Undefined:
+def share_sat_current(data: Occupation) -> Array | Values | Undefined:
     """Share of the time during which the current demand is saturated.
 
     Trapezoidal mean of the mode's samples: a change counts as halfway between two samples.
@@ -90,7 +96,7 @@ def share_sat_current(data: Occupation) -> float | Undefined:
 
 
 @measure("1", needs=("sat_duty",))
-def share_sat_duty(data: Occupation) -> float | Undefined:
+def share_sat_duty(data: Occupation) -> Array | Values | Undefined:
     """Share of the time during which the duty cycle is saturated.
 
     Trapezoidal mean of the mode's samples: a change counts as halfway between two samples.
@@ -98,9 +104,9 @@ def share_sat_duty(data: Occupation) -> float | Undefined:
     return _share(data.t, data.sat_duty, "saturated duty cycle")
 
 
-def _share(t: Array, mode: Array | None, label: str) -> float | Undefined:
+def _share(t: Array, mode: Array | None, label: str) -> Values | Undefined:
     if mode is None:
         return Undefined(f"the mode '{label}' is not recorded")
-    if not np.all((mode == 0.0) | (mode == 1.0)):
-        return Undefined(f"the mode '{label}' holds other values than 0 and 1")
-    return integral(t, mode) / float(t[-1] - t[0])
+    other = ~np.all((mode == 0.0) | (mode == 1.0), axis=-1)
+    share = integral(t, mode) / (t[-1] - t[0])
+    return Values(share, (other, lambda _: f"the mode '{label}' holds other values than 0 and 1"))

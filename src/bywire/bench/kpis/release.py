@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Undefined, defect, measure, signal
+from bywire.bench.kpis.kpi import Values, measure
+from bywire.bench.kpis.samples import defect, sample, signal
 from bywire.core.typing import Array
 
 
@@ -25,17 +27,22 @@ class Setting:
         Level below which it counts as released, in its SI unit.
     """
 
+    BY_CASE: ClassVar[tuple[str, ...]] = ("empty",)
+
     signal: str
     empty: float
 
 
 @dataclass(frozen=True, eq=False)
 class Release:
-    """A signal from the release on: times [s], values, its SI unit, and the level of `Setting`."""
+    """A signal from the release on: times [s], values, its SI unit, and the level of `Setting`.
+
+    Times and values of shapes ``(n,)`` and ``(..., n)``, the level ``(...)``.
+    """
 
     t: Array
     y: Array
-    empty: float
+    empty: float | Array
     unit: str = "1"
 
     @property
@@ -62,29 +69,32 @@ def select(recording: xr.Dataset, setting: Setting) -> Release:
     UnknownNameError
         When the recording does not hold it.
     """
-    after = recording.sel(time=slice(-1e-9, None))
-    t, _ = signal(after, "time")
-    y, unit = signal(after, setting.signal)
-    return Release(t, y, setting.empty, unit)
+    t, _ = signal(recording, "time")
+    y, unit = signal(recording, setting.signal)
+    first = int(np.searchsorted(t, -1e-9))
+    return Release(t[first:], y[..., first:], setting.empty, unit)
 
 
 @measure("s")
-def time_to_empty(data: Release) -> float | Undefined:
+def time_to_empty(data: Release) -> Values:
     """Time from the release until the output stays below the level that counts as empty.
 
     Interpolated between the last sample above it and the next one.
     """
-    above = np.flatnonzero(data.y > data.empty)
-    if not above.size:
-        return 0.0
-    k = int(above[-1])
-    if k + 1 == data.t.size:
-        return Undefined("it does not empty in the recorded time")
-    share = (data.y[k] - data.empty) / (data.y[k] - data.y[k + 1])
-    return float(data.t[k] + share * (data.t[k + 1] - data.t[k]))
+    t, y, last = data.t, data.y, data.t.size - 1
+    above = y > np.asarray(data.empty)[..., None]
+    k = last - np.argmax(above[..., ::-1], axis=-1)
+    full = above[..., -1]
+    k = np.where(full, 0, np.minimum(k, last - 1))
+    here, there = sample(y, k), sample(y, k + 1)
+    with np.errstate(all="ignore"):  # where it never was above
+        share = (here - data.empty) / (here - there)
+        left = t[k] + share * (t[k + 1] - t[k])
+    emptied = np.where(above.any(axis=-1), left, 0.0)
+    return Values(emptied, (full, lambda _: "it does not empty in the recorded time"))
 
 
 @measure("level")
-def residual_level(data: Release) -> float:
+def residual_level(data: Release) -> Array:
     """Output at the end of the recording."""
-    return float(data.y[-1])
+    return np.asarray(data.y[..., -1])

@@ -16,7 +16,8 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.bench.kpis.kpi import Undefined, defect, measure, signal
+from bywire.bench.kpis.kpi import Undefined, measure
+from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
 
 _HALF_POWER = math.sqrt(0.5)

@@ -23,32 +23,34 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
     t
         Times [s], increasing, shape ``(n,)``.
     y
-        Signal, shape ``(n,)``.
+        Signal, shape ``(..., n)``.
     period
         Averaging time T [s], at most the whole record; zero or less returns the signal itself.
 
     Returns
     -------
     numpy.ndarray
-        Shape ``(n,)``.
+        Shape ``(..., n)``.
     """
     if period <= 0 or t.size < 2:
         return y
     width = min(period, float(t[-1] - t[0]))
     a = np.clip(t - 0.5 * width, t[0], t[-1] - width)
-    return np.asarray((_primitive(t, y, a + width) - _primitive(t, y, a)) / width)
+    slope = (y[..., 1:] - y[..., :-1]) / (t[1:] - t[:-1])
+    pieces = 0.5 * (y[..., 1:] + y[..., :-1]) * np.diff(t)
+    total = np.zeros(y.shape)
+    np.cumsum(pieces, axis=-1, out=total[..., 1:])
+
+    def primitive(at: Array) -> Array:
+        """Return the integral of the piecewise straight signal from ``t[0]`` to each instant."""
+        k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
+        d = at - t[k]
+        total_k, y_k, slope_k = (np.take(each, k, axis=-1) for each in (total, y, slope))
+        return np.asarray(total_k + y_k * d + 0.5 * slope_k * d**2)
+
+    return np.asarray((primitive(a + width) - primitive(a)) / width)
 
 
 def treatment(period: float) -> str:
     """Return the note on figures of a smoothed signal; empty for the raw one."""
     return f"of the moving average over {period:g} s" if period > 0 else ""
-
-
-def _primitive(t: Array, y: Array, at: Array) -> Array:
-    """Return the integral of the piecewise straight signal from ``t[0]`` to each instant."""
-    pieces = 0.5 * (y[1:] + y[:-1]) * np.diff(t)
-    total = np.concatenate(([0.0], np.cumsum(pieces)))
-    k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
-    d = at - t[k]
-    slope = (y[k + 1] - y[k]) / (t[k + 1] - t[k])
-    return np.asarray(total[k] + y[k] * d + 0.5 * slope * d**2)

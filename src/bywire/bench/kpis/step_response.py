@@ -12,11 +12,13 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any, ClassVar
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.kpis.kpi import Undefined, defect, integral, measure, signal
+from bywire.bench.kpis.kpi import Undefined, Values, Why, measure
+from bywire.bench.kpis.samples import defect, integral, sample, signal
 from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.core.typing import Array
 
@@ -28,6 +30,8 @@ _SETTLED = 0.1  # of the time after the step: must lie inside the band, else not
 @dataclass(frozen=True)
 class Setting:
     """What the step was, and how to look at its response.
+
+    The levels may differ between cases that are judged together: shape ``(...)`` then.
 
     Parameters
     ----------
@@ -46,6 +50,8 @@ class Setting:
         Name of the set point in the recording, for figures; empty where none is recorded.
     """
 
+    BY_CASE: ClassVar[tuple[str, ...]] = ("start", "end")
+
     signal: str
     t_step: float
     start: float | None = None
@@ -62,9 +68,10 @@ class StepResponse:
     Parameters
     ----------
     t, y
-        Times [s], increasing from the instant of the step, and response, shape ``(n,)`` each.
+        Times [s], increasing from the instant of the step, shape ``(n,)``, and response,
+        ``(..., n)``.
     start, end, unit
-        Levels of 0 % and 100 %, and the response's SI unit.
+        Levels of 0 % and 100 %, shape ``(...)``, and the response's SI unit.
     window
         Beginning and end [s] of the steady state; None for the last 20 %.
     is_tracking
@@ -75,8 +82,8 @@ class StepResponse:
 
     t: Array
     y: Array
-    start: float
-    end: float
+    start: Any
+    end: Any
     unit: str = "1"
     window: tuple[float, float] | None = None
     is_tracking: bool = True
@@ -94,25 +101,38 @@ class StepResponse:
         return self.problem or defect(self.t, self.y)
 
     @cached_property
-    def course(self) -> Array | Undefined:
-        """The response with 0 at ``start`` and 1 at ``end``."""
-        height = self.end - self.start
-        if not np.isfinite(height) or abs(height) <= 1e-12 * max(abs(self.start), abs(self.end)):
-            return Undefined(f"the step height is zero ({self.start:g} to {self.end:g})")
+    def blind(self) -> tuple[Why, ...]:
+        """Where there is no step to be seen, and why."""
+        start, end = np.asarray(self.start), np.asarray(self.end)
+        height = np.abs(end - start)
+        least = 1e-12 * np.maximum(np.abs(start), np.abs(end))
+        flat: Why = (
+            ~np.isfinite(height) | (height <= least),
+            lambda c: f"the step height is zero ({_at(start, c):g} to {_at(end, c):g})",
+        )
+        if self.is_tracking:
+            return (flat,)
         inside = self.y if isinstance(self.steady, Undefined) else self.steady[1]
-        if not self.is_tracking and abs(height) <= np.ptp(inside):
-            return Undefined("the response changes by less than its ripple: no step is seen")
-        return np.asarray((self.y - self.start) / height)
+        text = "the response changes by less than its ripple: no step is seen"
+        return (flat, (height <= np.ptp(inside, axis=-1), lambda _: text))
+
+    @cached_property
+    def course(self) -> Array:
+        """The response with 0 at ``start`` and 1 at ``end``; nothing else where `blind`."""
+        start = np.asarray(self.start)[..., None]
+        height = np.asarray(self.end)[..., None] - start
+        with np.errstate(all="ignore"):
+            return np.asarray((self.y - start) / height)
 
     @cached_property
     def steady(self) -> tuple[Array, Array] | Undefined:
         """Times and values in the window of the steady state."""
         t, last = self.t, float(self.t[-1])
         a, b = self.window or (last - _LAST * (last - float(t[0])), last)
-        inside = (t >= a) & (t <= b)
-        if np.count_nonzero(inside) < 2:
+        inside = slice(np.searchsorted(t, a), np.searchsorted(t, b, side="right"))
+        if t[inside].size < 2:
             return Undefined(f"the steady state's window, {a:g} to {b:g} s, holds < 2 samples")
-        return t[inside], self.y[inside]
+        return t[inside], self.y[..., inside]
 
 
 def select(recording: xr.Dataset, setting: Setting) -> StepResponse:
@@ -133,24 +153,26 @@ def select(recording: xr.Dataset, setting: Setting) -> StepResponse:
         return replace(whole, problem=problem)
     y = smoothed(t, raw, setting.smoothing)
     first = int(np.searchsorted(t, setting.t_step, side="right"))
+    begins = _between(t, y, setting.t_step)[..., None]
     after = replace(
         whole,
         t=np.append(setting.t_step, t[first:]),
-        y=np.append(np.interp(setting.t_step, t, y), y[first:]),
+        y=np.concatenate((begins, y[..., first:]), axis=-1),
         is_tracking=setting.end is not None,
         note=treatment(setting.smoothing),
     )
-    start, end = setting.start, _mean(after) if setting.end is None else setting.end
+    start: Any = setting.start
+    end: Any = _mean(after) if setting.end is None else setting.end
     if start is None:
-        before = y[t < setting.t_step - 0.5 * setting.smoothing]
-        start = float(np.mean(before) if before.size else after.y[0])
+        before = y[..., : np.searchsorted(t, setting.t_step - 0.5 * setting.smoothing)]
+        start = np.mean(before, axis=-1) if before.size else after.y[..., 0]
     if isinstance(end, Undefined):
         return replace(after, problem=end.reason)
     return replace(after, start=start, end=end)
 
 
 @measure("s")
-def dead_time(response: StepResponse) -> float | Undefined:
+def dead_time(response: StepResponse) -> Values:
     """Time from the step until the response first reaches 5 % of the step height.
 
     A first-order lag without dead time shows 0.051 of its time constant here.
@@ -159,16 +181,14 @@ def dead_time(response: StepResponse) -> float | Undefined:
 
 
 @measure("s")
-def rise_time(response: StepResponse) -> float | Undefined:
+def rise_time(response: StepResponse) -> Values:
     """Time between the first crossings of 10 % and of 90 % of the step height."""
     low, high = _first(response, 0.1), _first(response, 0.9)
-    if isinstance(low, Undefined) or isinstance(high, Undefined):
-        return low if isinstance(low, Undefined) else high
-    return high - low
+    return Values(high.values - low.values, *low.reasons, *high.reasons)
 
 
 @measure("s")
-def settling_time(response: StepResponse) -> float | Undefined:
+def settling_time(response: StepResponse) -> Values:
     """Time from the step to the last entry into the band of 2 % of the step height around its end.
 
     The entry is interpolated. Not defined when it falls into the last tenth of the time after
@@ -176,35 +196,42 @@ def settling_time(response: StepResponse) -> float | Undefined:
     peak never settles, nor does a steady-state error of more than 2 %.
     """
     t, z = response.t, response.course
-    if isinstance(z, Undefined):
-        return z
-    outside = np.flatnonzero(np.abs(z - 1.0) > _BAND)
-    if outside.size == 0:
-        return 0.0
-    k = int(outside[-1])
-    if k == t.size - 1:
-        return Undefined(f"never settles: {100 * z[-1]:.4g} % of the step height at the end")
-    edge = 1.0 + np.copysign(_BAND, z[k] - 1.0)
-    entry = float(t[k] + (edge - z[k]) / (z[k + 1] - z[k]) * (t[k + 1] - t[k]))
-    if entry > t[-1] - _SETTLED * (t[-1] - t[0]):
-        return Undefined(
-            f"enters the band only {t[-1] - entry:.3g} s before the recording ends: record longer"
-        )
-    return entry - float(t[0])
+    last = t.size - 1
+    outside = np.abs(z - 1.0) > _BAND
+    k = np.minimum(last - np.argmax(outside[..., ::-1], axis=-1), last - 1)
+    here, there = sample(z, k), sample(z, k + 1)
+    with np.errstate(all="ignore"):  # where nothing lies outside
+        edge = 1.0 + np.copysign(_BAND, here - 1.0)
+        entry = t[k] + (edge - here) / (there - here) * (t[k + 1] - t[k])
+    strayed = outside.any(axis=-1)
+    late = strayed & (entry > t[-1] - _SETTLED * (t[-1] - t[0]))
+    return Values(
+        np.where(strayed, entry - t[0], 0.0),
+        *response.blind,
+        (
+            outside[..., -1],
+            lambda c: f"never settles: {100 * z[c][-1]:.4g} % of the step height at the end",
+        ),
+        (
+            late,
+            lambda c: f"enters the band only {t[-1] - entry[c]:.3g} s before the recording ends: "
+            "record longer",
+        ),
+    )
 
 
 @measure("%")
-def overshoot(response: StepResponse) -> float | Undefined:
+def overshoot(response: StepResponse) -> Values:
     """Largest excess of the response over the step's end, in % of the step height.
 
     The largest sample counts; 0 where the end is never exceeded.
     """
-    z = response.course
-    return z if isinstance(z, Undefined) else 100.0 * max(0.0, float(np.max(z)) - 1.0)
+    excess = np.max(response.course, axis=-1) - 1.0
+    return Values(100.0 * np.maximum(0.0, excess), *response.blind)
 
 
 @measure("level")
-def steady_state_error(response: StepResponse) -> float | Undefined:
+def steady_state_error(response: StepResponse) -> Array | Undefined:
     """Magnitude of the set point less the mean response in the window of the steady state.
 
     Trapezoidal mean over the window's samples, by default the last 20 % of the time after the
@@ -213,41 +240,63 @@ def steady_state_error(response: StepResponse) -> float | Undefined:
     if not response.is_tracking:
         return Undefined("no set point is given")
     mean = _mean(response)
-    return mean if isinstance(mean, Undefined) else abs(response.end - mean)
+    return mean if isinstance(mean, Undefined) else np.asarray(np.abs(response.end - mean))
 
 
 @measure("level")
-def ripple(response: StepResponse) -> float | Undefined:
+def ripple(response: StepResponse) -> Array | Undefined:
     """Peak to peak of the response in the window of the steady state.
 
     Largest less smallest sample; a drift in the window counts. Smoothing removes the ripple of
     its own period from this figure too.
     """
     steady = response.steady
-    return steady if isinstance(steady, Undefined) else float(np.ptp(steady[1]))
+    return steady if isinstance(steady, Undefined) else np.asarray(np.ptp(steady[1], axis=-1))
 
 
-def _first(response: StepResponse, level: float) -> float | Undefined:
+def _first(response: StepResponse, level: float) -> Values:
     """Return the time from the step to the first crossing of a level."""
     t, z = response.t, response.course
-    if isinstance(z, Undefined):
-        return z
-    reached = np.flatnonzero(z >= level)
-    if reached.size == 0:
-        return Undefined(
-            f"never reaches {100 * level:g} % of the step height: {100 * np.max(z):.4g} % at most"
-        )
-    k = int(reached[0])
-    if k == 0:
-        return Undefined(f"already at {100 * z[0]:.4g} % of the step height at the step")
-    share = (level - z[k - 1]) / (z[k] - z[k - 1])
-    return float(t[k - 1] + share * (t[k] - t[k - 1]) - t[0])
+    reached = z >= level
+    k = np.argmax(reached, axis=-1)
+    before = np.maximum(k - 1, 0)
+    below, above = sample(z, before), sample(z, k)
+    with np.errstate(all="ignore"):  # where it is never reached
+        share = (level - below) / (above - below)
+        time = t[before] + share * (t[k] - t[before]) - t[0]
+    return Values(
+        time,
+        *response.blind,
+        (
+            ~reached.any(axis=-1),
+            lambda c: f"never reaches {100 * level:g} % of the step height: "
+            f"{100 * np.max(z[c]):.4g} % at most",
+        ),
+        (
+            k == 0,
+            lambda c: f"already at {100 * z[c][0]:.4g} % of the step height at the step",
+        ),
+    )
 
 
-def _mean(response: StepResponse) -> float | Undefined:
+def _mean(response: StepResponse) -> Array | Undefined:
     """Return the mean over time in the window of the steady state."""
     steady = response.steady
     if isinstance(steady, Undefined):
         return steady
     t, y = steady
-    return integral(t, y) / float(t[-1] - t[0])
+    return np.asarray(integral(t, y) / (t[-1] - t[0]))
+
+
+def _between(t: Array, y: Array, at: float) -> Array:
+    """Return the response of each case at an instant within its times, as `numpy.interp` does."""
+    k = int(np.searchsorted(t, at, side="right")) - 1
+    here, there = y[..., k], y[..., k + 1]
+    if t[k] == at:
+        return np.asarray(here)
+    return np.asarray((there - here) / (t[k + 1] - t[k]) * (at - t[k]) + here)
+
+
+def _at(level: Array, case: Any) -> float:
+    """Return a level that is that of all cases, or one of each."""
+    return float(level[case] if level.ndim else level)

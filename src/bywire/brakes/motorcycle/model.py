@@ -16,6 +16,7 @@ from bywire.core.assembly import Assembly
 from bywire.core.model import Bounds, Task
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.signals import Role, zeros
+from bywire.core.watching import watched_by_elements
 from bywire.plant import (
     anti_alias_filter,
     ball_screw_gear,
@@ -201,8 +202,13 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the user should know of a recording."""
         held = par.drive.mode == "current-source" and "i" in recording
-        seen = recording.assign(i_source=recording["i"]) if held else recording
+        source = {"i_source": ("time", recording["i"].values)} if held else {}
+        seen = recording.assign(source) if held else recording
         return warnings.watch(recording, par) + super().watch(seen, par)
+
+    def watched(self, par: Any) -> tuple[str, ...]:
+        """Return the signals that ``watch`` looks at."""
+        return (*warnings.WATCHED, *watched_by_elements(self, par))
 
 
 def _ecu(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:

@@ -10,6 +10,9 @@ import xarray as xr
 
 from bywire.core.parameters import ParameterSet
 
+WATCHED = ("at_stop", "F_stop", "i", "p_pd")
+"""what `watch` looks at"""
+
 
 def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
     """Return the warnings of a recording, of which the signals may be a selection.
@@ -22,8 +25,7 @@ def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
         if far.any():
             first = float(recording["time"].values[int(np.argmax(far))])
             warnings.append(f"the piston reached its end stop at t = {first:.4g} s")
-    known = par.flat()
-    return warnings + _pressed_back(recording, known)
+    return warnings + _pressed_back(recording, par.flat())
 
 
 def _pressed_back(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from typing import Any
+
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.registry import units_of
 from bywire.brakes.motorcycle.case import case_from_rest, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
@@ -39,12 +41,9 @@ def step(options: Options) -> step_response.Setting:
     return step_response.Setting("i", 0.0, 0.0, options.i_step, set_point="i_ref")
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the step's KPIs of the motor current."""
-    run = recordings["run"]
-    kpis = evaluate("step_response", run, step(options))
-    kpis |= evaluate("effort", run, effort.Setting())
-    return tuple(kpis.values())
+def judged(options: Options) -> dict[str, Any]:
+    """Return the families of key figures: the step of the motor current, and effort."""
+    return {"step_response": step(options), "effort": effort.Setting()}
 
 
 EXPERIMENT = Experiment(
@@ -54,7 +53,7 @@ EXPERIMENT = Experiment(
     options=Options,
     defaults=Options(i_step=0.73, duration=0.04, record=1e-4),
     cases=cases,
-    judge=judge,
+    judge=FamilyJudge(judged),
     kpis=units_of("step_response", "effort", resolved={"level": "A"}),
     figures=("step-response", "time-traces"),
     step=step,

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from typing import Any
+
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, step_response
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.registry import units_of
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
@@ -46,13 +48,13 @@ def step(options: Options) -> step_response.Setting:
     )  # fmt: skip
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the step's, the effort's and the occupation's KPIs, of the pressure p_mc."""
-    run = recordings["run"]
-    kpis = evaluate("step_response", run, step(options))
-    kpis |= evaluate("effort", run, effort.Setting())
-    kpis |= evaluate("occupation", run, occupation.Setting())
-    return tuple(kpis.values())
+def judged(options: Options) -> dict[str, Any]:
+    """Return the families of key figures: the step of the pressure p_mc, effort, occupation."""
+    return {
+        "step_response": step(options),
+        "effort": effort.Setting(),
+        "occupation": occupation.Setting(),
+    }
 
 
 EXPERIMENT = Experiment(
@@ -62,7 +64,7 @@ EXPERIMENT = Experiment(
     options=Options,
     defaults=Options(p_from=6e5, p_to=37e5, duration=1.2, settle=1.0, smoothing=0.02),
     cases=cases,
-    judge=judge,
+    judge=FamilyJudge(judged),
     kpis=units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
     figures=("step-response", "time-traces", "energy-balance"),
     step=step,

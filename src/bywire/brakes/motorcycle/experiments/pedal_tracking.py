@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, tracking
-from bywire.bench.kpis.kpi import Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.registry import units_of
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
 from bywire.control import pedal_map
@@ -62,13 +63,13 @@ def followed(options: Options) -> tracking.Setting:
     return tracking.Setting("p_mc", "p_ref", options.smoothing)
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return how well the pressure follows its set point."""
-    run = recordings["run"]
-    kpis = evaluate("tracking", run, followed(options))
-    kpis |= evaluate("effort", run, effort.Setting())
-    kpis |= evaluate("occupation", run, occupation.Setting())
-    return tuple(kpis.values())
+def judged(options: Options) -> dict[str, Any]:
+    """Return the families of key figures: how well the pressure follows, effort, occupation."""
+    return {
+        "tracking": followed(options),
+        "effort": effort.Setting(),
+        "occupation": occupation.Setting(),
+    }
 
 
 def _ride(par: MotorcycleParameters, options: Options) -> xr.Dataset:
@@ -123,7 +124,7 @@ EXPERIMENT = Experiment(
     options=Options,
     defaults=Options(trace="", trace_map="", max_gap=0.1, smoothing=0.02),
     cases=cases,
-    judge=judge,
+    judge=FamilyJudge(judged),
     kpis=units_of("tracking", "effort", "occupation", resolved={"level": "Pa"}),
     figures=("tracking", "time-traces"),
     followed=followed,

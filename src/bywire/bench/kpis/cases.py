@@ -1,0 +1,127 @@
+"""Key figures of many cases at once, by the definitions that a single run has."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.kpis.kpi import Kpi, KpiOfCases
+from bywire.bench.kpis.registry import FAMILIES, Family, evaluate
+from bywire.bench.rows import Rows
+
+
+@dataclass(frozen=True)
+class FamilyJudge:
+    """The judge of an experiment of one run whose key figures all come from families.
+
+    Of many cases it judges all at once, of no more signals than it needs.
+
+    Parameters
+    ----------
+    settings
+        ``settings(options)``: the ``Setting`` of each family by its name.
+    left_out
+        Figures of these families that are not given.
+    """
+
+    settings: Callable[[Any], Mapping[str, Any]]
+    left_out: Collection[str] = ()
+
+    def __call__(self, recordings: Mapping[str, xr.Dataset], options: Any) -> tuple[Kpi, ...]:
+        """Return the key figures of the run."""
+        (run,) = recordings.values()
+        given = [evaluate(name, run, each) for name, each in self.settings(options).items()]
+        return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
+
+    def of_cases(self, rows: Rows, options: Sequence[Any]) -> tuple[KpiOfCases, ...]:
+        """Return the key figures of many cases.
+
+        ``rows``: signals of shape (cases, time); ``options``: of each case, of one structure.
+        """
+        each = [self.settings(chosen) for chosen in options]
+        given = [evaluate_cases(name, rows, [s[name] for s in each]) for name in each[0]]
+        return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
+
+    def signals(self, options: Sequence[Any]) -> set[str]:
+        """Return the names of all signals that it may look at, of cases with these options."""
+        each = {setting for chosen in options for setting in self.settings(chosen).values()}
+        return {name for setting in each for name in signals_of_setting(setting)}
+
+    def _wants(self, name: str) -> bool:
+        return name not in self.left_out
+
+
+def signals_of_setting(setting: Any) -> set[str]:
+    """Return the names of signals in a family's ``Setting``; texts that name none among them."""
+    return {value for value in vars(setting).values() if isinstance(value, str) and value}
+
+
+def evaluate_cases(
+    name: str, rows: Rows, settings: Sequence[Any]
+) -> dict[str, KpiOfCases]:
+    """Return all figures of a family by name, of many cases at once.
+
+    Where the settings differ in no more than what the family declares as ``BY_CASE``, they are
+    computed together; else, and of a family that declares nothing, each for itself.
+
+    Parameters
+    ----------
+    name
+        Name of the family.
+    rows
+        Signals of shape ``(cases, time)``.
+    settings
+        The family's ``Setting`` of each case.
+
+    Raises
+    ------
+    UnknownNameError
+        When the family, or a signal that a setting asks for by name, is unknown.
+    """
+    chosen = FAMILIES.find(name)
+    by_case: tuple[str, ...] | None = getattr(chosen.setting_class, "BY_CASE", None)
+    together = None if by_case is None else _together(chosen, rows, settings, by_case)
+    if together is not None:
+        return together
+    each = [
+        evaluate(name, cast(xr.Dataset, rows.case(k)), setting).values()
+        for k, setting in enumerate(settings)
+    ]
+    return {figure.name: figure for figure in of_cases(each)}
+
+
+def of_cases(each: Sequence[Iterable[Kpi]]) -> Iterator[KpiOfCases]:
+    """Yield the key figures of cases, each of which gave the same ones, by figure."""
+    for kpis in zip(*each, strict=True):
+        values, notes = np.array([kpi.value for kpi in kpis]), [kpi.note for kpi in kpis]
+        first = kpis[0]
+        yield KpiOfCases(first.name, values, first.unit, first.definition, notes.__getitem__)
+
+
+def _together(
+    chosen: Family, rows: Rows, settings: Sequence[Any], by_case: tuple[str, ...]
+) -> dict[str, KpiOfCases] | None:
+    """Return the figures of cases at once; None where one of them is unlike the others."""
+    first = settings[0]
+    joined = {name: [getattr(setting, name) for setting in settings] for name in by_case}
+    levels = {n: np.array(values) for n, values in joined.items() if values[0] is not None}
+    is_alike = all(
+        (value is None) == (name not in levels) for name in by_case for value in joined[name]
+    )
+    blank = dict.fromkeys(by_case)
+    if not is_alike or any(
+        other != first and replace(other, **blank) != replace(first, **blank) for other in settings
+    ):
+        return None
+    data = chosen.select(cast(xr.Dataset, rows), replace(first, **levels))
+    if data.defect:
+        return None
+    figures = [figure.of_cases(data) for figure in chosen.measures.values()]
+    return {
+        each.name: replace(each, values=np.broadcast_to(each.values, len(settings)))
+        for each in figures
+    }

@@ -1,0 +1,87 @@
+"""Numbers that remember how they are computed, so that a part of a model's equations runs alone.
+
+A model's equations are run once on `Traced` numbers; of what they give, any part then runs on the
+rows of a recording, and nothing else of the model with it.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+
+class Traced:
+    """A number, known by its name or by how it is computed.
+
+    Parameters
+    ----------
+    operation
+        What computes it; None for one that is given by name.
+    inputs
+        What it is computed from; the name of one that is given.
+    """
+
+    __slots__ = ("inputs", "operation")
+    __array_ufunc__ = None  # NumPy's numbers leave the operation to this one
+
+    def __init__(self, operation: Callable[..., Any] | None, *inputs: Any) -> None:
+        self.operation, self.inputs = operation, inputs
+
+    def _bywire_op(self, name: str, *inputs: Any) -> Traced:
+        return Traced(getattr(np, name), *inputs)
+
+    def __bool__(self) -> bool:
+        raise TypeError("what a traced number is shows only on rows")
+
+
+def _forward(operation: Callable[..., Any]) -> Callable[..., Traced]:
+    return lambda *inputs: Traced(operation, *inputs)
+
+
+def _backward(operation: Callable[..., Any]) -> Callable[..., Traced]:
+    return lambda second, first: Traced(operation, first, second)
+
+
+_BOTH = ("add", "sub", "mul", "truediv", "pow", "and", "or", "mod", "floordiv")
+for _name in (*_BOTH, "neg", "pos", "abs", "lt", "le", "gt", "ge", "eq", "ne"):
+    _operation = getattr(operator, f"__{_name}__")
+    setattr(Traced, f"__{_name}__", _forward(_operation))
+    if _name in _BOTH:
+        setattr(Traced, f"__r{_name}__", _backward(_operation))
+
+
+def names_in(values: Any) -> Iterator[str]:
+    """Yield the names that a value, or a tuple of values, is computed from."""
+    waiting, seen = [values], set()
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, tuple):
+            waiting += each
+        elif isinstance(each, Traced) and id(each) not in seen:
+            seen.add(id(each))
+            if each.operation is None:
+                yield each.inputs[0]
+            else:
+                waiting += each.inputs
+
+
+def computed(values: Any, given: Mapping[str, Any]) -> Any:
+    """Return what a value, or a tuple of values, is where its names are given."""
+    known: dict[int, Any] = {}
+
+    def value(each: Any) -> Any:
+        if isinstance(each, tuple):
+            rows = [value(inner) for inner in each]
+            return each._make(rows) if hasattr(each, "_make") else tuple(rows)
+        if not isinstance(each, Traced):
+            return each
+        if each.operation is None:
+            return given[each.inputs[0]]
+        if id(each) not in known:
+            known[id(each)] = each.operation(*map(value, each.inputs))
+        return known[id(each)]
+
+    return value(values)

@@ -1,0 +1,103 @@
+"""Families judge many cases at once as each for itself: value, reason, to the last digit."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from bywire.bench.kpis import effort, extremes, hysteresis, occupation, release, step_response
+from bywire.bench.kpis.cases import FamilyJudge, evaluate_cases
+from bywire.bench.kpis.registry import FAMILIES, evaluate
+from bywire.bench.rows import Rows
+
+CASES = 300
+STEP = step_response.Setting("y", 0.0, 0.0, 1.0)
+SETTINGS = {
+    "step": ("step_response", STEP),
+    "smoothed": ("step_response", replace(STEP, t_step=0.01, smoothing=0.03)),
+    "open loop": ("step_response", replace(STEP, start=None, end=None)),
+    "window": ("step_response", replace(STEP, window=(0.5, 0.7))),
+    "no window": ("step_response", replace(STEP, end=None, window=(3.0, 4.0))),
+    "effort": ("effort", effort.Setting("y", "power", "energy")),
+    "power alone": ("effort", effort.Setting("y", "power", "nothing")),
+    "occupation": ("occupation", occupation.Setting("mode", "t_stuck", "mode", "nothing")),
+    "samples of the mode": ("occupation", occupation.Setting("mode", "", "y")),
+    "extremes": ("extremes", extremes.Setting("y")),
+    "release": ("release", release.Setting("y", 0.02)),
+}
+
+
+@pytest.fixture(scope="module")
+def rows() -> Rows:
+    """Return responses that swing, creep, never settle, never begin, or begin at their end."""
+    random = np.random.default_rng(1)
+    t = np.linspace(-0.2, 1.0, 241)
+    rate, swing, gain = (random.uniform(*ends, (CASES, 1)) for ends in ((1, 40), (0, 60), (0, 1.2)))
+    y = (t >= 0) * gain * (1.0 - np.exp(-rate * np.clip(t, 0.0, None)) * np.cos(swing * t))
+    y += random.choice([0.0, 0.001, 0.05], (CASES, 1)) * random.standard_normal(y.shape)
+    y[::17] = 0.0
+    y[::19] += 1.0
+    mode = (random.uniform(size=y.shape) < 0.3).astype(float)
+    mode[::23, 5] = 0.5
+    power = y * random.standard_normal(y.shape)
+    signals = {"y": y, "power": power, "mode": mode, "energy": np.cumsum(power, axis=1),
+               "t_stuck": np.cumsum(mode, axis=1)}  # fmt: skip
+    return Rows(t, signals, {name: {"units": "m"} for name in signals})
+
+
+def test_each_case_is_as_if_it_were_alone_for_every_family(rows):
+    told = set()
+    for family, setting in SETTINGS.values():
+        together = evaluate_cases(family, rows, [setting] * CASES)
+        assert list(together) == list(FAMILIES.find(family).measures)
+        for k in range(CASES):
+            for name, alone in evaluate(family, rows.case(k), setting).items():
+                assert together[name].case(k) == alone
+                told |= {alone.note.split()[0]} if math.isnan(alone.value) else set()
+    assert told >= {"never", "already", "enters", "the", "no", "it"}  # reasons of every kind
+
+
+def test_levels_may_differ_between_cases(rows):
+    ends = np.linspace(0.5, 1.5, CASES).tolist()
+    settings = [replace(STEP, end=end, start=0.1 * end) for end in ends]
+    together = evaluate_cases("step_response", rows, settings)
+    emptied = evaluate_cases("release", rows, [release.Setting("y", end) for end in ends])
+    for k in range(0, CASES, 7):
+        for name, alone in evaluate("step_response", rows.case(k), settings[k]).items():
+            assert together[name].case(k) == alone
+        one = evaluate("release", rows.case(k), release.Setting("y", ends[k]))
+        assert emptied["time_to_empty"].case(k) == one["time_to_empty"]
+
+
+def test_what_differs_otherwise_or_is_broken_is_judged_one_by_one(rows):
+    few = Rows(rows["time"].values, {"y": rows["y"].values[1:4].copy()}, {"y": {"units": "m"}})
+    smoothed = [replace(STEP, smoothing=each) for each in (0.0, 0.02, 0.03)]
+    with_end = [STEP, replace(STEP, end=None), STEP]
+    few["y"].values[1, 7] = math.nan
+    for settings in (smoothed, with_end, [STEP] * 3):
+        together = evaluate_cases("step_response", few, settings)
+        for k, setting in enumerate(settings):
+            alone = evaluate("step_response", few.case(k), setting)
+            assert {n: figure.case(k) for n, figure in together.items()} == alone
+    loops = [hysteresis.Setting("y", "y")] * 3  # a family that takes no cases together
+    loop = evaluate_cases("hysteresis", few, loops)["loop_area"]
+    assert loop.case(2) == evaluate("hysteresis", few.case(2), loops[2])["loop_area"]
+    assert "not a number" in together["rise_time"].case(1).note
+    assert not together["overshoot"].case(0).note
+
+
+def test_a_judge_by_families_is_one_of_a_recording_too(rows):
+    judge = FamilyJudge(
+        lambda end: {"step_response": replace(STEP, end=end), "effort": effort.Setting("y")},
+        left_out={"energy"},
+    )
+    assert judge.signals([1.0, 1.1]) >= {"y", "P_el", "E_source"}
+    together = judge.of_cases(rows, [1.0] * CASES)
+    recording = xr.Dataset({"y": ("time", rows["y"].values[3], {"units": "m"})},
+                           {"time": rows["time"].values})  # fmt: skip
+    assert [kpi.name for kpi in together] == [kpi.name for kpi in judge({"run": recording}, 1.0)]
+    assert [each.case(3) for each in together] == list(judge({"run": recording}, 1.0))
