@@ -32,6 +32,18 @@ def drawn_once() -> Iterator[None]:
         yield
 
 
+@pytest.fixture
+def drawn() -> None:
+    """Have the figures of a test laid out and drawn: one test of each kind of them asks for it."""
+
+
+@pytest.fixture(autouse=True)
+def undrawn_unless_asked(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Have files of figures without what is in them; for the conftest of a folder."""
+    with drawn_once() if "drawn" in request.fixturenames else undrawn():
+        yield
+
+
 @cache
 def _empty(kind: str) -> bytes:
     return _drawn(Figure((1.0, 1.0)), kind)

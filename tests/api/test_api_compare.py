@@ -160,6 +160,7 @@ def test_curves_lie_in_the_brakes_panels_with_what_differs_in_the_legend(folders
     assert {SEQUENCE[0], SEQUENCE[1]} <= colors
 
 
+@pytest.mark.usefixtures("drawn")
 def test_one_page_and_one_record(folders, tmp_path):
     bywire.compare(*folders).write(tmp_path / "out")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {

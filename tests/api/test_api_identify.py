@@ -12,11 +12,11 @@ import pytest
 import bywire
 from bywire.identification.method import METHODS
 from bywire.report.answer import AnswerWarning
-from undrawn import undrawn
 
 SHORT = {"duration": "0.1 s"}
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_simulated_winding_shows_itself_and_is_written_whole(tmp_path: Path) -> None:
     found = bywire.identify("motor-winding", synthetic=1, options=SHORT, starts=2)
     assert found.holds
@@ -33,8 +33,7 @@ def test_a_simulated_winding_shows_itself_and_is_written_whole(tmp_path: Path) -
     assert {Path(file).name for file in kept["files"]} == names
     bench = bywire.load(tmp_path / "parameters.toml")
     assert bench.par.leaves()["motor.R_m"] == pytest.approx(found.parameters["motor.R_m"])
-    with undrawn():
-        found.write(tmp_path)  # over its own result
+    found.write(tmp_path)  # over its own result
     other = bywire.identify("friction-model", synthetic=1, options={"duration": "4 s"})
     with pytest.raises(bywire.BywireError, match="holds a result of motor-winding"):
         other.write(tmp_path)
@@ -90,6 +89,7 @@ def test_an_interrupt_says_where_it_goes_on(
         bywire.identify("seal-friction", synthetic=1, folder=tmp_path)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_a_recording_is_replayed_from_memory(tmp_path: Path) -> None:
     bench = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.1, "pulses": 1})
     recording = bywire.run(bench).recording[["M_set", "y_M", "x"]]

@@ -35,6 +35,7 @@ def test_every_value_is_run_and_judged(found):
     assert f"peak_current <= 18 A: failed at motor.R_m = {missed.sum()} values" in str(found)
 
 
+@pytest.mark.usefixtures("drawn")
 def test_one_page_with_both_figures_and_all_recordings(found, tmp_path):
     files = {path.name for path in found.write(tmp_path)}
     assert files == {"run.nc", "key-figures.png", "overlay.png", "report.html", "range.json"}

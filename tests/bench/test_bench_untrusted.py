@@ -66,7 +66,7 @@ def cases(content: dict[str, Any]) -> tuple[Any, ...]:
     return from_mapping(content, Path("nowhere"), "fuzz").cases()
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(content=CONTENT)
 def test_any_content_is_a_bench_or_an_error_for_the_user(content):
     found = outcome(lambda: cases(content))

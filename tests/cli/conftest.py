@@ -5,26 +5,16 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from command_line import BRAKING, QUICK, SCRIPT, Outcome
 
 from bywire.cli.main import main
-from undrawn import drawn_once, undrawn
+from undrawn import drawn, undrawn_unless_asked
 
-
-@pytest.fixture
-def drawn() -> None:
-    """Have the figures of a test laid out and drawn: one test of each kind of them asks for it."""
-
-
-@pytest.fixture(autouse=True)
-def _figures(request: pytest.FixtureRequest) -> Iterator[None]:
-    """Have files of figures without what is in them, unless a test asks for that."""
-    with drawn_once() if "drawn" in request.fixturenames else undrawn():
-        yield
+__all__ = ["drawn", "undrawn_unless_asked"]
 
 
 @pytest.fixture

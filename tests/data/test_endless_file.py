@@ -55,7 +55,6 @@ def endless(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
         (".nc", read_trace),
         (".nc", trace_names),
         (".nc", bywire.read_recording),
-        (".h5", bywire.read_recording),
     ],
     indirect=["endless"],
 )

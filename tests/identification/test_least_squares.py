@@ -54,7 +54,7 @@ def colored(seed: int) -> Array:
 
 @pytest.mark.parametrize("make", [white, colored])
 def test_parameters_put_in_come_back_with_honest_intervals(make: object) -> None:
-    found = [estimate(decay(make(seed))) for seed in range(200)]  # type: ignore[operator]
+    found = [estimate(decay(make(seed))) for seed in range(100)]  # type: ignore[operator]
     values = np.array([f.values for f in found])
     error = values.mean(axis=0) - TRUTH
     assert np.all(np.abs(error) < 3.0 * values.std(axis=0, ddof=1) / np.sqrt(len(found)))
@@ -66,7 +66,7 @@ def test_parameters_put_in_come_back_with_honest_intervals(make: object) -> None
 def test_white_residuals_counted_as_independent_would_lie_about_colored_ones() -> None:
     """The gate of the test above can fail: the plain formula covers far too little."""
     hits = []
-    for seed in range(60):
+    for seed in range(40):
         found = estimate(decay(colored(seed)))
         r, J = decay(colored(seed)).evaluate(found.values)
         plain = np.sqrt(np.diag(np.linalg.inv(J.T @ J)) * (r @ r) / (r.size - 2))
@@ -146,7 +146,7 @@ def line(seed: int, share: float, loss: Loss) -> Estimate:
 @pytest.mark.parametrize("share", [0.0, 0.05])
 def test_intervals_of_every_loss_are_honest(loss: Loss, share: float) -> None:
     """An M-estimate's covariance has the mean slope of its influence, not its weight."""
-    found = [line(seed, share, loss) for seed in range(120)]
+    found = [line(seed, share, loss) for seed in range(60)]
     inside = np.mean([(f.intervals()[:, 0] < [1, 2]) & (f.intervals()[:, 1] > [1, 2])
                       for f in found])  # fmt: skip
     assert 0.9 <= inside <= 0.99

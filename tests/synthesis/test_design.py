@@ -114,7 +114,8 @@ def test_step_figures_are_those_of_the_nonlinear_run_without_friction() -> None:
 
 def test_the_worst_model_of_a_range_decides() -> None:
     texts = ("crossover >= 5 Hz", "phase margin >= 60 deg")
-    found = designed("moment", texts, {"wedge.mu_B": [0.25, 0.35, 0.45]})
+    with few_starts():
+        found = designed("moment", texts, {"wedge.mu_B": [0.25, 0.35, 0.45]})
     assert found.status == "met"
     assert found.worst["crossover"][1] == "wedge.mu_B = 0.25"
     assert found.worst["phase_margin"][1] == "wedge.mu_B = 0.45"
@@ -122,8 +123,8 @@ def test_the_worst_model_of_a_range_decides() -> None:
     assert bound == {("crossover", "wedge.mu_B = 0.25"), ("phase_margin", "wedge.mu_B = 0.45")}
     loop, par = of("moment")
     # The law's gain is f_c alone: the best is where both slacks meet, found by bisection here.
-    low, high = 1.0, 30.0
-    for _ in range(14):
+    low, high = 4.0, 9.0
+    for _ in range(9):
         f_c = math.sqrt(low * high)
         slow = margins(loop, par.replace({"control.moment.f_c": f_c, "wedge.mu_B": 0.25}), 200.0)
         fast = margins(loop, par.replace({"control.moment.f_c": f_c, "wedge.mu_B": 0.45}), 200.0)

@@ -24,15 +24,16 @@ Array = NDArray[np.float64]
 FRICTIONLESS = {
     "bearing.C_0": 0.0, "bearing.C_2": 0.0, "bearing.T_nu": 0.0, "screw.eta_f": 1.0,
     "screw.eta_b": 1.0, "wedge_friction.mu_int": 0.0, "wedge_friction.mu_R": 0.0,
-    "flywheel.runout": 0.0, "flywheel.law": "driven", "encoder.law": "ideal",
-    "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0,
+    "flywheel.runout": 0.0, "motor_1.T_cog": 0.0, "motor_2.T_cog": 0.0,
 }  # fmt: skip
+# With and without friction: one structure, and so one kernel.
+STRUCTURE = {"command.mode": "position", "flywheel.law": "driven", "encoder.law": "ideal"}
 SWEEP = Sweep(("theta_2_set",), "theta_2", (1.0, 10.0, 60.0, 150.0), (1e-3,), tolerance=1e-4)
 
 
 def positioned(**changes: float | str) -> Run:
     """Return the assembled brake, parked, in position control."""
-    found = parameters("roberts2003").replace({"command.mode": "position", **changes})
+    found = parameters("roberts2003").replace({**STRUCTURE, **changes})
     assert isinstance(found, WedgeParameters)
     memory = memory_at(0.0, found)
     mean = WedgeBrake.Stimulus._field_defaults | {

@@ -64,7 +64,7 @@ def test_bands_hold_a_drift_and_the_innovations_are_white() -> None:
 
 def test_drift_and_noise_are_found() -> None:
     walks = []
-    for seed in range(4):
+    for seed in range(2):
         phi, y, _ = drifting(seed, 0.2, 0.1)
         walks.append(likeliest(phi, y, T, np.array([1.0, -2.0]), np.ones(2)))
     assert np.mean([w.drift for w in walks]) == pytest.approx(0.2, rel=0.2)
