@@ -14,7 +14,7 @@ from bywire.simulation.run import Run, simulate
 from cross.motorcycle_reference import run_reference
 
 BAR = 1e5
-REFERENCE_STEP = 2e-4
+REFERENCE_STEP = 4e-4
 RAMP = {"kind": "ramp", "start": 0.0, "end": 5.0, "slope": 0.2, "t_start": 0.0, "t_hold": 0.0}
 
 
@@ -29,13 +29,13 @@ def braking(law: str, dither: str) -> Run:
     return as_run(bench.cases()[0], bench.step)
 
 
-def ramp(law: str) -> Run:
-    """Return 36 s of the ramp of eq. (17), from an ideal current source that holds for 5 ms."""
+def ramp(law: str, duration: float) -> Run:
+    """Return the ramp of eq. (17), from an ideal current source that holds for 5 ms."""
     bench = Bench(
         "open-loop",
         "dardanelli2010",
         overrides={"gear.law": law, "drive.T_source": 5e-3},
-        options={"source": "current", "duration": 36.0, "record": 5e-3},
+        options={"source": "current", "duration": duration, "record": 5e-3},
         stimulus=RAMP | {"after": "return"},
     )
     return as_run(bench.cases()[0], bench.step)
@@ -66,15 +66,18 @@ def short() -> Short:
     return Short(run, run_reference(run, REFERENCE_STEP))
 
 
-laws = pytest.mark.parametrize("law", ["paper", "directional"])
-# Seconds each: the other law is a trust run.
-long_laws = pytest.mark.parametrize(
-    "law", [pytest.param("paper", marks=pytest.mark.trust), "directional"]
-)
+LAWS = ("paper", "directional")
+laws = pytest.mark.parametrize("law", LAWS)
 
 
-@long_laws
-def test_hard_braking_with_dither(law: str) -> None:
+def test_hard_braking_with_dither(short: Short) -> None:
+    assert short.reference["mode_changes"] > 50
+    compare(*short, 0.01)
+
+
+@pytest.mark.trust
+@laws
+def test_hard_braking_with_dither_to_its_end(law: str) -> None:
     run = braking(law, "sine")
     reference = run_reference(run, REFERENCE_STEP)
     assert reference["mode_changes"] > 100
@@ -87,10 +90,12 @@ def test_hard_braking_without_dither(law: str) -> None:
     compare(run, run_reference(run, REFERENCE_STEP), 0.001)
 
 
-@long_laws
-def test_ramp(law: str) -> None:
-    """The staircase of jumps up and down again."""
-    run = ramp(law)
+@pytest.mark.parametrize(("law", "duration"), [
+    ("directional", 18.0), *(pytest.param(law, 36.0, marks=pytest.mark.trust) for law in LAWS)
+])  # fmt: skip
+def test_ramp(law: str, duration: float) -> None:
+    """The staircase of jumps, and the way back."""
+    run = ramp(law, duration)
     reference = run_reference(run, REFERENCE_STEP)
     assert reference["mode_changes"] >= 12
     assert 0.8 < reference["stuck"].mean() < 0.99

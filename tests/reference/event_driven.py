@@ -27,7 +27,7 @@ Controller = Callable[[int, float, dict[str, float]], float]
 Field = Callable[[list[float]], tuple[list[float], list[list[float]], tuple[float, float]]]
 
 TORQUE_TOL = 1e-12  # N m, far below the friction (2e-3) and far above its round-off (1e-17)
-NEWTON_TOL = 1e-10  # of SCALE; the error left after the last iteration is about its square
+NEWTON_TOL = 1e-6  # of SCALE; the error left after the last iteration is about its square
 SCALE = np.array([1.0, 1.0, 1.0, 1e5, 1e5, 1e5, 1.0])
 REFINEMENT = 15.0  # how many more steps per time where the Stribeck curve is steep
 

@@ -24,7 +24,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import CompilerError
-from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
+from bywire.simulation.compiler import compile_library, find_compiler
 
 Array = NDArray[np.float64]
 Signal = Callable[[Array], Array]
@@ -43,6 +43,7 @@ FIXED = {"caliper.law": "linear", "encoder.law": "ideal", "command.mode": "momen
 """the only values that it knows"""
 DISC = 1e-3
 """band of the disc over that of the shafts: its friction changes its speed as much more slowly"""
+FLAGS = ("-O3", "-march=native")  # many steps of one small function
 _FILES = ("karnopp_wedge_control.c", "karnopp_wedge.c")
 
 
@@ -55,7 +56,7 @@ def _library(names: tuple[str, ...]) -> ctypes.CDLL:
     fields = "".join(f"    double {name};\n" for name in names)
     parts = [Path(__file__).with_name(name).read_text() for name in _FILES]
     source = "\n".join((f"typedef struct {{\n{fields}}} Par;\n", *parts))
-    library = ctypes.CDLL(str(compile_library(source, PLAIN, compiler)))
+    library = ctypes.CDLL(str(compile_library(source, FLAGS, compiler)))
     library.karnopp_run.restype = None
     return library
 

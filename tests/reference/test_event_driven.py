@@ -149,11 +149,11 @@ def test_halving_the_step_changes_nothing(gear: Gear) -> None:
     plant = replace(BRAKE, gear=gear)
     x0 = balanced(plant, 20.0 * BAR)
     coarse, fine = (
-        simulate(plant, dithered(plant, x0["i"]), 0.5, PERIOD, x0, step) for step in (2e-4, 1e-4)
+        simulate(plant, dithered(plant, x0["i"]), 0.3, PERIOD, x0, step) for step in (2e-4, 1e-4)
     )
     assert 0.05 < fine["stuck"].mean() < 0.95
-    assert np.ptp(fine["p_mc"]) > 10.0 * BAR
-    assert fine["mode_changes"] == coarse["mode_changes"] >= 30
+    assert np.ptp(fine["p_mc"]) > 8.0 * BAR
+    assert fine["mode_changes"] == coarse["mode_changes"] >= 20
     assert np.abs(fine["p_mc"] - coarse["p_mc"]).max() < 1e-5 * BAR
 
 
@@ -172,7 +172,7 @@ def test_sticks_below_breakaway_and_slips_above(gear: Gear, sigma: int) -> None:
             duty = i * (plant.R_m + plant.R_bat * duty**2) / plant.V_bat
         return simulate(plant, lambda k, t, s: duty, t_end, PERIOD, x0, 1e-4)
 
-    below, above = at(0.9, 10.0), at(1.001, 1.0)
+    below, above = at(0.9, 10.0), at(1.001, 0.4)
     assert below["mode_changes"] == 0
     assert np.all(below["stuck"])
     assert np.ptp(below["theta"]) == 0.0
