@@ -24,10 +24,15 @@ def undrawn() -> Iterator[None]:
 
 
 @contextmanager
-def drawn_once() -> Iterator[None]:
-    """Have every figure laid out and drawn for its file, in few pixels, not again for a page."""
+def drawn_once(laid_out: bool = False) -> Iterator[None]:
+    """Have every figure drawn for its file, in few pixels, not again for a page.
+
+    To lay out what is drawn takes twice as long.
+    """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(files, "PNG_DPI", 50)
+        if not laid_out:
+            patch.setattr(files, "_settle", lambda figure: figure.set_layout_engine("none"))
         patch.setattr(inline_figure, "figure_bytes", lambda figure, kind="png": _empty(kind))
         yield
 

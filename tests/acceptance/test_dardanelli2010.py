@@ -248,3 +248,10 @@ def test_identified_values_come_back_and_tell_what_is_disagreed_on(items: Items)
         assert zero > pole  # the other order than Table 4's
         assert items[f"table4.{region}.eq21.T1"]["computed"] == pytest.approx(pole, rel=0.15)
     assert items["fig6.misfit.identified"]["computed"] < 0.1
+
+
+@pytest.mark.trust
+def test_every_figure_can_be_laid_out(reproduction: Reproduction, tmp_path: Path) -> None:
+    """Nothing collapses to no size, of which the layout would warn."""
+    with drawn_once(laid_out=True):
+        reproduction.write(tmp_path)

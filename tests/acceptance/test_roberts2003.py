@@ -270,3 +270,10 @@ def test_report_opens_with_causes_and_shows_every_figure(
     assert results.pop("files") == [str(path) for path in paths]
     assert results == reproduction.as_object()
     assert [label for label, share in timed.stages if share == 1.0] == list(PARTS)
+
+
+@pytest.mark.trust
+def test_every_figure_can_be_laid_out(reproduction: Reproduction, tmp_path: Path) -> None:
+    """Nothing collapses to no size, of which the layout would warn."""
+    with drawn_once(laid_out=True):
+        reproduction.write(tmp_path)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -96,3 +97,19 @@ def test_friction_makes_a_band_of_forces(results, mu_B):
     bound = friction.mu_int * squeeze * TAN_ALPHA + friction.mu_R * F_N
     assert 0.5 * width == pytest.approx(bound, rel=0.1)
     assert kpi[f"F_M_falling_{at}"] < kpi[f"F_M_{at}"] < kpi[f"F_M_rising_{at}"]
+
+
+# Odd options
+
+ODD = [
+    ("friction-sweep", {"M_step": 2.0, "mu_B": (0.3,)}),
+    ("friction-sweep", {"t_hold": 0.002, "mu_B": (1.5,)}),
+    ("static-force", {"mu_B": (1.2, 0.36397023426620234), "t_hold": 0.001}),
+    ("static-force", {"M_hold": 2.0, "mu_B": (0.3,), "t_ramp": 0.001, "t_start": 0.001}),
+]
+
+
+@pytest.mark.parametrize(("name", "options"), ODD)
+def test_odd_options_give_figures_or_reasons(name, options):
+    for kpi in bywire.run(bywire.Bench(name, "roberts2003", options=options)).kpis:
+        assert math.isfinite(kpi.value) or kpi.note, kpi.name

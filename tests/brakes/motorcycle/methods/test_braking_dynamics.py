@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 PAR = parameters("dardanelli2010")
 EQ22 = METHOD.defaults.replace({"plant": "eq-22"})
 VALUES = np.array([1.02e6, 1.66, 0.127, 0.0223, 1.53])
-SEEDS = range(1, 5)
+SEEDS = range(1, 4)
 
 
 @pytest.fixture(scope="module")
@@ -133,7 +133,7 @@ def test_intervals_that_forget_the_current_s_noise_would_lie(data: dict[int, xr.
             found.append(fit(replace(region, steps=steps), PAR, joint=True, turns=1))
         return found
 
-    assert np.mean(deviations(forgetful(data[seed]) for seed in (1, 2, 3)) ** 2) > 2.0
+    assert np.mean(deviations(forgetful(data[seed]) for seed in (1, 2)) ** 2) > 2.0
 
 
 def test_two_steps_in_turn_agree_with_all_at_once(

@@ -99,22 +99,24 @@ def test_stiffness(results):
     "changes",
     [
         {"heart.K_S": 80e6, "heart.K_W": 20e6, "heart.g_1": 50e-6, "heart.g_12": 0.0},
-        {"heart.K_W": 60e6, "rig.sensor.K_F": 40e6, "screw.eta_f": 0.8, "screw.eta_b": 0.75},
-        {"screw.law": "drive"},
+        {"heart.K_W": 60e6, "rig.sensor.K_F": 40e6, "screw.eta_f": 0.8, "screw.eta_b": 0.75,
+         "screw.law": "drive"},
     ],
 )
 def test_other_stiffnesses(changes):
-    check_stiffness(values(bywire.run(bywire.Bench("stiffness", "roberts2003", changes))))
+    bench = bywire.Bench("stiffness", "roberts2003", changes, step=40e-6)
+    check_stiffness(values(bywire.run(bench)))
 
 
 def test_stiffness_assumes_symmetry_as_the_paper_says():
     """Motors 10 % apart drag the wedge along: its friction carries force that no spring sees."""
     unequal = {"motor_2.K_ref": 0.11}
-    found = values(bywire.run(bywire.Bench("stiffness", "roberts2003", unequal)))
+    found = values(bywire.run(bywire.Bench("stiffness", "roberts2003", unequal, step=40e-6)))
     assert found["K_S"] == pytest.approx(60e6, rel=0.01)
     assert 1.03 < found["K_W"] / 40e6 < 1.08
     smooth = unequal | {"wedge_friction.mu_int": 0.0}
-    check_stiffness(values(bywire.run(bywire.Bench("stiffness", "roberts2003", smooth))))
+    check_stiffness(values(bywire.run(bywire.Bench("stiffness", "roberts2003", smooth,
+                                                   step=40e-6))))  # fmt: skip
 
 
 def test_compression_is_as_before_and_tension_is_softer(results):
@@ -192,12 +194,11 @@ def test_force_fight(results):
 def test_force_fight_grows_with_the_difference():
     shares = {"more_K": -0.05, "more_J": 0.05, "more_R": 0.1, "more_D": 0.5}
     peaks = []
-    for scale in (0.0, 0.5, 1.0):
+    for scale in (0.5, 1.0):
         options = {name: scale * share for name, share in shares.items()}
         bench = bywire.Bench("force-fight", "roberts2003", options=options)
         peaks.append(values(bywire.run(bench))["peak_force_step_unequal"])
-    assert peaks[0] < 1e-6
-    assert 10.0 < peaks[1] < peaks[2]
+    assert 10.0 < peaks[0] < peaks[1]
 
 
 @pytest.mark.parametrize(
