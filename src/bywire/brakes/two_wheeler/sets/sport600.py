@@ -1,0 +1,78 @@
+"""A sport motorcycle of the 600 to 1000 cm^3 class with its rider."""
+
+from __future__ import annotations
+
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.catalog import CitedSet
+from bywire.core.provenance import chosen, derived, paper
+
+_LAP = "bike_params_r6.csv, a 600 cm^3 sport motorcycle with rider"
+SOURCE = (
+    "mass, drag and rolling resistance: R. Graham, motorcycle-lap-sim, open source; rear brake: "
+    "A. Dardanelli, G. Alli, S. M. Savaresi, Modeling and control of an electro-mechanical "
+    "brake-by-wire actuator for a sport motorbike, 2010; adhesion: values for car tyres that "
+    "circulate under the name of M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme, 1993; "
+    "the rest is chosen for the class"
+)
+_CLASS = "class of 600 to 1000 cm^3 sport motorcycles with rider"
+_TYRE = {
+    "sigma": chosen(0.10, "tyre transients of the order of 0.1 s at walking pace"),
+    "c_t": chosen(1.1, "a tenth of critical damping of the vehicle on its stuck tyres"),
+    "v_low": chosen(2.0, "above, the relaxation length damps"),
+    "tau_slide": chosen(1e-4, "short beside all that a vehicle does"),
+}
+
+SPORT600 = CitedSet(
+    name="sport600",
+    assembly="two-wheeler",
+    source=SOURCE,
+    summary="sport motorcycle with rider, pressure loops of 10 Hz",
+    parameter_class=TwoWheelerParameters,
+    values={
+        "vehicle.body.m": paper(265.0, _LAP),
+        "vehicle.body.L": chosen(1.40, _CLASS),
+        "vehicle.body.l_f": chosen(0.69, "static load 51 % in front"),
+        "vehicle.body.h": chosen(0.62, "lifts its rear wheel at 1.11 g"),
+        "vehicle.body.h_a": chosen(0.62, "that of the center of gravity: drag does not pitch"),
+        "vehicle.body.inertia": chosen(35.0, "radius of gyration 0.36 m"),
+        "vehicle.body.CdA": paper(0.40, _LAP),
+        "vehicle.body.rho": chosen(1.225, "standard atmosphere at sea level"),
+        "vehicle.body.g": chosen(9.81, "gravity"),
+        "vehicle.body.load": chosen("lagged", "suspensions carry load over in 0.1 s"),
+        "vehicle.body.tau_N": chosen(0.080, "pitch mode of 2 Hz, well damped"),
+        "vehicle.ground.k": chosen(1e6, "stiff: what lags is tau_N"),
+        "vehicle.ground.tau": chosen(1e-2, "more than critical: a landing does not rebound"),
+        "vehicle.front_wheel.J": chosen(0.50, "17 inch wheel with two discs"),
+        "vehicle.front_wheel.r": chosen(0.30, "120/70 R17"),
+        "vehicle.front_wheel.C_rr": paper(0.015, _LAP),
+        "vehicle.rear_wheel.J": chosen(0.65, "17 inch wheel with disc and sprocket"),
+        "vehicle.rear_wheel.r": paper(0.31, _LAP),
+        "vehicle.rear_wheel.C_rr": paper(0.015, _LAP),
+        **{f"vehicle.front_tyre.{name}": value for name, value in _TYRE.items()},
+        **{f"vehicle.rear_tyre.{name}": value for name, value in _TYRE.items()},
+        "vehicle.road.surface": chosen("dry-asphalt", "an experiment's choice"),
+        "vehicle.road.further": chosen("same", "an experiment's choice"),
+        "vehicle.road.grip": chosen(1.0, "as circulated"),
+        "vehicle.road.own.c1": chosen(1.2801, "dry asphalt, to start from"),
+        "vehicle.road.own.c2": chosen(23.99, "dry asphalt, to start from"),
+        "vehicle.road.own.c3": chosen(0.52, "dry asphalt, to start from"),
+        "vehicle.road.x_change": chosen(15.0, "an experiment's choice"),
+        "vehicle.road.x_back": chosen(1e4, "an experiment's choice"),
+        "vehicle.road.ramp": chosen(0.01, "a jump, next to the length of a tyre's contact"),
+        "vehicle.road.gradient": chosen(0.0, "an experiment's choice"),
+        "vehicle.road.gradient_further": chosen(0.0, "an experiment's choice"),
+        "front.circuit.f_n": chosen(10.0, "the loop of the source of the rear brake"),
+        "front.circuit.zeta": chosen(0.7, "no overshoot of note"),
+        "front.disc.faces": chosen(4.0, "two discs"),
+        "front.disc.mu_pad": chosen(0.45, "sintered pads"),
+        "front.disc.A_cal": chosen(14.1e-4, "four pistons of 30 mm, two on each side"),
+        "front.disc.r_eff": chosen(0.13, "disc of 310 mm"),
+        "rear.circuit.f_n": paper(10.0, "section 2"),
+        "rear.circuit.zeta": chosen(0.7, "no overshoot of note"),
+        "rear.disc.faces": chosen(2.0, "one disc"),
+        "rear.disc.mu_pad": chosen(0.40, "organic pads"),
+        "rear.disc.A_cal": derived(3e-4, "A_pd of Table 1, rounded"),
+        "rear.disc.r_eff": chosen(0.095, "disc of 220 mm"),
+        "ecu.T_s": paper(1e-3, "section 2"),
+    },
+)

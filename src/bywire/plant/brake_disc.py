@@ -1,0 +1,51 @@
+"""Brake discs of a wheel, from the pressure in the calipers to the torque that they can hold."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Area, Factor, Length, Unit
+from bywire.core.signals import Pressure, Signal
+
+Count = Annotated[float, Unit("1", 2.0), Field(ge=1, allow_inf_nan=False)]
+
+
+class Parameters(ParameterSet):
+    """Discs and calipers of one wheel."""
+
+    faces: Count
+    """faces that pads press on: two for each disc"""
+    mu_pad: Factor
+    """coefficient of friction of the pads"""
+    A_cal: Area
+    """area of the pistons on one side of a disc"""
+    r_eff: Length
+    """radius at which the pads' friction acts"""
+
+
+class Input(NamedTuple):
+    """Pressure in the calipers."""
+
+    p: Pressure
+
+
+class Output(NamedTuple):
+    """Torque that the discs can hold."""
+
+    torque: Annotated[float, Signal("N*m", "largest brake torque", 300.0)]
+
+
+def torque_per_pressure(
+    par: Parameters,
+) -> Annotated[float, Signal("N*m/Pa", "brake torque over pressure", 3e-4)]:
+    r"""Return :math:`k = z\, \mu_{pad} A_{cal} r_{eff}`."""
+    return par.faces * par.mu_pad * par.A_cal * par.r_eff
+
+
+def output(u: Input, par: Parameters) -> Output:
+    """Return the torque; none without pressure."""
+    return Output(torque=torque_per_pressure(par) * ops.fmax(u.p, 0.0))

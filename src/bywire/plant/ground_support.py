@@ -1,0 +1,89 @@
+"""Ground below the rear wheel: it pushes and never pulls, and a landing does not rebound."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Stiffness, TimeConstant
+from bywire.core.signals import ContactCompliance, Energy, Overlap, Power, Role, Signal
+
+Loss = Annotated[
+    float,
+    Signal(
+        "W",
+        "loss of the ground's contact, less its energy at start",
+        role=Role("sink", "ground contact", book="vehicle"),
+    ),
+]
+
+
+class Parameters(ParameterSet):
+    """Upright stiffness of rear tyre and suspension, without which nothing would carry."""
+
+    k: Stiffness
+    """stiffness"""
+    tau: TimeConstant
+    """damping over stiffness"""
+
+
+class Input(NamedTuple):
+    """How far the rear wheel has risen, and how fast."""
+
+    z: Annotated[float, Signal("m", "rise of the rear wheel", 1e-2)]
+    v: Annotated[float, Signal("m/s", "speed of its rise", 0.1)]
+
+
+class InputRate(NamedTuple):
+    """Derivative of what the stored energy depends on."""
+
+    z: Annotated[float, Signal("m/s", "speed of the rise", 0.1)]
+
+
+class Forces(NamedTuple):
+    """Contact force, >= 0."""
+
+    support: Annotated[float, Signal("N", "force of the ground on the rear wheel", 1e3)]
+
+
+class Overlaps(NamedTuple):
+    """Overlap with damping."""
+
+    support: Overlap
+
+
+def overlaps(u: Input, par: Parameters) -> Overlaps:
+    """Return the damped overlap, affine in rise and speed."""
+    return Overlaps(support=-u.z - par.tau * u.v)
+
+
+def compliance(par: Parameters) -> ContactCompliance:
+    """Return the compliance."""
+    return 1.0 / par.k
+
+
+def forces(u: Input, par: Parameters) -> Forces:
+    """Return the contact force."""
+    return Forces(support=ops.fmax(overlaps(u, par).support * par.k, 0.0))
+
+
+def input_rate(u: Input) -> InputRate:
+    """Return how the rise moves."""
+    return InputRate(z=u.v)
+
+
+def energy(u: Input, par: Parameters) -> Energy:
+    """Return the elastic energy."""
+    depth = ops.fmax(-u.z, 0.0)
+    return 0.5 * par.k * depth * depth
+
+
+def power_in(u: Input, f: Forces) -> Power:
+    """Return the work that the wheel does on the ground."""
+    return -f.support * u.v
+
+
+def power_loss(u: Input, f: Forces, par: Parameters) -> Loss:
+    """Return the power that the contact takes and does not store, >= 0."""
+    return (par.k * ops.fmax(-u.z, 0.0) - f.support) * u.v

@@ -1,0 +1,45 @@
+"""Brake circuit whose pressure follows its demand as a loop of second order does."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Factor, Frequency
+from bywire.core.signals import Pressure, Signal
+
+
+class Parameters(ParameterSet):
+    """What stands in for a brake by wire of which the loop alone is known."""
+
+    f_n: Frequency
+    """natural frequency of the pressure loop"""
+    zeta: Factor
+    """its damping ratio"""
+
+
+class State(NamedTuple):
+    """Pressure and its rate."""
+
+    p: Pressure
+    p_rate: Annotated[float, Signal("Pa/s", "rate of the pressure", 1e8)]
+
+
+class Input(NamedTuple):
+    """Demand."""
+
+    p_ref: Pressure
+
+
+class Rates(NamedTuple):
+    """Derivatives of pressure and rate."""
+
+    p: Annotated[float, Signal("Pa/s", "rate of the pressure", 1e8)]
+    p_rate: Annotated[float, Signal("Pa/s**2", "acceleration of the pressure", 1e10)]
+
+
+def rate(x: State, u: Input, par: Parameters) -> Rates:
+    r"""Return the derivatives, :math:`\ddot p = \omega^2 (p_{ref} - p) - 2 \zeta \omega \dot p`."""
+    w = 2.0 * math.pi * par.f_n
+    return Rates(p=x.p_rate, p_rate=w * w * (u.p_ref - x.p) - 2.0 * par.zeta * w * x.p_rate)

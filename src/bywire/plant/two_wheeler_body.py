@@ -1,0 +1,212 @@
+"""Body of a two-wheeler on a straight road: it brakes, leans on its front wheel, and may lift."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Length, Unit
+from bywire.core.signals import Energy, Power, Role, Signal
+
+BodyMass = Annotated[float, Unit("kg", 250.0), Field(gt=0, allow_inf_nan=False)]
+BodyInertia = Annotated[float, Unit("kg*m**2", 35.0), Field(ge=0, allow_inf_nan=False)]
+Sine = Annotated[float, Signal("1", "sine of the slope", 0.05)]
+Cosine = Annotated[float, Signal("1", "cosine of the slope", 1.0)]
+Drag = Annotated[float, Signal("W", "air drag", role=Role("sink", "air drag", book="vehicle"))]
+
+
+class Parameters(ParameterSet):
+    """Rigid body with rider, front contact on the ground.
+
+    ``load``: ``"lagged"`` carries load from wheel to wheel as suspensions do, in ``tau_N``;
+    ``"rigid"`` at once.
+    """
+
+    m: BodyMass
+    """mass with rider"""
+    L: Length
+    """wheelbase"""
+    l_f: Length
+    """distance of the center of gravity behind the front contact"""
+    h: Length
+    """height of the center of gravity"""
+    h_a: Length
+    """height at which the air drag acts"""
+    inertia: BodyInertia
+    """inertia of pitching about the center of gravity"""
+    CdA: Annotated[float, Unit("m**2", 0.4), Field(ge=0, allow_inf_nan=False)]
+    """drag area"""
+    rho: Annotated[float, Unit("kg/m**3", 1.2), Field(ge=0, allow_inf_nan=False)]
+    """density of the air"""
+    g: Annotated[float, Unit("m/s**2", 9.81), Field(gt=0, allow_inf_nan=False)]
+    """gravity"""
+    load: Literal["lagged", "rigid"]
+    """how load is carried from wheel to wheel"""
+    tau_N: Duration
+    """time constant of the load transfer"""
+
+
+class State(NamedTuple):
+    """Place and speed of the body, load of the rear wheel, pitch about the front contact."""
+
+    x: Annotated[float, Signal("m", "distance", 30.0)]
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
+    N_lag: Annotated[float, Signal("N", "load of the rear wheel, lagged", 1e3)]
+    phi: Annotated[float, Signal("rad", "pitch, nose down", 0.05)]
+    phi_rate: Annotated[float, Signal("rad/s", "pitch rate", 0.2)]
+
+
+class Factors(NamedTuple):
+    """Factors of the derivatives."""
+
+    x: Annotated[float, Signal("1", "unity")]
+    v: Annotated[float, Signal("kg", "mass", 250.0)]
+    N_lag: Annotated[float, Signal("s", "time constant", 0.1)]
+    phi: Annotated[float, Signal("1", "unity")]
+    phi_rate: Annotated[float, Signal("kg*m**2", "inertia", 150.0)]
+
+
+class Balance(NamedTuple):
+    """What drives the states."""
+
+    x: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
+    v: Annotated[float, Signal("N", "force", 1e3)]
+    N_lag: Annotated[float, Signal("N", "load to come", 1e3)]
+    phi: Annotated[float, Signal("rad/s", "pitch rate", 0.2)]
+    phi_rate: Annotated[float, Signal("N*m", "pitching torque", 500.0)]
+
+
+class Input(NamedTuple):
+    """Braking forces of both tyres together, slope, and the ground's force on the rear wheel."""
+
+    F: Annotated[float, Signal("N", "braking force of both tyres", 1e3)]
+    sine: Sine
+    cosine: Cosine
+    support: Annotated[float, Signal("N", "force of the ground on the rear wheel", 1e3)]
+
+
+class Loads(NamedTuple):
+    """Loads of the wheels."""
+
+    front: Annotated[float, Signal("N", "load of the front wheel", 1e3)]
+    rear: Annotated[float, Signal("N", "load of the rear wheel", 1e3)]
+
+
+class Place(NamedTuple):
+    """The center of gravity over the front contact."""
+
+    l_f: Annotated[float, Signal("m", "distance behind the front contact", 0.7)]
+    h: Annotated[float, Signal("m", "height", 0.6)]
+
+
+def drag(x: State, par: Parameters) -> Annotated[float, Signal("N", "air drag", 100.0)]:
+    r"""Return the air drag, :math:`\frac12 \rho C_d A\, v |v|`."""
+    return 0.5 * par.rho * par.CdA * x.v * ops.fabs(x.v)
+
+
+def center(x: State, par: Parameters) -> Place:
+    """Return where the center of gravity is at a pitch."""
+    sine, cosine = ops.sin(x.phi), ops.cos(x.phi)
+    return Place(par.l_f * cosine - par.h * sine, par.h * cosine + par.l_f * sine)
+
+
+def static_load(
+    cosine: Cosine, par: Parameters
+) -> Annotated[float, Signal("N", "rear load at rest", 1e3)]:
+    """Return the load of the rear wheel without braking force."""
+    return par.m * par.g * cosine * par.l_f / par.L
+
+
+def rear_load(
+    F: Annotated[float, Signal("N", "braking force of both tyres", 1e3)],
+    F_d: Annotated[float, Signal("N", "air drag", 100.0)],
+    cosine: Cosine,
+    par: Parameters,
+) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
+    r"""Return the load that holds the body level, >= 0.
+
+    .. math:: N_r = (m g l_f \cos\gamma - F h - F_d (h - h_a))/L
+    """
+    carried = F * par.h + F_d * (par.h - par.h_a)
+    return ops.fmax(static_load(cosine, par) - carried / par.L, 0.0)
+
+
+def rigid_rear_load(
+    mu_f: Annotated[float, Signal("1", "front braking force over load", 1.0)],
+    mu_r: Annotated[float, Signal("1", "rear braking force over load", 1.0)],
+    F_d: Annotated[float, Signal("N", "air drag", 100.0)],
+    cosine: Cosine,
+    par: Parameters,
+) -> Annotated[float, Signal("N", "load of the rear wheel", 1e3)]:
+    """Return `rear_load` where the braking forces follow the loads at once."""
+    carried = mu_f * par.m * par.g * cosine * par.h + F_d * (par.h - par.h_a)
+    left = static_load(cosine, par) - carried / par.L
+    return ops.fmax(left / (1.0 + (mu_r - mu_f) * par.h / par.L), 0.0)
+
+
+def loads(
+    N_r: Annotated[float, Signal("N", "load of the rear wheel", 1e3)],
+    cosine: Cosine,
+    par: Parameters,
+) -> Loads:
+    """Return the loads of both wheels, which carry the weight together."""
+    return Loads(front=par.m * par.g * cosine - N_r, rear=N_r)
+
+
+def mass(x: State, par: Parameters) -> Factors:
+    """Return the factors of the derivatives: mass, time constant, inertia about the contact."""
+    l_f = center(x, par).l_f
+    return Factors(
+        x=1.0, v=par.m, N_lag=par.tau_N, phi=1.0, phi_rate=par.inertia + par.m * l_f * l_f
+    )
+
+
+def balance(x: State, u: Input, par: Parameters) -> Balance:
+    r"""Return forces and torques.
+
+    .. math::
+        m \dot v &= -F - F_d - m g \sin\gamma \\
+        \tau_N \dot N &= N_r - N \\
+        (I + m l_f'^2) \ddot\varphi &= F h' - m g l_f' \cos\gamma + m l_f' h' \dot\varphi^2 + N L
+    """
+    F_d, at = drag(x, par), center(x, par)
+    weight = par.m * par.g
+    pitching = u.F * at.h + F_d * (par.h - par.h_a) - weight * u.cosine * at.l_f
+    turning = par.m * at.l_f * at.h * x.phi_rate * x.phi_rate
+    return Balance(
+        x=x.v,
+        v=-u.F - F_d - weight * u.sine,
+        N_lag=rear_load(u.F, F_d, u.cosine, par) - x.N_lag,
+        phi=x.phi_rate,
+        phi_rate=pitching + turning + u.support * par.L,
+    )
+
+
+def energy(x: State, par: Parameters) -> Energy:
+    """Return the kinetic energy of the speed, and of pitching with what it lifts."""
+    at = center(x, par)
+    turning = 0.5 * (par.inertia + par.m * at.l_f * at.l_f) * x.phi_rate * x.phi_rate
+    return 0.5 * par.m * x.v * x.v + turning + par.m * par.g * (at.h - par.h)
+
+
+def power_in(x: State, u: Input, par: Parameters) -> Power:
+    """Return the power of tyres and slope, and of what pitches the body."""
+    travel = -(u.F + par.m * par.g * u.sine) * x.v
+    return travel + pitch_power(x, u, par) + u.support * par.L * x.phi_rate
+
+
+def pitch_power(x: State, u: Input, par: Parameters) -> Power:
+    """Return the power of the forces' torque about the front contact, without the ground's."""
+    at = center(x, par)
+    torque = u.F * at.h + drag(x, par) * (par.h - par.h_a)
+    flat = par.m * par.g * (1.0 - u.cosine) * at.l_f
+    return (torque + flat) * x.phi_rate
+
+
+def power_loss(x: State, par: Parameters) -> Drag:
+    """Return the power of the air drag, >= 0."""
+    return drag(x, par) * x.v
+

@@ -1,0 +1,153 @@
+"""Tyre, lengthwise: a deflection that relaxes as it rolls, and slides where adhesion ends."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, NamedTuple
+
+from annotated_types import Ge, Gt
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Length, Unit
+from bywire.core.signals import Power, Signal
+
+Slip = Annotated[float, Signal("1", "slip", 0.1)]
+Coefficient1 = Annotated[float, Signal("1", "adhesion coefficient c1"), Ge(0.5)]
+Coefficient2 = Annotated[float, Signal("1", "adhesion coefficient c2", 30.0), Ge(10)]
+Coefficient3 = Annotated[float, Signal("1", "adhesion coefficient c3", 0.5), Gt(0)]
+_STEPS = 5  # of Newton's method, from below, to a deflection that only a stopping wheel feels
+
+
+class Parameters(ParameterSet):
+    """Carcass and tread together, as one deflection; the curve of adhesion is the surface's."""
+
+    sigma: Length
+    """relaxation length"""
+    c_t: Annotated[float, Unit("s/m", 1.0), Field(ge=0, allow_inf_nan=False)]
+    """damping over load of the tyre that sticks, near standstill"""
+    v_low: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
+    """speed above which that damping is gone"""
+    tau_slide: Duration
+    """time in which a sliding tyre gives up the deflection that it cannot hold"""
+
+
+class State(NamedTuple):
+    """Deflection."""
+
+    u: Annotated[float, Signal("m", "tyre deflection", 5e-3)]
+
+
+class Contact(NamedTuple):
+    """Speeds of the vehicle and of the tread, and the surface below."""
+
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
+    v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
+    c1: Coefficient1
+    c2: Coefficient2
+    c3: Coefficient3
+
+
+class Limits(NamedTuple):
+    """What a tyre can hold at its slip."""
+
+    mu: Annotated[float, Signal("1", "largest adhesion", 1.0)]
+    u: Annotated[float, Signal("m", "largest deflection", 1e-2)]
+
+
+class Input(NamedTuple):
+    """Speeds, load, surface, and what `limits` says; these are taken value-only."""
+
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
+    v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
+    N: Annotated[float, Signal("N", "load", 1e3), Ge(0)]
+    c1: Coefficient1
+    c2: Coefficient2
+    c3: Coefficient3
+    mu_max: Annotated[float, Signal("1", "largest adhesion", 1.0), Ge(0)]
+    u_max: Annotated[float, Signal("m", "largest deflection", 1e-2), Gt(0)]
+
+
+class Output(NamedTuple):
+    """What the tyre does."""
+
+    F: Annotated[float, Signal("N", "braking force of the tyre", 1e3)]
+
+
+def adhesion(
+    slip: Slip, c1: Coefficient1, c2: Coefficient2, c3: Coefficient3
+) -> Annotated[float, Signal("1", "adhesion", 1.0)]:
+    r"""Return the adhesion at a slip >= 0, :math:`\mu = c_1 (1 - e^{-c_2 \lambda}) - c_3 \lambda`.
+
+    References
+    ----------
+    M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme, 1993.
+    """
+    return c1 * (1.0 - ops.exp(-c2 * slip)) - c3 * slip
+
+
+def peak_slip(c1: Coefficient1, c2: Coefficient2, c3: Coefficient3) -> Slip:
+    r"""Return the slip of the largest adhesion, :math:`\lambda^* = \ln(c_1 c_2/c_3)/c_2`, <= 1."""
+    return ops.fmin(ops.log(c1 * c2 / c3) / c2, 1.0)
+
+
+def braking_slip(u: Contact, par: Parameters) -> Slip:
+    """Return the slip, relative to the faster of vehicle and tread; 0 where nothing moves.
+
+    1 for a wheel that stands below a moving vehicle; never beyond -1 and 1.
+    """
+    faster = ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel))
+    slip = (u.v - u.v_wheel) / ops.where(faster > 0, faster, par.v_low)
+    return ops.clip(slip, -1.0, 1.0)
+
+
+def limits(u: Contact, par: Parameters) -> Limits:
+    """Return what the tyre holds: its peak up to the peak's slip, beyond it what is left there.
+
+    The deflection is that which the rising branch of the curve needs for the adhesion.
+    """
+    slip, peak = ops.fabs(braking_slip(u, par)), peak_slip(u.c1, u.c2, u.c3)
+    mu = adhesion(ops.fmax(slip, peak), u.c1, u.c2, u.c3)
+    rising = 0.0 * slip
+    for _ in range(_STEPS):
+        decay = ops.exp(-u.c2 * rising)
+        left = mu - u.c1 * (1.0 - decay) + u.c3 * rising
+        rising = rising + left / (u.c1 * u.c2 * decay - u.c3)
+    return Limits(mu, par.sigma * ops.where(slip > peak, rising, peak))
+
+
+def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", "rate", 0.5)]:
+    r"""Return how the deflection changes, :math:`\dot u = v - \omega r - |v| u/\sigma`.
+
+    It is pulled back to the limit where it slides.
+    """
+    beyond = x.u - ops.clip(x.u, -u.u_max, u.u_max)
+    return u.v - u.v_wheel - ops.fabs(u.v) * x.u / par.sigma - beyond / par.tau_slide
+
+
+def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
+    """Return 1 where the tyre slides, 0 where it sticks to the road."""
+    return ops.where(ops.fabs(x.u) < u.u_max, 0.0, 1.0)
+
+
+def force_over_load(
+    x: State, u: Input, par: Parameters
+) -> Annotated[float, Signal("1", "braking force over load", 1.0)]:
+    """Return the force over the load: of the deflection up to the limit, damped near standstill."""
+    held = adhesion(ops.fmin(ops.fabs(x.u), u.u_max) / par.sigma, u.c1, u.c2, u.c3)
+    elastic = ops.where(x.u < 0, -1.0, 1.0) * ops.fmin(held, u.mu_max)
+    slow = ops.fmin(ops.fabs(u.v) / par.v_low, 1.0)
+    damping = par.c_t * (u.v - u.v_wheel) * 0.5 * (1.0 + ops.cos(math.pi * slow))
+    return ops.clip(elastic + (1.0 - sliding(x, u)) * damping, -u.mu_max, u.mu_max)
+
+
+def output(x: State, u: Input, par: Parameters) -> Output:
+    """Return the braking force."""
+    return Output(F=u.N * force_over_load(x, u, par))
+
+
+def work(x: State, u: Input, par: Parameters) -> Power:
+    """Return the power that the tyre takes: what slides, is damped, and is stored and given back.
+    """
+    return output(x, u, par).F * (u.v - u.v_wheel)

@@ -1,0 +1,208 @@
+"""A two-wheeler on a straight road, around brakes of any kind.
+
+A vehicle with brakes inherits from `TwoWheeler` and from the assemblies of its brakes, and says in
+``brake_torques`` what these can hold at each wheel. Standstill is no special case: brake and
+rolling resistance are one dry friction on each wheel, the tyre is a spring, and the road is felt
+at every speed.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+from bywire.core import ops
+from bywire.core.assembly import Assembly, MemoryT, ParT
+from bywire.core.model import Bounds
+from bywire.core.parameters import ParameterSet
+from bywire.core.parts import Integral, Part, Shown, Wire
+from bywire.core.signals import Role
+from bywire.plant import ground_support, road, road_wheel, two_wheeler_body, tyre
+
+BOOK = "vehicle"
+
+
+class VehicleParameters(ParameterSet):
+    """Body, wheels, tyres and the road below them."""
+
+    body: two_wheeler_body.Parameters
+    ground: ground_support.Parameters
+    front_wheel: road_wheel.Parameters
+    rear_wheel: road_wheel.Parameters
+    front_tyre: tyre.Parameters
+    rear_tyre: tyre.Parameters
+    road: road.Parameters
+
+
+def _sink(label: str) -> Role:
+    return Role("sink", label, book=BOOK)
+
+
+class TwoWheeler(Assembly[ParT, MemoryT]):
+    """Body, two wheels on their tyres, and a road; parameters stand in ``vehicle``."""
+
+    frictions: ClassVar[tuple[str, ...]] = ("omega_f", "omega_r")
+
+    body = Part(two_wheeler_body, par="vehicle.body", outside=True, loss="E_drag")
+    ground = Part(
+        ground_support, par="vehicle.ground", outside=True, output=("support",),
+        work="W_ground", loss="E_ground",
+    )  # fmt: skip
+    front = Part(
+        road_wheel, par="vehicle.front_wheel", outside=True, suffix="_f",
+        labels={"omega": "front wheel speed"},
+    )  # fmt: skip
+    rear = Part(
+        road_wheel, par="vehicle.rear_wheel", outside=True, suffix="_r",
+        labels={"omega": "rear wheel speed"},
+    )  # fmt: skip
+    front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f")
+    rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r")
+    road = Part(road, par="vehicle.road")
+    E_brake_f = Integral("J", "heat of the front brake", role=_sink("front brake"))
+    E_brake_r = Integral("J", "heat of the rear brake", role=_sink("rear brake"))
+    E_roll = Integral("J", "rolling resistance", role=_sink("rolling resistance"))
+    E_tyre_f = Integral("J", "front tyre: slip and deflection", role=_sink("front tyre"))
+    E_tyre_r = Integral("J", "rear tyre: slip and deflection", role=_sink("rear tyre"))
+    W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
+    W_pitch = Integral(
+        "J", "work of the braking forces on pitching", role=Role("source", "pitching", book=BOOK)
+    )
+    t_locked_f = Integral("s", "time in which the front wheel stands")
+    t_locked_r = Integral("s", "time in which the rear wheel stands")
+
+    F_f = Wire("N", "braking force of the front tyre", 1e3)
+    F_r = Wire("N", "braking force of the rear tyre", 1e3)
+    N_f = Wire("N", "load of the front wheel", 1e3)
+    N_r = Wire("N", "load of the rear wheel", 1e3)
+    T_f = Wire("N*m", "torque that the front brake can hold", 300.0)
+    T_r = Wire("N*m", "torque that the rear brake can hold", 300.0)
+    slip_f = Shown("1", "front braking slip")
+    slip_r = Shown("1", "rear braking slip")
+    sliding_f = Shown("1", "front tyre slides")
+    sliding_r = Shown("1", "rear tyre slides")
+    mu_f = Shown("1", "front braking force over load")
+    mu_r = Shown("1", "rear braking force over load")
+    a = Shown("m/s**2", "deceleration", 10.0)
+    E_vehicle = Shown("J", "energy of the vehicle", role=_sink("vehicle"))
+
+    def brake_torques(self, w: Self) -> tuple[float, float]:
+        """Return what the front and the rear brake can hold [N m], >= 0."""
+        raise NotImplementedError
+
+    def wire(self, w: Self) -> None:
+        """Say what wheels, tyres and body feel."""
+        super().wire(w)
+        par = w.body.par
+        w.T_f, w.T_r = self.brake_torques(w)
+        slope = road.slope(w.body.xe.x, w.road.par)
+        w.ground.u = ground_support.Input(par.L * w.body.x.phi, par.L * w.body.x.phi_rate)
+        front = _felt(w, w.front, w.front_tyre, w.body.xe.x)
+        rear = _felt(w, w.rear, w.rear_tyre, w.body.xe.x - par.L)
+        w.N_f, w.N_r = _loads(w, slope.cosine, front, rear)
+        w.front_tyre.u, w.rear_tyre.u = front._replace(N=w.N_f), rear._replace(N=w.N_r)
+        w.F_f = tyre.output(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par).F
+        w.F_r = tyre.output(w.rear_tyre.x, w.rear_tyre.u, w.rear_tyre.par).F
+        w.front.u = road_wheel.Input(w.F_f, 0.0)
+        w.rear.u = road_wheel.Input(w.F_r, 0.0)
+        w.body.u = two_wheeler_body.Input(
+            w.F_f + w.F_r, slope.sine, slope.cosine, w.ground.f.support
+        )
+
+    def friction(self, w: Self) -> tuple[Bounds, ...]:
+        """Return the limits of brake and rolling resistance, one dry friction on each wheel."""
+        front, rear = (brake + rolling for brake, rolling in _resistances(w))
+        return (*super().friction(w), (-front, front), (-rear, rear))
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return where the vehicle's energy goes."""
+        rolling, brakes = [], []
+        for wheel, name, (_, most) in zip(
+            (w.front, w.rear), TwoWheeler.frictions, _resistances(w), strict=True
+        ):
+            torque = w.reaction[self.frictions.index(name)]
+            rolling.append(ops.fmin(most, ops.fabs(torque)) * ops.fabs(wheel.x.omega))
+            brakes.append(-torque * wheel.x.omega - rolling[-1])
+        body = w.body.par
+        return {
+            **super().power(w),
+            "E_brake_f": brakes[0],
+            "E_brake_r": brakes[1],
+            "E_roll": rolling[0] + rolling[1],
+            "E_tyre_f": tyre.work(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par),
+            "E_tyre_r": tyre.work(w.rear_tyre.x, w.rear_tyre.u, w.rear_tyre.par),
+            "W_slope": -body.m * body.g * w.body.u.sine * w.body.x.v,
+            "W_pitch": two_wheeler_body.pitch_power(w.body.x, w.body.u, body),
+            "t_locked_f": ops.where(w.front.x.omega == 0, 1.0, 0.0),
+            "t_locked_r": ops.where(w.rear.x.omega == 0, 1.0, 0.0),
+        }
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return what is recorded beside states, wires and losses."""
+        force = two_wheeler_body.balance(w.body.x, w.body.u, w.body.par).v
+        kinetic = (
+            two_wheeler_body.energy(w.body.x, w.body.par)
+            + road_wheel.energy(w.front.x, w.front.par)
+            + road_wheel.energy(w.rear.x, w.rear.par)
+        )
+        return {
+            **super().record(w),
+            "slip_f": tyre.braking_slip(_contact(w.front_tyre.u), w.front_tyre.par),
+            "slip_r": tyre.braking_slip(_contact(w.rear_tyre.u), w.rear_tyre.par),
+            "sliding_f": tyre.sliding(w.front_tyre.x, w.front_tyre.u),
+            "sliding_r": tyre.sliding(w.rear_tyre.x, w.rear_tyre.u),
+            "mu_f": tyre.force_over_load(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par),
+            "mu_r": tyre.force_over_load(w.rear_tyre.x, w.rear_tyre.u, w.rear_tyre.par),
+            "a": -force / w.body.par.m,
+            "E_vehicle": kinetic + ground_support.energy(w.ground.u, w.ground.par),
+        }
+
+
+def rolling_start(v: float, par: VehicleParameters) -> dict[str, Any]:
+    """Return the states of the vehicle's parts at a speed [m/s], rolling freely on the level."""
+    body = par.body
+    N_r = two_wheeler_body.static_load(1.0, body)
+    sunk = -N_r / (par.ground.k * body.L)
+    return {
+        "body": two_wheeler_body.State(0.0, v, N_r, sunk, 0.0),
+        "front": road_wheel.State(v / par.front_wheel.r),
+        "rear": road_wheel.State(v / par.rear_wheel.r),
+    }
+
+
+def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
+    """Return what a tyre feels, but for its load."""
+    ground, speed, tread = road.surface(place, w.road.par), w.body.x.v, wheel.par
+    seen = tyre.Contact(w.body.xe.v, road_wheel.tread_speed(wheel.xe, tread), *ground)
+    limits = tyre.limits(seen, rubber.par)
+    return tyre.Input(
+        speed, road_wheel.tread_speed(wheel.x, tread), 0.0, *ground, limits.mu, limits.u
+    )
+
+
+def _contact(u: tyre.Input) -> tyre.Contact:
+    return tyre.Contact(u.v, u.v_wheel, u.c1, u.c2, u.c3)
+
+
+def _loads(
+    w: Any, cosine: float, front: tyre.Input, rear: tyre.Input
+) -> two_wheeler_body.Loads:
+    """Return the loads of both wheels, lagged or at once."""
+    par = w.body.par
+    if par.load == "lagged":
+        return two_wheeler_body.loads(ops.fmax(w.body.x.N_lag, 0.0), cosine, par)
+    N_r = two_wheeler_body.rigid_rear_load(
+        tyre.force_over_load(w.front_tyre.x, front, w.front_tyre.par),
+        tyre.force_over_load(w.rear_tyre.x, rear, w.rear_tyre.par),
+        two_wheeler_body.drag(w.body.x, par),
+        cosine,
+        par,
+    )
+    return two_wheeler_body.loads(N_r, cosine, par)
+
+
+def _resistances(w: Any) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Return for each wheel what its brake and its rolling resistance can hold [N m]."""
+    return (
+        (w.T_f, road_wheel.rolling_resistance(w.N_f, w.front.par)),
+        (w.T_r, road_wheel.rolling_resistance(w.N_r, w.rear.par)),
+    )
