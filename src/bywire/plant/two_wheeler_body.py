@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
@@ -47,6 +47,15 @@ class Parameters(ParameterSet):
     """how load is carried from wheel to wheel"""
     tau_N: Duration
     """time constant of the load transfer"""
+
+    @model_validator(mode="after")
+    def _stands(self) -> Parameters:
+        if not self.l_f < self.L:
+            raise ValueError(
+                f"l_f = {self.l_f:g} m must be below the wheelbase L = {self.L:g} m: the center of "
+                "gravity lies between the wheels"
+            )
+        return self
 
 
 class State(NamedTuple):
@@ -209,4 +218,3 @@ def pitch_power(x: State, u: Input, par: Parameters) -> Power:
 def power_loss(x: State, par: Parameters) -> Drag:
     """Return the power of the air drag, >= 0."""
     return drag(x, par) * x.v
-

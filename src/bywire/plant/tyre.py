@@ -148,6 +148,5 @@ def output(x: State, u: Input, par: Parameters) -> Output:
 
 
 def work(x: State, u: Input, par: Parameters) -> Power:
-    """Return the power that the tyre takes: what slides, is damped, and is stored and given back.
-    """
+    """Return the power that the tyre takes: sliding, damping, and deflection that comes back."""
     return output(x, u, par).F * (u.v - u.v_wheel)

@@ -65,12 +65,15 @@ def amount(value: float | None, symbol: str, digits: int = 4) -> str:
     --------
     >>> amount(2.5e6, "Pa"), amount(None, "Pa"), amount(0.034, "1"), amount(1187.0, "Hz", 3)
     ('25 bar', '-', '0.034', '1190 Hz')
+    >>> amount(0.0125, "m"), amount(41.07, "m")
+    ('12.5 mm', '41.07 m')
     """
     if value is None:
         return "-"
     if math.isnan(value):
         return "not defined"
-    number, unit = in_display_unit(float(value), symbol)
+    is_long = symbol == "m" and abs(value) >= 1.0
+    number, unit = (value, "m") if is_long else in_display_unit(float(value), symbol)
     written = unit_text(unit)
     figures = f"{number:.{digits}g}"
     if "e+" in figures:  # 1.19e+03
@@ -141,6 +144,8 @@ def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:
     """Return a number in the unit in which a value reads best."""
     if symbol == "s" and abs(value) < 1.0:
         return 1e3 * number, "ms"
+    if symbol == "m" and abs(value) >= 1.0:  # of roads, not of pistons
+        return number, "m"
     return in_display_unit(float(number), symbol)
 
 

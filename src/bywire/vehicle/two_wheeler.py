@@ -19,6 +19,7 @@ from bywire.core.signals import Role
 from bywire.plant import ground_support, road, road_wheel, two_wheeler_body, tyre
 
 BOOK = "vehicle"
+_CRAWL = 0.05  # of the tyre's low speed: below, a slip is no longer told from none
 
 
 class VehicleParameters(ParameterSet):
@@ -47,14 +48,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         ground_support, par="vehicle.ground", outside=True, output=("support",),
         work="W_ground", loss="E_ground",
     )  # fmt: skip
-    front = Part(
-        road_wheel, par="vehicle.front_wheel", outside=True, suffix="_f",
-        labels={"omega": "front wheel speed"},
-    )  # fmt: skip
-    rear = Part(
-        road_wheel, par="vehicle.rear_wheel", outside=True, suffix="_r",
-        labels={"omega": "rear wheel speed"},
-    )  # fmt: skip
+    front = Part(road_wheel, par="vehicle.front_wheel", outside=True, suffix="_f")
+    rear = Part(road_wheel, par="vehicle.rear_wheel", outside=True, suffix="_r")
     front_tyre = Part(tyre, par="vehicle.front_tyre", suffix="_f")
     rear_tyre = Part(tyre, par="vehicle.rear_tyre", suffix="_r")
     road = Part(road, par="vehicle.road")
@@ -76,6 +71,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
     N_r = Wire("N", "load of the rear wheel", 1e3)
     T_f = Wire("N*m", "torque that the front brake can hold", 300.0)
     T_r = Wire("N*m", "torque that the rear brake can hold", 300.0)
+    v_f = Shown("m/s", "front tread speed", 20.0)
+    v_r = Shown("m/s", "rear tread speed", 20.0)
     slip_f = Shown("1", "front braking slip")
     slip_r = Shown("1", "rear braking slip")
     sliding_f = Shown("1", "front tyre slides")
@@ -146,8 +143,10 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
         )
         return {
             **super().record(w),
-            "slip_f": tyre.braking_slip(_contact(w.front_tyre.u), w.front_tyre.par),
-            "slip_r": tyre.braking_slip(_contact(w.rear_tyre.u), w.rear_tyre.par),
+            "v_f": w.front_tyre.u.v_wheel,
+            "v_r": w.rear_tyre.u.v_wheel,
+            "slip_f": _shown_slip(w.front_tyre),
+            "slip_r": _shown_slip(w.rear_tyre),
             "sliding_f": tyre.sliding(w.front_tyre.x, w.front_tyre.u),
             "sliding_r": tyre.sliding(w.rear_tyre.x, w.rear_tyre.u),
             "mu_f": tyre.force_over_load(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par),
@@ -179,13 +178,15 @@ def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
     )
 
 
-def _contact(u: tyre.Input) -> tyre.Contact:
-    return tyre.Contact(u.v, u.v_wheel, u.c1, u.c2, u.c3)
+def _shown_slip(rubber: Any) -> float:
+    """Return the slip as recordings show it: fading where nothing moves any more."""
+    u, least = rubber.u, _CRAWL * rubber.par.v_low
+    faster = ops.fmax(ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel)), least)
+    slip: float = (u.v - u.v_wheel) / faster
+    return slip
 
 
-def _loads(
-    w: Any, cosine: float, front: tyre.Input, rear: tyre.Input
-) -> two_wheeler_body.Loads:
+def _loads(w: Any, cosine: float, front: tyre.Input, rear: tyre.Input) -> two_wheeler_body.Loads:
     """Return the loads of both wheels, lagged or at once."""
     par = w.body.par
     if par.load == "lagged":

@@ -1,10 +1,15 @@
-"""The ECU of the two-wheeler: the rider's demand."""
+"""The ECU of the two-wheeler: wheel speeds, reference speed, slip and lift control.
+
+Controllers only ever lower what the rider demands.
+"""
 
 from __future__ import annotations
 
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, NamedTuple
 
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters as Par
+from bywire.control import lift_pi, slip_pi, vehicle_speed, wheel_speed
+from bywire.core import ops
 from bywire.core.signals import Signal
 
 
@@ -18,14 +23,111 @@ class Stimulus(NamedTuple):
 class Memory(NamedTuple):
     """What the ECU holds between its ticks."""
 
-    p_f_ref: Annotated[
-        float, Signal("Pa", "front pressure set point", 2e6, set_point_of="p_f")
-    ]
-    p_r_ref: Annotated[
-        float, Signal("Pa", "rear pressure set point", 2e6, set_point_of="p_r")
-    ]
+    p_f_ref: Annotated[float, Signal("Pa", "front pressure set point", 2e6, set_point_of="p_f")]
+    p_r_ref: Annotated[float, Signal("Pa", "rear pressure set point", 2e6, set_point_of="p_r")]
+    p_f_most: Annotated[float, Signal("Pa", "front demand, build-up limited", 2e6)]
+    p_r_most: Annotated[float, Signal("Pa", "rear demand, build-up limited", 2e6)]
+    v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v")]
+    slip_f_hat: Annotated[float, Signal("1", "front slip as the ECU sees it", 0.1)]
+    slip_r_hat: Annotated[float, Signal("1", "rear slip as the ECU sees it", 0.1)]
+    a_hat: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
+    abs_f: Annotated[float, Signal("1", "slip control of the front wheel acts")]
+    abs_r: Annotated[float, Signal("1", "slip control of the rear wheel acts")]
+    lift: Annotated[float, Signal("1", "lift control acts")]
+    omega_f_hat: Annotated[float, Signal("rad/s", "measured front wheel speed", 60.0)]
+    omega_r_hat: Annotated[float, Signal("rad/s", "measured rear wheel speed", 60.0)]
+    edge_f: Annotated[float, Signal("rad", "angle of the last front edge", 100.0)]
+    edge_r: Annotated[float, Signal("rad", "angle of the last rear edge", 100.0)]
+    age_f: Annotated[float, Signal("s", "time since the last front edge", 1e-3)]
+    age_r: Annotated[float, Signal("s", "time since the last rear edge", 1e-3)]
+    v_last: Annotated[float, Signal("m/s", "speed at the last sample, in the sensor", 20.0)]
+    slip_f_integral: Annotated[float, Signal("Pa", "integral part of the front slip PI", 2e6)]
+    slip_r_integral: Annotated[float, Signal("Pa", "integral part of the rear slip PI", 2e6)]
+    lift_integral: Annotated[float, Signal("Pa", "integral part of the lift PI", 2e6)]
 
 
-def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
-    """Run the ECU once."""
-    return m._replace(p_f_ref=u.p_f_set, p_r_ref=u.p_r_set)
+class Readings(NamedTuple):
+    """What there is to be seen at a tick."""
+
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
+    sine: Annotated[float, Signal("1", "sine of the slope", 0.05)]
+    tread_f: Annotated[float, Signal("m/s", "speed of the front tread", 20.0)]
+    tread_r: Annotated[float, Signal("m/s", "speed of the rear tread", 20.0)]
+    angle_f: Annotated[float, Signal("rad", "angle of the last front edge", 100.0)]
+    angle_r: Annotated[float, Signal("rad", "angle of the last rear edge", 100.0)]
+    age_f: Annotated[float, Signal("s", "time since the last front edge", 1e-3)]
+    age_r: Annotated[float, Signal("s", "time since the last rear edge", 1e-3)]
+
+
+def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Run the ECU once: measure, limit the build-up, then let the controllers lower it."""
+    m = _measured(r, m, par)
+    before = m
+    rise = par.ecu.p_rate * par.ecu.T_s
+    m = m._replace(
+        p_f_most=ops.fmin(u.p_f_set, m.p_f_most + rise),
+        p_r_most=ops.fmin(u.p_r_set, m.p_r_most + rise),
+    )
+    p_f, p_r = m.p_f_most, m.p_r_most
+    if par.ecu.lift == "pi":
+        seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
+        lift, out = lift_pi.output(
+            lift_pi.State(m.lift_integral), seen, par.ecu.T_s, par.ecu.front_lift
+        )
+        p_f, m = out.p, m._replace(lift_integral=lift.integral, lift=out.lowered)
+    if par.ecu.abs == "pi":
+        front, out_f = slip_pi.output(
+            slip_pi.State(m.slip_f_integral),
+            slip_pi.Input(m.v_hat, m.slip_f_hat, u.p_f_set, p_f, before.p_f_most),
+            par.ecu.T_s,
+            par.ecu.front_slip,
+        )
+        rear, out_r = slip_pi.output(
+            slip_pi.State(m.slip_r_integral),
+            slip_pi.Input(m.v_hat, m.slip_r_hat, u.p_r_set, p_r, before.p_r_most),
+            par.ecu.T_s,
+            par.ecu.rear_slip,
+        )
+        p_f, p_r = out_f.p, out_r.p
+        m = m._replace(
+            slip_f_integral=front.integral,
+            slip_r_integral=rear.integral,
+            abs_f=out_f.lowered,
+            abs_r=out_r.lowered,
+        )
+    return m._replace(p_f_ref=p_f, p_r_ref=p_r)
+
+
+def _measured(r: Readings, m: Memory, par: Par) -> Memory:
+    """Return the memory with speeds, slips and deceleration as the ECU sees them."""
+    T, ecu, vehicle = par.ecu.T_s, par.ecu, par.vehicle
+    front = wheel_speed.output(
+        wheel_speed.State(m.edge_f, m.age_f, m.omega_f_hat),
+        wheel_speed.Input(r.angle_f, r.age_f), T, ecu.wheel_speed,
+    )  # fmt: skip
+    rear = wheel_speed.output(
+        wheel_speed.State(m.edge_r, m.age_r, m.omega_r_hat),
+        wheel_speed.Input(r.angle_r, r.age_r), T, ecu.wheel_speed,
+    )  # fmt: skip
+    shown = (m.v_last - r.v) / T - vehicle.body.g * r.sine + par.sensors.a_offset
+    a_hat = m.a_hat + T / (par.sensors.tau_a + T) * (shown - m.a_hat)
+    if ecu.sees == "known":
+        v, tread_f, tread_r = r.v, r.tread_f, r.tread_r
+    else:
+        tread_f = front.omega * ecu.front_slip.r_hat
+        tread_r = rear.omega * ecu.rear_slip.r_hat
+        seen = vehicle_speed.Input(tread_f, tread_r, shown)
+        v = vehicle_speed.output(vehicle_speed.State(m.v_hat), seen, T, ecu.vehicle_speed).v
+    return m._replace(
+        v_hat=v,
+        slip_f_hat=vehicle_speed.slip(v, tread_f, ecu.front_slip.v_off),
+        slip_r_hat=vehicle_speed.slip(v, tread_r, ecu.rear_slip.v_off),
+        a_hat=a_hat,
+        omega_f_hat=front.omega,
+        omega_r_hat=rear.omega,
+        edge_f=front.angle,
+        edge_r=rear.angle,
+        age_f=front.age,
+        age_r=rear.age,
+        v_last=r.v,
+    )

@@ -9,7 +9,7 @@ from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.model import Task
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
-from bywire.plant import brake_disc, pressure_loop
+from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
 from bywire.vehicle.two_wheeler import TwoWheeler, rolling_start
 
 Par = TwoWheelerParameters
@@ -22,19 +22,18 @@ class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
 
-    front_circuit = Part(
-        pressure_loop, par="front.circuit", suffix="_f", labels={"p": "front brake pressure"}
-    )
-    rear_circuit = Part(
-        pressure_loop, par="rear.circuit", suffix="_r", labels={"p": "rear brake pressure"}
-    )
+    front_circuit = Part(pressure_loop, par="front.circuit", suffix="_f")
+    rear_circuit = Part(pressure_loop, par="rear.circuit", suffix="_r")
+    front_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_f")
+    rear_encoder = Part(wheel_encoder, par="sensors.encoder", suffix="_r")
     front_disc = Part(brake_disc, par="front.disc")
     rear_disc = Part(brake_disc, par="rear.disc")
 
     records: ClassVar[tuple[str, ...]] = (
-        "x", "v", "a", "omega_f", "omega_r", "slip_f", "slip_r", "mu_f", "mu_r", "sliding_f",
-        "sliding_r", "u_f", "u_r", "F_f", "F_r", "N_f", "N_r", "support", "phi", "phi_rate",
-        "p_f", "p_r", "p_f_ref", "p_r_ref", "T_f", "T_r", "t_locked_f", "t_locked_r",
+        "x", "v", "v_f", "v_r", "a", "omega_f", "omega_r", "slip_f", "slip_r", "mu_f", "mu_r",
+        "sliding_f", "sliding_r", "u_f", "u_r", "F_f", "F_r", "N_f", "N_r", "support", "phi",
+        "phi_rate", "p_f", "p_r", "p_f_ref", "p_r_ref", "v_hat", "slip_f_hat", "slip_r_hat", "a_hat", "abs_f",
+        "abs_r", "lift", "T_f", "T_r", "t_locked_f", "t_locked_r",
         "E_vehicle", "E_brake_f", "E_brake_r", "E_tyre_f", "E_tyre_r", "E_drag", "E_roll",
         "E_ground", "W_slope", "W_pitch",
     )  # fmt: skip
@@ -43,6 +42,8 @@ class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
         """Return what the discs hold at the pressures of both circuits."""
         w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
         w.rear_circuit.u = pressure_loop.Input(w.m.p_r_ref)
+        w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
+        w.rear_encoder.u = wheel_encoder.Input(w.rear.x.omega)
         w.front_disc.u = brake_disc.Input(w.front_circuit.x.p)
         w.rear_disc.u = brake_disc.Input(w.rear_circuit.x.p)
         return (
@@ -52,8 +53,40 @@ class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
         """Return the ECU's task."""
-        return (Task("ecu", par.ecu.T_s, ecu.tick),)
+        return (Task("ecu", par.ecu.T_s, _tick),)
 
     def rest(self, par: Par) -> tuple[Any, ecu.Memory]:
         """Return the vehicle standing on its wheels, brakes open."""
-        return self.state(**rolling_start(0.0, par.vehicle)), zeros(ecu.Memory)
+        return at_speed(0.0, par)
+
+
+def at_speed(v: float, par: Par) -> tuple[Any, ecu.Memory]:
+    """Return the vehicle rolling at a speed [m/s], brakes open, its ECU awake."""
+    front, rear = v / par.vehicle.front_wheel.r, v / par.vehicle.rear_wheel.r
+    T = par.ecu.T_s
+    memory = zeros(ecu.Memory)._replace(
+        v_hat=v, v_last=v, omega_f_hat=front, omega_r_hat=rear,
+        edge_f=-front * T, edge_r=-rear * T,
+    )  # fmt: skip
+    return TwoWheelerByWire.state(**rolling_start(v, par.vehicle)), memory
+
+
+def _tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:
+    front, rear = par.vehicle.front_wheel, par.vehicle.rear_wheel
+    edges = [
+        wheel_encoder.reading(
+            wheel_encoder.State(theta), wheel_encoder.Input(omega), par.sensors.encoder
+        )
+        for theta, omega in ((x.theta_f, x.omega_f), (x.theta_r, x.omega_r))
+    ]
+    seen = ecu.Readings(
+        v=x.v,
+        sine=road.slope(x.x, par.vehicle.road).sine,
+        tread_f=road_wheel.tread_speed(road_wheel.State(x.omega_f), front),
+        tread_r=road_wheel.tread_speed(road_wheel.State(x.omega_r), rear),
+        angle_f=edges[0].angle,
+        angle_r=edges[1].angle,
+        age_f=edges[0].age,
+        age_r=edges[1].age,
+    )
+    return ecu.tick(seen, m, u, par)

@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from bywire.control import lift_pi, slip_pi, vehicle_speed, wheel_speed
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
-from bywire.plant import brake_disc, pressure_loop
+from bywire.core.quantities import Duration, TimeConstant, Unit
+from bywire.plant import brake_disc, pressure_loop, wheel_encoder
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+PressureRate = Annotated[float, Unit("Pa/s", 2e7), Field(gt=0, allow_inf_nan=False)]
+Acceleration = Annotated[float, Unit("m/s**2", 0.1), Field(allow_inf_nan=False)]
 
 
 class BrakeParameters(ParameterSet):
@@ -15,11 +23,40 @@ class BrakeParameters(ParameterSet):
     disc: brake_disc.Parameters
 
 
+class SensorParameters(ParameterSet):
+    """Sensors beside those of the brakes."""
+
+    encoder: wheel_encoder.Parameters
+    a_offset: Acceleration
+    """what the accelerometer shows too much of deceleration"""
+    tau_a: TimeConstant
+    """time constant of its filter"""
+
+
 class EcuParameters(ParameterSet):
-    """What runs on the ECU."""
+    """What runs on the ECU.
+
+    ``abs``: ``"pi"`` controls the slip of both wheels; ``"off"`` leaves them to the rider.
+    ``lift``: ``"pi"`` keeps the rear wheel on the ground.
+    ``sees``: the speed and slip of the controllers are ``"estimated"`` from the sensors, or
+    ``"known"``, for comparison.
+    """
 
     T_s: Duration
     """sample time"""
+    abs: Literal["off", "pi"]
+    """control of the wheels' slip"""
+    lift: Literal["off", "pi"]
+    """control of the rear wheel's lift"""
+    sees: Literal["estimated", "known"]
+    """whether speed and slip are estimated"""
+    p_rate: PressureRate
+    """fastest build-up of a demand"""
+    wheel_speed: wheel_speed.Parameters
+    vehicle_speed: vehicle_speed.Parameters
+    front_slip: slip_pi.Parameters
+    rear_slip: slip_pi.Parameters
+    front_lift: lift_pi.Parameters
 
 
 class TwoWheelerParameters(ParameterSet):
@@ -28,4 +65,5 @@ class TwoWheelerParameters(ParameterSet):
     vehicle: VehicleParameters
     front: BrakeParameters
     rear: BrakeParameters
+    sensors: SensorParameters
     ecu: EcuParameters

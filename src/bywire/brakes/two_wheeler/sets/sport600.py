@@ -21,6 +21,16 @@ _TYRE = {
     "v_low": chosen(2.0, "above, the relaxation length damps"),
     "tau_slide": chosen(1e-4, "short beside all that a vehicle does"),
 }
+_SLIP = {
+    "schedule": chosen("speed", "gain and pole of a wheel fall with its speed"),
+    "slip_set": chosen(0.105, "0.8 of the peak's on wet asphalt; others are flat there"),
+    "omega_c": chosen(20.0, "a third of a 10 Hz pressure loop"),
+    "T_i": chosen(0.2, "four times the crossover's"),
+    "T_t": chosen(0.05, "the crossover's"),
+    "v_off": chosen(2.0, "48 pulses then come every 20 ms"),
+    "v_fall": chosen(6.0, "an edge of 48 pulses comes every 7 ms"),
+    "v_fixed": chosen(15.0, "the middle of a stop"),
+}
 
 SPORT600 = CitedSet(
     name="sport600",
@@ -73,6 +83,38 @@ SPORT600 = CitedSet(
         "rear.disc.mu_pad": chosen(0.40, "organic pads"),
         "rear.disc.A_cal": derived(3e-4, "A_pd of Table 1, rounded"),
         "rear.disc.r_eff": chosen(0.095, "disc of 220 mm"),
+        "sensors.encoder.law": chosen("pulses", "as wheel sensors are"),
+        "sensors.encoder.pulses": chosen(48.0, "usual; 100 on some"),
+        "sensors.encoder.omega_min": chosen(0.1, "far below walking pace"),
+        "sensors.a_offset": chosen(0.0, "an experiment's choice"),
+        "sensors.tau_a": chosen(0.01, "short beside the pressure loop"),
         "ecu.T_s": paper(1e-3, "section 2"),
+        "ecu.abs": chosen("pi", "an experiment's choice"),
+        "ecu.lift": chosen("pi", "an experiment's choice"),
+        "ecu.sees": chosen("estimated", "as on the road"),
+        "ecu.p_rate": chosen(
+            2e7, "200 bar/s: faster, and the front wheel locks before it is loaded"
+        ),
+        "ecu.wheel_speed.law": chosen("period", "differences of 48 pulses are too coarse"),
+        "ecu.wheel_speed.pulses": chosen(48.0, "as the sensor has"),
+        "ecu.vehicle_speed.law": chosen("accelerometer", "both wheels slip together"),
+        "ecu.vehicle_speed.a_max": chosen(12.26, "1.25 g"),
+        "ecu.vehicle_speed.slip_small": chosen(0.005, "a rolling wheel's"),
+        "ecu.vehicle_speed.tau": chosen(
+            0.2, "long beside the first bite, which slips less at first"
+        ),
+        "ecu.vehicle_speed.v_still": chosen(1.0, "an edge then comes every 40 ms"),
+        **{f"ecu.front_slip.{name}": value for name, value in _SLIP.items()},
+        "ecu.front_slip.J_hat": chosen(0.50, "that of the wheel"),
+        "ecu.front_slip.r_hat": chosen(0.30, "that of the wheel"),
+        "ecu.front_slip.k_hat": derived(4 * 0.45 * 14.1e-4 * 0.13, "that of the discs"),
+        **{f"ecu.rear_slip.{name}": value for name, value in _SLIP.items()},
+        "ecu.rear_slip.J_hat": chosen(0.65, "that of the wheel"),
+        "ecu.rear_slip.r_hat": chosen(0.31, "that of the wheel"),
+        "ecu.rear_slip.k_hat": derived(2 * 0.40 * 3e-4 * 0.095, "that of the disc"),
+        "ecu.front_lift.a_lim": derived(0.95 * 9.81 * 0.69 / 0.62, "0.95 of g l_f/h"),
+        "ecu.front_lift.k_p": chosen(1e5, "1 bar for 1 m/s^2: an eighth of the static gain"),
+        "ecu.front_lift.T_i": chosen(0.05, "crosses over at 1.3 Hz, below the load's transfer"),
+        "ecu.front_lift.T_t": chosen(0.05, "as that of slip control"),
     },
 )

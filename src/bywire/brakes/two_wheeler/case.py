@@ -1,0 +1,69 @@
+"""What the two-wheeler's experiments share: runs that begin rolling, and what judges a stop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+import numpy as np
+import xarray as xr
+from pydantic import Field
+
+from bywire.bench.experiment import Case
+from bywire.bench.kpis.kpi import Kpi
+from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.quantities import Unit
+from bywire.core.typing import Array
+from bywire.plant import road, tyre
+from bywire.vehicle import ideal_stop, stop_figures
+from bywire.vehicle.two_wheeler import VehicleParameters
+
+RidingSpeed = Annotated[float, Unit("m/s", 28.0), Field(gt=0, allow_inf_nan=False)]
+Demand = Annotated[float, Unit("Pa", 4e6), Field(ge=0, allow_inf_nan=False)]
+
+
+def rolling_case(
+    par: TwoWheelerParameters,
+    v_0: float,
+    demands: Mapping[str, float],
+    duration: float,
+    changes: Mapping[str, Any] | None = None,
+    label: str = "run",
+) -> Case:
+    """Return a run that begins rolling at a speed [m/s]; the rider demands from time zero on.
+
+    Parameters
+    ----------
+    demands
+        Pressure demand [Pa] by name of the stimulus.
+    changes
+        Parameters that the experiment sets.
+    """
+    changed = par.replace(dict(changes or {}))
+    state, memory = at_speed(v_0, changed)
+
+    def stimulus(t: Array) -> dict[str, Array]:
+        return {name: np.where(t < -1e-9, 0.0, p) for name, p in demands.items()}
+
+    return Case(label, TwoWheelerByWire(), changed, state, memory, stimulus, duration)
+
+
+def vehicle_of(run: xr.Dataset) -> VehicleParameters:
+    """Return the parameters of the vehicle with which a recording was made."""
+    return TwoWheelerParameters.model_validate_json(run.attrs["parameters"]).vehicle
+
+
+def judged_stop(run: xr.Dataset, v_0: float) -> tuple[Kpi, ...]:
+    """Return the key figures of a stop from a speed [m/s]."""
+    par = vehicle_of(run)
+    ideal = ideal_stop.ideal_distance(v_0, par)
+    peak = tyre.peak_slip(*road.surface(0.0, par.road))
+    return stop_figures.stop_figures(run, stop_figures.Setting(ideal, float(peak)))
+
+
+def time_to_stop(v_0: float, par: TwoWheelerParameters) -> float:
+    """Return a time [s] in which a vehicle with locked wheels stands, and a second more."""
+    ground = road.surface(0.0, par.vehicle.road)
+    held = tyre.adhesion(1.0, *ground) * par.vehicle.body.g
+    return round(v_0 / (0.6 * held) + 1.0, 1)

@@ -1,0 +1,87 @@
+"""Rear lift: the front brake alone brings the rear wheel off the ground, and is let go, or not."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, rolling_case, vehicle_of
+from bywire.brakes.two_wheeler.parameters import PressureRate, TwoWheelerParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Factor
+
+FIGURES = Figures(
+    undefined="the rear wheel stays on the ground",
+    lift_time=("s", "Time from zero until the rear wheel leaves the ground."),
+    lift_deceleration=("m/s**2", "Deceleration at which it does."),
+    flat_limit=("m/s**2", "Deceleration at which the level body lifts at rest, g l_f/h."),
+    time_to_5_deg=("s", "Time from lift to a pitch of 5 degrees."),
+    peak_pitch=("rad", "Largest pitch, nose down."),
+    air_time=("s", "Time in which the rear wheel is off the ground."),
+)
+_FIVE = math.radians(5.0)
+
+
+class Options(ParameterSet):
+    """The stop; slip control stays off, lift control is a parameter."""
+
+    v_0: RidingSpeed
+    """speed at the start"""
+    p_front: Demand
+    """front pressure that the rider demands"""
+    p_rate: PressureRate
+    """how fast: faster, and the wheel locks before the load is on it"""
+    grip: Factor
+    """factor on the adhesion of the road: sport tyres hold more than the surfaces' car tyres"""
+    duration: Duration
+    """time recorded"""
+
+
+def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
+    """Return the one run."""
+    demands = {"p_f_set": options.p_front}
+    changes = {"ecu.abs": "off", "ecu.p_rate": options.p_rate, "vehicle.road.grip": options.grip}
+    return (rolling_case(par, options.v_0, demands, options.duration, changes),)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return when the rear wheel lifts, and how far."""
+    run = recordings["run"]
+    body = vehicle_of(run).body
+    flat = body.g * body.l_f / body.h
+    off = run["support"].values <= 0
+    values = _lift(run, off) if off.any() else dict.fromkeys(FIGURES.units, math.nan)
+    if not off.any():
+        values |= {"peak_pitch": float(np.max(run["phi"].values)), "air_time": 0.0}
+    return FIGURES(**{**values, "flat_limit": flat})
+
+
+def _lift(run: xr.Dataset, off: np.ndarray) -> dict[str, float | tuple[float, str]]:
+    t, a, phi = (run[name].values for name in ("time", "a", "phi"))
+    k = int(np.argmax(off))
+    far = np.flatnonzero(phi > _FIVE)
+    reached = float(t[far[0]] - t[k]) if far.size else (math.nan, "5 degrees are not reached")
+    return {
+        "lift_time": float(t[k]),
+        "lift_deceleration": float(a[k]),
+        "time_to_5_deg": reached,
+        "peak_pitch": float(np.max(phi)),
+        "air_time": float(np.sum(np.diff(t)[off[:-1]])),
+    }
+
+
+EXPERIMENT = Experiment(
+    name="rear-lift",
+    assembly="two-wheeler",
+    summary="front brake alone from 30 m/s on dry asphalt, 27 bar; lift control is a parameter",
+    options=Options,
+    defaults=Options(v_0=30.0, p_front=27e5, p_rate=60e5, grip=1.2, duration=1.5),
+    cases=cases,
+    judge=judge,
+    kpis=FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)

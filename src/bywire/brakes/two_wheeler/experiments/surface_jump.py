@@ -1,0 +1,107 @@
+"""Surface jump: the road turns from one surface into another below a vehicle that brakes hard."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.two_wheeler.case import (
+    Demand,
+    RidingSpeed,
+    judged_stop,
+    rolling_case,
+    vehicle_of,
+)
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from bywire.plant import road, tyre
+from bywire.plant.road import Distance, SurfaceName
+from bywire.vehicle import stop_figures
+
+_CALM = 1.2  # of the peak's slip
+
+FIGURES = Figures(
+    recovery_time=(
+        "s",
+        "Time from the front wheel's step onto the further surface until its slip stays below "
+        f"{_CALM:g} of the slip of the peak there, above {stop_figures.SLOW:g} m/s.",
+    ),
+    jump_speed=("m/s", "Speed at that step."),
+)
+
+
+class Options(ParameterSet):
+    """The stop, and the two surfaces."""
+
+    v_0: RidingSpeed
+    """speed at the start"""
+    p_front: Demand
+    """front pressure that the rider demands"""
+    p_rear: Demand
+    """rear pressure that the rider demands"""
+    first: SurfaceName
+    """surface at the start"""
+    further: SurfaceName
+    """surface from x_change on"""
+    x_change: Distance
+    """where that begins"""
+    duration: Duration
+    """time recorded"""
+
+
+def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
+    """Return the one run."""
+    demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
+    changes = {
+        "vehicle.road.surface": options.first,
+        "vehicle.road.further": options.further,
+        "vehicle.road.x_change": options.x_change,
+        "vehicle.road.x_back": options.x_change + 1e6,
+    }
+    return (rolling_case(par, options.v_0, demands, options.duration, changes),)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return the key figures of the stop, the ideal one on the first surface, and the recovery."""
+    run = recordings["run"]
+    return (*FIGURES(**_recovery(run, options)), *judged_stop(run, options.v_0))
+
+
+def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, str]]:
+    t, x, v = (run[name].values for name in ("time", "x", "v"))
+    if not np.any(x > options.x_change):
+        undefined = (math.nan, "the vehicle stops before the further surface")
+        return {"recovery_time": undefined, "jump_speed": undefined}
+    k = int(np.argmax(x > options.x_change))
+    begin = float(np.interp(options.x_change, x[: k + 1], t[: k + 1]))
+    ground = road.surface(options.x_change + 1.0, vehicle_of(run).road)
+    beyond = (t > begin) & (v > stop_figures.SLOW)
+    beyond &= run["slip_f"].values > _CALM * tyre.peak_slip(*ground)
+    last = float(t[np.flatnonzero(beyond)[-1]]) if beyond.any() else begin
+    return {"recovery_time": last - begin, "jump_speed": float(np.interp(begin, t, v))}
+
+
+EXPERIMENT = Experiment(
+    name="surface-jump",
+    assembly="two-wheeler",
+    summary="panic stop from 30 m/s, dry asphalt turns wet after 15 m",
+    options=Options,
+    defaults=Options(
+        v_0=30.0,
+        p_front=40e5,
+        p_rear=40e5,
+        first="dry-asphalt",
+        further="wet-asphalt",
+        x_change=15.0,
+        duration=6.0,
+    ),
+    cases=cases,
+    judge=judge,
+    kpis=FIGURES.units | stop_figures.units(),
+    figures=("time-traces", "energy-balance"),
+)

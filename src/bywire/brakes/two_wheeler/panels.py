@@ -1,0 +1,30 @@
+"""What time traces of the two-wheeler show."""
+
+from __future__ import annotations
+
+from bywire.report.line_role import Role
+from bywire.report.panels import Panel, Panels, Trace
+
+PANELS = Panels(
+    "two-wheeler",
+    ("two-wheeler",),
+    (
+        Panel(
+            "speed",
+            (Trace("v"), Trace("v_f", Role.SECOND), Trace("v_r", Role.MEASURED)),
+            height=1.8,
+        ),
+        Panel("slip", (Trace("slip_f"), Trace("slip_r", Role.SECOND)), height=1.4),
+        Panel("deceleration", (Trace("a"),)),
+        Panel(
+            "front pressure", (Trace("p_f"), Trace("p_f_ref", Role.SET_POINT)),
+            saturation="abs_f", saturated="slip control",
+        ),
+        Panel(
+            "rear pressure", (Trace("p_r"), Trace("p_r_ref", Role.SET_POINT)),
+            saturation="abs_r", saturated="slip control",
+        ),
+        Panel("load", (Trace("N_f"), Trace("N_r", Role.SECOND))),
+        Panel("pitch", (Trace("phi"),)),
+    ),
+)  # fmt: skip

@@ -1,0 +1,64 @@
+"""Lift control of a two-wheeler: PI on the deceleration at which its rear wheel would lift."""
+
+from __future__ import annotations
+
+from typing import Annotated, NamedTuple
+
+from annotated_types import Gt
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Unit
+from bywire.core.signals import Pressure, Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
+
+
+class Parameters(ParameterSet):
+    """It acts before the wheel lifts: once lifted, no lower demand within reach brings it back."""
+
+    a_lim: Annotated[float, Unit("m/s**2", 10.0), Field(gt=0, allow_inf_nan=False)]
+    """deceleration that is not exceeded; the limit of the flat body is g l_f/h"""
+    k_p: Annotated[float, Unit("Pa*s**2/m", 1e5), Field(ge=0, allow_inf_nan=False)]
+    """proportional gain"""
+    T_i: Duration
+    """integral time"""
+    T_t: Duration
+    """tracking time of the anti-wind-up"""
+
+
+class State(NamedTuple):
+    """Integral part."""
+
+    integral: Pressure
+
+
+class Input(NamedTuple):
+    """Deceleration, rider's demand, what is left of it to be lowered, and that a sample ago."""
+
+    a: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
+    p_rider: Pressure
+    p_most: Pressure
+    p_before: Pressure
+
+
+class Output(NamedTuple):
+    """Demand, and whether it was lowered."""
+
+    p: Pressure
+    lowered: Annotated[float, Signal("1", "lift control acts")]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the controller by one sample.
+
+    .. math:: p = \min(p_{most}, K_p (a_{lim} - a) + I)
+    """
+    error = par.a_lim - u.a
+    wanted = par.k_p * error + x.integral
+    p = ops.clip(wanted, 0.0, ops.fmax(u.p_most, 0.0))
+    growth = par.k_p / par.T_i * error + (p - wanted) / par.T_t
+    idle = u.p_before <= 0
+    integral = ops.where(idle, ops.fmax(u.p_rider, 0.0), x.integral + T * growth)
+    return State(integral), Output(p, ops.where(p < u.p_most, 1.0, 0.0))

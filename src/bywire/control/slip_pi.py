@@ -1,0 +1,100 @@
+"""Slip control of one wheel: PI whose gain follows the speed, and which only lowers a demand."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge, Gt
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Fraction, Length, Unit
+from bywire.core.signals import Pressure, Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
+
+
+class Parameters(ParameterSet):
+    """Gains by the crossover of the loop, from what the ECU believes of its wheel.
+
+    ``schedule``: ``"speed"`` lets the gain follow the speed, with which gain and pole of the wheel
+    fall (eq. S1 of the notes on slip control); ``"fixed"`` keeps that of v_fixed.
+    """
+
+    schedule: Literal["speed", "fixed"]
+    """whether the gain follows the speed"""
+    slip_set: Fraction
+    """slip that is held"""
+    omega_c: Annotated[float, Unit("rad/s", 20.0), Field(gt=0, allow_inf_nan=False)]
+    """crossover of the loop on the falling side of adhesion"""
+    T_i: Duration
+    """integral time"""
+    T_t: Duration
+    """tracking time of the anti-wind-up"""
+    v_off: Annotated[float, Unit("m/s", 2.0), Field(gt=0, allow_inf_nan=False)]
+    """speed to which slip is relative at least: below, control fades out and the wheel may lock"""
+    v_fall: Annotated[float, Unit("m/s", 5.0), Field(gt=0, allow_inf_nan=False)]
+    """speed below which the slip that is held falls with speed, as far as sensors can follow"""
+    v_fixed: Annotated[float, Unit("m/s", 15.0), Field(gt=0, allow_inf_nan=False)]
+    """speed whose gain is kept (schedule "fixed")"""
+    J_hat: Annotated[float, Unit("kg*m**2", 0.5), Field(gt=0, allow_inf_nan=False)]
+    """inertia of the wheel as the ECU believes it"""
+    r_hat: Length
+    """its radius"""
+    k_hat: Annotated[float, Unit("N*m/Pa", 3e-4), Field(gt=0, allow_inf_nan=False)]
+    """torque of its brake over pressure"""
+
+
+class State(NamedTuple):
+    """Integral part."""
+
+    integral: Pressure
+
+
+class Input(NamedTuple):
+    """Speed, slip, the rider's demand, what is left of it to be lowered, and that a sample ago."""
+
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
+    slip: Annotated[float, Signal("1", "braking slip", 0.1)]
+    p_rider: Pressure
+    p_most: Pressure
+    p_before: Pressure
+
+
+class Output(NamedTuple):
+    """Demand, and whether it was lowered."""
+
+    p: Pressure
+    lowered: Annotated[float, Signal("1", "slip control acts")]
+
+
+def gain(
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)], par: Parameters
+) -> Annotated[float, Signal("Pa", "pressure over slip", 3e6)]:
+    r"""Return the proportional gain, :math:`K_p = \omega_c J v/(r k)`."""
+    speed = par.v_fixed if par.schedule == "fixed" else ops.fmax(v, par.v_off)
+    return par.omega_c * par.J_hat * speed / (par.r_hat * par.k_hat)
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the controller by one sample.
+
+    .. math:: p = \min(p_{most}, K_p (\lambda_{set} - \lambda) + I)
+
+    The integral follows what is demanded in the tracking time, and starts at the rider's demand.
+
+    References
+    ----------
+    S. M. Savaresi, M. Tanelli, Active Braking Control Systems Design for Vehicles, 2010: slip
+    control of a single corner; the gain that follows the speed is derived from its linear model.
+    """
+    K_p = gain(u.v, par)
+    error = par.slip_set * ops.fmin(u.v / par.v_fall, 1.0) - u.slip
+    wanted = K_p * error + x.integral
+    p = ops.clip(wanted, 0.0, ops.fmax(u.p_most, 0.0))
+    growth = K_p / par.T_i * error + (p - wanted) / par.T_t
+    # Nothing to be lowered yet: the first demand must not wait for the integral.
+    idle = u.p_before <= 0
+    integral = ops.where(idle, ops.fmax(u.p_rider, 0.0), x.integral + T * growth)
+    return State(integral), Output(p, ops.where(p < u.p_most, 1.0, 0.0))

@@ -1,0 +1,70 @@
+"""Speed of the vehicle from its wheels, while these slip."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge, Gt
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, Unit, Weight
+from bywire.core.signals import Signal
+
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
+Speed = Annotated[float, Signal("m/s", "speed", 20.0), Ge(0)]
+
+
+class Parameters(ParameterSet):
+    """Reference speed.
+
+    ``law``: ``"wheels"`` follows the faster wheel, but falls no faster than the best braking;
+    ``"accelerometer"`` adds up the measured deceleration, and comes back to the faster wheel where
+    this slips little. The first fails where both wheels slip together.
+    """
+
+    law: Literal["wheels", "accelerometer"]
+    """what carries the speed while the wheels slip"""
+    a_max: Annotated[float, Unit("m/s**2", 12.0), Field(gt=0, allow_inf_nan=False)]
+    """deceleration that no braking exceeds (law "wheels")"""
+    slip_small: Weight
+    """slip up to which a wheel is believed (law "accelerometer")"""
+    tau: Duration
+    """time in which the reference comes back to a wheel that is believed"""
+    v_still: Annotated[float, Unit("m/s", 1.0), Field(gt=0, allow_inf_nan=False)]
+    """speed below which every wheel is believed, or an error would stay at standstill"""
+
+
+class State(NamedTuple):
+    """Reference speed."""
+
+    v: Speed
+
+
+class Input(NamedTuple):
+    """Speeds of the treads, and deceleration."""
+
+    v_f: Annotated[float, Signal("m/s", "measured speed of the front tread", 20.0)]
+    v_r: Annotated[float, Signal("m/s", "measured speed of the rear tread", 20.0)]
+    a: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> State:
+    """Advance the reference by one sample; never below the faster wheel, which brakes only."""
+    fastest = ops.fmax(u.v_f, u.v_r)
+    if par.law == "wheels":
+        return State(ops.fmax(ops.fmax(fastest, x.v - par.a_max * T), 0.0))
+    carried = x.v - u.a * T
+    drawn = carried + T / (par.tau + T) * (fastest - carried)
+    rolls = ops.where(carried - fastest < par.slip_small * carried, drawn, carried)
+    return State(ops.fmax(ops.where(carried < par.v_still, drawn, rolls), 0.0))
+
+
+def slip(
+    v: Speed,
+    v_wheel: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)],
+    v_off: Annotated[float, Signal("m/s", "speed below which slip is not told", 2.0), Gt(0)],
+) -> Annotated[float, Signal("1", "braking slip as the ECU sees it", 0.1)]:
+    """Return the braking slip as the ECU sees it, relative to at least ``v_off``."""
+    return (v - v_wheel) / ops.fmax(v, v_off)

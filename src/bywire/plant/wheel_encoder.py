@@ -1,0 +1,62 @@
+"""Pulse wheel on a road wheel, and the capture unit that stamps its edges with their time."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal, NamedTuple
+
+from pydantic import Field
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Unit
+from bywire.core.signals import Signal
+
+WheelSpeed = Annotated[float, Signal("rad/s", "wheel speed", 60.0)]
+
+
+class Parameters(ParameterSet):
+    """One edge for each pulse, without loss; time stamps are exact.
+
+    ``law``: ``"pulses"``, or an ``"ideal"`` angle.
+    """
+
+    law: Literal["ideal", "pulses"]
+    """whether the angle is known between the edges"""
+    pulses: Annotated[float, Unit("1", 48.0), Field(ge=1, allow_inf_nan=False)]
+    """pulses per revolution"""
+    omega_min: Annotated[float, Unit("rad/s", 0.1), Field(gt=0, allow_inf_nan=False)]
+    """slowest speed whose edges are stamped right"""
+
+
+class State(NamedTuple):
+    """Angle of the wheel."""
+
+    theta: Annotated[float, Signal("rad", "wheel angle", 100.0)]
+
+
+class Input(NamedTuple):
+    """Speed of the wheel."""
+
+    omega: WheelSpeed
+
+
+class Reading(NamedTuple):
+    """What the capture unit shows."""
+
+    angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
+    age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
+
+
+def rate(u: Input) -> WheelSpeed:
+    """Return how fast the angle grows."""
+    return u.omega
+
+
+def reading(x: State, u: Input, par: Parameters) -> Reading:
+    """Return the angle of the last edge and how long ago it was; of an ideal angle, just now."""
+    if par.law == "ideal":
+        return Reading(x.theta, 0.0)
+    step = 2.0 * math.pi / par.pulses
+    angle = step * ops.floor(x.theta / step)
+    return Reading(angle, (x.theta - angle) / ops.fmax(ops.fabs(u.omega), par.omega_min))
