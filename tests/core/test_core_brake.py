@@ -18,7 +18,7 @@ from bywire.core.model import ASSEMBLIES
 from systems.loading import SPRING_AXIS, forgotten
 
 HEAD = "from bywire.core.brake import Brake\n"
-OURS = {"motorcycle", "wedge"}
+OURS = {"motorcycle", "two-wheeler", "wedge"}
 
 Write = Callable[[str, str], Path]
 

@@ -80,9 +80,10 @@ def role_attributes(role: Role | None) -> dict[str, str]:
 def actuator_ledger(recording: xr.Dataset) -> Ledger:
     """Return the books of an actuator or rig, between the ends of a recording.
 
-    ``recording``: recording with energies [J].
+    ``recording``: recording with energies [J]. Where all of these stand in one further book, as
+    those of a vehicle without actuators do, it is that one.
     """
-    return _ledger(recording, "")
+    return _ledger(recording, _main_book(recording))
 
 
 def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
@@ -93,7 +94,14 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     """
     roles = _roles(recording, _changes(recording)).values()
     names = dict.fromkeys(role.book for role in roles if role.book)
-    return {name: _ledger(recording, name) for name in names}
+    main = _main_book(recording)
+    return {name: _ledger(recording, name) for name in names if name != main}
+
+
+def _main_book(recording: xr.Dataset) -> str:
+    """Return the book that stands first: that of the actuator, or the only one there is."""
+    books = {role.book for role in _roles(recording, _changes(recording)).values()}
+    return books.pop() if len(books) == 1 else ""
 
 
 def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]) -> Ledger:

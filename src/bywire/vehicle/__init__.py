@@ -1,1 +1,5 @@
 """Vehicles around any brake: what they share, and what is said of their stops."""
+
+from bywire.vehicle.two_wheeler import TwoWheeler, VehicleParameters, rolling_start
+
+__all__ = ["TwoWheeler", "VehicleParameters", "rolling_start"]

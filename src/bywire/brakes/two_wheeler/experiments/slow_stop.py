@@ -54,7 +54,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
         "vehicle.road.gradient_further": options.gradient,
         "ecu.abs": "off",
         "ecu.lift": "off",
-        "ecu.p_rate": 1e9,  # the rider's hand is as fast as the circuit
+        "ecu.p_rate": 1e12,  # the rider's hand is as fast as the circuit
     }
     return (rolling_case(par, options.v_0, demands, options.duration, changes),)
 

@@ -6,7 +6,7 @@ from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import chosen, derived, paper
 
-_LAP = "bike_params_r6.csv, a 600 cm^3 sport motorcycle with rider"
+_LAP = "Table legacy/bike_params_r6.csv, a 600 cm^3 sport motorcycle with rider"
 SOURCE = (
     "mass, drag and rolling resistance: R. Graham, motorcycle-lap-sim, open source; rear brake: "
     "A. Dardanelli, G. Alli, S. M. Savaresi, Modeling and control of an electro-mechanical "
