@@ -18,13 +18,18 @@ from bywire.core.parameters import ParameterSet, leaf_fields
 
 NODES = 4  # of every table
 ATTEMPTS = 2000
+MANY = 64
+"""combinations of choices above which not all are tried"""
 
 Arguments = dict[str, Any]
 Choices = dict[str, Any]
 
 
 def combinations(annotations: Mapping[str, Any]) -> Iterator[Choices]:
-    """Yield every combination of structural choices, ``par.law`` and the like, of some arguments.
+    """Yield combinations of structural choices, ``par.law`` and the like, of some arguments.
+
+    Every combination where there are few; else every choice beside the first and beside the last
+    of all the others.
 
     Raises
     ------
@@ -35,8 +40,17 @@ def combinations(annotations: Mapping[str, Any]) -> Iterator[Choices]:
     for name, annotation in annotations.items():
         if is_parameters(annotation):
             options |= _options(annotation, f"{name}.")
-    for values in itertools.product(*options.values()):
-        yield dict(zip(options, values, strict=True))
+    if math.prod(map(len, options.values())) <= MANY:
+        for values in itertools.product(*options.values()):
+            yield dict(zip(options, values, strict=True))
+        return
+    for end in (0, -1):
+        beside = {name: values[end] for name, values in options.items()}
+        yield beside
+        for name, values in options.items():
+            for value in values:
+                if value != beside[name]:
+                    yield {**beside, name: value}
 
 
 def _options(cls: type[ParameterSet], prefix: str) -> dict[str, tuple[Any, ...]]:
