@@ -5,6 +5,7 @@ import math
 import pytest
 
 import bywire
+from bywire.brakes.two_wheeler.case import on_surface
 from bywire.plant import brake_disc, road, tyre
 from bywire.vehicle.ideal_stop import ideal_distance, peak_adhesion
 
@@ -14,7 +15,7 @@ K_DRAG = 1.225 * 0.40 / (2.0 * 265.0)
 
 def vehicle(surface="dry-asphalt", **changes):
     par = bywire.parameters("sport600")
-    return par.replace({"vehicle.road.surface": surface, **changes})
+    return par.replace({**on_surface(surface), **changes})
 
 
 @pytest.mark.parametrize(
@@ -70,7 +71,7 @@ def test_brakes_hold_what_their_discs_say():
 @pytest.mark.parametrize(
     ("changes", "said"),
     [({"vehicle.body.l_f": 1.5}, "between the wheels"),
-     ({"vehicle.road.own.c3": 40.0}, "must rise with slip first"),
+     ({"vehicle.road.first.c3": 40.0}, "must rise with slip first"),
      ({"vehicle.road.x_back": 10.0}, "begins before it ends")],
 )  # fmt: skip
 def test_impossible_geometry_and_roads_are_refused(changes, said):

@@ -19,10 +19,7 @@ Gradient = Annotated[float, Unit("1", 0.05), Field(gt=-1, lt=1, allow_inf_nan=Fa
 SurfaceName = Literal[
     "dry-asphalt", "wet-asphalt", "dry-concrete", "dry-cobble", "wet-cobble", "snow", "ice", "own"
 ]
-FurtherSurface = Literal[
-    "same", "dry-asphalt", "wet-asphalt", "dry-concrete", "dry-cobble", "wet-cobble", "snow", "ice",
-    "own",
-]  # fmt: skip
+"""what experiments call a surface; ``own`` is that of the parameters"""
 
 
 class Surface(NamedTuple):
@@ -53,8 +50,8 @@ SURFACES = {
 Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak"""
 
 
-class OwnSurface(ParameterSet):
-    """A surface of one's own."""
+class SurfaceParameters(ParameterSet):
+    """Adhesion of a tyre on a surface, after Burckhardt."""
 
     c1: Coefficient
     """what the adhesion tends to, but for c3"""
@@ -64,7 +61,7 @@ class OwnSurface(ParameterSet):
     """how much it falls up to a locked wheel"""
 
     @model_validator(mode="after")
-    def _has_a_peak(self) -> OwnSurface:
+    def _has_a_peak(self) -> SurfaceParameters:
         if not self.c1 * self.c2 > self.c3:
             raise ValueError(
                 f"c1 c2 = {self.c1 * self.c2:g} must be above c3 = {self.c3:g}: the adhesion must "
@@ -74,18 +71,14 @@ class OwnSurface(ParameterSet):
 
 
 class Parameters(ParameterSet):
-    """Two stretches of road, one behind the other, and the first one again behind these.
+    """Two stretches of road, one behind the other, and the first one again behind these."""
 
-    ``surface``, ``further``: what they are made of; ``"own"`` takes the coefficients of ``own``.
-    """
-
-    surface: SurfaceName
-    """what the road is made of"""
-    further: FurtherSurface
-    """what it is made of from x_change on"""
+    first: SurfaceParameters
+    """surface of the first stretch"""
+    further: SurfaceParameters
+    """surface from x_change on"""
     grip: Factor
     """factor on the adhesion of every surface"""
-    own: OwnSurface
     x_change: Distance
     """where the further surface begins, from where the front wheel is at time zero"""
     x_back: Distance
@@ -118,11 +111,12 @@ def share(x: Place, par: Parameters) -> Annotated[float, Signal("1", "share of t
 
 def surface(x: Place, par: Parameters) -> Surface:
     """Return the coefficients of the adhesion at a place."""
-    first = _coefficients(par.surface, par)
-    if par.further != "same":
-        part, second = share(x, par), _coefficients(par.further, par)
-        first = Surface(*(a + part * (b - a) for a, b in zip(first, second, strict=True)))
-    return Surface(par.grip * first.c1, first.c2, par.grip * first.c3)
+    part, first, further = share(x, par), par.first, par.further
+    return Surface(
+        c1=par.grip * (first.c1 + part * (further.c1 - first.c1)),
+        c2=first.c2 + part * (further.c2 - first.c2),
+        c3=par.grip * (first.c3 + part * (further.c3 - first.c3)),
+    )
 
 
 def slope(x: Place, par: Parameters) -> Slope:
@@ -130,7 +124,3 @@ def slope(x: Place, par: Parameters) -> Slope:
     rise = par.gradient + share(x, par) * (par.gradient_further - par.gradient)
     cosine = 1.0 / ops.sqrt(1.0 + rise * rise)
     return Slope(rise * cosine, cosine)
-
-
-def _coefficients(name: str, par: Parameters) -> Surface:
-    return Surface(par.own.c1, par.own.c2, par.own.c3) if name == "own" else SURFACES[name]

@@ -17,7 +17,7 @@ Slip = Annotated[float, Signal("1", "slip", 0.1)]
 Coefficient1 = Annotated[float, Signal("1", "adhesion coefficient c1"), Ge(0.5)]
 Coefficient2 = Annotated[float, Signal("1", "adhesion coefficient c2", 30.0), Ge(10)]
 Coefficient3 = Annotated[float, Signal("1", "adhesion coefficient c3", 0.5), Gt(0)]
-_STEPS = 5  # of Newton's method, from below, to a deflection that only a stopping wheel feels
+_STEPS, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # of Newton's method; least slope, in slip; floor of roots
 
 
 class Parameters(ParameterSet):
@@ -109,12 +109,28 @@ def limits(u: Contact, par: Parameters) -> Limits:
     """
     slip, peak = ops.fabs(braking_slip(u, par)), peak_slip(u.c1, u.c2, u.c3)
     mu = adhesion(ops.fmax(slip, peak), u.c1, u.c2, u.c3)
-    rising = 0.0 * slip
+    return Limits(mu, par.sigma * ops.where(slip > peak, rising_slip(mu, u), peak))
+
+
+def rising_slip(
+    mu: Annotated[float, Signal("1", "adhesion", 1.0), Ge(0)], u: Contact
+) -> Annotated[float, Signal("1", "slip", 0.1)]:
+    """Return the slip below the peak's at which the adhesion is ``mu``, within 5e-6.
+
+    By Newton's method from below: from the slip without the curve's linear fall, or from the
+    parabola through the peak, whichever is closer.
+    """
+    peak = peak_slip(u.c1, u.c2, u.c3)
+    bend = u.c2 * u.c3
+    below = ops.fmax(adhesion(peak, u.c1, u.c2, u.c3) - mu, 0.0)
+    straight = -ops.log(ops.fmax(1.0 - mu / u.c1, _LEAST)) / u.c2
+    slip = ops.fmax(peak - ops.sqrt(2.0 * below / bend + _LEAST), straight)
     for _ in range(_STEPS):
-        decay = ops.exp(-u.c2 * rising)
-        left = mu - u.c1 * (1.0 - decay) + u.c3 * rising
-        rising = rising + left / (u.c1 * u.c2 * decay - u.c3)
-    return Limits(mu, par.sigma * ops.where(slip > peak, rising, peak))
+        decay = ops.exp(-u.c2 * slip)
+        left = mu - u.c1 * (1.0 - decay) + u.c3 * slip
+        # At the peak itself, where the curve is level, rounding must not be divided by nothing.
+        slip = slip + left / ops.fmax(u.c1 * u.c2 * decay - u.c3, _LEVEL * bend)
+    return ops.fmin(slip, peak)
 
 
 def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", "rate", 0.5)]:
@@ -134,12 +150,17 @@ def sliding(x: State, u: Input) -> Annotated[float, Signal("1", "tyre slides")]:
 def force_over_load(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("1", "braking force over load", 1.0)]:
-    """Return the force over the load: of the deflection up to the limit, damped near standstill."""
-    held = adhesion(ops.fmin(ops.fabs(x.u), u.u_max) / par.sigma, u.c1, u.c2, u.c3)
-    elastic = ops.where(x.u < 0, -1.0, 1.0) * ops.fmin(held, u.mu_max)
+    """Return the force over the load: of the deflection up to the limit, damped near standstill.
+
+    With its damping a tyre holds no more than without: what it holds at most at its slip.
+    """
+    slides = sliding(x, u)
+    held = adhesion(ops.fabs(x.u) / par.sigma, u.c1, u.c2, u.c3)
+    size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))
+    elastic = ops.where(x.u < 0, -size, size)
     slow = ops.fmin(ops.fabs(u.v) / par.v_low, 1.0)
     damping = par.c_t * (u.v - u.v_wheel) * 0.5 * (1.0 + ops.cos(math.pi * slow))
-    return ops.clip(elastic + (1.0 - sliding(x, u)) * damping, -u.mu_max, u.mu_max)
+    return ops.clip(elastic + (1.0 - slides) * damping, -u.mu_max, u.mu_max)
 
 
 def output(x: State, u: Input, par: Parameters) -> Output:

@@ -12,7 +12,7 @@ from bywire.simulation.run import simulate
 
 KMH_100 = "100 km/h"
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
-WET = {"vehicle.road.surface": "wet-asphalt"}
+WET = {"options.surface": "wet-asphalt"}
 KNOWN = {"ecu.sees": "known", "sensors.encoder.law": "ideal"}
 
 

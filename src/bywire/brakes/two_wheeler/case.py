@@ -16,6 +16,7 @@ from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.plant import road, tyre
+from bywire.plant.road import SURFACES, SurfaceName
 from bywire.vehicle import ideal_stop, stop_figures
 from bywire.vehicle.two_wheeler import VehicleParameters
 
@@ -49,6 +50,16 @@ def rolling_case(
     return Case(label, TwoWheelerByWire(), changed, state, memory, stimulus, duration)
 
 
+def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
+    """Return the parameters of a road of some surface, and of a further one; own ones stay."""
+    changes: dict[str, float] = {}
+    for stretch, name in (("first", first), ("further", first if further is None else further)):
+        if name != "own":
+            numbers = SURFACES[name]._asdict()
+            changes |= {f"vehicle.road.{stretch}.{key}": v for key, v in numbers.items()}
+    return changes
+
+
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
     """Return the parameters of the vehicle with which a recording was made."""
     return TwoWheelerParameters.model_validate_json(run.attrs["parameters"]).vehicle
@@ -60,10 +71,3 @@ def judged_stop(run: xr.Dataset, v_0: float) -> tuple[Kpi, ...]:
     ideal = ideal_stop.ideal_distance(v_0, par)
     peak = tyre.peak_slip(*road.surface(0.0, par.road))
     return stop_figures.stop_figures(run, stop_figures.Setting(ideal, float(peak)))
-
-
-def time_to_stop(v_0: float, par: TwoWheelerParameters) -> float:
-    """Return a time [s] in which a vehicle with locked wheels stands, and a second more."""
-    ground = road.surface(0.0, par.vehicle.road)
-    held = tyre.adhesion(1.0, *ground) * par.vehicle.body.g
-    return round(v_0 / (0.6 * held) + 1.0, 1)

@@ -18,7 +18,7 @@ Par = TwoWheelerParameters
 class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
     """Each brake follows its demand as a loop of second order, as fast as its bandwidth."""
 
-    name: ClassVar[str] = "two-wheeler"
+    name: ClassVar[str] = "two-wheeler-by-wire"
     Memory: ClassVar = ecu.Memory
     Stimulus: ClassVar = ecu.Stimulus
 

@@ -7,7 +7,7 @@ from bywire.report.panels import Panel, Panels, Trace
 
 PANELS = Panels(
     "two-wheeler",
-    ("two-wheeler",),
+    ("two-wheeler-by-wire",),
     (
         Panel(
             "speed",

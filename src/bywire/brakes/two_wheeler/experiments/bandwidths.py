@@ -8,7 +8,13 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
-from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, judged_stop, rolling_case
+from bywire.brakes.two_wheeler.case import (
+    Demand,
+    RidingSpeed,
+    judged_stop,
+    on_surface,
+    rolling_case,
+)
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Nodes, Unit
@@ -49,7 +55,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
             par, options.v_0, demands, options.duration,
             {
                 "front.circuit.f_n": f, "rear.circuit.f_n": f,
-                "vehicle.road.surface": options.surface,
+                **on_surface(options.surface),
             },
             _label(f),
         )
@@ -79,7 +85,7 @@ _DEFAULTS = Options(
 
 EXPERIMENT = Experiment(
     name="bandwidths",
-    assembly="two-wheeler",
+    assembly="two-wheeler-by-wire",
     summary="controlled stops from 30 m/s on wet asphalt with pressure loops of 2 to 100 Hz",
     options=Options,
     defaults=_DEFAULTS,

@@ -8,19 +8,20 @@ from bywire.brakes.two_wheeler.case import (
     Demand,
     RidingSpeed,
     judged_stop,
+    on_surface,
     rolling_case,
-    time_to_stop,
 )
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
+from bywire.plant.road import SurfaceName
 from bywire.vehicle import stop_figures
 
 _FROM = 100.0 / 3.6
 
 
 class Options(ParameterSet):
-    """The stop; road and controllers are parameters."""
+    """The stop, and the surface; slope and controllers are parameters."""
 
     v_0: RidingSpeed
     """speed at the start"""
@@ -28,14 +29,17 @@ class Options(ParameterSet):
     """front pressure that the rider demands"""
     p_rear: Demand
     """rear pressure that the rider demands"""
+    surface: SurfaceName
+    """what the road is made of"""
     duration: Duration
-    """time recorded; long enough for locked wheels on this road unless given"""
+    """time recorded"""
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
-    return (rolling_case(par, options.v_0, demands, options.duration),)
+    changes = on_surface(options.surface)
+    return (rolling_case(par, options.v_0, demands, options.duration, changes),)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
@@ -43,20 +47,16 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     return judged_stop(recordings["run"], options.v_0)
 
 
-def following(par: TwoWheelerParameters) -> dict[str, float]:
-    """Return how long is recorded unless it is given [s]."""
-    return {"duration": time_to_stop(_FROM, par)}
-
-
 EXPERIMENT = Experiment(
     name="straight-stop",
-    assembly="two-wheeler",
-    summary="panic stop from 100 km/h, 40 bar on both brakes; road and control are parameters",
+    assembly="two-wheeler-by-wire",
+    summary="panic stop from 100 km/h, 40 bar on both brakes, on any surface",
     options=Options,
-    defaults=Options(v_0=_FROM, p_front=40e5, p_rear=40e5, duration=10.0),
+    defaults=Options(
+        v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=10.0
+    ),
     cases=cases,
     judge=judge,
     kpis=stop_figures.units(),
     figures=("time-traces", "energy-balance"),
-    following=following,
 )

@@ -13,6 +13,7 @@ from bywire.brakes.two_wheeler.case import (
     Demand,
     RidingSpeed,
     judged_stop,
+    on_surface,
     rolling_case,
     vehicle_of,
 )
@@ -58,8 +59,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
     """Return the one run."""
     demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
     changes = {
-        "vehicle.road.surface": options.first,
-        "vehicle.road.further": options.further,
+        **on_surface(options.first, options.further),
         "vehicle.road.x_change": options.x_change,
         "vehicle.road.x_back": options.x_change + 1e6,
     }
@@ -88,7 +88,7 @@ def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[floa
 
 EXPERIMENT = Experiment(
     name="surface-jump",
-    assembly="two-wheeler",
+    assembly="two-wheeler-by-wire",
     summary="panic stop from 30 m/s, dry asphalt turns wet after 15 m",
     options=Options,
     defaults=Options(

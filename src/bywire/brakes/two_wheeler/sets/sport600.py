@@ -5,6 +5,7 @@ from __future__ import annotations
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import chosen, derived, paper
+from bywire.plant.road import SURFACES
 
 _LAP = "Table legacy/bike_params_r6.csv, a 600 cm^3 sport motorcycle with rider"
 SOURCE = (
@@ -31,10 +32,14 @@ _SLIP = {
     "v_fall": chosen(6.0, "an edge of 48 pulses comes every 7 ms"),
     "v_fixed": chosen(15.0, "the middle of a stop"),
 }
+_DRY = {
+    name: derived(value, "dry asphalt for car tyres, as circulated")
+    for name, value in SURFACES["dry-asphalt"]._asdict().items()
+}
 
 SPORT600 = CitedSet(
     name="sport600",
-    assembly="two-wheeler",
+    assembly="two-wheeler-by-wire",
     source=SOURCE,
     summary="sport motorcycle with rider, pressure loops of 10 Hz",
     parameter_class=TwoWheelerParameters,
@@ -60,12 +65,9 @@ SPORT600 = CitedSet(
         "vehicle.rear_wheel.C_rr": paper(0.015, _LAP),
         **{f"vehicle.front_tyre.{name}": value for name, value in _TYRE.items()},
         **{f"vehicle.rear_tyre.{name}": value for name, value in _TYRE.items()},
-        "vehicle.road.surface": chosen("dry-asphalt", "an experiment's choice"),
-        "vehicle.road.further": chosen("same", "an experiment's choice"),
         "vehicle.road.grip": chosen(1.0, "as circulated"),
-        "vehicle.road.own.c1": chosen(1.2801, "dry asphalt, to start from"),
-        "vehicle.road.own.c2": chosen(23.99, "dry asphalt, to start from"),
-        "vehicle.road.own.c3": chosen(0.52, "dry asphalt, to start from"),
+        **{f"vehicle.road.first.{name}": value for name, value in _DRY.items()},
+        **{f"vehicle.road.further.{name}": value for name, value in _DRY.items()},
         "vehicle.road.x_change": chosen(15.0, "an experiment's choice"),
         "vehicle.road.x_back": chosen(1e4, "an experiment's choice"),
         "vehicle.road.ramp": chosen(0.01, "a jump, next to the length of a tyre's contact"),
