@@ -46,7 +46,7 @@ def interrupted(wait_for: Path, pause: float, *arguments: str | Path) -> Outcome
 
 
 @posix
-@pytest.mark.parametrize("pause", [0.0, 2.5], ids=["while it is set up", "while it runs"])
+@pytest.mark.parametrize("pause", [0.0, 1.5], ids=["while it is set up", "while it runs"])
 def test_interrupt_ends_with_130(bench, tmp_path, pause):
     out = tmp_path / "out"
     outcome = interrupted(out, pause, bench(LONG), "--out", out, "--json")

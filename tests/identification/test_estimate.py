@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from bywire.identification.estimate import Estimate, Kept, as_object
+from bywire.identification.leftover import Part
 from bywire.identification.unknown import Unknown
 
 # Deviations 0.3, 2 and 0.1; b and c go together by -0.95, a and c by 0.5.
@@ -123,3 +124,10 @@ def test_unknowns_and_values_that_do_not_belong_together_are_not_cut(read: objec
     fewer = replace(ESTIMATE, unknowns=ESTIMATE.unknowns[:2])
     with pytest.raises(ValueError, match=r"shorter|longer"):
         read(fewer)  # type: ignore[operator]
+
+
+def test_what_is_left_of_each_part_is_in_its_unit() -> None:
+    parts = (Part("p", "", 3, "Pa", noise=2.0), Part("i", "slow", 1, "A"))
+    first, second = replace(ESTIMATE, parts=parts).leftovers()
+    assert (first.residuals.tolist(), first.unit) == ([2.0, -2.0, 6.0], "Pa")
+    assert (second.residuals.tolist(), second.label) == ([0.0], "slow:i")

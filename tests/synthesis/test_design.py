@@ -192,7 +192,7 @@ def test_an_interrupt_leaves_the_best_until_then() -> None:
 
 def test_the_same_seed_gives_the_same_gains() -> None:
     texts = ("bandwidth >= 100 Hz", "phase margin >= 60 deg")
-    with few_starts():
+    with few_starts(is_coarse=False):  # on that grid all seeds lead to the same gains
         first, second, other = (designed("current", texts, seed=seed) for seed in (4, 4, 5))
     assert first.gains == second.gains != other.gains
 

@@ -184,7 +184,9 @@ def open_books_of(run: Run, trajectory: Trajectory) -> list[str]:
     """Return what `open_books` says of a run of which the `energy_signals` were computed."""
     signals = signals_of(run.model.Output)
     rows = {n: ("time", trajectory[n], _attributes(signals[n])) for n in energy_signals(run)}
-    return open_books(xr.Dataset(rows)) if rows and trajectory.time.size else []
+    if not (rows and trajectory.time.size):
+        return []
+    return open_books(xr.Dataset(rows, {"time": trajectory.time}))
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:
