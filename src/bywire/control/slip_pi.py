@@ -53,9 +53,10 @@ class State(NamedTuple):
 
 
 class Input(NamedTuple):
-    """Speed, slip, the rider's demand, what is left of it to be lowered, and that a sample ago."""
+    """Speed, slip and its set point, the rider's demand, what may be lowered, and that before."""
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)]
+    slip_set: Annotated[float, Signal("1", "slip set point", 0.1)]
     slip: Annotated[float, Signal("1", "braking slip", 0.1)]
     p_rider: Pressure
     p_most: Pressure
@@ -77,6 +78,13 @@ def gain(
     return par.omega_c * par.J_hat * speed / (par.r_hat * par.k_hat)
 
 
+def set_point(
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0), Ge(0)], par: Parameters
+) -> Annotated[float, Signal("1", "slip set point", 0.1)]:
+    """Return the slip that is held at a speed."""
+    return par.slip_set * ops.fmin(v / par.v_fall, 1.0)
+
+
 def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
     r"""Advance the controller by one sample.
 
@@ -90,7 +98,7 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     control of a single corner; the gain that follows the speed is derived from its linear model.
     """
     K_p = gain(u.v, par)
-    error = par.slip_set * ops.fmin(u.v / par.v_fall, 1.0) - u.slip
+    error = u.slip_set - u.slip
     wanted = K_p * error + x.integral
     p = ops.clip(wanted, 0.0, ops.fmax(u.p_most, 0.0))
     growth = K_p / par.T_i * error + (p - wanted) / par.T_t

@@ -69,10 +69,10 @@ def units() -> dict[str, str]:
 def standstill(run: xr.Dataset) -> float:
     """Return when the speed is zero for the first time after zero [s]; NaN where it never is."""
     t, v = run["time"].values, run["v"].values
-    stopped = np.flatnonzero((v <= 0) & (t > 0))
+    stopped = np.flatnonzero((v[1:] <= 0) & (v[:-1] > 0) & (t[1:] > 0))
     if not stopped.size:
         return math.nan
-    k = int(stopped[0])
+    k = int(stopped[0]) + 1
     return float(t[k - 1] + (t[k] - t[k - 1]) * v[k - 1] / (v[k - 1] - v[k]))
 
 

@@ -78,16 +78,22 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
     if par.ecu.abs == "pi":
         front, out_f = slip_pi.output(
             slip_pi.State(m.slip_f_integral),
-            slip_pi.Input(m.v_hat, m.slip_f_hat, u.p_f_set, p_f, before.p_f_most),
+            slip_pi.Input(
+                m.v_hat, slip_pi.set_point(m.v_hat, par.ecu.front_slip), m.slip_f_hat,
+                u.p_f_set, p_f, before.p_f_most,
+            ),
             par.ecu.T_s,
             par.ecu.front_slip,
-        )
+        )  # fmt: skip
         rear, out_r = slip_pi.output(
             slip_pi.State(m.slip_r_integral),
-            slip_pi.Input(m.v_hat, m.slip_r_hat, u.p_r_set, p_r, before.p_r_most),
+            slip_pi.Input(
+                m.v_hat, slip_pi.set_point(m.v_hat, par.ecu.rear_slip), m.slip_r_hat,
+                u.p_r_set, p_r, before.p_r_most,
+            ),
             par.ecu.T_s,
             par.ecu.rear_slip,
-        )
+        )  # fmt: skip
         p_f, p_r = out_f.p, out_r.p
         m = m._replace(
             slip_f_integral=front.integral,

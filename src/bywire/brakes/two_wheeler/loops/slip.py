@@ -1,0 +1,65 @@
+"""Slip loop of a wheel, around the loop of its brake's pressure."""
+
+from __future__ import annotations
+
+from typing import cast
+
+from bywire.analysis.loop import Loop, Point, Quantity
+from bywire.brakes.two_wheeler.rigs.wheel_on_drum import (
+    Memory,
+    Stimulus,
+    WheelOnDrum,
+    WheelOnDrumParameters,
+)
+from bywire.control import slip_pi
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.plant import brake_disc, pressure_loop, road_wheel, tyre
+
+
+def point(par: ParameterSet, value: float) -> Point:
+    """Return the wheel held at its set slip while the vehicle keeps a speed [m/s].
+
+    Raises
+    ------
+    ParameterError
+        When the speed is not positive, or the slip lies beyond the peak, where no slip that is
+        not controlled stays.
+    """
+    if not value > 0.0:
+        raise ParameterError(f"speed = {value:g} m/s is no operating point: it must be > 0 m/s")
+    at = cast(WheelOnDrumParameters, par.replace({"drum.v": value}))
+    slip = slip_pi.set_point(value, at.slip)
+    surface = tuple(at.drum.surface.flat().values())
+    if not slip < tyre.peak_slip(*surface):
+        raise ParameterError(
+            f"slip.slip_set = {slip:g} is no operating point: the adhesion has its peak at "
+            f"{tyre.peak_slip(*surface):.3g}, ask for less"
+        )
+    v_wheel = value * (1.0 - slip)
+    force = at.drum.N * tyre.adhesion(slip, *surface)
+    held = at.wheel.r * force - road_wheel.rolling_resistance(at.drum.N, at.wheel)
+    p = held / brake_disc.torque_per_pressure(at.brake.disc)
+    state = WheelOnDrum.state(
+        wheel=road_wheel.State(v_wheel / at.wheel.r),
+        tyre=tyre.State(at.tyre.sigma * slip),
+        circuit=pressure_loop.State(p, 0.0),
+    )
+    memory = Memory(p_ref=p, slip_hat=slip, slip_ref=slip, integral=p, acts=1.0)
+    return Point(WheelOnDrum(), at, state, memory, Stimulus(slip_set=slip, p_set=2.0 * p))
+
+
+LOOP = Loop(
+    name="slip",
+    assembly="wheel-on-drum",
+    summary="slip control of a wheel around its brake's pressure loop, 1 kHz",
+    at=Quantity("speed", "m/s", 20.0),
+    inputs=("slip_set",),
+    output="slip",
+    cut="p_ref",
+    point=point,
+    causes={"curve of the adhesion": {"drum.surface.c3": 1e-6}},
+    band=(0.2, 50.0),
+    amplitudes=(1e-3, 5e-3),
+    tunables={"slip.omega_c": (1.0, 200.0), "slip.T_i": (0.01, 2.0)},
+)

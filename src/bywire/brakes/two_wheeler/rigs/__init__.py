@@ -1,0 +1,1 @@
+"""Rigs: parts of the vehicle by themselves."""

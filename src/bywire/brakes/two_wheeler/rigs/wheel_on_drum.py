@@ -1,0 +1,145 @@
+"""A wheel with its brake on a drum that keeps its speed: where slip control is designed."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
+
+from pydantic import Field
+
+from bywire.brakes.two_wheeler.parameters import BrakeParameters
+from bywire.control import slip_pi, vehicle_speed
+from bywire.core.assembly import Assembly
+from bywire.core.model import Task
+from bywire.core.parameters import ParameterSet
+from bywire.core.parts import Integral, Part, Shown, Wire
+from bywire.core.quantities import Duration, Unit
+from bywire.core.signals import Role, Signal, zeros
+from bywire.plant import brake_disc, pressure_loop, road, road_wheel, tyre
+
+DrumSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
+Load = Annotated[float, Unit("N", 2e3), Field(gt=0, allow_inf_nan=False)]
+
+
+class DrumParameters(ParameterSet):
+    """The drum: its surface keeps its speed, whatever the wheel does."""
+
+    v: DrumSpeed
+    """speed of its surface"""
+    N: Load
+    """force that presses the wheel on it"""
+    surface: road.SurfaceParameters
+
+
+class WheelOnDrumParameters(ParameterSet):
+    """Wheel, tyre, brake, drum and slip control."""
+
+    wheel: road_wheel.Parameters
+    tyre: tyre.Parameters
+    brake: BrakeParameters
+    drum: DrumParameters
+    slip: slip_pi.Parameters
+    T_s: Duration
+    """sample time of slip control"""
+
+
+Par = WheelOnDrumParameters
+
+
+class Stimulus(NamedTuple):
+    """What slip control is to hold, and what it may use."""
+
+    slip_set: Annotated[float, Signal("1", "slip demand", 0.1)]
+    p_set: Annotated[float, Signal("Pa", "pressure that may be lowered", 4e6)]
+
+
+class Memory(NamedTuple):
+    """What slip control holds between its ticks."""
+
+    p_ref: Annotated[float, Signal("Pa", "pressure set point", 2e6, set_point_of="p")]
+    slip_hat: Annotated[float, Signal("1", "measured slip", 0.1)]
+    slip_ref: Annotated[float, Signal("1", "slip set point", 0.1, set_point_of="slip")]
+    integral: Annotated[float, Signal("Pa", "integral part", 2e6)]
+    acts: Annotated[float, Signal("1", "slip control acts")]
+
+
+class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
+    """The wheel turns, so that brake and rolling resistance are a torque that linear models see.
+
+    Where it would lock, this rig is no longer right, and says so.
+    """
+
+    name: ClassVar[str] = "wheel-on-drum"
+    Memory: ClassVar = Memory
+    Stimulus: ClassVar = Stimulus
+
+    wheel = Part(road_wheel)
+    tyre = Part(tyre, loss={"E_tyre": "work"})
+    circuit = Part(pressure_loop, par="brake.circuit")
+    disc = Part(brake_disc, par="brake.disc")
+    W_drum = Integral("J", "work of the drum", role=Role("source", "drum"))
+    E_brake = Integral("J", "brake and rolling resistance", role=Role("sink", "brake"))
+
+    F = Wire("N", "braking force of the tyre", 1e3)
+    T = Wire("N*m", "torque that brake and rolling resistance can hold", 300.0)
+    slip = Shown("1", "braking slip", 0.1)
+
+    def wire(self, w: Self) -> None:
+        """Say what wheel, tyre and brake feel."""
+        drum, ground = w.par.drum, w.par.drum.surface
+        surface = (ground.c1, ground.c2, ground.c3)
+        limits = tyre.limits(
+            tyre.Contact(drum.v, road_wheel.tread_speed(w.wheel.xe, w.wheel.par), *surface),
+            w.tyre.par,
+        )
+        tread = road_wheel.tread_speed(w.wheel.x, w.wheel.par)
+        w.tyre.u = tyre.Input(drum.v, tread, drum.N, *surface, limits.mu, limits.u)
+        w.F = tyre.output(w.tyre.x, w.tyre.u, w.tyre.par).F
+        w.circuit.u = pressure_loop.Input(w.m.p_ref)
+        w.disc.u = brake_disc.Input(w.circuit.x.p)
+        w.T = brake_disc.output(w.disc.u, w.disc.par).torque + road_wheel.rolling_resistance(
+            drum.N, w.wheel.par
+        )
+        w.wheel.u = road_wheel.Input(w.F, -w.T)
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return what the drum gives and the brake takes."""
+        return {"W_drum": w.F * w.par.drum.v, "E_brake": w.T * w.wheel.x.omega}
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return the slip."""
+        return {"slip": braking_slip(w.wheel.x.omega, w.par)}
+
+    def tasks(self, par: Par) -> tuple[Task, ...]:
+        """Return slip control."""
+        return (Task("slip", par.T_s, tick),)
+
+    def watch(self, recording: Any, par: Any) -> list[str]:
+        """Return what the user should know of a recording."""
+        said = super().watch(recording, par)
+        if "omega" in recording and bool((recording["omega"] <= 0).any()):
+            said.append("the wheel came to a stop: on this rig it would turn backward then")
+        return said
+
+    def rest(self, par: Par) -> tuple[Any, Any]:
+        """Return the wheel rolling freely on the drum."""
+        state = self.state(wheel=road_wheel.State(par.drum.v / par.wheel.r))
+        return state, zeros(Memory)
+
+
+def braking_slip(omega: float, par: Par) -> float:
+    """Return the slip against the drum."""
+    return vehicle_speed.slip(par.drum.v, omega * par.wheel.r, par.slip.v_off)
+
+
+def tick(x: Any, m: Memory, u: Stimulus, par: Par) -> Memory:
+    """Run slip control once."""
+    slip = braking_slip(x.omega, par)
+    state, out = slip_pi.output(
+        slip_pi.State(m.integral),
+        slip_pi.Input(par.drum.v, u.slip_set, slip, u.p_set, u.p_set, u.p_set),
+        par.T_s,
+        par.slip,
+    )
+    return m._replace(
+        p_ref=out.p, slip_hat=slip, slip_ref=u.slip_set, integral=state.integral, acts=out.lowered
+    )

@@ -1,0 +1,52 @@
+"""The slip loop of a wheel on a drum, against closed forms."""
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.analysis.linear.linearize import linearize
+from bywire.brakes.two_wheeler.loops.slip import point
+from bywire.plant import brake_disc
+
+
+def spread(schedule):
+    """Return the largest gain margin over the smallest, of speeds from 10 to 30 m/s."""
+    given = {"slip.schedule": schedule}
+    found = bywire.margins("slip", overrides=given, over="at=10 m/s:30 m/s:3")
+    each = [margins.gain for margins in found.margins]
+    return max(each) / min(each)
+
+
+def test_the_plant_has_the_gain_and_the_pole_of_a_single_corner():
+    par = bywire.parameters("front600")
+    for v in (10.0, 30.0):
+        at = point(par, v)
+        model = linearize(
+            at.model, at.par, at.state, at.memory, inputs=("p_ref",), outputs=("slip",)
+        )
+        ground, slip = par.drum.surface, par.slip.slip_set
+        slope = ground.c1 * ground.c2 * np.exp(-ground.c2 * slip) - ground.c3
+        k, wheel = brake_disc.torque_per_pressure(par.brake.disc), par.wheel
+        # Gain r k/(J v a) with a = mu' N r^2/(J v), at every speed.
+        gain = k / (slope * par.drum.N * wheel.r)
+        low = model.response(np.array([1e-3]))[0, 0, 0]
+        assert low.real == pytest.approx(gain, rel=1e-3)
+        # Wheel on a tyre that relaxes: s^2 + s v/sigma + mu' N r^2/(J sigma) = 0.
+        sigma = par.tyre.sigma
+        corner = np.roots([1.0, v / sigma, slope * par.drum.N * wheel.r**2 / (wheel.J * sigma)])
+        for root in corner:
+            assert np.abs(model.poles() - root).min() < 1e-6 * np.abs(root)
+
+
+def test_a_gain_that_follows_the_speed_keeps_the_gain_margin():
+    assert spread("speed") < 1.2
+    assert spread("fixed") > 2.0
+
+
+@pytest.mark.parametrize(
+    ("changes", "v", "said"),
+    [({"slip.slip_set": 0.2}, 20.0, "peak at 0.131"), ({}, -1.0, "must be > 0 m/s")],
+)
+def test_points_that_do_not_stay_are_refused(changes, v, said):
+    with pytest.raises(bywire.BywireError, match=said):
+        point(bywire.parameters("front600").replace(changes), v)
