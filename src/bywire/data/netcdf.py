@@ -102,7 +102,7 @@ class RecordingSource:
     attributes
         Of the whole file.
     coords
-        Names of variables that others stand over.
+        Names of coordinates besides those of the dimensions.
     """
 
     def __init__(
@@ -180,9 +180,7 @@ def _open(path: Path, options: ReadOptions) -> Iterator[RecordingSource]:
         stored, attributes = store.load()
         variables, attributes, named = xr.conventions.decode_cf_variables(stored, attributes)
         recorded = {str(name): variable for name, variable in variables.items()}
-        coords = [name for name, variable in recorded.items()
-                  if variable.dims == (name,) or name in named]  # fmt: skip
-        yield RecordingSource(recorded, attributes, coords)
+        yield RecordingSource(recorded, attributes, [name for name in recorded if name in named])
     finally:
         store.close()
 
