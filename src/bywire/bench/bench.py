@@ -190,12 +190,12 @@ class Bench:
         cases = self.cases_with(self.par, self.chosen_options, make)
         for case in cases:
             _check_driven(case, self.definition)
-        wanted, given = self.par.flat(), [case.par.flat() for case in cases]
         for name in self.overrides:
-            if given and all(values[name] != wanted[name] for values in given):
+            wanted, given = self.par.value(name), [case.par.value(name) for case in cases]
+            if given and all(value != wanted for value in given):
                 raise ParameterError(
-                    f"{name} = {wanted[name]!r} would have no effect: experiment "
-                    f"{self.experiment!r} sets it to {given[0][name]!r}; leave it out"
+                    f"{name} = {wanted!r} would have no effect: experiment "
+                    f"{self.experiment!r} sets it to {given[0]!r}; leave it out"
                 )
         return tuple(case.aligned(self.step, self.record) for case in cases)
 

@@ -142,11 +142,13 @@ def varied_leaf(bench: Bench, name: str) -> Leaf:
     UnknownNameError
         With the nearest numbers of the bench.
     """
-    known = dict(leaf_fields(type(bench.par)))
+    parameters = leaf_fields(type(bench.par))
+    if name in parameters:
+        return parameters[name]
     options = leaf_fields(type(bench.chosen_options))
-    known |= {f"{_OPTION}{option}": leaf for option, leaf in options.items()}
+    known = {f"{_OPTION}{option}": leaf for option, leaf in options.items()}
     if name not in known:
-        raise unknown_name("parameter or option to vary", name, known)
+        raise unknown_name("parameter or option to vary", name, {**parameters, **known})
     return known[name]
 
 

@@ -126,6 +126,7 @@ def watch_cases(rows: Rows, runs: Sequence[Run], unsettled: Sequence[int]) -> li
     ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts.
     """
     solver = map(_solver_doubts, doubts_of(runs), unsettled)
+    rows.silent = runs[0].model.silent(rows, [run.par for run in runs])
     books = open_books_of_cases(cast(xr.Dataset, rows), len(runs))
     return [
         [*doubts, *book, *run.model.watch(rows.case(k), run.par)]
@@ -182,11 +183,12 @@ def energy_signals(run: Run) -> tuple[str, ...]:
 
 def open_books_of(run: Run, trajectory: Trajectory) -> list[str]:
     """Return what `open_books` says of a run of which the `energy_signals` were computed."""
-    signals = signals_of(run.model.Output)
-    rows = {n: ("time", trajectory[n], _attributes(signals[n])) for n in energy_signals(run)}
-    if not (rows and trajectory.time.size):
+    if not trajectory.time.size:
         return []
-    return open_books(xr.Dataset(rows, {"time": trajectory.time}))
+    attributes = _attributes_of(run.model.Output)
+    energies = {name: trajectory[name] for name in energy_signals(run)}
+    rows = Rows(trajectory.time, energies, {name: attributes[name] for name in energies})
+    return open_books(cast(xr.Dataset, rows))
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:

@@ -98,12 +98,15 @@ class Rows:
         self._values = {**signals, TIME: time}
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
         self._signals = tuple(signals)
+        self.silent: frozenset[str] = frozenset()  # parts of the model that have nothing to say
         self.sizes = {TIME: time.size}
 
     def case(self, k: int, notes: Callable[[], Mapping[str, Any]] = dict) -> Rows:
         """Return the rows of one run of several."""
         signals = {name: self._values[name][k] for name in self._signals}
-        return Rows(self._values[TIME], signals, self._attributes, notes)
+        rows = Rows(self._values[TIME], signals, self._attributes, notes)
+        rows.silent = self.silent
+        return rows
 
     def with_signals(
         self, signals: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]

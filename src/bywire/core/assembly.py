@@ -9,7 +9,7 @@ would fight the diagonal mass form of ``core.model``, which stays below this for
 from __future__ import annotations
 
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from itertools import islice, repeat
 from typing import Any, ClassVar, Generic, NamedTuple, Self, TypeVar
@@ -19,7 +19,7 @@ from bywire.core.gathering import AnyPart, contacts, gather, stores
 from bywire.core.model import Bounds, Matrix, Model
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
-from bywire.core.watching import warnings_of, watched_by_elements
+from bywire.core.watching import silent_parts, warnings_of, watched_by_elements
 from bywire.core.wired import Instant, Wired, instant_of, line
 from bywire.core.wires import Integral, Shown, Wire
 
@@ -289,6 +289,13 @@ class Assembly(Model, Generic[ParT, MemoryT]):
     def watched(self, par: Any) -> tuple[str, ...] | None:
         """Return the signals that ``watch`` looks at; None where it is written by hand."""
         return watched_by_elements(self, par) if type(self).watch is Assembly.watch else None
+
+    def silent(self, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
+        """Return the parts whose elements say nothing of any of several cases, by name.
+
+        ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
+        """
+        return silent_parts(self, rows, pars)
 
     def _nothing(self) -> Any:
         """Return a memory that is not known: where it does not count, nobody must see it."""

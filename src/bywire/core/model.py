@@ -191,6 +191,10 @@ class Model(Protocol):
         """
         return None
 
+    def silent(self, rows: Any, pars: Any) -> frozenset[str]:
+        """Return what ``watch`` need not look at in any of several cases; see `Assembly.silent`."""
+        return frozenset()
+
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:
     """Yield the complete models that a module defines."""

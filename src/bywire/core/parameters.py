@@ -25,7 +25,6 @@ from bywire.core.refusals import refusals
 from bywire.core.units import Written
 
 T = TypeVar("T", bound="ParameterSet")
-_Named = tuple[dict[str, Any], dict[str, float], dict[str, Any]]
 
 
 class ParameterSet(BaseModel):
@@ -53,56 +52,56 @@ class ParameterSet(BaseModel):
 
     def replace(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with other values at dotted names; groups that hold them are validated."""
-        return _validated(type(self), _fields(self), values)
+        made = _validated(type(self), _fields(self), values)
+        # All others are known: thousands of sets a second differ from one in few values.
+        numbers, choices = self._by_name("numbers"), self._by_name("choices")
+        given = {name: made.value(name) for name in values}
+        new = {name: float(value) for name, value in given.items() if _is_number(value)}
+        chosen = {name: value for name, value in given.items() if name not in new}
+        has_tables = any(isinstance(value, tuple) for value in chosen.values())
+        if new.keys() <= numbers.keys() and chosen.keys() <= choices.keys() and not has_tables:
+            made._known["numbers", ""] = numbers | new
+            made._known["choices", ""] = choices | chosen if chosen else choices
+        return made
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""
-        return dict(self._named("")[0])
+        return dict(self._by_name("values"))
 
     def leaves(self) -> dict[str, float]:
         """Return the numbers by dotted name, tables spread as ``name.0``, ``name.1``, ..."""
-        return dict(self.numbers_and_choices[0])
+        return dict(self._by_name("numbers"))
 
     def choices(self) -> dict[str, Any]:
         """Return the structural choices by dotted name, with the length of every table."""
-        return dict(self.numbers_and_choices[1])
+        return dict(self._by_name("choices"))
 
-    @property
-    def numbers_and_choices(self) -> tuple[dict[str, float], dict[str, Any]]:
-        """Leaves and choices, tables spread; not to be changed."""
-        return self._named("")[1:]
+    def value(self, name: str) -> Any:
+        """Return a leaf or choice of a dotted name that there is; ``name.0`` of a table's nodes."""
+        found: Any = self
+        for step in name.split("."):
+            found = found[int(step)] if isinstance(found, tuple) else getattr(found, step)
+        return found
 
     @cached_property
-    def _known(self) -> dict[str, _Named]:
+    def _known(self) -> dict[tuple[str, str], dict[str, Any]]:
         return {}
 
-    def _named(self, prefix: str) -> _Named:
-        """Return all values by dotted name, the numbers of them with tables spread, the choices.
+    def _by_name(self, kind: str, prefix: str = "") -> dict[str, Any]:
+        """Return what is of a kind, ``values``, ``numbers`` or ``choices``, by dotted name.
 
         ``prefix``: what goes before the names. Groups that several sets share look theirs up once.
         """
-        if prefix in self._known:
-            return self._known[prefix]
-        values: dict[str, Any] = {}
-        numbers: dict[str, float] = {}
-        choices: dict[str, Any] = {}
-        for field, value in _fields(self).items():
-            name = prefix + field
-            if isinstance(value, ParameterSet):
-                inner = value._named(f"{name}.")
-                for all_of_them, its_own in zip((values, numbers, choices), inner, strict=True):
-                    all_of_them.update(its_own)
-                continue
-            values[name] = value
-            if isinstance(value, tuple):
-                numbers |= {f"{name}.{k}": float(v) for k, v in enumerate(value)}
-                choices[name] = len(value)
-            elif _is_number(value):
-                numbers[name] = float(value)
-            else:
-                choices[name] = value
-        self._known[prefix] = values, numbers, choices
-        return values, numbers, choices
+        known = self._known
+        if (kind, prefix) not in known:
+            named: dict[str, Any] = {}
+            for name, value in _fields(self).items():
+                if isinstance(value, ParameterSet):
+                    named.update(value._by_name(kind, f"{prefix}{name}."))
+                else:
+                    named.update(_entries(kind, prefix + name, value))
+            known[kind, prefix] = named
+        return known[kind, prefix]
 
     def with_leaves(self, values: Mapping[str, Any]) -> Self:
         """Return a set of the same structure that carries other objects as its numbers.
@@ -190,6 +189,18 @@ def _node_notes(annotation: Any) -> Iterator[Any]:
     for node in typing.get_args(annotation)[:1]:
         for note in getattr(node, "__metadata__", ()):
             yield from note.metadata if isinstance(note, FieldInfo) else (note,)
+
+
+def _entries(kind: str, name: str, value: Any) -> dict[str, Any]:
+    """Return what a field is of a kind, see `ParameterSet._by_name`."""
+    if kind == "values":
+        return {name: value}
+    if isinstance(value, tuple):
+        spread = {f"{name}.{k}": float(v) for k, v in enumerate(value)}
+        return spread if kind == "numbers" else {name: len(value)}
+    if _is_number(value):
+        return {name: float(value)} if kind == "numbers" else {}
+    return {} if kind == "numbers" else {name: value}
 
 
 def _is_number(value: Any) -> bool:

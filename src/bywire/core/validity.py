@@ -2,11 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Callable
+from typing import Any, TypeVar
 
 import numpy as np
 
 from bywire.core.typing import Array
+
+F = TypeVar("F", bound=Callable[..., list[str]])
+
+
+def row_by_row(watch: F) -> F:
+    """Declare that an element's ``watch`` says something if and only if it does so of some one row.
+
+    It is then asked once of the rows of many cases, (cases, rows) each: they are silent mostly.
+    """
+    watch.row_by_row = True  # type: ignore[attr-defined]
+    return watch
 
 
 def outside(values: Any, low: float, high: float) -> Any:

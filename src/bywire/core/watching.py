@@ -6,6 +6,7 @@ structure, and on a recording only what leads to those elements is computed.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -22,16 +23,45 @@ _KNOWN: dict[Any, Felt] = {}
 
 def warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
     """Return the warnings of an assembly's elements; see `Assembly.watch`."""
-    felt = _felt(model, par)
-    warnings: list[str] = []
+    silent = getattr(recording, "silent", ())
+    felt = tuple(each for each in _felt(model, par) if each[0].name not in silent)
+    return [text for _, texts in _said(model, felt, recording, (par,)) for text in texts]
+
+
+def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
+    """Return the parts of an assembly whose elements say nothing of any of several cases.
+
+    ``rows``: signals of shape (cases, rows). Only elements that are watched row by row can be told,
+    with the same parameters of their own in every case.
+    """
+    felt = tuple(
+        (part, each)
+        for part, each in _felt(model, pars[0])
+        if hasattr(part.element.watch, "row_by_row")
+        and all(_is_shared(name, pars) for name in (part.path, *model.shared))
+    )
+    return frozenset(part.name for part, texts in _said(model, felt, rows, pars) if not texts)
+
+
+def _is_shared(name: str, pars: Sequence[Any]) -> bool:
+    """Return whether a group of parameters is the same in all sets, or there is none."""
+    try:
+        first, *others = (par.value(name) for par in pars)
+    except AttributeError:
+        return True
+    return all(other is first or other == first for other in others)
+
+
+def _said(
+    model: Any, felt: Felt, rows: Any, pars: Sequence[Any]
+) -> Iterator[tuple[Any, list[str]]]:
+    """Yield parts that watch and what they say of rows; ``pars``: one for all, or of each case."""
     with np.errstate(all="ignore"):
-        traced = tuple(tuple(each.values()) for _, each in felt)
-        values = computed(traced, _Given(recording, par))
+        values = computed(tuple(tuple(each.values()) for _, each in felt), _Given(rows, pars))
         for (part, names), each in zip(felt, values, strict=True):
-            wired: Any = Wired(part, Instant(None, None, None, par, model.shared))
+            wired: Any = Wired(part, Instant(None, None, None, pars[0], model.shared))
             more = dict(zip(names, each, strict=True))
-            warnings += wired.call(part.element.watch, t=recording["time"].values, **more)
-    return warnings
+            yield part, wired.call(part.element.watch, t=rows["time"].values, **more)
 
 
 def watched_by_elements(model: Any, par: Any) -> tuple[str, ...]:
@@ -42,13 +72,13 @@ def watched_by_elements(model: Any, par: Any) -> tuple[str, ...]:
 
 def _felt(model: Any, par: Any) -> Felt:
     """Return the parts that watch, and how what each looks at follows from signals."""
+    # What an instance holds of its own may stand in the equations.
+    key = None if vars(model) else (type(model), tuple(par.choices().items()))
+    if key in _KNOWN:
+        return _KNOWN[key]
     parts = [part for part in model.parts.values() if part.has("watch")]
     if not parts:
         return ()
-    # What an instance holds of its own may stand in the equations.
-    key = None if vars(model) else (type(model), tuple(par.numbers_and_choices[1].items()))
-    if key in _KNOWN:
-        return _KNOWN[key]
     leaves = {name: Traced(None, _PARAMETER + name) for name in par.leaves()}
     state, memory = (
         kind._make(Traced(None, name) for name in kind._fields)
@@ -64,13 +94,11 @@ def _felt(model: Any, par: Any) -> Felt:
 class _Given(dict[str, Any]):
     """Rows of signals and values of parameters by name; of what is not recorded NaN."""
 
-    def __init__(self, recording: Any, par: Any) -> None:
-        self._recording, self._par = recording, par
+    def __init__(self, recording: Any, pars: Sequence[Any]) -> None:
+        self._recording, self._pars = recording, pars
 
     def __missing__(self, name: str) -> Any:
         if not name.startswith(_PARAMETER):
             return self._recording[name].values if name in self._recording else _NAN
-        value = self._par
-        for step in name[1:].split("."):
-            value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
-        return value
+        each = [par.value(name[len(_PARAMETER) :]) for par in self._pars]
+        return each[0] if len(each) == 1 else np.array(each)[:, None]

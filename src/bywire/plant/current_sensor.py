@@ -11,7 +11,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import SignedCurrent
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, outside
+from bywire.core.validity import first, outside, row_by_row
 
 MotorCurrent = Annotated[float, Signal("A", "motor current", 5.0)]
 Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
@@ -50,6 +50,7 @@ def value(share: Reading, par: Parameters) -> MotorCurrent:
     return par.i_low + share * (par.i_high - par.i_low)
 
 
+@row_by_row
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
     """Return whether the current left the sensor's range, and when first."""
     text = f"the current leaves the sensor's range, {par.i_low:g} to {par.i_high:g} A,"

@@ -10,7 +10,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Length
 from bywire.core.signals import FlowResistance, Role, Signal
 from bywire.core.typing import Array
-from bywire.core.validity import highest
+from bywire.core.validity import highest, row_by_row
 from bywire.plant import brake_fluid
 
 Loss = Annotated[float, Signal("W", "loss in the pipeline", role=Role("sink", "pipeline"))]
@@ -75,6 +75,7 @@ def power_loss(u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Loss
     return q * (brake_fluid.flow_energy(u.p_a, fluid) - brake_fluid.flow_energy(u.p_b, fluid))
 
 
+@row_by_row
 def watch(t: Array, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> list[str]:
     """Return whether the flow was too fast to be laminar."""
     Re = highest(output(u, par, fluid).Re)

@@ -11,7 +11,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import SignedPressure
 from bywire.core.signals import Signal
 from bywire.core.typing import Array
-from bywire.core.validity import first, outside
+from bywire.core.validity import first, outside, row_by_row
 
 AbsolutePressure = Annotated[float, Signal("Pa", "absolute pressure", 2e6)]
 Reading = Annotated[float, Signal("1", "reading, share of the range", 0.5)]
@@ -53,6 +53,7 @@ def value(share: Reading, par: Parameters) -> AbsolutePressure:
     return par.p_low + share * (par.p_high - par.p_low)
 
 
+@row_by_row
 def watch(t: Array, u: Input, par: Parameters) -> list[str]:
     """Return whether the pressure left the sensor's range, and when first."""
     span = f"{par.p_low / 1e5:g} to {par.p_high / 1e5:g} bar absolute"

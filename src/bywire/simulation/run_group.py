@@ -32,7 +32,9 @@ from bywire.simulation.run import (
 )
 from bywire.simulation.schedule import Schedule
 
-_CHUNKS = 20  # pieces of a run between which progress is shown and an interrupt is heeded
+# Pieces of a run, between which progress is shown and an interrupt is heeded: at most so many, and
+# not of fewer substeps, of which a piece costs a hundred.
+_CHUNKS, _SUBSTEPS = 20, 20_000
 
 
 def fit_lanes(runs: Sequence[Run]) -> bool:
@@ -173,7 +175,8 @@ def simulate_group(
 def _edges(schedule: Schedule, first: int) -> list[int]:
     """Return the frames at which pieces of a run begin and end; one at the first row recorded."""
     every = schedule.record_frames
-    edges = {*np.linspace(0, schedule.frames // every, _CHUNKS + 1).astype(int).tolist(), first}
+    pieces = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
+    edges = {*np.linspace(0, schedule.frames // every, pieces + 1).astype(int).tolist(), first}
     return [each * every for each in sorted(edges)]
 
 

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import gc
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
@@ -66,8 +67,32 @@ def computed_chunk(
         When interrupted.
     """
     values = plan.values(chunk) if isinstance(chunk, int) else chunk.values
+    with _garbage_later():
+        return _computed(plan, number_of(chunk), values, threads)
+
+
+@contextmanager
+def _garbage_later() -> Iterator[None]:
+    """Look for garbage once at the end, and not among all objects again and again meanwhile.
+
+    Models that were evaluated refer to themselves and to arrays: too few objects for Python to look
+    for them soon, and too many megabytes to wait.
+    """
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()
+        gc.collect(1)
+
+
+def _computed(
+    plan: StudyPlan, number: int, values: Mapping[str, NDArray[Any]], threads: int | None
+) -> Columns:
     count = len(next(iter(values.values())))
-    numbers = number_of(chunk) * CHUNK + np.arange(count)
+    numbers = number * CHUNK + np.arange(count)
     benches: dict[int, Bench] = {}
     failures = [""] * count
     for k in range(count):
@@ -83,9 +108,6 @@ def computed_chunk(
     columns[FAILURE][:] = failures
     for group in _alike(benches):
         _fill(columns, group, benches, threads)
-    # Models that were evaluated refer to themselves and to arrays: too few objects for Python to
-    # look for them soon, and too many megabytes to wait.
-    gc.collect(1)
     return columns
 
 

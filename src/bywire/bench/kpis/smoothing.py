@@ -45,8 +45,13 @@ def smoothed(t: Array, y: Array, period: float) -> Array:
         """Return the integral of the piecewise straight signal from ``t[0]`` to each instant."""
         k = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 2)
         d = at - t[k]
-        total_k, y_k, slope_k = (np.take(each, k, axis=-1) for each in (total, y, slope))
-        return np.asarray(total_k + y_k * d + 0.5 * slope_k * d**2)
+        there, linear, bent = (np.take(each, k, axis=-1) for each in (total, y, slope))
+        linear *= d
+        bent *= 0.5
+        bent *= d**2
+        there += linear
+        there += bent
+        return there
 
     return np.asarray((primitive(a + width) - primitive(a)) / width)
 

@@ -25,7 +25,7 @@ def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
         if far.any():
             first = float(recording["time"].values[int(np.argmax(far))])
             warnings.append(f"the piston reached its end stop at t = {first:.4g} s")
-    return warnings + _pressed_back(recording, par.flat())
+    return warnings + _pressed_back(recording, par.choices())
 
 
 def _pressed_back(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
