@@ -155,7 +155,9 @@ def force_over_load(
     With its damping a tyre holds no more than without: what it holds at most at its slip.
     """
     slides = sliding(x, u)
-    held = adhesion(ops.fabs(x.u) / par.sigma, u.c1, u.c2, u.c3)
+    # No magnitude: its slope at zero, where a free wheel rolls, would be none.
+    bent = ops.where(x.u < 0, -x.u, x.u)
+    held = adhesion(bent / par.sigma, u.c1, u.c2, u.c3)
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))
     elastic = ops.where(x.u < 0, -size, size)
     slow = ops.fmin(ops.fabs(u.v) / par.v_low, 1.0)

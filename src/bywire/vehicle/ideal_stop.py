@@ -3,9 +3,15 @@
 from __future__ import annotations
 
 import math
+from typing import Annotated
 
+from pydantic import Field
+
+from bywire.core.quantities import Unit
 from bywire.plant import road, tyre
 from bywire.vehicle.two_wheeler import VehicleParameters
+
+RidingSpeed = Annotated[float, Unit("m/s", 28.0), Field(gt=0, allow_inf_nan=False)]
 
 
 def peak_adhesion(par: VehicleParameters) -> float:

@@ -145,8 +145,8 @@ class TwoWheeler(Assembly[ParT, MemoryT]):
             **super().record(w),
             "v_f": w.front_tyre.u.v_wheel,
             "v_r": w.rear_tyre.u.v_wheel,
-            "slip_f": _shown_slip(w.front_tyre),
-            "slip_r": _shown_slip(w.rear_tyre),
+            "slip_f": shown_slip(w.front_tyre.u, w.front_tyre.par),
+            "slip_r": shown_slip(w.rear_tyre.u, w.rear_tyre.par),
             "sliding_f": tyre.sliding(w.front_tyre.x, w.front_tyre.u),
             "sliding_r": tyre.sliding(w.rear_tyre.x, w.rear_tyre.u),
             "mu_f": tyre.force_over_load(w.front_tyre.x, w.front_tyre.u, w.front_tyre.par),
@@ -178,12 +178,11 @@ def _felt(w: Any, wheel: Any, rubber: Any, place: float) -> tyre.Input:
     )
 
 
-def _shown_slip(rubber: Any) -> float:
+def shown_slip(u: tyre.Input, par: tyre.Parameters) -> float:
     """Return the slip as recordings show it: fading where nothing moves any more."""
-    u, least = rubber.u, _CRAWL * rubber.par.v_low
+    least = _CRAWL * par.v_low
     faster = ops.fmax(ops.fmax(ops.fabs(u.v), ops.fabs(u.v_wheel)), least)
-    slip: float = (u.v - u.v_wheel) / faster
-    return slip
+    return (u.v - u.v_wheel) / faster
 
 
 def _loads(w: Any, cosine: float, front: tyre.Input, rear: tyre.Input) -> two_wheeler_body.Loads:

@@ -20,7 +20,7 @@ from bywire.plant.road import SURFACES, SurfaceName
 from bywire.vehicle import ideal_stop, stop_figures
 from bywire.vehicle.two_wheeler import VehicleParameters
 
-RidingSpeed = Annotated[float, Unit("m/s", 28.0), Field(gt=0, allow_inf_nan=False)]
+RidingSpeed = ideal_stop.RidingSpeed
 Demand = Annotated[float, Unit("Pa", 4e6), Field(ge=0, allow_inf_nan=False)]
 
 

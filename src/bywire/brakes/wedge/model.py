@@ -127,12 +127,16 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             runout_rate=flywheel.runout_rate(w.disc.xe, par.flywheel),
         )
         w.stop.u = end_stop.Input(x.x, x.v, -par.wedge.x_stop, par.wedge.x_stop)
-        w.disc.u = flywheel.Input(0.0)
+        w.disc.u = flywheel.Input(self.disc_torque(w))
         w.moment_sensor.u = moment_sensor.Input(w.M_B)
         w.supply.u = drive_supply.Input(
             drive_train.measured_power(w.drive_1, w.motor_1, w.m.i_1_ref, w.m.on)
             + drive_train.measured_power(w.drive_2, w.motor_2, w.m.i_2_ref, w.m.on)
         )
+
+    def disc_torque(self, w: Self) -> float:
+        """Return what turns the disc beside its own drive [N m]: nothing on the test stand."""
+        return 0.0
 
     def friction(self, w: Self) -> tuple[Bounds, ...]:
         """Return the limits of the frictions on both shafts, on the wedge and on the disc."""

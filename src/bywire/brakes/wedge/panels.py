@@ -32,6 +32,19 @@ BRAKING = Panels(
 )
 """moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""
 
+CORNER = Panels(
+    "wedge-corner",
+    ("wedge-corner",),
+    (
+        Panel("speed", (Trace("v_x"), Trace("v_tread", Role.SECOND)), height=1.8),
+        Panel("slip", (Trace("slip"),)),
+        *BRAKING.panels[:2],
+        Panel("normal force", (Trace("F_N"),)),
+        BRAKING.panels[-1],
+    ),
+)
+"""the vehicle above, its brake below"""
+
 DRIVES = Panels(
     "wedge-drives",
     ("wedge-brake", "screw-rig", "shaft-rig"),

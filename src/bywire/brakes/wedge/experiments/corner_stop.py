@@ -1,0 +1,118 @@
+"""Corner stop: the wedge brake stops a quarter of a car, holds it, and lets go.
+
+The moment is demanded until the vehicle stands and beyond. What the tyre does to the brake at the
+end is the subject: it rocks back, and the wheel with it as far as the pads let it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.wedge.case import mean, steps, swing
+from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from bywire.plant.road import SURFACES, SurfaceName
+from bywire.vehicle.ideal_stop import RidingSpeed
+
+_CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
+
+FIGURES = Figures(
+    undefined="the vehicle does not stop before the brake lets go",
+    stopping_distance=("m", "Distance from the demand to the first standstill."),
+    stopping_time=("s", "Time from the demand to the first standstill."),
+    moment_before_stop=("N*m", "Mean moment of the sensor in the last half second of braking."),
+    peak_slip=("1", "Largest slip above a tenth of the speed at the start."),
+    rebound_speed=("m/s", "Largest speed backward after the stop."),
+    wheel_reversal=("rad", "How far the wheel turns back after the stop."),
+    force_held=("N", f"Mean normal force from {_CALM:g} s after the stop to the release."),
+    force_change=("N", "Normal force peak to peak in that time."),
+    creep_speed=("m/s", "Largest speed of the vehicle in that time."),
+    energy_braked=("J", "Energy taken from the wheel until the stop."),
+)
+
+
+class Options(ParameterSet):
+    """The stop."""
+
+    v_0: RidingSpeed
+    """speed at the start"""
+    M_brake: SomeMoment
+    """moment demanded from time zero on"""
+    surface: SurfaceName
+    """what the road is made of"""
+    t_hold: Duration
+    """time until the demand falls to zero"""
+    t_end: Duration
+    """time recorded after it"""
+
+
+def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
+    """Return the one run."""
+    changes = {"command.mode": "moment", "flywheel.law": "coasting"}
+    if options.surface != "own":
+        numbers = SURFACES[options.surface]._asdict()
+        for stretch in ("first", "further"):
+            changes |= {f"corner.road.{stretch}.{k}": v for k, v in numbers.items()}
+    changed = par.replace(changes)
+    state, memory = at_speed(options.v_0, changed)
+    levels = {0.0: options.M_brake, options.t_hold: 0.0}
+    return (
+        Case(
+            "run", WedgeCorner(), changed, state, memory, lambda t: {"M_set": steps(t, levels)},
+            options.t_hold + options.t_end,
+        ),
+    )  # fmt: skip
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return how the corner stops, and what is held then."""
+    run = recordings["run"]
+    held = run.sel(time=slice(None, options.t_hold - 1e-9))
+    v = held["v_x"].values
+    stopped = np.flatnonzero((v[1:] <= 0) & (v[:-1] > 0))
+    if not stopped.size:
+        return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
+    return FIGURES(**_stop(held, int(stopped[0]) + 1, options))
+
+
+def _stop(held: xr.Dataset, k: int, options: Options) -> dict[str, float | tuple[float, str]]:
+    t, v = held["time"].values, held["v_x"].values
+    end = float(t[k - 1] + (t[k] - t[k - 1]) * v[k - 1] / (v[k - 1] - v[k]))
+    begin, last = end + _CALM, options.t_hold
+    late = t >= begin
+    fast = v > 0.1 * options.v_0
+    short = (math.nan, f"less than {_CALM:g} s are held after the stop")
+    return {
+        "stopping_distance": float(np.interp(end, t, held["s"].values)),
+        "stopping_time": end,
+        "moment_before_stop": mean(held, "y_M", max(end - 0.5, 0.0), end),
+        "peak_slip": float(np.max(held["slip"].values[fast], initial=0.0)),
+        "rebound_speed": float(np.max(-v[k:])),
+        "wheel_reversal": float(np.max(held["phi"].values) - held["phi"].values[-1]),
+        "force_held": mean(held, "F_N", begin, last) if late.any() else short,
+        "force_change": swing(held, "F_N", begin, last) if late.any() else short,
+        "creep_speed": float(np.max(np.abs(v[late]))) if late.any() else short,
+        "energy_braked": float(np.interp(end, t, held["E_brake"].values)),
+    }
+
+
+EXPERIMENT = Experiment(
+    name="corner-stop",
+    assembly="wedge-corner",
+    summary="the wedge brake stops a quarter of a car from 50 km/h with 600 N m, and holds it",
+    options=Options,
+    defaults=Options(
+        v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", t_hold=5.5, t_end=0.5
+    ),
+    cases=cases,
+    judge=judge,
+    kpis=FIGURES.units,
+    figures=("time-traces", "energy-balance"),
+)

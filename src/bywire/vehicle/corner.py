@@ -1,0 +1,104 @@
+"""A car's corner around any brake with a disc: body, tyre and road.
+
+A corner inherits from `Corner` and from the assembly of its brake, whose disc turns with the wheel.
+It says in ``wheel`` how fast that turns, and lets `tyre_torque` turn it.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Self
+
+from bywire.core import ops
+from bywire.core.assembly import Assembly, MemoryT, ParT
+from bywire.core.parameters import ParameterSet
+from bywire.core.parts import Integral, Part, Shown, Wire
+from bywire.core.quantities import Length
+from bywire.core.signals import Role
+from bywire.plant import corner_body, road, tyre
+from bywire.vehicle.two_wheeler import BOOK, shown_slip
+
+
+class CornerParameters(ParameterSet):
+    """Body, wheel, tyre and road; the wheel's inertia is that of the brake's disc."""
+
+    body: corner_body.Parameters
+    r: Length
+    """rolling radius of the wheel"""
+    tyre: tyre.Parameters
+    road: road.Parameters
+
+
+class WheelSpeed(NamedTuple):
+    """Speed of the wheel [rad/s], as it enters the implicit solve and value-only."""
+
+    x: float
+    xe: float
+
+
+def _sink(label: str) -> Role:
+    return Role("sink", label, book=BOOK)
+
+
+class Corner(Assembly[ParT, MemoryT]):
+    """Body and tyre of a corner; parameters stand in ``corner``."""
+
+    corner = Part(corner_body, par="corner.body", outside=True, state={"v": "v_x"})
+    tyre = Part(tyre, par="corner.tyre")
+    road = Part(road, par="corner.road")
+    E_tyre = Integral("J", "tyre: slip and deflection", role=_sink("tyre"))
+    W_slope = Integral("J", "work of gravity", role=Role("source", "slope", book=BOOK))
+    t_locked = Integral("s", "time in which the wheel stands")
+
+    F_x = Wire("N", "braking force of the tyre", 1e3)
+    N_x = Wire("N", "load of the wheel", 4e3)
+    v_tread = Shown("m/s", "tread speed", 20.0)
+    slip = Shown("1", "braking slip", 0.1)
+    sliding = Shown("1", "tyre slides")
+    a = Shown("m/s**2", "deceleration", 10.0)
+    E_body = Shown("J", "energy of the body", role=_sink("body"))
+
+    def wheel(self, w: Self) -> WheelSpeed:
+        """Return how fast the wheel turns."""
+        raise NotImplementedError
+
+    def tyre_torque(self, w: Self) -> float:
+        """Wire body and tyre, and return the torque of the road on the wheel [N m]."""
+        par: CornerParameters = w.par.corner  # type: ignore[attr-defined]
+        omega = self.wheel(w)
+        ground = road.surface(w.corner.xe.s, par.road)
+        slope = road.slope(w.corner.xe.s, par.road)
+        seen = tyre.Contact(w.corner.xe.v, omega.xe * par.r, *ground)
+        limits = tyre.limits(seen, par.tyre)
+        w.N_x = corner_body.load(slope.cosine, par.body)
+        w.tyre.u = tyre.Input(
+            w.corner.x.v, omega.x * par.r, w.N_x, *ground, limits.mu, limits.u
+        )
+        w.F_x = tyre.output(w.tyre.x, w.tyre.u, par.tyre).F
+        w.corner.u = corner_body.Input(w.F_x, slope.sine)
+        return par.r * w.F_x
+
+    def power(self, w: Self) -> dict[str, float]:
+        """Return where the vehicle's energy goes."""
+        body = w.corner.par
+        return {
+            **super().power(w),
+            "E_tyre": tyre.work(w.tyre.x, w.tyre.u, w.tyre.par),
+            "W_slope": -body.m * body.g * w.corner.u.sine * w.corner.x.v,
+            "t_locked": ops.where(self.wheel(w).x == 0, 1.0, 0.0),
+        }
+
+    def record(self, w: Self) -> dict[str, float]:
+        """Return what is recorded beside states, wires and losses."""
+        return {
+            **super().record(w),
+            "v_tread": w.tyre.u.v_wheel,
+            "slip": shown_slip(w.tyre.u, w.tyre.par),
+            "sliding": tyre.sliding(w.tyre.x, w.tyre.u),
+            "a": -corner_body.balance(w.corner.x, w.corner.u, w.corner.par).v / w.corner.par.m,
+            "E_body": corner_body.energy(w.corner.x, w.corner.par),
+        }
+
+
+def rolling_states(v: float) -> dict[str, Any]:
+    """Return the states of the corner's parts at a speed [m/s]."""
+    return {"corner": corner_body.State(s=0.0, v=v), "tyre": tyre.State(0.0)}

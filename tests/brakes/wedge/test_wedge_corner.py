@@ -1,0 +1,54 @@
+"""The wedge brake on a car's corner: it stops, and holds what rocks back."""
+
+import math
+
+import numpy as np
+import pytest
+
+import bywire
+
+
+@pytest.fixture(scope="module")
+def stop():
+    return bywire.run("corner-stop", estimate_error=False)
+
+
+def test_it_stops_as_its_moment_says(stop):
+    v, M, par = 50.0 / 3.6, 600.0, bywire.parameters("roberts2003-corner")
+    corner = par.corner
+    a = M / corner.r / (corner.body.m + par.flywheel.J_F / corner.r**2)
+    # The gap is crossed and the moment built up first; then the deceleration is the moment's.
+    ideal = v * v / (2.0 * a)
+    delay = (stop.kpi("stopping_distance").value - ideal) / v
+    assert 0.0 < delay < 0.15
+    assert stop.kpi("stopping_time").value == pytest.approx(v / a + delay, abs=0.02)
+    assert stop.kpi("moment_before_stop").value == pytest.approx(M, rel=0.01)
+
+
+def test_energy_of_the_vehicle_closes(stop):
+    run = stop.recording
+    left = run["E_body"] + run["E_wheel"] + run["E_tyre"] + run["E_brake"] - run["W_slope"]
+    assert np.abs(left - left[0]).max() < 1e-6 * float(run["E_body"][0])
+    assert float(run["E_brake"][-1]) > 0.9 * float(run["E_body"][0])
+
+
+def test_the_standing_wheel_holds_the_car_that_rocks_back(stop):
+    run, end = stop.recording, stop.kpi("stopping_time").value
+    assert stop.kpi("rebound_speed").value > 0.05
+    held = run.sel(time=slice(end + 0.02, 5.4))
+    assert not held["Omega"].values.any()
+    assert stop.kpi("force_change").value == 0.0  # no motor acts on a moment that is the tyre's
+    assert stop.kpi("creep_speed").value < 1e-2
+
+
+def test_too_little_grip_locks_the_wheel():
+    result = bywire.run(
+        "corner-stop", {"options.surface": "snow", "options.t_hold": "1.5 s"}, estimate_error=False
+    )
+    run = result.recording
+    assert float(run["t_locked"][-1]) > 0.3
+    assert float(run["slip"].sel(time=slice(0.5, 1.4)).max()) == pytest.approx(1.0)
+    assert math.isnan(result.kpi("stopping_distance").value)
+    # Locked, the road gives mu(1) and no more, whatever the brake presses.
+    locked = run["a"].sel(time=slice(1.2, 1.4))
+    assert float(locked.mean()) == pytest.approx(0.130 * 9.81, rel=5e-3)
