@@ -9,9 +9,9 @@ from typing import get_args
 import pytest
 
 import bywire
-from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.catalog import PARAMETER_SETS, CitedSet
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import choice_fields, leaf_fields
 from bywire.core.provenance import Cited, Kind, calibrated, chosen, derived, paper
 
@@ -53,7 +53,7 @@ def test_entry_is_complete(name):
     assert re.search(r"\d{4}", found.source), "a citation has a year"
     assert found.summary
     assert not found.summary.endswith(".")
-    assert found.assembly in {e.assembly for e in EXPERIMENTS.all().values()}
+    assert found.assembly in ASSEMBLIES.all()
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -25,7 +25,7 @@ class WedgeCornerParameters(WedgeParameters):
     corner: CornerParameters
 
 
-class WedgeCorner(Corner[WedgeCornerParameters, control.Memory], WedgeBrake):  # type: ignore[misc]
+class WedgeCorner(Corner[WedgeCornerParameters, control.Memory], WedgeBrake):
     """The brake with all its controllers; the flywheel is the wheel, the road turns it."""
 
     name: ClassVar[str] = "wedge-corner"
@@ -58,7 +58,7 @@ class WedgeCorner(Corner[WedgeCornerParameters, control.Memory], WedgeBrake):  #
             "E_brake": w.flow.W_brake,
         }
 
-    def rest(self, par: WedgeCornerParameters) -> tuple[Any, control.Memory]:
+    def rest(self, par: Any) -> tuple[Any, control.Memory]:
         """Return the vehicle standing, the brake parked."""
         return at_speed(0.0, par)
 
