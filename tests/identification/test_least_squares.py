@@ -122,6 +122,16 @@ def test_a_prior_weighs_like_a_measurement() -> None:
     assert estimate(problem)["mean"] == pytest.approx(wanted, rel=1e-9)
 
 
+def test_what_is_left_tells_the_noise_of_the_data_and_not_the_priors() -> None:
+    y = np.random.default_rng(3).normal(1.0, 1.0, 50)  # twice the noise that is assumed
+    unknown = Unknown("mean", 0.0, prior=(1.0, 0.1))
+    found = estimate(Problem((unknown,), lambda v: ((v[0] - y) / 0.5, np.full((50, 1), 2.0))))
+    r = (found["mean"] - y) / 0.5
+    data, prior = 50 / 0.25, 1 / 0.1**2  # the weights that both had
+    scattered = (r @ r / 49 * data + prior) / (data + prior) ** 2
+    assert found.deviations == pytest.approx([scattered**0.5], rel=1e-6)
+
+
 def test_a_robust_loss_shrugs_off_outliers() -> None:
     spoiled = white(2)
     spoiled[::20] += 1.0
