@@ -26,7 +26,8 @@ def values(result):
 
 def sweep(options, **overrides):
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
-    return bywire.run(bywire.Bench("friction-sweep", "roberts2003", changes, options))
+    bench = bywire.Bench("friction-sweep", "roberts2003", changes, options, step=40e-6)
+    return bywire.run(bench)
 
 
 def test_every_substep_settles_and_nothing_warns(results):
@@ -111,5 +112,6 @@ ODD = [
 
 @pytest.mark.parametrize(("name", "options"), ODD)
 def test_odd_options_give_figures_or_reasons(name, options):
-    for kpi in bywire.run(bywire.Bench(name, "roberts2003", options=options)).kpis:
+    bench = bywire.Bench(name, "roberts2003", options=options, step=40e-6)
+    for kpi in bywire.run(bench).kpis:
         assert math.isfinite(kpi.value) or kpi.note, kpi.name

@@ -16,6 +16,7 @@ from bywire.report.answer import AnswerWarning
 
 
 def run(name, overrides=None, options=None, **timing):
+    timing = {"step": 40e-6, **timing}
     bench = bywire.Bench(name, "roberts2003", overrides or {}, options or {}, **timing)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy's means of nothing

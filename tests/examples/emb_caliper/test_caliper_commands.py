@@ -86,7 +86,7 @@ def test_design_meets_what_is_required_from_low_to_high_force(command: Any) -> N
     with few_starts():
         code, out, err = command(
             "design", "clamp-force", "--linear-only", "--require", "bandwidth >= 5 Hz",
-            "--require", "phase margin >= 60 deg", "--over", "at=2 kN:30 kN:3",
+            "--require", "phase margin >= 60 deg", "--over", "at=2 kN:30 kN:2",
         )  # fmt: skip
     assert code == 0, err
     assert "linear design met" in out

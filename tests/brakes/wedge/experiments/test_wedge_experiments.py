@@ -33,7 +33,8 @@ def values(result):
 
 def run(name, options=None, **overrides):
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
-    return bywire.run(bywire.Bench(name, "roberts2003", options=options or {}, overrides=changes))
+    bench = bywire.Bench(name, "roberts2003", changes, options or {}, step=40e-6)
+    return bywire.run(bench)
 
 
 def test_every_substep_settles_and_nothing_warns(results):

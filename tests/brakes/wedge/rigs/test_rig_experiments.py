@@ -64,7 +64,8 @@ def test_efficiency(results):
 @pytest.mark.parametrize(("eta_f", "eta_b"), [(0.9, 0.9), (0.75, 0.5)])
 def test_other_efficiencies(eta_f, eta_b):
     changes = {"screw.eta_f": eta_f, "screw.eta_b": eta_b, "bearing.C_2": 0.0}
-    found = values(bywire.run(bywire.Bench("screw-efficiency", "roberts2003", changes)))
+    bench = bywire.Bench("screw-efficiency", "roberts2003", changes, step=40e-6)
+    found = values(bywire.run(bench))
     for suffix in ("", "_reverse"):
         assert found[f"eta_f{suffix}"] == pytest.approx(eta_f, rel=0.01)
         assert found[f"eta_b{suffix}"] == pytest.approx(eta_b, rel=0.01)
@@ -80,7 +81,8 @@ def test_other_efficiencies(eta_f, eta_b):
     ],
 )
 def test_torque_that_does_not_get_through_is_said(overrides, options, names):
-    result = bywire.run(bywire.Bench("screw-efficiency", "roberts2003", overrides, options))
+    bench = bywire.Bench("screw-efficiency", "roberts2003", overrides, options, step=40e-6)
+    result = bywire.run(bench)
     for name in names:
         assert math.isnan(result.kpi(name).value), name
         assert "no steady motion" in result.kpi(name).note
@@ -196,7 +198,7 @@ def test_force_fight_grows_with_the_difference():
     peaks = []
     for scale in (0.5, 1.0):
         options = {name: scale * share for name, share in shares.items()}
-        bench = bywire.Bench("force-fight", "roberts2003", options=options)
+        bench = bywire.Bench("force-fight", "roberts2003", options=options, step=40e-6)
         peaks.append(values(bywire.run(bench))["peak_force_step_unequal"])
     assert 10.0 < peaks[0] < peaks[1]
 
