@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters as Par
-from bywire.control import lift_pi, slip_pi, vehicle_speed, wheel_speed
+from bywire.control import lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
 from bywire.core import ops
 from bywire.core.signals import Signal
 
@@ -34,6 +34,10 @@ class Memory(NamedTuple):
     abs_f: Annotated[float, Signal("1", "slip control of the front wheel acts")]
     abs_r: Annotated[float, Signal("1", "slip control of the rear wheel acts")]
     lift: Annotated[float, Signal("1", "lift control acts")]
+    tread_f: Annotated[float, Signal("m/s", "measured speed of the front tread", 20.0)]
+    tread_r: Annotated[float, Signal("m/s", "measured speed of the rear tread", 20.0)]
+    eta_f: Annotated[float, Signal("1", "front wheel's deceleration over gravity", 1.0)]
+    eta_r: Annotated[float, Signal("1", "rear wheel's deceleration over gravity", 1.0)]
     omega_f_hat: Annotated[float, Signal("rad/s", "measured front wheel speed", 60.0)]
     omega_r_hat: Annotated[float, Signal("rad/s", "measured rear wheel speed", 60.0)]
     edge_f: Annotated[float, Signal("rad", "angle of the last front edge", 100.0)]
@@ -76,32 +80,65 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
         )
         p_f, m = out.p, m._replace(lift_integral=lift.integral, lift=out.lowered)
     if par.ecu.abs == "pi":
-        front, out_f = slip_pi.output(
-            slip_pi.State(m.slip_f_integral),
-            slip_pi.Input(
-                m.v_hat, slip_pi.set_point(m.v_hat, par.ecu.front_slip), m.slip_f_hat,
-                u.p_f_set, p_f, before.p_f_most,
-            ),
-            par.ecu.T_s,
-            par.ecu.front_slip,
-        )  # fmt: skip
-        rear, out_r = slip_pi.output(
-            slip_pi.State(m.slip_r_integral),
-            slip_pi.Input(
-                m.v_hat, slip_pi.set_point(m.v_hat, par.ecu.rear_slip), m.slip_r_hat,
-                u.p_r_set, p_r, before.p_r_most,
-            ),
-            par.ecu.T_s,
-            par.ecu.rear_slip,
-        )  # fmt: skip
-        p_f, p_r = out_f.p, out_r.p
+        front = _Wheel(m.slip_f_hat, m.tread_f, before.tread_f, m.eta_f, m.slip_f_integral)
+        rear = _Wheel(m.slip_r_hat, m.tread_r, before.tread_r, m.eta_r, m.slip_r_integral)
+        on_front = _lowered(
+            front, m.v_hat, (u.p_f_set, p_f, before.p_f_most), par.ecu.front_slip, par
+        )
+        on_rear = _lowered(
+            rear, m.v_hat, (u.p_r_set, p_r, before.p_r_most), par.ecu.rear_slip, par
+        )
+        p_f, p_r = on_front.p, on_rear.p
         m = m._replace(
-            slip_f_integral=front.integral,
-            slip_r_integral=rear.integral,
-            abs_f=out_f.lowered,
-            abs_r=out_r.lowered,
+            slip_f_integral=on_front.integral,
+            slip_r_integral=on_rear.integral,
+            eta_f=on_front.eta,
+            eta_r=on_rear.eta,
+            abs_f=on_front.acts,
+            abs_r=on_rear.acts,
         )
     return m._replace(p_f_ref=p_f, p_r_ref=p_r)
+
+
+_Demands = tuple[float, float, float]
+
+
+class _Wheel(NamedTuple):
+    """What slip control knows of a wheel."""
+
+    slip: float
+    tread: float
+    tread_before: float
+    eta: float
+    integral: float
+
+
+class _Lowered(NamedTuple):
+    """What slip control does."""
+
+    p: float
+    acts: float
+    integral: float
+    eta: float
+
+
+def _lowered(
+    wheel: _Wheel, v: float, demands: _Demands, gains: slip_pi.Parameters, par: Par
+) -> _Lowered:
+    """Return what slip control leaves of the rider's demand: all, what may be lowered, before."""
+    mix, seen = mixed_slip.output(
+        mixed_slip.State(wheel.tread_before, wheel.eta),
+        mixed_slip.Input(slip_pi.set_point(v, gains), wheel.slip, wheel.tread),
+        par.ecu.T_s,
+        par.ecu.mix,
+    )
+    state, out = slip_pi.output(
+        slip_pi.State(wheel.integral),
+        slip_pi.Input(v, seen.set_point, seen.mixed, *demands),
+        par.ecu.T_s,
+        gains,
+    )
+    return _Lowered(out.p, out.lowered, state.integral, mix.eta)
 
 
 def _measured(r: Readings, m: Memory, par: Par) -> Memory:
@@ -129,6 +166,8 @@ def _measured(r: Readings, m: Memory, par: Par) -> Memory:
         slip_f_hat=vehicle_speed.slip(v, tread_f, ecu.front_slip.v_off),
         slip_r_hat=vehicle_speed.slip(v, tread_r, ecu.rear_slip.v_off),
         a_hat=a_hat,
+        tread_f=tread_f,
+        tread_r=tread_r,
         omega_f_hat=front.omega,
         omega_r_hat=rear.omega,
         edge_f=front.angle,

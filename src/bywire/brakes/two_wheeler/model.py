@@ -65,7 +65,7 @@ def at_speed(v: float, par: Par) -> tuple[Any, ecu.Memory]:
     front, rear = v / par.vehicle.front_wheel.r, v / par.vehicle.rear_wheel.r
     T = par.ecu.T_s
     memory = zeros(ecu.Memory)._replace(
-        v_hat=v, v_last=v, omega_f_hat=front, omega_r_hat=rear,
+        v_hat=v, v_last=v, tread_f=v, tread_r=v, omega_f_hat=front, omega_r_hat=rear,
         edge_f=-front * T, edge_r=-rear * T,
     )  # fmt: skip
     return TwoWheelerByWire.state(**rolling_start(v, par.vehicle)), memory

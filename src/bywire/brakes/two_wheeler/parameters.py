@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from bywire.control import lift_pi, slip_pi, vehicle_speed, wheel_speed
+from bywire.control import lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 from bywire.plant import brake_disc, pressure_loop, wheel_encoder
@@ -54,6 +54,7 @@ class EcuParameters(ParameterSet):
     """fastest build-up of a demand"""
     wheel_speed: wheel_speed.Parameters
     vehicle_speed: vehicle_speed.Parameters
+    mix: mixed_slip.Parameters
     front_slip: slip_pi.Parameters
     rear_slip: slip_pi.Parameters
     front_lift: lift_pi.Parameters

@@ -106,6 +106,10 @@ SPORT600 = CitedSet(
             0.2, "long beside the first bite, which slips less at first"
         ),
         "ecu.vehicle_speed.v_still": chosen(1.0, "an edge then comes every 40 ms"),
+        "ecu.mix.alpha": chosen(1.0, "slip alone"),
+        "ecu.mix.eta_set": chosen(0.8, "a full stop on wet asphalt"),
+        "ecu.mix.tau": chosen(0.02, "the noise of edges, short beside the loop"),
+        "ecu.mix.g": chosen(9.81, "gravity"),
         **{f"ecu.front_slip.{name}": value for name, value in _SLIP.items()},
         "ecu.front_slip.J_hat": chosen(0.50, "that of the wheel"),
         "ecu.front_slip.r_hat": chosen(0.30, "that of the wheel"),
