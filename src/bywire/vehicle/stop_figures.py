@@ -66,9 +66,8 @@ def units() -> dict[str, str]:
     return {**STOP.units, **WHEEL.ending(*WHEELS)}
 
 
-def standstill(run: xr.Dataset) -> float:
-    """Return when the speed is zero for the first time after zero [s]; NaN where it never is."""
-    t, v = run["time"].values, run["v"].values
+def standstill(t: Array, v: Array) -> float:
+    """Return when a speed is zero for the first time after zero [s]; NaN where it never is."""
     stopped = np.flatnonzero((v[1:] <= 0) & (v[:-1] > 0) & (t[1:] > 0))
     if not stopped.size:
         return math.nan
@@ -78,10 +77,10 @@ def standstill(run: xr.Dataset) -> float:
 
 def stop_figures(run: xr.Dataset, setting: Setting) -> tuple[Kpi, ...]:
     """Return the key figures of a stop that begins at time zero."""
-    end = standstill(run)
-    t = run["time"].values
+    t, v = run["time"].values, run["v"].values
+    end = standstill(t, v)
     braked = (t >= -1e-9) & (t <= end if math.isfinite(end) else np.isfinite(t))
-    fast = braked & (run["v"].values > SLOW)
+    fast = braked & (v > SLOW)
     heat = {name: _growth(run[f"E_brake_{name}"].values, braked) for name in WHEELS.values()}
     total = sum(heat.values())
     kpis = STOP(**_course(run, end, setting), **_smoothness(run, braked, fast), disc_energy=total)

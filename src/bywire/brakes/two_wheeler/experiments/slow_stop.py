@@ -62,7 +62,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how the vehicle comes to rest, and how it stays there."""
     run = recordings["run"]
-    end = stop_figures.standstill(run)
+    end = stop_figures.standstill(run["time"].values, run["v"].values)
     if math.isnan(end):
         return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
     return FIGURES(**_rest(run, end))

@@ -20,6 +20,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant.road import SURFACES, SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
+from bywire.vehicle.stop_figures import standstill
 
 _CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
 
@@ -75,16 +76,14 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how the corner stops, and what is held then."""
     run = recordings["run"]
     held = run.sel(time=slice(None, options.t_hold - 1e-9))
-    v = held["v_x"].values
-    stopped = np.flatnonzero((v[1:] <= 0) & (v[:-1] > 0))
-    if not stopped.size:
+    end = standstill(held["time"].values, held["v_x"].values)
+    if math.isnan(end):
         return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
-    return FIGURES(**_stop(held, int(stopped[0]) + 1, options))
+    return FIGURES(**_stop(held, end, options))
 
 
-def _stop(held: xr.Dataset, k: int, options: Options) -> dict[str, float | tuple[float, str]]:
+def _stop(held: xr.Dataset, end: float, options: Options) -> dict[str, float | tuple[float, str]]:
     t, v = held["time"].values, held["v_x"].values
-    end = float(t[k - 1] + (t[k] - t[k - 1]) * v[k - 1] / (v[k - 1] - v[k]))
     begin, last = end + _CALM, options.t_hold
     late = t >= begin
     fast = v > 0.1 * options.v_0
@@ -94,7 +93,7 @@ def _stop(held: xr.Dataset, k: int, options: Options) -> dict[str, float | tuple
         "stopping_time": end,
         "moment_before_stop": mean(held, "y_M", max(end - 0.5, 0.0), end),
         "peak_slip": float(np.max(held["slip"].values[fast], initial=0.0)),
-        "rebound_speed": float(np.max(-v[k:])),
+        "rebound_speed": float(np.max(-v[t >= end])),
         "wheel_reversal": float(np.max(held["phi"].values) - held["phi"].values[-1]),
         "force_held": mean(held, "F_N", begin, last) if late.any() else short,
         "force_change": swing(held, "F_N", begin, last) if late.any() else short,
