@@ -31,6 +31,9 @@ FEWER = {  # of experiments of many runs, which tests of their brakes run as the
     "static-force": 'mu_B = "0.2, 0.6"', "friction-sweep": 'mu_B = "0.2, 0.6"',
     "position-step": 'amplitudes = "0.5 rad"',
 }  # fmt: skip
+LARGE = ("disc-stop", "force-cycle", "static-force", "stiffness")
+"""kernels in lanes that no other test needs take half a minute; other experiments have the same
+families of key figures"""
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 
@@ -110,7 +113,9 @@ def _rows(recording):
     return Rows(recording["time"].values, signals, attributes, lambda: recording.attrs)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=pytest.mark.trust) if n in LARGE else n for n in NAMES]
+)
 def test_figures_of_many_cases_are_those_of_their_recordings(results, name):
     """By families of all at once, of no more signals than they need; by hand one by one."""
     bench = results[name].bench
