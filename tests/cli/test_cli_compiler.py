@@ -29,6 +29,7 @@ def anew(bywire, monkeypatch):
 
     def call(*arguments, **environment):
         monkeypatch.setattr(engine, "_PREPARED", {})
+        monkeypatch.delenv("BYWIRE_CC_QUICK", raising=False)  # a compiler's label says it
         for name, value in environment.items():
             monkeypatch.setenv(name, value)
         find_compiler.cache_clear()
