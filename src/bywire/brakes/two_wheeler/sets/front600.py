@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bywire.brakes.two_wheeler.rigs.wheel_on_drum import WheelOnDrumParameters
-from bywire.brakes.two_wheeler.sets.sport600 import SOURCE, SPORT600
+from bywire.brakes.two_wheeler.sets import sport600
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import chosen, derived
 from bywire.plant.road import SURFACES
@@ -16,14 +16,14 @@ _FROM = {
 FRONT600 = CitedSet(
     name="front600",
     assembly="wheel-on-drum",
-    source=SOURCE,
+    source=sport600.SOURCE,
     summary="front wheel of the sport motorcycle on a wet drum",
     parameter_class=WheelOnDrumParameters,
     values={
         **{
             name.replace(there, here, 1): value
             for here, there in _FROM.items()
-            for name, value in SPORT600.values.items()
+            for name, value in sport600.SPORT600.values.items()
             if name.startswith(f"{there}.")
         },
         "drum.v": chosen(20.0, "the middle of a stop"),
@@ -32,6 +32,6 @@ FRONT600 = CitedSet(
             f"drum.surface.{name}": derived(value, "wet asphalt for car tyres, as circulated")
             for name, value in SURFACES["wet-asphalt"]._asdict().items()
         },
-        "T_s": SPORT600.values["ecu.T_s"],
+        "T_s": sport600.SPORT600.values["ecu.T_s"],
     },
 )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
-from bywire.brakes.wedge.sets.roberts2003 import ENTRIES, SOURCE
+from bywire.brakes.wedge.sets import roberts2003
 from bywire.core.catalog import CitedSet
 from bywire.core.provenance import chosen, derived
 from bywire.plant.road import SURFACES
@@ -16,13 +16,13 @@ _ADHESION = {
 CORNER = CitedSet(
     name="roberts2003-corner",
     assembly="wedge-corner",
-    source=SOURCE
+    source=roberts2003.SOURCE
     + "; adhesion: values that circulate under the name of M. Burckhardt, 1993; the corner is "
     "chosen",
     summary="the wedge brake on the front corner of a mid-size car",
     parameter_class=WedgeCornerParameters,
     values={
-        **ENTRIES[0].values,
+        **roberts2003.ENTRIES[0].values,
         "flywheel.J_F": chosen(1.2, "wheel, tyre and disc of a mid-size car"),
         "corner.body.m": chosen(450.0, "front corner of a mid-size car"),
         "corner.body.g": chosen(9.81, "gravity"),
