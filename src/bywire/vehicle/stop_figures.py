@@ -19,7 +19,7 @@ SLOW = 2.5
 _FILTER, _BUILD_UP = 0.02, 0.3  # s: averaging of the deceleration, and what is no jerk of control
 
 STOP = Figures(
-    undefined="the vehicle does not stop in the recorded time",
+    undefined="the vehicle does not stop in the recorded time: give a longer options.duration",
     stopping_distance=("m", "Distance from time zero to the first standstill."),
     stopping_time=("s", "Time from zero to the first standstill."),
     braking_efficiency=("%", "Ideal stopping distance on this road over the distance."),

@@ -75,6 +75,21 @@ def test_mixed_control_needs_no_tuning_to_the_surface(surface):
     assert result.kpi("braking_efficiency").value >= 85.0
 
 
+def test_a_stop_is_recorded_to_its_end_on_any_surface():
+    for surface in ("dry-asphalt", "snow"):
+        result = stopped(OFF, surface=surface)
+        last = float(result.recording["time"][-1])
+        assert 0.5 * last < result.kpi("stopping_time").value < last
+
+
+def test_a_slope_on_which_locked_wheels_slide_on_needs_a_duration():
+    downhill = {"vehicle.road.gradient": "-0.2"}
+    with pytest.raises(bywire.BywireError, match=r"give options.duration"):
+        stopped({**OFF, **downhill}, surface="snow")
+    result = stopped({**OFF, **downhill}, surface="snow", duration="2 s")
+    assert "longer options.duration" in result.kpi("stopping_distance").note
+
+
 def test_slip_alone_is_tuned_to_a_surface():
     result = stopped({}, surface="dry-cobble", v_0="30 m/s")
     assert result.kpi("braking_efficiency").value < 65.0

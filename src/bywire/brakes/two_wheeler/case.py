@@ -13,6 +13,7 @@ from bywire.bench.experiment import Case
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.errors import ParameterError
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.plant import road, tyre
@@ -71,3 +72,15 @@ def judged_stop(run: xr.Dataset, v_0: float) -> tuple[Kpi, ...]:
     ideal = ideal_stop.ideal_distance(v_0, par)
     peak = tyre.peak_slip(*road.surface(0.0, par.road))
     return stop_figures.stop_figures(run, stop_figures.Setting(ideal, float(peak)))
+
+
+def locked_stop(v_0: float, par: TwoWheelerParameters) -> float:
+    """Return a time [s] in which locked wheels stop a vehicle, a single one on most roads."""
+    road_ahead, body = par.vehicle.road, par.vehicle.body
+    slope = road.slope(0.0, road_ahead)
+    held = tyre.adhesion(1.0, *road.surface(0.0, road_ahead)) * slope.cosine + slope.sine
+    if not held > 0.0:
+        raise ParameterError(
+            "locked wheels do not stop on this slope: give options.duration, the time to record"
+        )
+    return round(v_0 / (0.7 * held * body.g) + 1.0, 1)

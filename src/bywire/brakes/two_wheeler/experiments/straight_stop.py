@@ -8,12 +8,13 @@ from bywire.brakes.two_wheeler.case import (
     Demand,
     RidingSpeed,
     judged_stop,
+    locked_stop,
     on_surface,
     rolling_case,
 )
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.core.quantities import TimeConstant
 from bywire.plant.road import SurfaceName
 from bywire.vehicle import stop_figures
 
@@ -31,15 +32,16 @@ class Options(ParameterSet):
     """rear pressure that the rider demands"""
     surface: SurfaceName
     """what the road is made of"""
-    duration: Duration
-    """time recorded"""
+    duration: TimeConstant
+    """time recorded; 0 for as long as locked wheels take on this surface, and a little more"""
 
 
 def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
     demands = {"p_f_set": options.p_front, "p_r_set": options.p_rear}
     changes = on_surface(options.surface)
-    return (rolling_case(par, options.v_0, demands, options.duration, changes),)
+    duration = options.duration or locked_stop(options.v_0, par.replace(changes))
+    return (rolling_case(par, options.v_0, demands, duration, changes),)
 
 
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
@@ -53,7 +55,7 @@ EXPERIMENT = Experiment(
     summary="panic stop from 100 km/h, 40 bar on both brakes, on any surface",
     options=Options,
     defaults=Options(
-        v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=10.0
+        v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
     ),
     cases=cases,
     judge=judge,
