@@ -17,8 +17,8 @@ SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
 class Parameters(ParameterSet):
     """Share of both, and the deceleration that goes with the slip that is held.
 
-    ``alpha`` 1 is slip alone, 0 deceleration alone. Between them one set point does on surfaces
-    whose peaks lie at different slips: where the road holds more, less slip is asked for.
+    ``alpha`` 1 is slip alone, 0 deceleration alone. Between them less slip is asked for where the
+    road holds more; beyond the peak, where it holds less, more: gains have to be its own.
     """
 
     alpha: Weight

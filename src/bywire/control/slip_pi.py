@@ -19,7 +19,7 @@ class Parameters(ParameterSet):
     """Gains by the crossover of the loop, from what the ECU believes of its wheel.
 
     ``schedule``: ``"speed"`` lets the gain follow the speed, with which gain and pole of the wheel
-    fall (eq. S1 of the notes on slip control); ``"fixed"`` keeps that of v_fixed.
+    fall; ``"fixed"`` keeps that of v_fixed.
     """
 
     schedule: Literal["speed", "fixed"]

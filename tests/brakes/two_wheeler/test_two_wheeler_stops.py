@@ -67,12 +67,18 @@ def test_a_controlled_stop_on_wet_road(controlled):
 
 
 @pytest.mark.parametrize("surface", ["dry-asphalt", "wet-asphalt", "snow", "dry-cobble"])
-def test_mixed_control_needs_no_tuning_to_the_surface(surface):
-    mixed = {
-        "ecu.mix.alpha": "0.8", "ecu.front_slip.slip_set": "0.08", "ecu.rear_slip.slip_set": "0.08"
-    }  # fmt: skip
-    result = stopped(mixed, surface=surface, v_0="30 m/s", duration="20 s")
+def test_a_larger_slip_does_for_every_surface(surface):
+    larger = {"ecu.front_slip.slip_set": "0.28", "ecu.rear_slip.slip_set": "0.28"}
+    result = stopped(larger, surface=surface, v_0="30 m/s")
     assert result.kpi("braking_efficiency").value >= 85.0
+    assert result.kpi("locked_time_front").value == 0.0
+
+
+def test_mixed_control_sees_the_deceleration_of_its_wheel():
+    run = stopped({**WET, "ecu.mix.alpha": "0.95"}, v_0="30 m/s").recording
+    steady = run.sel(time=slice(1.0, 2.0))
+    slowed = float(steady["v_f"][0] - steady["v_f"][-1]) / 9.81
+    assert float(steady["eta_f"].mean()) == pytest.approx(slowed, rel=0.05)
 
 
 def test_a_stop_is_recorded_to_its_end_on_any_surface():

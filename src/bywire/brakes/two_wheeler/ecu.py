@@ -65,8 +65,7 @@ class Readings(NamedTuple):
 
 def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
     """Run the ECU once: measure, limit the build-up, then let the controllers lower it."""
-    m = _measured(r, m, par)
-    before = m
+    before, m = m, _measured(r, m, par)
     rise = par.ecu.p_rate * par.ecu.T_s
     m = m._replace(
         p_f_most=ops.fmin(u.p_f_set, m.p_f_most + rise),
