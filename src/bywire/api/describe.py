@@ -8,6 +8,7 @@ from typing import Any
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
+from bywire.api.described_faults import described_fault, faults
 from bywire.api.described_parameters import (
     described_group,
     described_kpi,
@@ -70,6 +71,7 @@ def described(name: str) -> list[Object]:
         "loop": (LOOPS.all(), described_loop),
         "plant": (PLANTS.all(), described_plant),
         "stimulus": (STIMULI.all(), _stimulus),
+        "fault": (faults(), described_fault),
         "KPI": (definitions(), lambda kpi: described_kpi(kpi.name, kpi.definition)),
         "parameter": ({n: n for n in parameters()}, described_parameter),
         "parameter group": ({n: n for n in groups()}, described_group),

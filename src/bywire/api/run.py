@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
@@ -13,6 +13,7 @@ from bywire.api.run_remarks import remarks
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
+from bywire.bench.faults.fault_section import from_text
 from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
@@ -201,6 +202,7 @@ def run(
     bench: Bench | str | Path,
     overrides: Mapping[str, str] = ...,
     *,
+    faults: Sequence[str] = ...,
     progress: Progress | None = None,
     engine: str = "auto",
     estimate_error: bool = True,
@@ -213,6 +215,7 @@ def run(
     overrides: Mapping[str, str] = ...,
     *,
     over: str,
+    faults: Sequence[str] = ...,
     progress: Progress | None = None,
     engine: str = "auto",
     estimate_error: bool = True,
@@ -225,6 +228,7 @@ def run(
     overrides: Mapping[str, str] = MappingProxyType({}),
     *,
     over: str = "",
+    faults: Sequence[str] = (),
     progress: Progress | None = None,
     engine: str = "auto",
     estimate_error: bool = True,
@@ -241,6 +245,9 @@ def run(
     over
         Range, for instance ``"motor.R_m=0.2 ohm:0.6 ohm:9"`` or ``"options.p_to=20 bar, 30 bar"``:
         the values run side by side, and the result is a `BenchRange`.
+    faults
+        What fails beside what the bench says, as ``--fault`` takes it, for instance
+        ``"pressure.stuck=20 bar@1 s"``.
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
@@ -273,6 +280,8 @@ def run(
         bench = bench_file.read(bench, overrides)
     elif overrides:
         bench = bench.with_overrides(overrides)
+    if faults:
+        bench = replace(bench, faults=(*bench.faults, *map(from_text, faults)))
     if over:
         from bywire.api.run_over import run_over
 

@@ -22,7 +22,19 @@ def remarks(result: Result) -> list[str]:
     A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
     it, or that ends off its set point by more than a twentieth of the step.
     """
-    return [*_changes(result), *_shares(result), *_set_point(result)]
+    return [*_faults(result), *_changes(result), *_shares(result), *_set_point(result)]
+
+
+def _faults(result: Result) -> list[str]:
+    texts = []
+    for fault in result.bench.injections:
+        mode, course = fault.mode, fault.course
+        size = f" = {amount(fault.value, mode.unit)}" if mode.unit else ""
+        until = f" to {amount(course.end, 's')}" if math.isfinite(course.end) else " on"
+        texts.append(
+            f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: {mode.summary}"
+        )
+    return texts
 
 
 def _changes(result: Result) -> list[str]:

@@ -6,6 +6,7 @@ from typing import Any
 
 from bywire.analysis.linear.plant import PLANTS
 from bywire.analysis.loop import LOOPS
+from bywire.api.described_faults import fault_summaries
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
@@ -40,6 +41,7 @@ def all_things() -> dict[str, Any]:
         "studies": _of_assemblies(_in_order(STUDIES)),
         "methods": {m.name: _method(m) for m in _in_order(METHODS)} | for_benches,
         "stimuli": {stimulus.name: stimulus.summary for stimulus in STIMULI.all().values()},
+        "faults": fault_summaries(),
         "kpis": {kpi.name: kpi.definition for kpi in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments},
     }

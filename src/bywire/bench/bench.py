@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
@@ -12,6 +12,8 @@ import numpy as np
 
 from bywire.bench.experiment import EXPERIMENTS, Case, Cases, Experiment, as_run
 from bywire.bench.extent import check_seed, checked_interval, checked_step
+from bywire.bench.faults.fault_section import Injection, injections
+from bywire.bench.faults.injected import checked_sections, with_faults
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.relative_changes import settled
 from bywire.bench.requirements import check
@@ -54,6 +56,9 @@ class Bench:
         KPI name -> limit, such as ``{"overshoot": "<= 15 %"}``.
     name
         What reports call it.
+    faults
+        What fails, and when: tables as those of ``[[faults]]`` in a bench file, see
+        ``docs/faults.md``.
     assembly
         Which model of the parameters' brake is tested, where an experiment of any brake leaves
         the choice; that of the parameter set where empty.
@@ -76,6 +81,7 @@ class Bench:
     requirements: Mapping[str, str] = field(default_factory=dict)
     name: str = ""
     assembly: str = ""
+    faults: Sequence[Mapping[str, Any]] = ()
 
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
@@ -83,6 +89,7 @@ class Bench:
                 raise ParameterError(f"{key} = {quoted(getattr(self, key))}: a text is wanted")
         for key in ("overrides", "options", "stimulus", "requirements"):
             object.__setattr__(self, key, dict(getattr(self, key)))  # ours alone from now on
+        object.__setattr__(self, "faults", tuple(checked_sections(self.faults)))
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
@@ -183,7 +190,8 @@ class Bench:
         """Return the runs as they would be with other parameters and options."""
         has_several = self.definition.beside is not None
         stimuli = self.chosen_stimuli if has_several else self.chosen_stimulus
-        return (make or self.definition.cases)(par, options, stimuli)
+        cases = (make or self.definition.cases)(par, options, stimuli)
+        return with_faults(cases, self.faults) if self.faults else cases
 
     def _made(self, make: Cases) -> tuple[Case, ...]:
         """Return cases, or refuse overrides without effect and steps that do not divide."""
@@ -198,6 +206,16 @@ class Bench:
                     f"{self.experiment!r} sets it to {given[0]!r}; leave it out"
                 )
         return tuple(case.aligned(self.step, self.record) for case in cases)
+
+    @cached_property
+    def injections(self) -> tuple[Injection, ...]:
+        """What fails in the runs: the faults, read for the first of them."""
+        if not self.faults:
+            return ()
+        has_several = self.definition.beside is not None
+        stimuli = self.chosen_stimuli if has_several else self.chosen_stimulus
+        case, *_ = self.definition.cases(self.par, self.chosen_options, stimuli)
+        return injections(self.faults, case.model, case.par)
 
     def runs(self) -> dict[str, Run]:
         """Return the runs by label, for ensembles and sensitivities.

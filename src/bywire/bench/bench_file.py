@@ -12,6 +12,8 @@ from typing import Any
 from bywire.bench.bench import Bench, experiment_of, stimulus_sections
 from bywire.bench.bench_text import PATHS
 from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.faults.fault_section import with_units_wanted
+from bywire.bench.faults.injected import checked_sections
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.relative_changes import is_relative, settled
 from bywire.bench.stimuli.registry import STIMULI
@@ -22,6 +24,7 @@ from bywire.data.toml_file import read_toml
 
 _SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 _KEYS = ("experiment", "parameters", "assembly", "name")
+_FAULTS = "faults"
 _SIMULATION = ("step", "record", "seed")
 _NAME = re.compile(r"[a-z][a-z0-9-]*")
 _TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
@@ -34,7 +37,8 @@ def load(path: str | Path) -> Bench:
     ----------
     path
         TOML file with ``experiment`` and ``parameters``, and the sections ``[options]``,
-        ``[stimulus]``, ``[set]``, ``[simulation]`` and ``[requirements]`` as wanted.
+        ``[stimulus]``, ``[set]``, ``[simulation]``, ``[requirements]`` and ``[[faults]]`` as
+        wanted.
 
     Returns
     -------
@@ -102,6 +106,7 @@ def from_mapping(content: Mapping[str, Any], folder: Path, name: str) -> Bench:
         requirements=content.get("requirements", {}),
         name=content.get("name", name),
         assembly=content.get("assembly", ""),
+        faults=[with_units_wanted(each) for each in checked_sections(content.get(_FAULTS, ()))],
         **_simulation(content.get("simulation", {})),
     )
 
@@ -173,8 +178,8 @@ def _printable(name: str) -> str:
 def _require_shape(content: Mapping[str, Any]) -> None:
     """Refuse unknown keys, and texts and sections that are something else."""
     for key in content:
-        if key not in (*_KEYS, *_SECTIONS):
-            raise unknown_name("key", key, (*_KEYS, *_SECTIONS))
+        if key not in (*_KEYS, *_SECTIONS, _FAULTS):
+            raise unknown_name("key", key, (*_KEYS, *_SECTIONS, _FAULTS))
     for section in _SECTIONS:
         if not isinstance(content.get(section, {}), Mapping):
             raise ParameterError(f"[{section}] must be a section with key = value lines")
@@ -238,6 +243,8 @@ def _changed(content: Mapping[str, Any], changes: Mapping[str, str]) -> dict[str
             raise unknown_name("section", section, _SECTIONS)
         elif name in _SECTIONS:
             raise ParameterError(f"{name} is a section: write {name}.NAME=VALUE")
+        elif section == _FAULTS:
+            raise ParameterError("faults are put in by --fault NAME=VALUE@ONSET, not by --set")
         elif name in _KEYS:
             changed[name] = value
         else:

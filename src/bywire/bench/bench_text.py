@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from bywire.bench.bench import Bench, stimulus_sections
+from bywire.bench.faults.course import Course
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.parameters import ParameterSet, leaf_fields
 
@@ -53,6 +54,15 @@ def bench_text(bench: Bench, comment: str = "") -> str:
         if values:
             lines += ["", f"[{name}]"]
             lines += [f"{_key(k)} = {_text(k, v, units.get(k, '1'))}" for k, v in values.items()]
+    for section, fault in zip(bench.faults, bench.injections, strict=True):
+        units = _units(Course) | {"value": fault.mode.unit or "1"}
+        lines += ["", "[[faults]]"]
+        lines += [f"{_key(k)} = {_text(k, v, units.get(k, '1'))}"
+                  for k, v in section.items() if k != "set"]  # fmt: skip
+        changed = section.get("set", {})
+        of_parameters = _units(type(bench.par))
+        lines += [f'set."{k}" = {_text(k, v, of_parameters.get(k, "1"))}'
+                  for k, v in changed.items()]  # fmt: skip
     return "\n".join(lines) + "\n"
 
 

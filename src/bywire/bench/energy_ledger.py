@@ -100,7 +100,8 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
 
 def _main_book(recording: xr.Dataset) -> str:
     """Return the book that stands first: that of the actuator, or the only one there is."""
-    books = {role.book for role in _roles(recording, _changes(recording)).values()}
+    roles = _roles(recording, _changes(recording)).values()
+    books = {role.book for role in roles if role.side == "sink"}
     return books.pop() if len(books) == 1 else ""
 
 

@@ -16,6 +16,7 @@ from bywire.bench.kpis.kpi import Kpi
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
+from bywire.simulation.changes import Change
 from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 
@@ -82,6 +83,22 @@ class Case:
         common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
         settle = math.ceil(self.settle / common - 1e-9) * common
         return replace(self, settle=float(f"{settle:.12g}"), record=record)
+
+
+@dataclass(frozen=True)
+class FaultyCase(Case):
+    """One run of an experiment in which something fails.
+
+    Parameters
+    ----------
+    changes
+        Times [s] with the parameters that hold from then on, in order; on the recording's axis.
+    falsified
+        ``falsified(t) -> dict``: further signals of the model's Stimulus, those of its taps.
+    """
+
+    changes: tuple[tuple[float, ParameterSet], ...] = ()
+    falsified: Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]] = lambda _: {}
 
 
 Cases = Callable[[Any, Any, Any], tuple[Case, ...]]
@@ -191,6 +208,8 @@ def as_run(
 
     def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
         given = begun.stimulus(t - begun.settle)
+        if isinstance(begun, FaultyCase):
+            given = {**given, **begun.falsified(t - begun.settle)}
         rows = np.zeros((t.size, len(fields)))
         for k, name in enumerate(fields):
             if name in given:
@@ -200,6 +219,7 @@ def as_run(
             rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
         return rows
 
+    changes = begun.changes if isinstance(begun, FaultyCase) else ()
     return Run(
         model=begun.model,
         par=begun.par,
@@ -209,6 +229,7 @@ def as_run(
         duration=begun.settle + begun.duration,
         step=step,
         record=begun.record,
+        changes=tuple(Change(begun.settle + t, par) for t, par in changes),
     )
 
 

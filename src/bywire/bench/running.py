@@ -147,8 +147,18 @@ def _finished(bench: Bench, case: Case, recording: xr.Dataset) -> xr.Dataset:
     definition = bench.definition
     if definition.beside is not None:
         recording = _with_inputs(recording, case)
+    if bench.faults:
+        recording = _with_faults(recording, bench)
     finish = definition.finish
     return recording if finish is None else finish(recording, bench.chosen_options)
+
+
+def _with_faults(recording: xr.Dataset, bench: Bench) -> xr.Dataset:
+    """Return a recording with the number of faults that are there."""
+    time = recording["time"].values
+    there = sum((fault.course.is_there(time) for fault in bench.injections), np.zeros(time.size))
+    attributes = {"units": "1", "long_name": "faults that are there"}
+    return recording.assign({"faults": ("time", there, attributes)})
 
 
 def _case_notes(bench: Bench, case: Case) -> dict[str, Any]:
@@ -210,6 +220,7 @@ def _bench_notes(bench: Bench) -> dict[str, str]:
         "parameter_set": bench.parameters,
         "options": bench.chosen_options.model_dump_json(),
         "stimulus": json.dumps(_described(bench.chosen_stimuli)),
+        **({"faults": json.dumps(bench.faults, default=str)} if bench.faults else {}),
     }
 
 

@@ -41,6 +41,10 @@ def run(
     over: Annotated[
         str, typer.Option(help="Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")
     ] = "",
+    fault: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME[=VALUE][@ONSET]", help="What fails, see 'bywire list faults'."),
+    ] = None,
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -50,7 +54,8 @@ def run(
 
     show(
         lambda progress: run_bench(
-            bench, changes(set_), over=over, progress=progress, estimate_error=error_estimate
+            bench, changes(set_), over=over, faults=fault or (), progress=progress,
+            estimate_error=error_estimate,
         ),
         out,
         json,

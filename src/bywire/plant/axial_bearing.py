@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Gain, KinematicViscosity, Torque, Unit
 from bywire.core.signals import Power, Signal
@@ -42,6 +43,11 @@ class Parameters(ParameterSet):
     """exponent factor of the Stribeck peak"""
     omega_S: AngularSpeed
     """speed over which the Stribeck peak falls"""
+
+
+FAULTS = (
+    ParameterFault("worn", "more friction", ("C_0", "C_1", "C_2", "T_nu"), 5.0),
+)
 
 
 class Input(NamedTuple):

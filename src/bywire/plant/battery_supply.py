@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import InternalResistance, Voltage
 from bywire.core.signals import Power, Role, Signal
@@ -18,6 +19,12 @@ class Parameters(ParameterSet):
     """open-circuit voltage of the battery"""
     R_bat: InternalResistance
     """internal resistance of battery and leads"""
+
+
+FAULTS = (
+    ParameterFault("under-voltage", "weak battery", replaced="V_bat", value=6.0),
+    ParameterFault("bad-contact", "more resistance in battery and leads", ("R_bat",), 10.0),
+)
 
 
 class Input(NamedTuple):

@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Area, Factor, Length, Unit
 from bywire.core.signals import Pressure, Signal
@@ -25,6 +26,11 @@ class Parameters(ParameterSet):
     """area of the pistons on one side of a disc"""
     r_eff: Length
     """radius at which the pads' friction acts"""
+
+
+FAULTS = (
+    ParameterFault("glazed", "less friction of the pads", ("mu_pad",), 0.7),
+)
 
 
 class Input(NamedTuple):

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Ge
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Density, KinematicViscosity, Unit, Volume
 from bywire.core.signals import (
@@ -31,14 +33,23 @@ class Parameters(ParameterSet):
     """kinematic viscosity"""
     rho: Density
     """density"""
-    air: Literal["none", "entrained"]
-    """whether gas bubbles sit in the master cylinder's chamber"""
+    air: Literal["none", "entrained", "caliper"]
+    """where gas bubbles sit: nowhere, in the master cylinder's chamber, or in line and caliper"""
     V_air: Volume
     """volume of the gas at ambient pressure"""
     n_air: Annotated[float, Unit("1", 1.2), Field(gt=1, le=1.7, allow_inf_nan=False)]
     """polytropic exponent of the gas (toward 1 isothermal, 1.4 adiabatic)"""
     p_atm: Annotated[float, Unit("Pa", 1e5), Field(gt=0, allow_inf_nan=False)]
     """ambient pressure, absolute"""
+
+
+FAULTS = (
+    ParameterFault("air", "gas bubbles in the chamber, by their volume", replaced="V_air",
+                   value=8.8e-9, with_it={"air": "entrained"}),
+    ParameterFault("air-in-line", "gas bubbles in line and caliper, by their volume",
+                   replaced="V_air", value=1.28e-6, with_it={"air": "caliper"}),
+    ParameterFault("cold", "thicker fluid", ("nu",), 3.0),
+)
 
 
 class Chamber(NamedTuple):
@@ -53,7 +64,7 @@ def gas_volume(p: GaugePressure, par: Parameters) -> Annotated[float, Signal("m*
 
     .. math:: V_g = V_{air} \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
     """
-    if par.air == "none":
+    if par.air != "entrained":
         return 0.0 * par.V_air
     absolute = par.p_atm + ops.fmax(p, 0.0)
     return par.V_air * ops.power(par.p_atm / absolute, 1.0 / par.n_air)
@@ -67,15 +78,27 @@ def compliance(u: Chamber, par: Parameters) -> FluidCompliance:
     The fluid fills what the gas leaves: with V in the place of V - V_g the stored energy is not
     the integral of the powers.
     """
-    if par.air == "none":
+    if par.air != "entrained":
         return u.V / par.beta
     gas = gas_volume(u.p, par)
-    return (u.V - gas) / par.beta + gas / (par.n_air * (par.p_atm + ops.fmax(u.p, 0.0)))
+    return (u.V - gas) / par.beta + gas_compliance(u.p, par)
+
+
+def gas_compliance(p: GaugePressure, par: Parameters) -> FluidCompliance:
+    r"""Return :math:`-dV_g/dp` of the gas, wherever it sits; the parameters say that there is some.
+
+    .. math:: \frac{V_{air}}{n (p_{atm} + p)} \left(\frac{p_{atm}}{p_{atm} + p}\right)^{1/n}
+    """
+    absolute = par.p_atm + ops.fmax(p, 0.0)
+    gas = par.V_air * ops.power(par.p_atm / absolute, 1.0 / par.n_air)
+    return gas / (par.n_air * absolute)
 
 
 def compression_energy(u: Chamber, par: Parameters) -> Energy:
     """Return the energy stored in a chamber by compressing its fluid and its gas."""
     density = flow_energy_integral(u.p, par) / par.beta
+    if par.air != "entrained":
+        return u.V * density
     return (u.V - gas_volume(u.p, par)) * density + gas_energy(u.p, par)
 
 
@@ -88,6 +111,28 @@ def gas_energy(p: GaugePressure, par: Parameters) -> Energy:
     head = (ops.power(ratio, 1.0 - 1.0 / n) - 1.0) * n / (n - 1.0)
     tail = n * (ops.power(ratio, -1.0 / n) - 1.0)
     return par.V_air * par.p_atm / n * (head + tail)
+
+
+def inflow_energy(p: GaugePressure, par: Parameters) -> Energy:
+    r"""Return what fluid that came in its place has brought, gas and fluid together.
+
+    .. math:: \int_0^p h(p') \left(-\frac{dV_g}{dp'}\right) dp'
+
+    with the flow energy h of `flow_energy`, term by term in closed form.
+    """
+    m, a = 1.0 / par.n_air, par.p_atm
+    ratio = (a + ops.fmax(p, 0.0)) / a
+    decay = ops.power(ratio, -m)
+    total = 0.0 * p
+    scale = par.V_air * m * a
+    for k in range(1, 5):  # the terms of h: p^k / (k! beta^(k - 1))
+        moment, grown = 0.0 * p, decay
+        for j in range(k + 1):
+            moment = moment + (-1.0) ** (k - j) * math.comb(k, j) * (grown - 1.0) / (j - m)
+            grown = grown * ratio
+        total = total + scale * moment / math.factorial(k)
+        scale = scale * a / par.beta
+    return total
 
 
 def flow_energy(

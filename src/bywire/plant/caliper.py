@@ -9,8 +9,9 @@ from annotated_types import Ge
 from pydantic import model_validator
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Area, Nodes, Stiffness, Unit
+from bywire.core.quantities import Area, Conductance, Nodes, Stiffness, Unit
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.plant import brake_fluid
 
@@ -20,7 +21,9 @@ class Parameters(ParameterSet):
 
     ``law``: ``"linear"`` is eq. (11); ``"compressible"`` is eq. (10), with the compressibility
     of the fluid in the caliper; ``"table"`` interpolates a measured pressure-volume curve, whose
-    flat start can hold the volume of a knock-back.
+    flat start can hold the volume of a knock-back. ``leak``: whether fluid is lost to the outside
+    in proportion to the pressure. Gas in line and caliper (``fluid.air = "caliper"``) adds to the
+    volume that the caliper takes in.
     """
 
     law: Literal["linear", "compressible", "table"]
@@ -34,6 +37,11 @@ class Parameters(ParameterSet):
     V_table: Annotated[Nodes, Unit("m**3", 1e-7)]
     """volumes of the table, from 0, increasing; used by law "table" only"""
 
+    leak: Literal["tight", "leaking"]
+    """whether fluid is lost to the outside"""
+    G_leak: Conductance
+    """conductance of the leak; used by leak "leaking" only"""
+
     @model_validator(mode="after")
     def _table_is_a_curve(self) -> Parameters:
         p, V = self.p_table, self.V_table
@@ -46,6 +54,13 @@ class Parameters(ParameterSet):
             if nodes and (nodes[0] != 0.0 or not rising):
                 raise ValueError(f"caliper.{name} must start at 0 and increase, got {nodes}")
         return self
+
+
+FAULTS = (
+    ParameterFault("soft", "softer pads or a hose that swells", ("K_pd",), 0.5),
+    ParameterFault("leaking", "fluid is lost to the outside, by the leak's conductance",
+                   replaced="G_leak", value=1e-13, with_it={"leak": "leaking"}),
+)
 
 
 class State(NamedTuple):
@@ -76,15 +91,24 @@ def mass(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> FluidCompl
     ----------
     Dardanelli, Alli, Savaresi (2010), eqs. (10) and (11).
     """
+    if fluid.air == "caliper":
+        return _pads(x, par, fluid) + brake_fluid.gas_compliance(x.p, fluid)
+    return _pads(x, par, fluid)
+
+
+def _pads(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
+    """Return dV/dp of the pads and of the fluid that they took in."""
     if par.law == "table":
         return _slope(x.p, par)
     spring = par.A_pd * par.A_pd / par.K_pd
     return spring if par.law == "linear" else spring * (1.0 + x.p / fluid.beta)
 
 
-def balance(u: Input) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
-    """Return the flow that the pads take up: all that comes in."""
-    return u.q
+def balance(
+    x: State, u: Input, par: Parameters
+) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
+    """Return the flow that the pads take up: all that comes in, but for what leaks."""
+    return u.q if par.leak == "tight" else u.q - par.G_leak * x.p
 
 
 def _slope(p: float, par: Parameters) -> float:
@@ -97,7 +121,13 @@ def _slope(p: float, par: Parameters) -> float:
 
 
 def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
-    """Return the energy of the pads and of the fluid that came in: integral of h(p) dV."""
+    """Return the energy of the pads, of fluid that came in and of gas: integral of h(p) dV."""
+    pads = _pad_energy(x, par, fluid)
+    return pads + brake_fluid.inflow_energy(x.p, fluid) if fluid.air == "caliper" else pads
+
+
+def _pad_energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
+    """Return the energy of the pads and of the fluid that they took in."""
     H = brake_fluid.flow_energy_integral
     if par.law == "table":
         total = 0.0 * H(x.p, fluid) * _slope(x.p, par)
@@ -119,3 +149,10 @@ def energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Energy:
 def power_in(x: State, u: Input, fluid: brake_fluid.Parameters) -> Power:
     """Return what the inflow carries."""
     return brake_fluid.convected_power(u.q, x.p, fluid)
+
+
+def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+    """Return what the leak carries away, >= 0."""
+    if par.leak == "tight":
+        return 0.0 * x.p
+    return brake_fluid.convected_power(par.G_leak * x.p, x.p, fluid)

@@ -6,6 +6,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
     Current,
@@ -41,6 +42,13 @@ class Parameters(ParameterSet):
     """supply voltage: gain and limit of the PWM stage"""
     R_off: Resistance
     """what the diodes act like while the stage is off: resistance that empties the winding"""
+
+
+FAULTS = (
+    ParameterFault("under-voltage", "less voltage at the power stage", ("V_dc",), 0.5),
+    ParameterFault("scale", "current measurement shows a multiple", ("G_sense",), 0.5),
+    ParameterFault("derated", "less current than wanted", ("i_max",), 0.5),
+)
 
 
 class State(NamedTuple):

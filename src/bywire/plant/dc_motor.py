@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, NamedTuple
 
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Inductance, Resistance, TorqueConstant
 from bywire.core.signals import Energy, Power, Role, Signal
@@ -20,6 +21,12 @@ class Parameters(ParameterSet):
     """winding inductance"""
     K_e: TorqueConstant
     """torque and back-EMF constant"""
+
+
+FAULTS = (
+    ParameterFault("hot", "hot winding or a bad contact", ("R_m",), 2.0),
+    ParameterFault("demagnetized", "weaker magnets", ("K_e",), 0.7),
+)
 
 
 class State(NamedTuple):

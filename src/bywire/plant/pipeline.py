@@ -6,6 +6,7 @@ import math
 from typing import Annotated, NamedTuple
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Length
 from bywire.core.signals import FlowResistance, Role, Signal
@@ -27,6 +28,11 @@ class Parameters(ParameterSet):
     """coefficient of the laminar resistance; 32 in the paper, 8 in textbooks"""
     Re_max: Factor
     """Reynolds number above which the flow is not laminar and the element warns"""
+
+
+FAULTS = (
+    ParameterFault("kinked", "narrower pipe", ("d_pl",), 0.3),
+)
 
 
 class Input(NamedTuple):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, NamedTuple
 
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Frequency
 from bywire.core.signals import Pressure, Signal
@@ -17,6 +18,11 @@ class Parameters(ParameterSet):
     """natural frequency of the pressure loop"""
     zeta: Factor
     """its damping ratio"""
+
+
+FAULTS = (
+    ParameterFault("slow", "a slower loop: weak drive, cold fluid", ("f_n",), 0.3),
+)
 
 
 class State(NamedTuple):

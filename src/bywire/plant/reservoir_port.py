@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, NamedTuple
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Conductance, Length
 from bywire.core.signals import Power, Signal
@@ -18,15 +19,22 @@ class Parameters(ParameterSet):
 
     With either law the cup seal lets fluid in at once when the pressure would fall below
     ambient (the model's one-sided limit). ``law = "dead-stroke"`` also opens an orifice while
-    the piston has not yet traveled ``x_port`` from its retracted end.
+    the piston has not yet traveled ``x_port`` from its retracted end; with ``law = "leaking"`` the
+    cup seal lets fluid back at every stroke.
     """
 
-    law: Literal["makeup", "dead-stroke"]
-    """whether the piston uncovers a port near its retracted end"""
+    law: Literal["makeup", "dead-stroke", "leaking"]
+    """whether the piston uncovers a port near its retracted end, or its cup seal leaks"""
     x_port: Length
     """stroke from the retracted end in which the piston covers the port (law "dead-stroke")"""
     G_port: Conductance
-    """conductance of the fully open port (law "dead-stroke")"""
+    """conductance of the fully open port (law "dead-stroke"), or of the leak (law "leaking")"""
+
+
+FAULTS = (
+    ParameterFault("leaking", "the cup seal lets fluid back, by its conductance",
+                   replaced="G_port", value=1e-13, with_it={"law": "leaking"}),
+)
 
 
 class Input(NamedTuple):
@@ -44,13 +52,15 @@ class Output(NamedTuple):
 
 def closed_at(par: Parameters) -> Stroke:
     """Return the stroke from the retracted end after which a slow piston builds up pressure."""
-    return 0.0 * par.x_port if par.law == "makeup" else par.x_port
+    return par.x_port if par.law == "dead-stroke" else 0.0 * par.x_port
 
 
 def output(u: Input, par: Parameters) -> Output:
     """Return the conductance, which falls linearly to 0 while the piston covers the port."""
     if par.law == "makeup":
         return Output(G=0.0 * par.G_port)
+    if par.law == "leaking":
+        return Output(G=par.G_port)
     return Output(G=par.G_port * ops.clip(1.0 - u.x / par.x_port, 0.0, 1.0))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
     BreakawayFactor,
@@ -37,6 +38,12 @@ class Parameters(ParameterSet):
     """decay of the Stribeck peak with speed"""
     mu_T: RotaryDamping
     """viscous friction torque per shaft speed"""
+
+
+FAULTS = (
+    ParameterFault("swollen", "more friction, the same multiple everywhere",
+                   ("T_pr", "f_cfr_p", "f_cfr_n"), 1.9),
+)
 
 
 class Input(NamedTuple):

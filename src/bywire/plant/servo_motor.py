@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import (
     Inductance,
@@ -51,6 +52,13 @@ class Parameters(ParameterSet):
     """growth of the resistance with temperature, copper"""
     a_K: TemperatureCoefficient
     """fall of the torque constant with temperature, magnets"""
+
+
+FAULTS = (
+    ParameterFault("hot", "hot winding or a bad contact", ("R_ref",), 2.0),
+    ParameterFault("demagnetized", "weaker magnets", ("K_ref",), 0.7),
+    ParameterFault("seized", "the rotor drags in its bearings", ("D_M",), 100.0),
+)
 
 
 class State(NamedTuple):

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 NEAR = 0.5
 """share of a limit from which its lines are drawn"""
+FAULTS = "faults"
+"""variable that counts the faults that are there: a bar along the lower edge shows them"""
 
 
 def time_traces(
@@ -80,6 +82,7 @@ def time_traces(
             draw_limits(axes, limits, first)
         _shade_stuck(axes, recording, stuck, named=axes is rows[0])
         _mark_saturation(axes, panel, recording)
+        _mark_faults(axes, recording, named=axes is rows[0])
         _mark_limit(axes, panel, recording, first)
         axes.margins(x=0.0)
         set_ticks(axes, panel, first)
@@ -167,6 +170,15 @@ def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:
             spans, (0.96, 0.04), transform=axes.get_xaxis_transform(),
             facecolor=style.VERMILLION, edgecolor=style.VERMILLION, linewidth=0.8, zorder=2.0,
             label=panel.saturated,
+        )
+
+
+def _mark_faults(axes: Axes, recording: xr.Dataset, *, named: bool) -> None:
+    spans = _spans(recording, FAULTS)
+    if spans:
+        axes.broken_barh(
+            spans, (0.0, 0.04), transform=axes.get_xaxis_transform(), facecolor=style.PURPLE,
+            edgecolor=style.PURPLE, linewidth=0.8, zorder=2.0, label="fault" if named else None,
         )
 
 

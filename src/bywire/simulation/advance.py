@@ -20,7 +20,13 @@ _CHUNK_SECONDS = 0.1
 
 
 def advance_all(
-    engine: Engine, request: Request, vector: Array, values: Array, progress: Progress | None
+    engine: Engine,
+    request: Request,
+    vector: Array,
+    values: Array,
+    progress: Progress | None,
+    begin: int = 0,
+    last: int | None = None,
 ) -> int:
     """Advance in chunks that leave room for progress and interrupts; return frames done.
 
@@ -32,9 +38,11 @@ def advance_all(
         State vector of the engine, renewed in place; where an interrupt ends the run it holds
         the state after the frames that are done.
     values
-        Recorded rows, filled in place, shape (rows, signals).
+        Recorded rows from the first frame on, filled in place, shape (rows, signals).
     progress
         Called with the finished share, 0 to 1, after every chunk.
+    begin, last
+        First frame, and the one at which to end; the run's by default.
 
     Raises
     ------
@@ -42,11 +50,12 @@ def advance_all(
         When the trajectory leaves the numbers.
     """
     schedule = request.schedule
-    begin, size = 0, 16 * schedule.record_frames
-    while begin < schedule.frames:
-        end = min(begin + size, schedule.frames)
+    first = -(-begin // schedule.record_frames)
+    last, size = schedule.frames if last is None else last, 16 * schedule.record_frames
+    while begin < last:
+        end = min(begin + size, last)
         started, saved = time.perf_counter(), vector.copy()
-        row = -(-begin // schedule.record_frames)
+        row = -(-begin // schedule.record_frames) - first
         try:
             engine.advance(request, vector, begin, end, values[row:])
         except KeyboardInterrupt:

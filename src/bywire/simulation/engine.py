@@ -6,7 +6,7 @@ import threading
 import warnings
 from collections.abc import Callable, Mapping
 from functools import cache, lru_cache, wraps
-from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,9 +170,13 @@ def prepare(model: Model, par: ParameterSet) -> Prepared:
 
 def structure_of(model: Model, par: ParameterSet) -> tuple[object, ...]:
     """Return what tells models of different structure apart: type, own fields, choices."""
+    return (*_makeup(model), type(par), _in_order(tuple(par.choices().items())))
+
+
+def _makeup(model: Model) -> tuple[object, ...]:
+    """Return the type of a model and what tells its own values apart."""
     fields = sorted(getattr(model, "__dict__", {}).items())
-    own = tuple((name, _fingerprint(value)) for name, value in fields)
-    return (type(model), own, type(par), _in_order(tuple(par.choices().items())))
+    return (type(model), tuple((name, _fingerprint(value)) for name, value in fields))
 
 
 @lru_cache(maxsize=256)
@@ -190,6 +194,8 @@ def _fingerprint(value: object) -> object:
         return tuple(_fingerprint(v) for v in value)
     if isinstance(value, Mapping):
         return tuple((str(k), _fingerprint(v)) for k, v in value.items())
+    if hasattr(value, "balance") and hasattr(value, "tasks"):  # a model inside another one
+        return _makeup(cast(Model, value))
     return Identity(id(value))  # kept alive by the model that Prepared holds
 
 

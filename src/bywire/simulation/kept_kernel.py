@@ -142,14 +142,14 @@ def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
     structure
         As ``engine.structure_of`` returns it, with the types of the model and of its parameters.
     """
-    types = [value for value in structure if isinstance(value, type)]
+    types = _types(structure)
     if type(model) not in types or not all(map(_is_ours, types)) or _identities(structure):
         return None
     state = _running_state()
     if not state:
         return None
     names = [f"{kind.__module__}.{kind.__qualname__}" for kind in types]
-    rest = [value for value in structure if not isinstance(value, type)]
+    rest = _without_types(structure)
     built_by = (ca.CasadiMeta.version(), np.__version__, sys.version, platform.machine())
     home = str(Path(sys.modules[__name__].__file__ or ""))
     name = _digest(repr((names, rest, built_by, home)))[:32]
@@ -172,6 +172,20 @@ def _is_ours(kind: type) -> bool:
         if not (base.__module__.startswith("bywire.") and is_there):
             return False
     return True
+
+
+def _types(value: object) -> list[type]:
+    """Return the classes in a structure, those of models within models too."""
+    if isinstance(value, tuple):
+        return [kind for each in value for kind in _types(each)]
+    return [value] if isinstance(value, type) else []
+
+
+def _without_types(value: object) -> object:
+    """Return a structure without its classes, whose addresses say nothing in another process."""
+    if isinstance(value, tuple):
+        return [_without_types(each) for each in value if not isinstance(each, type)]
+    return value
 
 
 def _identities(value: object) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -15,7 +15,14 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import Progress, advance_all
-from bywire.simulation.engine import prepare
+from bywire.simulation.changes import (
+    PUT_IN,
+    Change,
+    energies,
+    energy_of,
+    pieces,
+)
+from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule, plan
@@ -39,6 +46,8 @@ class Run:
         (len(t), nu).
     duration, step, record
         Length of the run, substep and recording interval [s].
+    changes
+        Parameters that replace those before at some times, in order of time: see `Change`.
     """
 
     model: Model
@@ -49,6 +58,7 @@ class Run:
     duration: float
     step: float = 20e-6
     record: float = 1e-3
+    changes: tuple[Change, ...] = ()
 
     def schedule(self) -> Schedule:
         """Return the integer plan of the run."""
@@ -159,7 +169,11 @@ def simulate(
     schedule = request.schedule
     vector = initial_vector(chosen.layout, run.state, run.memory)
     values = np.empty((schedule.rows, len(wanted)))
-    finished = advance_all(chosen, request, vector, values, progress)
+    if run.changes:
+        finished, put_in = _advanced_in_pieces(run, engine, request, vector, values, progress)
+        values, wanted = np.column_stack((values, put_in)), (*wanted, PUT_IN)
+    else:
+        finished = advance_all(chosen, request, vector, values, progress)
     rows = schedule.rows if finished == schedule.frames else -(-finished // schedule.record_frames)
     counters = vector[chosen.layout.start["counters"] :]
     status: Status = "done" if finished == schedule.frames else "interrupted"
@@ -176,6 +190,41 @@ def simulate(
         engine=chosen.label,
         vector=vector,
     )
+
+
+def _advanced_in_pieces(
+    run: Run, kind: str, request: Request, vector: Array, values: Array, progress: Progress | None
+) -> tuple[int, Array]:
+    """Carry a run through its changes; return frames done and the energy that those put in.
+
+    Raises
+    ------
+    ParameterError
+        When a change alters the sample times or what the model's state consists of.
+    """
+    schedule, put_in = request.schedule, np.zeros(request.schedule.rows)
+    before: tuple[Engine, Request] | None = None
+    finished = 0
+    for begin, last, par in pieces(run.par, run.changes, schedule):
+        prepared = prepare(run.model, par)
+        engine = prepared.engine(kind)
+        is_planned = replace(run, par=par, changes=()).schedule() == schedule
+        if not is_planned or engine.layout.total != vector.size:
+            what = "what the model's state consists of" if is_planned else "a sample time"
+            raise ParameterError(
+                f"a change during the run alters {what}: only values and laws may change"
+            )
+        here = replace(request, parameters=np.array(list(par.leaves().values())))
+        places = energies(tuple(prepared.outputs))
+        if before is not None and places:
+            jump = energy_of(engine, here, vector, places) - energy_of(*before, vector, places)
+            put_in[-(-begin // schedule.record_frames) :] += jump
+        row = -(-begin // schedule.record_frames)
+        finished = advance_all(engine, here, vector, values[row:], progress, begin, last)
+        if finished < last:
+            break
+        before = engine, here
+    return finished, put_in
 
 
 def doubts_of(runs: Sequence[Run]) -> list[str]:

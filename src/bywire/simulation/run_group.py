@@ -18,8 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
+from bywire.simulation.changes import PUT_IN, energies, pieces
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare, structure_of
 from bywire.simulation.ensemble import LaneKernel, lane_kernel
@@ -41,11 +43,13 @@ def fit_lanes(runs: Sequence[Run]) -> bool:
     """Return whether runs can be computed side by side: a compiler, one structure, one plan."""
     if find_compiler() is None or not runs:
         return False
-    first, *others = runs
+    first = runs[0]
     structure, schedule = structure_of(first.model, first.par), first.schedule()
     return all(
-        structure_of(run.model, run.par) == structure and run.schedule() == schedule
-        for run in others
+        structure_of(run.model, par) == structure
+        and replace(run, par=par, changes=()).schedule() == schedule
+        for run in runs
+        for par in (run.par, *(change.par for change in run.changes))
     )
 
 
@@ -60,7 +64,8 @@ class RunGroup(Sequence[Trajectory]):
     time
         Times of the rows [s], shape (rows,).
     values
-        Signals, each of all runs in one piece, shape (signals, runs, rows).
+        Signals, each of all runs in one piece, shape (signals, runs, rows). Where runs have changes
+        and the stored energy is recorded, the last one is what these put in.
     names
         Signals, in the order of the first axis.
     vectors
@@ -154,13 +159,16 @@ def simulate_group(
     wanted = names if signals is None else tuple(signals)
     kernel = lane_kernel(prepared, compiler, tuple(selected(names, wanted).tolist()))
     schedule = runs[0].schedule()
-    edges = _edges(schedule, first)
+    edges = _edges(schedule, first, runs)
+    jumping = energies(wanted) if any(run.changes for run in runs) else []
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
-    values = np.empty((len(wanted), len(runs), schedule.rows - first))
+    recorded = (*wanted, PUT_IN) if jumping else wanted
+    values = np.zeros((len(recorded), len(runs), schedule.rows - first))
 
     def computed(begin: int) -> Array:
         cases = slice(begin, begin + kernel.lanes)
-        return _advanced(kernel, schedule, runs[cases], values[:, cases], edges, first, watch)
+        carried = _Carried(kernel, schedule, runs[cases], jumping)
+        return carried.to_the_end(values[:, cases], edges, first, watch)
 
     with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
         try:
@@ -169,15 +177,20 @@ def simulate_group(
             watch.stop.set()
             raise
     vector = np.concatenate(vectors, axis=1)[:, : len(runs)]
-    return RunGroup(tuple(runs), schedule.record_times[first:], values, wanted, vector, kernel)
+    return RunGroup(tuple(runs), schedule.record_times[first:], values, recorded, vector, kernel)
 
 
-def _edges(schedule: Schedule, first: int) -> list[int]:
-    """Return the frames at which pieces of a run begin and end; one at the first row recorded."""
+def _edges(schedule: Schedule, first: int, runs: Sequence[Run]) -> list[int]:
+    """Return the frames at which pieces of a run begin and end.
+
+    One is the first row recorded, others are where a run has changes.
+    """
     every = schedule.record_frames
-    pieces = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
-    edges = {*np.linspace(0, schedule.frames // every, pieces + 1).astype(int).tolist(), first}
-    return [each * every for each in sorted(edges)]
+    count = min(_CHUNKS, schedule.frames * schedule.substeps // _SUBSTEPS + 1)
+    rows = {*np.linspace(0, schedule.frames // every, count + 1).astype(int).tolist(), first}
+    changed = (pieces(run.par, run.changes, schedule) for run in runs if run.changes)
+    begins = {begin for stretches in changed for begin, _, _ in stretches}
+    return sorted(begins.union(each * every for each in rows))
 
 
 class _Watch:
@@ -195,34 +208,82 @@ class _Watch:
                 self._progress(self._done / self._pieces)
 
 
-def _advanced(
-    kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], values: Array,
-    edges: Sequence[int], skipped: int, watch: _Watch,
-) -> Array:  # fmt: skip
-    """Carry a group to the end of its runs; fill ``values``, return the state vectors."""
-    filled = [*group, *[group[-1]] * (kernel.lanes - len(group))]  # idle lanes repeat the last
-    parameters = np.array([list(run.par.leaves().values()) for run in filled]).T.copy()
-    vector = np.array([initial_vector(kernel.layout, r.state, r.memory) for r in filled]).T.copy()
-    each = [sampled_stimulus(run, schedule) for run in group]
-    stimulus = each[0]
-    if any(not np.array_equal(rows, stimulus) for rows in each[1:]):
-        stimulus = np.empty((*stimulus.shape, kernel.lanes))
-        for lane in range(kernel.lanes):
-            stimulus[:, :, lane] = each[min(lane, len(each) - 1)]
-    every = schedule.record_frames
-    silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the very first row
-    for begin, end in pairwise(edges):
-        if watch.stop.is_set():
-            break
-        first = begin // every - skipped
-        last = (schedule.rows if end == schedule.frames else end // every) - skipped
-        recorded = first >= 0
-        rows = np.empty((kernel.lanes, last - first if recorded else 1, values.shape[0]))
-        plan = schedule if recorded else silent
-        kernel.advance(plan, parameters, stimulus, vector, rows, end, begin)
-        if recorded:  # a kernel fills a block: here the rows of a signal come into one piece
-            values[:, :, first:last] = rows[: len(group)].transpose(2, 0, 1)
-        require_finite(kernel.layout, vector, f"one of {len(group)} runs left the numbers before "
-                       f"t = {end * schedule.frame:g} s")  # fmt: skip
-        watch.piece()
-    return vector
+class _Carried:
+    """Runs that are carried on side by side.
+
+    ``jumping``: places among the signals of the energies that changes make jump.
+    """
+
+    def __init__(
+        self, kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], jumping: list[int]
+    ) -> None:
+        self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
+        self._count, width = len(group), kernel.lanes
+        filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last
+        self._vector = np.array(
+            [initial_vector(kernel.layout, run.state, run.memory) for run in filled]
+        ).T.copy()
+        self._parameters = np.array([list(run.par.leaves().values()) for run in filled]).T.copy()
+        self._changes: dict[int, list[tuple[int, ParameterSet]]] = {}
+        for lane, run in enumerate(filled):
+            for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
+                self._changes.setdefault(begin, []).append((lane, par))
+        each = [sampled_stimulus(run, schedule) for run in group]
+        self._stimulus = each[0]
+        if any(not np.array_equal(rows, each[0]) for rows in each[1:]):
+            self._stimulus = np.empty((*each[0].shape, width))
+            for lane in range(width):
+                self._stimulus[:, :, lane] = each[min(lane, len(each) - 1)]
+
+    def to_the_end(
+        self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch
+    ) -> Array:
+        """Carry the runs on to their end; fill ``values``, return the state vectors."""
+        schedule, every = self._schedule, self._schedule.record_frames
+        silent = replace(schedule, record_frames=schedule.frames + 1)  # but for the first row
+        for begin, end in pairwise(edges):
+            if watch.stop.is_set():
+                break
+            first = -(-begin // every) - skipped
+            self._change(begin, values[:, :, max(first, 0) :])
+            last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
+            is_recorded = first >= 0
+            signals = values.shape[0] - bool(self._jumping)
+            height = max(last - first, 1) if is_recorded else 1
+            rows = np.empty((self._kernel.lanes, height, signals))
+            plan = schedule if is_recorded else silent
+            self._advance(plan, rows, begin, end)
+            if is_recorded:  # a kernel fills a block: here the rows of a signal come in one piece
+                block = rows[: self._count, : last - first].transpose(2, 0, 1)
+                values[:signals, :, first:last] = block
+            require_finite(
+                self._kernel.layout, self._vector,
+                f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
+            )  # fmt: skip
+            watch.piece()
+        return self._vector
+
+    def _change(self, begin: int, rows: Array) -> None:
+        """Take the parameters that hold from a frame on, and note what energy that puts in."""
+        here = self._changes.get(begin, ())
+        if not here:
+            return
+        before = self._energies(rows) if self._jumping and begin else None
+        for lane, par in here:
+            self._parameters[:, lane] = list(par.leaves().values())
+        if before is not None:
+            rows[-1] += (self._energies(rows) - before)[: self._count, None]
+
+    def _energies(self, rows: Array) -> Array:
+        """Return the sum of the energies of every lane now [J], shape (lanes,)."""
+        end, kept = self._schedule.frames, self._vector
+        row = np.empty((self._kernel.lanes, 1, rows.shape[0] - 1))
+        self._vector = kept.copy()
+        self._advance(self._schedule, row, end, end)
+        self._vector = kept
+        return np.asarray(row[:, 0, self._jumping].sum(axis=-1))
+
+    def _advance(self, plan: Schedule, rows: Array, begin: int, end: int) -> None:
+        self._kernel.advance(
+            plan, self._parameters, self._stimulus, self._vector, rows, end, begin
+        )

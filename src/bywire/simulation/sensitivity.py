@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import CompilerError, ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
+from bywire.simulation.changes import require_unchanged
 from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.emission import layout_of
 from bywire.simulation.emit_tangents import emit_tangents
@@ -136,6 +137,7 @@ def simulate_with_sensitivities(
     """
     if not parameters:
         raise ParameterError("sensitivities need at least one parameter: name it")
+    require_unchanged(run.changes, "sensitivities")
     prepared = prepare(run.model, run.par)
     directions = _directions(run, parameters, prepared.program.parameter_names)
     _require_shape("initial", initial, (len(run.state), len(parameters)))

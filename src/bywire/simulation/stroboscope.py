@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import CompilerError, ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
+from bywire.simulation.changes import require_unchanged
 from bywire.simulation.compiler import Compiler, find_compiler
 from bywire.simulation.engine import built_once, prepare
 from bywire.simulation.native import plan_array
@@ -93,6 +94,7 @@ class Stroboscope:
         compiler = find_compiler()
         if compiler is None:
             raise CompilerError("derivatives need a C compiler: install the extra bywire[compiler]")
+        require_unchanged(run.changes, "derivatives of a stroboscope")
         self._schedule = _by_substeps(window_schedule(run))
         self._open = replace(self._schedule, frames=self._schedule.frames + 1)
         program = prepare(run.model, run.par).program

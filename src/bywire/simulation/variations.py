@@ -11,6 +11,7 @@ import numpy as np
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
+from bywire.simulation.changes import require_unchanged
 from bywire.simulation.run import Run
 
 Variations = Mapping[str, Array | Sequence[float]]
@@ -29,6 +30,7 @@ def case_matrix(run: Run, variations: Variations) -> Array:
     ParameterError
         When a value is out of range, lengths differ, or a sample time varies.
     """
+    require_unchanged(run.changes, "variations")
     names = list(run.par.leaves())
     arrays = {name: np.atleast_1d(np.asarray(v, dtype=float)) for name, v in variations.items()}
     for name in arrays:

@@ -66,7 +66,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     port = Part(reservoir_port)
     E_port = Integral(
-        "J", "energy out through the reservoir port", role=Role("sink", "reservoir port")
+        "J", "energy out through reservoir port and leak", role=Role("sink", "port and leak")
     )
     W_shaft = Integral("J", "work of the motor on the gear")
     t_stuck = Integral("s", "time stuck", role=Role("standstill"))
@@ -155,6 +155,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         ideal = w.par.drive.mode in IDEAL
         battery = battery_supply.power_source(w.supply.u, w.supply.par)
         port = reservoir_port.power_loss(w.port.u, w.port.par, w.par.fluid)
+        port = port + caliper.power_loss(w.pads.x, w.pads.par, w.par.fluid)
         return {
             "E_source": w.voltage * w.current if ideal else battery,
             "E_copper": dc_motor.power_loss(dc_motor.State(w.current), w.motor.par),

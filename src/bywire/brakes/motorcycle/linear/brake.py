@@ -66,6 +66,11 @@ def coefficients(par: Par, p: float = 20e5, x: float | None = None) -> Coefficie
     ----------
     Dardanelli, Alli, Savaresi (2010), eq. (14).
     """
+    if par.caliper.leak == "leaking" or par.port.law == "leaking":
+        raise ParameterError(
+            "eq. (14) knows no leak, with which no pressure stays: take caliper.leak = 'tight' and "
+            "port.law = 'makeup', or simulate"
+        )
     k_g, A_mc = par.gear.k_g, par.master_cylinder.A_mc
     M = ball_screw_gear.inertia(par.gear)
     eta = par.gear.eta_g if par.gear.law == "paper" else 1.0

@@ -62,6 +62,8 @@ _HYDRAULIC = {
     "caliper.A_pd": paper(3e-4, _T1),
     "caliper.p_table": chosen((), "no measured curve"),
     "caliper.V_table": chosen((), "no measured curve"),
+    "caliper.leak": chosen("tight", "a fault, off"),
+    "caliper.G_leak": chosen(0.0, "a fault, off"),
     "port.law": chosen("makeup", "pressure never falls below ambient; dead stroke off"),
     "port.x_port": chosen(1e-3, "optional element, off"),
     "port.G_port": chosen(1e-11, "optional element, off"),

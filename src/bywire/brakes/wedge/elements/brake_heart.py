@@ -7,6 +7,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Role, Signal
@@ -44,6 +45,11 @@ class Parameters(ParameterSet):
     """free-play between the screws"""
     tau_heart: TimeConstant
     """damping over stiffness"""
+
+
+FAULTS = (
+    ParameterFault("worn", "more free-play on both sides", ("g_1", "g_2"), 5.0),
+)
 
 
 class Input(NamedTuple):

@@ -8,6 +8,7 @@ from typing import Annotated, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Gain, Length, Mass, Unit
 from bywire.core.signals import Energy, Power, Signal
@@ -29,6 +30,12 @@ class Parameters(ParameterSet):
     """return spring toward the middle; 0 for none"""
     x_stop: Length
     """travel at which the end stops stand, on either side"""
+
+
+FAULTS = (
+    ParameterFault("friction", "another friction of the pads: wet, hot, glazed", ("mu_B",), 1.5),
+    ParameterFault("spring-broken", "return spring broken", ("k_return",), 0.0),
+)
 
 
 class State(NamedTuple):

@@ -9,6 +9,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field, model_validator
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Length, Nodes, Stiffness, TimeConstant, Unit
 from bywire.core.signals import ContactCompliance, Energy, Overlap, Role, Signal
@@ -61,6 +62,13 @@ class Parameters(ParameterSet):
                 "empty: give both, or take law = 'linear'"
             )
         return self
+
+
+FAULTS = (
+    ParameterFault("gap-grown", "more clearance: worn pads, failed adjuster", ("clearance",), 2.0),
+    ParameterFault("pad-lost", "a pad is lost: clearance", replaced="clearance", value=10e-3),
+    ParameterFault("soft", "softer caliper or pads", ("K_cal",), 0.5),
+)
 
 
 def _require_rising(name: str, unit: str, nodes: Nodes) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated, Literal, NamedTuple
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Gain
 from bywire.core.signals import Power, Signal
@@ -23,6 +24,11 @@ class Parameters(ParameterSet):
     """coefficient of friction of the rollers"""
     stopped_disc: Literal["drop", "stick"]
     """what the pad does to the wedge while the disc stands"""
+
+
+FAULTS = (
+    ParameterFault("worn", "rollers and interfaces with more friction", ("mu_R", "mu_int"), 5.0),
+)
 
 
 class Input(NamedTuple):

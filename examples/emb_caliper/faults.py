@@ -1,0 +1,14 @@
+"""What may fail in the brake beside what its elements say."""
+
+from __future__ import annotations
+
+from bywire.authoring import Channel, Channels
+
+CHANNELS = Channels(
+    "emb-caliper",
+    (
+        Channel("encoder", "motor encoder", "rad", "theta", offset=0.5),
+        Channel("current", "current sensor", "A", "i", offset=1.0),
+        Channel("bridge", "bridge", "1", "duty", "drive", stuck=1.0, task="current"),
+    ),
+)

@@ -1,0 +1,1 @@
+"""Faults of a bench: what may fail, when it does, and what that changes in its runs."""

@@ -1,0 +1,188 @@
+"""Faults put into a run: its model with taps, what falsifies its signals, other parameters."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import fields
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from bywire.bench.experiment import Case, FaultyCase
+from bywire.bench.faults.fault_section import Injection, injections
+from bywire.bench.faults.modes import falsify, missed
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.typing import Array
+from bywire.simulation.tapped import Tap, Tapped, rests
+
+
+def checked_sections(sections: Any) -> list[dict[str, Any]]:
+    """Return the tables of faults as plain ones.
+
+    Raises
+    ------
+    ParameterError
+        When they are no sequence of tables.
+    """
+    is_sequence = isinstance(sections, Sequence) and not isinstance(sections, str)
+    if not is_sequence or not all(isinstance(each, Mapping) for each in sections):
+        raise ParameterError("faults: a sequence of tables is wanted, [[faults]] in a bench file")
+    return [dict(each) for each in sections]
+
+
+def with_faults(
+    cases: Sequence[Case], sections: Sequence[Mapping[str, Any]]
+) -> tuple[Case, ...]:
+    """Return the runs of an experiment with the faults that the sections describe.
+
+    Raises
+    ------
+    InputError
+        When a section does not fit one of the models, when a fault begins after the end of every
+        run, when two contradict each other, or when the experiment makes no run.
+    """
+    if not cases:
+        raise ParameterError(
+            "this experiment makes no run, so that nothing can fail in it: leave [[faults]] out"
+        )
+    read = [injections(sections, case.model, case.par) for case in cases]
+    for k, fault in enumerate(read[0]):
+        longest = max(case.duration for case in cases)
+        if fault.course.onset >= longest:
+            raise ParameterError(
+                f"faults[{k + 1}]: {fault.mode.name} begins at {fault.course.onset:g} s, but the "
+                f"run ends at {longest:g} s: give an earlier onset, or a longer run"
+            )
+    return tuple(injected(case, each) for case, each in zip(cases, read, strict=True))
+
+
+def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
+    """Return the taps that some faults take, and the tasks that miss their ticks."""
+    taps: dict[str, Tap] = {}
+    for fault in faults:
+        tap = fault.mode.tap(fault.value)
+        if tap is not None:
+            late = max(tap.late, taps[tap.name].late if tap.name in taps else 0)
+            taps[tap.name] = tap._replace(late=late)
+    tasks = dict.fromkeys(fault.mode.task for fault in faults if fault.mode.task)
+    return tuple(taps[name] for name in sorted(taps)), tuple(sorted(tasks))
+
+
+def injected(
+    case: Case,
+    faults: Sequence[Injection],
+    taps: tuple[Tap, ...] = (),
+    tasks: tuple[str, ...] = (),
+) -> Case:
+    """Return a run with faults.
+
+    Parameters
+    ----------
+    case
+        The run without.
+    faults
+        What fails in it; times are those of its recording.
+    taps, tasks
+        Taps and tasks that can miss ticks, of a model that several runs share; those of the faults
+        by default.
+
+    Raises
+    ------
+    ParameterError
+        When two faults contradict each other.
+    """
+    _require_apart(faults, case.par)
+    if not (taps or tasks):
+        taps, tasks = taps_of(faults)
+    changes = tuple(_changes(faults, case))
+    plain = {each.name: getattr(case, each.name) for each in fields(Case)}
+    if not (taps or tasks):
+        return FaultyCase(**plain, changes=changes)
+    model = Tapped(case.model, taps, tasks)
+    plain |= {"model": model, "memory": model.started(case.state, case.memory)}
+    falsified = _falsified(faults, case, {tap.name: tap for tap in taps})
+    return FaultyCase(**plain, changes=changes, falsified=falsified)
+
+
+def _falsified(
+    faults: Sequence[Injection], case: Case, taps: Mapping[str, Tap]
+) -> Callable[[Array], dict[str, Array]]:
+    periods = {task.name: task.period for task in case.model.tasks(case.par)}
+
+    def signals(t: Array) -> dict[str, Array]:
+        rows: dict[str, Array] = {}
+        for fault in faults:
+            mode, size = fault.mode, fault.course.size(t)
+            # Of each fault its own, so that another one beside it does not change its noise.
+            draws = np.random.default_rng((fault.seed, zlib.crc32(mode.name.encode())))
+            since = t - fault.course.onset
+            given: dict[str, Any] = {}
+            tap = mode.tap(fault.value)
+            if tap is not None:
+                names = taps[tap.name].controls()
+                each = falsify(mode, fault.value, size, since, case.par, draws)
+                given = {names[kind]: values for kind, values in each.items()}
+            elif mode.task:
+                ticks = since / periods[mode.task]
+                given = {rests(mode.task): missed(mode, fault.value, size, ticks, draws)}
+            for name, values in given.items():
+                rows[name] = rows.get(name, 0.0) + values
+        return rows
+
+    return signals
+
+
+def _changes(faults: Sequence[Injection], case: Case) -> Iterator[tuple[float, ParameterSet]]:
+    """Yield when parameters change, and what they are from then on."""
+    changing = [fault for fault in faults if fault.mode.changes is not None]
+    instants = {t for fault in changing for t in fault.course.instants(case.duration)}
+    times = sorted({max(t, -case.settle) for t in instants if t < case.duration})
+    for t in times:
+        yield t, _at(changing, t, case.par)
+
+
+def _at(faults: Sequence[Injection], t: float, par: ParameterSet) -> ParameterSet:
+    """Return the parameters at a time [s]: values between as far as a ramp has come."""
+    values: dict[str, Any] = {}
+    for fault in faults:
+        (size,) = fault.course.size(np.array([t]))
+        (there,) = fault.course.is_there(np.array([t]))
+        for name, full in _full(fault, par).items() if there else ():
+            now = par.value(name)
+            is_number = isinstance(now, (int, float)) and not isinstance(now, bool)
+            values[name] = now + size * (full - now) if is_number else full
+    try:
+        return par.replace(values)
+    except ParameterError as error:
+        names = " and ".join(fault.mode.name for fault in faults)
+        raise ParameterError(f"fault {names}: {error}") from None
+
+
+def _full(fault: Injection, par: ParameterSet) -> Mapping[str, Any]:
+    return {} if fault.mode.changes is None else fault.mode.changes(par, fault.value)
+
+
+def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
+    """Refuse two faults of one signal, task or parameter that are there at the same time."""
+    for one, other in combinations(faults, 2):
+        first, second = one.course, other.course
+        if first.onset >= second.gone or second.onset >= first.gone:
+            continue
+        both = {*_touched(one, par)} & {*_touched(other, par)}
+        if both:
+            raise ParameterError(
+                f"faults {one.mode.name} and {other.mode.name} contradict each other: both change "
+                f"{min(both)} at the same time; let one end before the other begins"
+            )
+
+
+def _touched(fault: Injection, par: ParameterSet) -> Iterator[str]:
+    mode = fault.mode
+    if mode.channel is not None:
+        yield f"the signal {mode.channel.name}"
+    if mode.task:
+        yield f"the task {mode.task}"
+    yield from _full(fault, par)

@@ -1,0 +1,251 @@
+"""What may fail in a model: the modes of its elements, signals, tasks, and those of its brake."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Collection, Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from bywire.core.errors import ModelError
+from bywire.core.faults import CHANNELS, FAULTS, Channel, ParameterFault
+from bywire.core.model import ASSEMBLIES, Model
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.signals import signals_of
+from bywire.core.typing import Array
+from bywire.simulation.tapped import Tap
+
+Changes = Callable[[Any, float], Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class Mode:
+    """One way to fail.
+
+    Parameters
+    ----------
+    name
+        Place and mode, for instance ``"pressure.stuck"``.
+    summary
+        What happens, in one line.
+    unit, value
+        SI unit of its value, and the value unless given; an empty unit: it takes none.
+    changes
+        ``changes(par, value)``: parameters that change, by dotted name; None of the other kinds.
+    channel
+        Signal that it falsifies.
+    falsified
+        What it does there: a function of `falsify`.
+    task
+        Controller that misses its ticks.
+    """
+
+    name: str
+    summary: str
+    unit: str = ""
+    value: float = 0.0
+    changes: Changes | None = field(default=None, compare=False)
+    channel: Channel | None = None
+    falsified: str = ""
+    task: str = ""
+
+    @property
+    def place(self) -> str:
+        """What fails: the name up to the last dot."""
+        return self.name.rpartition(".")[0]
+
+    def tap(self, value: float) -> Tap | None:
+        """Return the tap that it takes; None where it falsifies no signal."""
+        if self.channel is None:
+            return None
+        c = self.channel
+        late = round(value) if self.falsified == "late" else 0
+        return Tap(_identifier(c.name), c.side, c.signal, c.task, late)
+
+
+_READING = {
+    "stuck": ("shows one value", "level"),
+    "stuck-at-last": ("shows what it showed last", ""),
+    "offset": ("shows too much", "offset"),
+    "gain": ("shows a multiple", "factor"),
+    "drift": ("shows ever more, per second", "rate"),
+    "noise": ("shows noise, by its standard deviation", "offset"),
+    "dropout": ("misses samples, with a probability", "probability"),
+    "swapped": ("shows the opposite sign", ""),
+}
+_DRIVE = {
+    "stuck": ("gives one value", "level"),
+    "stuck-at-last": ("gives what it gave last", ""),
+    "gain": ("gives a multiple", "factor"),
+    "late": ("comes some ticks late", "ticks"),
+}
+_DEMAND = {
+    "lost": ("stays what it was last", ""),
+    "stuck": ("becomes one value", "level"),
+    "offset": ("comes with an offset", "offset"),
+}
+_TASK = {
+    "frozen": ("misses every tick, what it gave out stays", "", 0.0),
+    "dropped": ("runs only every so many ticks", "ticks", 2.0),
+    "missed": ("misses ticks, with a probability", "probability", 0.2),
+}
+_VALUES = {"factor": 0.5, "probability": 0.2, "ticks": 5.0}
+
+
+def modes_of(model: Model, par: ParameterSet) -> dict[str, Mode]:
+    """Return every way in which a model with these parameters may fail, by name.
+
+    Raises
+    ------
+    ModelError
+        When two of them have one name, or a channel names no signal of the model.
+    """
+    modes: dict[str, Mode] = {}
+    for mode in _every(model, par):
+        if mode.name in modes:
+            raise ModelError(f"{model.name}: there are two faults {mode.name!r}: rename one")
+        modes[mode.name] = mode
+    return modes
+
+
+def _every(model: Model, par: ParameterSet) -> Iterator[Mode]:
+    for place, node in _groups(par):
+        element = sys.modules[type(node).__module__]
+        if getattr(element, "Parameters", None) is not type(node):
+            continue  # a brake's own group, whose module says what fails in the brake
+        for fault in getattr(element, "FAULTS", ()):
+            yield _of_element(place, fault, par)
+    tasks = model.tasks(par)
+    declared = _declared(model)
+    for channel in (*declared, *_demands(model, {channel.signal for channel in declared})):
+        yield from _of_channel(channel, [task.name for task in tasks])
+    for task in tasks:
+        for name, (summary, kind, value) in _TASK.items():
+            yield Mode(f"{task.name}.{name}", f"task {task.name} {summary}", _unit(kind, ""),
+                       value, falsified=name, task=task.name)  # fmt: skip
+    brake = ASSEMBLIES.owner(model.name)
+    for each in FAULTS.of(brake).values():
+        if each.assembly == model.name:
+            yield Mode(each.name, each.summary, each.unit, each.value, each.changes)
+
+
+def _groups(par: ParameterSet, prefix: str = "") -> Iterator[tuple[str, ParameterSet]]:
+    for name, value in par:
+        if isinstance(value, ParameterSet):
+            yield f"{prefix}{name}", value
+            yield from _groups(value, f"{prefix}{name}.")
+
+
+def _of_element(place: str, fault: ParameterFault, par: ParameterSet) -> Mode:
+    def changes(now: Any, value: float) -> Mapping[str, Any]:
+        changed = {f"{place}.{name}": each for name, each in fault.with_it.items()}
+        changed |= {f"{place}.{name}": value * now.value(f"{place}.{name}")
+                    for name in fault.scaled}  # fmt: skip
+        return changed | ({f"{place}.{fault.replaced}": value} if fault.replaced else {})
+
+    unit = "1"
+    if fault.replaced:
+        unit = leaf_fields(type(par))[f"{place}.{fault.replaced}"].unit.symbol
+    elif not fault.scaled:
+        unit = ""
+    return Mode(f"{place}.{fault.name}", fault.summary, unit, fault.value, changes)
+
+
+def _declared(model: Model) -> tuple[Channel, ...]:
+    """Return the channels that the model's brake declares."""
+    known = CHANNELS.of(ASSEMBLIES.owner(model.name)).get(model.name)
+    channels = () if known is None else known.channels
+    for channel in channels:
+        sources = {"reading": model.State, "drive": model.Memory, "demand": model.Stimulus}
+        source = sources[channel.side]
+        if channel.signal not in source._fields:
+            raise ModelError(
+                f"{model.name}: the channel {channel.name!r} names no signal: {channel.signal!r} "
+                f"is none of {', '.join(source._fields)}"
+            )
+    return channels
+
+
+def _demands(model: Model, declared: Collection[str]) -> Iterator[Channel]:
+    """Yield a channel for every demand that none is declared for."""
+    for name, signal in signals_of(model.Stimulus).items():
+        if not name.startswith("noise_") and name not in declared:
+            yield Channel(name, signal.label, signal.unit, name, "demand", offset=signal.nominal)
+
+
+def _of_channel(channel: Channel, tasks: Collection[str]) -> Iterator[Mode]:
+    kinds = {"reading": _READING, "drive": _DRIVE, "demand": _DEMAND}[channel.side]
+    for name, (summary, kind) in kinds.items():
+        if name == "late" and channel.task not in tasks:
+            continue
+        value = {"level": channel.stuck, "offset": channel.offset, "rate": channel.offset}
+        yield Mode(
+            f"{channel.name}.{name}", f"{channel.summary} {summary}", _unit(kind, channel.unit),
+            value.get(kind, _VALUES.get(kind, 0.0)), channel=channel, falsified=name,
+        )  # fmt: skip
+
+
+def _unit(kind: str, unit: str) -> str:
+    if not kind:
+        return ""
+    return {"level": unit, "offset": unit, "rate": f"{unit}/s"}.get(kind, "1")
+
+
+def _identifier(name: str) -> str:
+    return name.replace("-", "_").replace(".", "_")
+
+
+def falsify(
+    mode: Mode, value: float, size: Array, since: Array, par: Any, draws: np.random.Generator
+) -> dict[str, Array]:
+    """Return what a falsified signal's tap gets, by kind, of the stimulus' rows.
+
+    Parameters
+    ----------
+    mode, value
+        What fails, and how much, in SI.
+    size, since
+        Share of its full size and time since its onset [s] at every row.
+    par
+        Parameters of the run.
+    draws
+        Source of noise and of what is missed.
+    """
+    channel = mode.channel
+    assert channel is not None
+    seen = channel.seen or (lambda y, _: y)
+    zero = seen(0.0, par)
+    slope = seen(1.0, par) - zero
+    if mode.falsified == "stuck":
+        return {"gain": -size, "offset": size * seen(value, par)}
+    if mode.falsified == "gain":
+        return {"gain": (value - 1.0) * size, "offset": (1.0 - value) * zero * size}
+    if mode.falsified == "swapped":
+        return {"gain": -2.0 * size, "offset": 2.0 * zero * size}
+    if mode.falsified == "offset":
+        return {"offset": slope * value * size}
+    if mode.falsified == "drift":
+        return {"offset": slope * value * size * np.maximum(since, 0.0)}
+    if mode.falsified == "noise":
+        return {"offset": slope * value * size * draws.standard_normal(size.size)}
+    if mode.falsified == "dropout":
+        return {"held": np.where(draws.random(size.size) < value, size > 0, 0.0)}
+    if mode.falsified == "late":
+        return {"late": np.where(size > 0, 1.0, 0.0)}
+    return {"held": np.where(size > 0, 1.0, 0.0)}  # lost, stuck-at-last
+
+
+def missed(
+    mode: Mode, value: float, size: Array, ticks: Array, draws: np.random.Generator
+) -> Array:
+    """Return where a task misses its tick, of the stimulus' rows.
+
+    ``ticks``: ticks of the task since the onset, at every row.
+    """
+    if mode.falsified == "dropped":
+        return np.where(np.mod(np.round(ticks), round(value)) != 0, size > 0, 0.0)
+    if mode.falsified == "missed":
+        return np.where(draws.random(size.size) < value, size > 0, 0.0)
+    return np.where(size > 0, 1.0, 0.0)

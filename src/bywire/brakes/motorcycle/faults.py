@@ -1,0 +1,69 @@
+"""What may fail in the motorcycle brake beside what its elements say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.core.faults import Channel, Channels, Fault
+from bywire.plant import current_sensor, pressure_sensor
+
+_GAP_PRESSURE = 2e3  # Pa, that closes a gap: little, and no volume without any
+NAME = MotorcycleBrake.name
+
+
+def _pressure(value: float, par: Any) -> float:
+    return pressure_sensor.reading(value + par.ecu.p_atm, par.pressure_sensor)
+
+
+def _current(value: float, par: Any) -> float:
+    return current_sensor.reading(value, par.current_sensor)
+
+
+CHANNELS = Channels(
+    NAME,
+    (
+        Channel("pressure", "pressure sensor", "Pa", "y_p", seen=_pressure,
+                stuck=20e5, offset=2e5),
+        Channel("current", "current sensor", "A", "y_i", seen=_current, offset=1.0),
+        Channel("bridge", "bridge", "1", "duty", "drive", stuck=1.0, task="ecu"),
+    ),
+)  # fmt: skip
+
+
+def _source(mode: str) -> Any:
+    """Return the changes in which an ideal source that gives nothing takes the ECU's place.
+
+    It is sampled like the ECU, so that the run's ticks stay where they are.
+    """
+
+    def changes(par: Any, value: float) -> Mapping[str, Any]:
+        return {"drive.mode": mode, "drive.T_source": par.ecu.T_s}
+
+    return changes
+
+
+def _knocked_back(par: Any, gap: float) -> Mapping[str, Any]:
+    """Return a pressure-volume curve that begins with the volume of a gap at the pads [m]."""
+    pads, dead = par.caliper, par.caliper.A_pd * gap
+    spring = pads.A_pd * pads.A_pd / pads.K_pd
+    return {
+        "caliper.law": "table",
+        "caliper.p_table": (0.0, _GAP_PRESSURE, _GAP_PRESSURE + 100e5),
+        "caliper.V_table": (0.0, dead, dead + spring * 100e5),
+    }
+
+
+FAULTS = (
+    Fault("battery.lost", "battery lost, the bridge opens: no current", _source("current-source"),
+          NAME),
+    Fault("battery.shorted", "battery lost, the bridge shorts the motor", _source("voltage-source"),
+          NAME),
+    Fault("bridge.open-phase", "a phase of the motor is open: no current",
+          _source("current-source"), NAME),
+    Fault("gear.jammed", "the screw jams where it is",
+          lambda par, value: {"seal.T_pr": value}, NAME, "N*m", 100.0),
+    Fault("caliper.knocked-back", "the disc has pushed the pads back, by the gap",
+          _knocked_back, NAME, "m", 0.3e-3),
+)  # fmt: skip

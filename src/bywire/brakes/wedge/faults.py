@@ -1,0 +1,38 @@
+"""What may fail in the wedge brake beside what its elements say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bywire.brakes.wedge.model import WedgeBrake
+from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner
+from bywire.core.faults import Channel, Channels, Fault
+
+_SIGNALS = (
+    Channel("moment", "moment sensor", "N*m", "y_M", offset=50.0),
+    Channel("encoder_1", "encoder 1", "rad", "theta_1", offset=0.1),
+    Channel("encoder_2", "encoder 2", "rad", "theta_2", offset=0.1),
+    Channel("drive_1", "demand of motor 1", "A", "i_1_ref", "drive", task="position"),
+    Channel("drive_2", "demand of motor 2", "A", "i_2_ref", "drive", task="position"),
+    Channel("power", "switch of the power stages", "1", "power_off", "demand", stuck=1.0),
+)
+
+BRAKE_CHANNELS = Channels(WedgeBrake.name, _SIGNALS)
+CORNER_CHANNELS = Channels(WedgeCorner.name, _SIGNALS)
+
+
+def _jammed(motor: str) -> Any:
+    """Return the changes in which a screw jams: its motor is braked without end by damping."""
+
+    def changes(par: Any, value: float) -> Mapping[str, Any]:
+        return {f"{motor}.D_M": value}
+
+    return changes
+
+
+FAULTS = tuple(
+    Fault(f"screw_{number}.jammed", f"screw {number} jams where it is, by damping",
+          _jammed(f"motor_{number}"), WedgeBrake.name, "N*m*s/rad", 1e3)
+    for number in (1, 2)
+)  # fmt: skip

@@ -1,0 +1,273 @@
+"""A model whose signals between plant and controllers can be falsified, and whose tasks can rest.
+
+What a sensor shows, what is demanded and what a controller gives out passes a *tap*, which returns
+``(1 + gain) y + offset``, what it returned last where it is held, or what it got some ticks ago.
+Gains, offsets and the rest are further signals of the stimulus: where they are zero the model is
+the one inside, and runs with and without a fault are of one structure.
+"""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Annotated, Any, Literal, NamedTuple
+
+from bywire.core import ops
+from bywire.core.model import Bounds, Matrix, Model, Task
+from bywire.core.signals import Signal, signals_of
+
+
+class Tap(NamedTuple):
+    """A signal that can be falsified.
+
+    Parameters
+    ----------
+    name
+        Of its stimulus, see `controls`.
+    side
+        ``"reading"``: a state as the tasks read it. ``"demand"``: a field of the stimulus.
+        ``"drive"``: a field of the memory as the plant feels it.
+    field
+        Which one.
+    task
+        Of a drive that may be late: the task that renews it.
+    late
+        Of a drive: ticks of that task by which it comes late where its ``late`` is 1.
+    """
+
+    name: str
+    side: Literal["reading", "demand", "drive"]
+    field: str
+    task: str = ""
+    late: int = 0
+
+    def controls(self) -> dict[str, str]:
+        """Return the names of the stimuli that falsify it, by what they do."""
+        kinds = ("gain", "offset", "held", "late") if self.late else ("gain", "offset", "held")
+        return {kind: f"tap_{self.name}_{kind}" for kind in kinds}
+
+
+def rests(task: str) -> str:
+    """Return the name of the stimulus that lets a task miss its tick where it is 1."""
+    return f"rest_{task.replace('-', '_')}"
+
+
+class Tapped(Model):
+    """A model with taps.
+
+    Parameters
+    ----------
+    inner
+        The model as it is.
+    taps
+        Signals that can be falsified.
+    resting
+        Tasks that can miss their ticks, by name.
+    """
+
+    def __init__(self, inner: Model, taps: tuple[Tap, ...], resting: tuple[str, ...] = ()) -> None:
+        self.inner, self.taps, self.resting = inner, taps, resting
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the model inside has beside the protocol: parts, what it records."""
+        if name.startswith("__") or name == "inner":
+            raise AttributeError(name)
+        return getattr(self.inner, name)
+
+    @property
+    def name(self) -> str:
+        """That of the model inside."""
+        return self.inner.name
+
+    @property
+    def State(self) -> type[NamedTuple]:
+        """As inside."""
+        return self.inner.State
+
+    @property
+    def Flow(self) -> type[NamedTuple]:
+        """As inside."""
+        return self.inner.Flow
+
+    @property
+    def Output(self) -> type[NamedTuple]:
+        """As inside; a drive is recorded as the plant feels it."""
+        return self.inner.Output
+
+    @property
+    def frictions(self) -> tuple[str, ...]:
+        """As inside."""
+        return self.inner.frictions
+
+    @property
+    def limits(self) -> tuple[str, ...]:
+        """As inside."""
+        return self.inner.limits
+
+    @property
+    def usually_open(self) -> tuple[bool, ...]:
+        """As inside."""
+        return self.inner.usually_open
+
+    @property
+    def Memory(self) -> type[NamedTuple]:
+        """That of the model inside, then what every tap returned last and what is under way."""
+        return _memory(self.inner.Memory, self.inner.State, self.inner.Stimulus, self.taps)
+
+    @property
+    def Stimulus(self) -> type[NamedTuple]:
+        """That of the model inside, then what falsifies."""
+        controls = [(name, Signal("1", name.replace("_", " ")))
+                    for tap in self.taps for name in tap.controls().values()]  # fmt: skip
+        tasks = [(rests(task), Signal("1", f"task {task} misses its tick"))
+                 for task in self.resting]  # fmt: skip
+        return _extended(self.inner.Stimulus, (*controls, *tasks))
+
+    def started(self, state: Any, memory: Any) -> Any:
+        """Return the memory at a start, of that of the model inside and the state."""
+        last: dict[str, Any] = {}
+        for tap in self.taps:
+            source = state if tap.side == "reading" else memory
+            value = 0.0 if tap.side == "demand" else getattr(source, tap.field)
+            last |= dict.fromkeys(_fields(tap), value)
+        return self.Memory(*memory, **last)
+
+    def rest(self, par: Any) -> tuple[Any, Any]:
+        """Return where the model inside rests."""
+        state, memory = self.inner.rest(par)
+        return state, self.started(state, memory)
+
+    def tasks(self, par: Any) -> tuple[Task, ...]:
+        """Return the controllers behind their taps."""
+        return tuple(
+            Task(task.name, task.period, partial(self._tick, task.name, task.tick))
+            for task in self.inner.tasks(par)
+        )
+
+    def _tick(
+        self, name: str, tick: Callable[..., Any], x: Any, memory: Any, stimulus: Any, par: Any
+    ) -> Any:
+        u = self.inner.Stimulus._make(stimulus[: len(self.inner.Stimulus._fields)])
+        before = self._inside(memory)
+        last: dict[str, Any] = {}
+        for tap in self.taps:
+            if tap.side == "reading":
+                x = x._replace(**{tap.field: _tapped(tap, x, memory, stimulus, last)})
+            elif tap.side == "demand":
+                u = u._replace(**{tap.field: _tapped(tap, u, memory, stimulus, last)})
+        after = tick(x, before, u, par)
+        if name in self.resting:
+            missed = getattr(stimulus, rests(name))
+            pairs = zip(before, after, strict=True)
+            after = type(after)(*(_either(missed, old, new) for old, new in pairs))
+        for tap in self.taps:
+            if tap.side == "drive" and (name == tap.task or not tap.late):
+                _tapped(tap, after, memory, stimulus, last)
+        kept = {each: getattr(memory, each) for each in self.Memory._fields[len(after) :]}
+        return self.Memory(*after, **{**kept, **last})
+
+    def _inside(self, memory: Any) -> Any:
+        return self.inner.Memory._make(memory[: len(self.inner.Memory._fields)])
+
+    def _felt(self, memory: Any) -> Any:
+        """Return the memory as the plant feels it."""
+        drives = {t.field: getattr(memory, f"last_{t.name}") for t in self.taps
+                  if t.side == "drive"}  # fmt: skip
+        return self._inside(memory)._replace(**drives)
+
+    def mass(self, xe: Any, par: Any) -> Any:
+        """As inside."""
+        return self.inner.mass(xe, par)
+
+    def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
+        """As inside, with the drives as they are felt."""
+        return self.inner.balance(x, xe, self._felt(memory), par, contact)
+
+    def bounds(
+        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
+    ) -> tuple[Bounds, ...]:
+        """As inside, with the drives as they are felt."""
+        return self.inner.bounds(x, xe, self._felt(memory), par, contact)
+
+    def compliance(self, par: Any) -> tuple[Matrix, ...]:
+        """As inside."""
+        return self.inner.compliance(par)
+
+    def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:
+        """As inside."""
+        return self.inner.gap(x, xe, par)
+
+    def powers(
+        self, x: Any, xe: Any, rate: Any, memory: Any, par: Any, contact: tuple[float, ...],
+        reaction: tuple[float, ...],
+    ) -> Any:  # fmt: skip
+        """As inside, with the drives as they are felt."""
+        return self.inner.powers(x, xe, rate, self._felt(memory), par, contact, reaction)
+
+    def output(
+        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...],
+        reaction: tuple[float, ...], flow: Any,
+    ) -> Any:  # fmt: skip
+        """As inside, with the drives as they are felt."""
+        return self.inner.output(x, self._felt(memory), par, contact, reaction, flow)
+
+    def watch(self, recording: Any, par: Any) -> list[str]:
+        """As inside."""
+        return self.inner.watch(recording, par)
+
+    def watched(self, par: Any) -> tuple[str, ...] | None:
+        """As inside."""
+        return self.inner.watched(par)
+
+    def silent(self, rows: Any, pars: Any) -> frozenset[str]:
+        """As inside."""
+        return self.inner.silent(rows, pars)
+
+
+def _tapped(tap: Tap, source: Any, memory: Any, stimulus: Any, last: dict[str, Any]) -> Any:
+    """Return what a tap gives, and note what it keeps."""
+    control = {kind: getattr(stimulus, name) for kind, name in tap.controls().items()}
+    value = getattr(source, tap.field)
+    held, *line = _fields(tap)
+    for k, name in enumerate(line):  # the oldest last
+        last[name] = value if k == 0 else getattr(memory, line[k - 1])
+    if line:
+        value = _either(control["late"], getattr(memory, line[-1]), value)
+    changed = value + control["gain"] * value + control["offset"]
+    last[held] = _either(control["held"], getattr(memory, held), changed)
+    return last[held]
+
+
+def _either(flag: float, old: float, new: float) -> float:
+    return ops.where(flag > 0.5, old, new)
+
+
+def _fields(tap: Tap) -> tuple[str, ...]:
+    """Return the fields of the memory that a tap keeps: its last value, then those under way."""
+    return (f"last_{tap.name}", *(f"late_{tap.name}_{k + 1}" for k in range(tap.late)))
+
+
+@cache
+def _memory(
+    memory: type[NamedTuple], state: type[NamedTuple], stimulus: type[NamedTuple],
+    taps: tuple[Tap, ...],
+) -> type[NamedTuple]:  # fmt: skip
+    sides = {"reading": state, "demand": stimulus, "drive": memory}
+    kept = []
+    for tap in taps:
+        signal = signals_of(sides[tap.side])[tap.field]
+        kept += [(name, Signal(signal.unit, f"{signal.label} behind its tap", signal.nominal))
+                 for name in _fields(tap)]  # fmt: skip
+    return _extended(memory, tuple(kept))
+
+
+@cache
+def _extended(
+    kind: type[NamedTuple], further: tuple[tuple[str, Signal], ...]
+) -> type[NamedTuple]:
+    hints = typing.get_type_hints(kind, include_extras=True)
+    fields = [(name, hints[name]) for name in kind._fields]
+    fields += [(name, Annotated[float, signal]) for name, signal in further]
+    made: Any = NamedTuple(kind.__name__, fields)  # type: ignore[misc]
+    return typing.cast("type[NamedTuple]", made)
