@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from bywire.api.frequency_response import frequency_response
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
+    from bywire.api.life import LifeResult, project_life
     from bywire.api.linearize import linearize
     from bywire.api.margins import margins
     from bywire.api.new import NewBrake, new
@@ -90,6 +91,8 @@ _HOMES = {
     "resample": "data.alignment",
     "agreement": "api.agreement",
     "frequency_response": "api.frequency_response",
+    "project_life": "api.life",
+    "LifeResult": "api.life",
     "linearize": "api.linearize",
     "design": "api.design",
     "study": "api.study",
@@ -121,6 +124,7 @@ __all__ = [
     "Conversion",
     "Ensemble",
     "Identification",
+    "LifeResult",
     "NewBrake",
     "Question",
     "Replay",
@@ -144,6 +148,7 @@ __all__ = [
     "new",
     "overview",
     "parameters",
+    "project_life",
     "read_measurement",
     "read_recording",
     "replay",

@@ -39,6 +39,7 @@ from bywire.core.parameters import leaf_fields
 from bywire.core.quantities import display_unit
 from bywire.identification.fitting.question import BENCH_METHODS, BenchMethod
 from bywire.identification.method import METHODS, Method
+from bywire.life.declaration import LIVES, Life
 from bywire.report.answer import Answer
 from bywire.report.document import Document, Flat, Paragraph, Section, TableBlock
 from bywire.report.tables import text_table
@@ -66,6 +67,7 @@ def described(name: str) -> list[Object]:
         "method of any bench": (BENCH_METHODS.all(), _bench_method),
         "experiment": (EXPERIMENTS.all(), _experiment),
         "experiment of any brake": (GENERIC_EXPERIMENTS.all(), _generic),
+        "life": (LIVES.all(), _life),
         "study": (STUDIES.all(), _study),
         "parameter set": (PARAMETER_SETS.all(), _set),
         "loop": (LOOPS.all(), described_loop),
@@ -250,6 +252,12 @@ def _named(experiment: GenericExperiment) -> str:
 def _study(study: Study) -> Object:
     return {**_in_short(study), "options": option_rows(study.options, study.defaults),
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
+
+
+def _life(life: Life) -> Object:
+    rows = option_rows(life.wear, life.defaults())
+    return {"summary": life.summary, "experiment": life.experiment, "options": rows,
+            "changed_with": "--set wear.NAME=VALUE"}  # fmt: skip
 
 
 def _set(cited: Set) -> Object:

@@ -17,7 +17,7 @@ from bywire.report.tables import Table, text_table
 
 TOPICS = (
     "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-    "plants", "studies", "methods", "stimuli", "faults", "kpis", "kpis_of_experiments",
+    "plants", "studies", "lives", "methods", "stimuli", "faults", "kpis", "kpis_of_experiments",
 )  # fmt: skip
 """kinds of things that have a name"""
 _WIDTH = 80  # characters of a line of the index

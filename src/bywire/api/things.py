@@ -18,6 +18,7 @@ from bywire.core.model import ASSEMBLIES
 from bywire.core.registry import Kind
 from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS, Method
+from bywire.life.declaration import LIVES
 from bywire.synthesis.study import STUDIES
 
 
@@ -39,6 +40,7 @@ def all_things() -> dict[str, Any]:
         "loops": _of_assemblies(_in_order(LOOPS)),
         "plants": _of_assemblies(_in_order(PLANTS)),
         "studies": _of_assemblies(_in_order(STUDIES)),
+        "lives": {life.name: life.summary for life in _in_order(LIVES)},
         "methods": {m.name: _method(m) for m in _in_order(METHODS)} | for_benches,
         "stimuli": {stimulus.name: stimulus.summary for stimulus in STIMULI.all().values()},
         "faults": fault_summaries(),

@@ -18,6 +18,7 @@ from bywire.cli.brake_commands import check_command, new_command
 from bywire.cli.compare_command import compare
 from bywire.cli.data_commands import convert
 from bywire.cli.identification_commands import identify, replay
+from bywire.cli.life_command import life_command
 from bywire.cli.loop_commands import (
     agreement_command,
     frequency_response_command,
@@ -47,6 +48,7 @@ app.command("agreement")(agreement_command)
 app.command("margins")(margins_command)
 study_app.command("size")(study_command)
 app.add_typer(study_app, name="study")
+app.command("life")(life_command)
 app.command("design")(design_command)
 app.command("convert")(convert)
 app.command("identify")(identify)

@@ -136,7 +136,7 @@ def _all_varied(
     correlations: Mapping[tuple[str, str], float] = {}
     if "measured" in content:
         measured, correlations = varied_as_measured(bench, content["measured"], folder)
-    varied = (*measured, *_varied(bench, content.get("vary", {})))
+    varied = (*measured, *read_varied(bench, content.get("vary", {})))
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
     names = [name for each in varied for name in (each.name, *each.together)]
@@ -146,8 +146,15 @@ def _all_varied(
     return varied, correlations
 
 
-def _varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
-    entries = dict(_entries(section))
+def read_varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
+    """Yield what a section ``[vary]`` varies of a bench.
+
+    Raises
+    ------
+    InputError
+        For names that are no numbers or choices of the bench, and values that do not fit.
+    """
+    entries = dict(entries_of(section))
     values = {
         **bench.par.flat(),
         **{f"{_OPTION}{k}": v for k, v in bench.chosen_options.flat().items()},
@@ -168,14 +175,14 @@ def _varied(bench: Bench, section: Mapping[str, Any]) -> Iterator[Varied]:
         yield Varied(name, leaf.unit.symbol, float(values[name]), law, together)
 
 
-def _entries(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
+def entries_of(section: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield the entries of ``[vary]`` by dotted name, however the file nests them."""
     for key, value in section.items():
         is_group = isinstance(value, Mapping) and value and "kind" not in value and all(
             isinstance(each, (Mapping, str)) for each in value.values()
         )  # fmt: skip
         if is_group:
-            yield from _entries(value, f"{prefix}{key}.")
+            yield from entries_of(value, f"{prefix}{key}.")
         else:
             yield f"{prefix}{key}", value
 

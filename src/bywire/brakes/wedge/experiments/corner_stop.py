@@ -36,6 +36,7 @@ FIGURES = Figures(
     force_change=("N", "Normal force peak to peak in that time."),
     creep_speed=("m/s", "Largest speed of the vehicle in that time."),
     energy_braked=("J", "Energy taken from the wheel until the stop."),
+    contact_angle=("rad", "Where the moment control believes the pads to touch, from parking."),
 )
 
 
@@ -99,6 +100,7 @@ def _stop(held: xr.Dataset, end: float, options: Options) -> dict[str, float | t
         "force_change": swing(held, "F_N", begin, last) if late.any() else short,
         "creep_speed": float(np.max(np.abs(v[late]))) if late.any() else short,
         "energy_braked": float(np.interp(end, t, held["E_brake"].values)),
+        "contact_angle": float(np.interp(end, t, held["theta_c"].values)),
     }
 
 

@@ -1,0 +1,259 @@
+"""How long a brake lasts: its slow states over thousands of stops, and what ends its life."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.running import Progress
+from bywire.core.errors import ParameterError, quoted
+from bywire.core.typing import Array, silent
+from bywire.life.life_file import read_life
+from bywire.life.one_by_one import one_by_one
+from bywire.life.projection import CONFIDENCE, Projection, projected
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import (
+    Banner,
+    Details,
+    Document,
+    FigureBlock,
+    Listing,
+    Section,
+    TableBlock,
+    recording_file,
+    spaced,
+)
+from bywire.report.parameter_rows import parameter_rows
+from bywire.report.subject import Subject
+from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.wording import amount
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MOST = 100_000  # stops that are run one by one
+
+
+@dataclass(frozen=True, repr=False)
+class LifeResult(Answer):
+    """How long a brake lasts.
+
+    Parameters
+    ----------
+    projection
+        Slow states and what is left of the limits over stops, SI.
+    checked
+        Slow states of stops run one by one, shape (stops + 1,) each; empty where none were.
+    """
+
+    projection: Projection
+    checked: Mapping[str, Array] = field(default_factory=dict)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the runs warned of: alike but for numbers, the first one stands for all."""
+        kinds: dict[str, list[str]] = {}
+        for text in self.projection.warnings:
+            kinds.setdefault(re.sub(r"-?\d[\d.e+-]*", "#", text), []).append(text)
+        return [
+            texts[0] + (f" (and {len(texts) - 1} alike)" if len(texts) > 1 else "")
+            for texts in kinds.values()
+        ]
+
+    @property
+    def data(self) -> xr.Dataset:
+        """Slow states and what is left of the limits after each stop, dimension ``stop``, SI."""
+        life, made = self.projection.plan.life, self.projection
+        told = {**life.states, **{f"left_{name}": each for name, each in life.limits.items()}}
+        values = {**made.states, **{f"left_{name}": each for name, each in made.left.items()}}
+        return xr.Dataset(
+            {
+                name: ("stop", values[name], {"units": each.unit, "long_name": each.label})
+                for name, each in told.items()
+            },
+            coords={"stop": np.arange(made.stops + 1)},
+        )
+
+    def deviation(self, name: str) -> float:
+        """Return by how much the projected change of a state differs from stops one by one.
+
+        A share of that change; NaN where none were run, or where it does not change.
+        """
+        if not self.checked:
+            return math.nan
+        truth = self.checked[name]
+        last = min(truth.size, self.projection.stops + 1) - 1
+        change = float(truth[last] - truth[0])
+        made = float(self.projection.states[name][last] - truth[0])
+        return made / change - 1.0 if change else math.nan
+
+    def document(self) -> Document:
+        """Return how long it lasts, what ends it, slow states, and how it was stepped."""
+        plan = self.projection.plan
+        subject = Subject(plan.name, plan.life.summary, plan.bench.parameters, plan.bench.par)
+        kpis, states = TableBlock(kpi_table(self._rows())), TableBlock(self._states(), width=110)
+        warned = [Listing([f"Warning: {text}." for text in self.warnings])] if self.warnings else []
+        wear = Details("Parameters of wear", [
+            TableBlock(parameter_table(parameter_rows(plan.wear, plan.life.values))),
+            TableBlock(parameter_table(parameter_rows(plan.conditions))),
+        ])  # fmt: skip
+        return Document(
+            f"Life {plan.name}",
+            subject.line,
+            sections=lambda: [
+                Section("Life", [*warned, kpis]),
+                Section("Slow states", [states, FigureBlock(self._drawn, _CAPTION, "life")]),
+                Section("Stops", [Listing(self._population()), wear]),
+                subject.provenance(),
+            ],
+            brief=[f"life {plan.name}: {plan.life.summary}", "", *spaced([kpis, states])],
+            data=self._data(),
+            banner=Banner(self._outcome()),
+            attachments=[recording_file("life.nc", self.data)],
+            record="life.json",
+        )
+
+    def _outcome(self) -> str:
+        made = self.projection
+        if not made.ended_by:
+            return f"no end within {made.stops} stops"
+        half = math.ceil(made.error)
+        about = f" +- {half}" if half else ""
+        return f"{made.stops}{about} stops: {made.plan.life.limits[made.ended_by].label} is used up"
+
+    def _rows(self) -> list[KpiRow]:
+        made, life = self.projection, self.projection.plan.life
+        runs = made.plan.simulated * (len(made.steps) + 1)
+        end = "ended by: " + life.limits[made.ended_by].label if made.ended_by else "no limit met"
+        rows = [
+            KpiRow("stops", float(made.stops), "1", f"Stops until the end of life; {end}."),
+            KpiRow("interval", made.error, "1",
+                   f"Half the width of its {100 * CONFIDENCE:g} % interval, by the sample of "
+                   f"{made.plan.simulated} stops."),
+            KpiRow("runs", float(runs), "1", "Stops that were simulated for it, at least."),
+        ]  # fmt: skip
+        for name, each in life.states.items():
+            if not math.isnan(share := self.deviation(name)):
+                rows.append(KpiRow(
+                    f"deviation_{name}", 100.0 * share, "%",
+                    f"Projected change of the {each.label} against "
+                    f"{len(self.checked[name]) - 1} stops run one by one.",
+                ))  # fmt: skip
+        return rows
+
+    def _states(self) -> Table:
+        made = self.projection
+        rows = []
+        for name, each in made.plan.life.states.items():
+            path = made.states[name]
+            rate = (path[-1] - path[0]) / made.stops
+            rows.append((
+                name, each.label, amount(path[0], each.unit), amount(path[-1], each.unit),
+                amount(float(path.min()), each.unit), amount(float(path.max()), each.unit),
+                amount(rate, each.unit),
+            ))  # fmt: skip
+        return text_table(("state", "meaning", "new", "at end", "least", "largest", "per stop"),
+                          rows)  # fmt: skip
+
+    def _population(self) -> list[str]:
+        plan = self.projection.plan
+        if not plan.varied:
+            return ["all stops are alike"]
+        return [f"{each.name}: {each.distribution.text}" for each in plan.varied]
+
+    def _drawn(self) -> Figure:
+        from bywire.report.life_figure import Course, life_figure
+
+        made, life = self.projection, self.projection.plan.life
+        courses = [
+            Course(each.label, each.unit, made.states[name])
+            for name, each in life.states.items() if np.ptp(made.states[name]) > 0.0
+        ] + [
+            Course(each.label, each.unit, made.left[name], is_left=True)
+            for name, each in life.limits.items()
+        ]  # fmt: skip
+        return life_figure(courses, [*(step.first for step in made.steps), made.stops])
+
+    def _data(self) -> dict[str, Any]:
+        made = self.projection
+        return {
+            "life": made.plan.life.name,
+            "name": made.plan.name,
+            "parameters": made.plan.bench.parameters,
+            "stops": made.stops,
+            "interval": made.error,
+            "ended_by": made.ended_by,
+            "states": {
+                name: {
+                    "unit": each.unit, "label": each.label,
+                    "new": float(made.states[name][0]), "end": float(made.states[name][-1]),
+                    "deviation": self.deviation(name),
+                }
+                for name, each in made.plan.life.states.items()
+            },
+            "left": {name: float(values[-1]) for name, values in made.left.items()},
+            "steps": [{"first": each.first, "stops": each.count} for each in made.steps],
+            "population": self._population(),
+            "warnings": self.warnings,
+        }  # fmt: skip
+
+
+_CAPTION = (
+    "Slow states over stops, with dots where stops were simulated, and what is left of the limits: "
+    "life ends where the first one is zero."
+)
+
+
+@use_case
+def project_life(
+    source: str | Path,
+    overrides: Mapping[str, str] = MappingProxyType({}),
+    *,
+    check: int = 0,
+    progress: Progress | None = None,
+) -> LifeResult:
+    """Project how a brake wears, and when its life ends.
+
+    Parameters
+    ----------
+    source
+        Life file, see ``docs/life.md``; or the name of a life.
+    overrides
+        Changes of the bench, of wear (``wear.NAME``) and of what is between stops
+        (``stop.NAME``), as texts with units.
+    check
+        Stops that are also run one by one, to check the projection; none by default.
+    progress
+        Called with a label and the finished share, 0 to 1.
+
+    Returns
+    -------
+    LifeResult
+        Stops until the end, with an interval; slow states after every stop in SI units.
+
+    Raises
+    ------
+    InputError
+        For a life file that does not fit, and a brake that is at its end from the start.
+    RunError
+        When a run fails, or a stop lacks a key figure that wear is computed from.
+    KeyboardInterrupt
+        When interrupted.
+    """
+    if not isinstance(source, (str, Path)):
+        raise ParameterError(f"life = {quoted(source)}: name a life file, see docs/life.md")
+    if isinstance(check, bool) or not isinstance(check, int) or not 0 <= check <= _MOST:
+        raise ParameterError(f"check = {quoted(check)}: a whole number from 0 to {_MOST} is wanted")
+    shown = progress or silent
+    plan = read_life(source, overrides)
+    made = projected(plan, shown)
+    checked = one_by_one(plan, min(check, made.stops), shown) if check else {}
+    return LifeResult(made, checked)

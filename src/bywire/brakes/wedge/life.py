@@ -1,0 +1,168 @@
+"""Life of the wedge brake's pads: they thin, the clearance grows, the caliper gets stiffer.
+
+Stops of a car's corner supply the friction work; see `bywire.life`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Literal
+
+import numpy as np
+
+from bywire.brakes.wedge.elements import wedge
+from bywire.brakes.wedge.laws.moment_control import SomeMoment
+from bywire.brakes.wedge.rigs.wedge_corner import WedgeCornerParameters
+from bywire.control import wear_adjuster
+from bywire.core.parameters import ParameterSet
+from bywire.core.provenance import chosen, derived
+from bywire.core.quantities import Length
+from bywire.core.typing import Array
+from bywire.life import warm_stops
+from bywire.life.declaration import Effects, Life, Slow, Values
+from bywire.plant import pad_wear, roller_screw
+
+
+class WearParameters(ParameterSet):
+    """Pads, how warm stops make them, what adjusts them, and where they end.
+
+    ``mechanism``: ``"teeth"`` is an adjuster; ``"none"`` leaves the clearance to grow.
+    """
+
+    pads: pad_wear.Parameters
+    disc: warm_stops.Parameters
+    mechanism: Literal["none", "teeth"]
+    """what takes the clearance back"""
+    adjuster: wear_adjuster.Parameters
+    h_new: Length
+    """thickness of a new pad; the bench's stiffness is that of new pads"""
+    h_min: Length
+    """thickness at which pads are replaced"""
+    M_full: SomeMoment
+    """moment that has to be within the wedge's travel"""
+
+
+def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
+    """Return the slow states of the brake with new pads."""
+    return {
+        "h_pad": wear.h_new, "clearance": par.caliper.clearance, "clicks": 0.0, "counted": 0.0,
+        "wide": 0.0, "work": 0.0,
+    }  # fmt: skip
+
+
+def follows(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Mapping[str, float]:
+    """Return clearance and stiffness of the caliper with worn pads."""
+    return {"caliper.clearance": z["clearance"], "caliper.K_cal": _stiffness(z, par, wear)}
+
+
+def effects(
+    figures: Mapping[str, Array], stops: Mapping[str, Array], z: Values,
+    par: WedgeCornerParameters, wear: WearParameters,
+) -> Effects:  # fmt: skip
+    """Return what each stop wears: both pads thin alike, and the clearance grows by both.
+
+    Read between stops: by how much the way to contact, as the moment control sees it, is longer
+    than the clearance, and how warm the disc is where a stop begins.
+    """
+    work = figures["energy_braked"]
+    before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
+    thinned = warm_stops.thinned(work, before, after, wear.pads)
+    way = figures["contact_angle"] * roller_screw.slope(par.screw) * wedge.slope(par.wedge)
+    return Effects(
+        {"h_pad": -thinned, "clearance": 2.0 * thinned, "work": work},
+        {"beyond": float(np.mean(way)) - z["clearance"], "T_disc": float(np.mean(before))},
+    )
+
+
+def between(
+    z: Values, readings: Mapping[str, float], par: WedgeCornerParameters, wear: WearParameters
+) -> Values:
+    """Return the slow states after the adjuster, the brake parked again."""
+    if wear.mechanism == "none":
+        return z
+    law, T = wear.adjuster, readings["T_disc"]
+    seen = z["clearance"] + readings["beyond"] - law.growth * (T - law.T_cold)
+    state, out = wear_adjuster.output(
+        wear_adjuster.State(applied=1.0, wide=z["wide"], teeth=z["counted"]),
+        wear_adjuster.Input(gap=seen, T=T, parked=1.0, wanted=0.0), law,
+    )  # fmt: skip
+    return {
+        **z,
+        "clearance": z["clearance"] - law.tooth * out.turned,
+        "clicks": z["clicks"] + out.turned,
+        "counted": state.teeth,
+        "wide": state.wide,
+    }
+
+
+def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
+    r"""Return what is left of the lining, of the wedge's travel, and until a hot disc drags.
+
+    .. math:: x_{stop} \tan\alpha - c - F_N/K_{CAL}
+
+    is left of the travel, with the normal force of the moment M_full.
+    """
+    F_N = wear.M_full / (2.0 * par.wedge.mu_B * par.caliper.r_B)
+    reach = par.wedge.x_stop * wedge.slope(par.wedge)
+    return {
+        "lining": z["h_pad"] - wear.h_min,
+        "travel": reach - z["clearance"] - F_N / _stiffness(z, par, wear),
+        "free": z["clearance"] - wear.adjuster.gap_min,
+    }
+
+
+def _stiffness(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> float:
+    return pad_wear.stiffness(par.caliper.K_cal, wear.h_new - z["h_pad"], wear.pads)
+
+
+WEDGE_PADS = Life(
+    name="wedge-pads",
+    summary="pads of the wedge brake on a car's corner, until they or the wedge's travel end",
+    experiment="corner-stop",
+    wear=WearParameters,
+    values={
+        "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
+        "pads.T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
+        "pads.T_act": chosen(2760.0, "four times the wear at 400 degC"),
+        "pads.n_pads": chosen(2.0, "a floating caliper"),
+        "pads.A_pad": chosen(50e-4, "front pads of a mid-size car"),
+        "pads.E_pad": chosen(5e8, "the order of organic linings under load"),
+        "disc.C_d": chosen(3.4e3, "7 kg of cast iron"),
+        "disc.tau_d": chosen(300.0, "minutes, in the wind of driving"),
+        "mechanism": chosen("teeth", "without one the travel ends after some 280 stops"),
+        "adjuster.gap_nominal": chosen(0.2e-3, "the clearance of the new brake"),
+        "adjuster.band": chosen(0.1e-3, "7 ms more until the pads touch"),
+        "adjuster.gap_min": chosen(0.13e-3, "what a disc 400 K hotter takes away"),
+        "adjuster.tooth": chosen(0.08e-3, "below the band: it never turns too far"),
+        "adjuster.applications": chosen(3.0, "a single odd application does not turn it"),
+        "adjuster.growth": derived(12e-6 * 28e-3, "12e-6 1/K of cast iron, a disc of 28 mm"),
+        "adjuster.T_cold": chosen(293.15, "20 degC"),
+        "adjuster.fault": chosen("none", "sound"),
+        "h_new": chosen(10e-3, "front pads of a mid-size car"),
+        "h_min": chosen(2e-3, "usual limit of wear"),
+        "M_full": chosen(950.0, "the largest moment that the paper shows"),
+    },
+    states={
+        "h_pad": Slow("m", "pad thickness"),
+        "clearance": Slow("m", "clearance"),
+        "clicks": Slow("1", "teeth turned"),
+        "counted": Slow("1", "teeth turned, as the adjuster counts them"),
+        "wide": Slow("1", "applications in a row with too much clearance"),
+        "work": Slow("J", "friction work"),
+    },
+    limits={
+        "lining": Slow("m", "lining left"),
+        "travel": Slow("m", "travel left"),
+        "free": Slow("m", "clearance left for a hot disc"),
+    },
+    begin=begin,
+    follows=follows,
+    effects=effects,
+    left=left,
+    figures=("energy_braked", "contact_angle"),
+    between=between,
+    settings={
+        "options.v_0": "100 km/h", "options.M_brake": "600 N*m", "options.t_hold": "7 s",
+        "options.t_end": "100 ms", "simulation.step": "50 us",
+    },
+)  # fmt: skip

@@ -1,0 +1,173 @@
+"""Life files: TOML in, a plan out; nothing in them is executed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from bywire.bench import bench_file
+from bywire.bench.bench import Bench
+from bywire.bench.values import parsed, require_units
+from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
+from bywire.core.parameters import ParameterSet, leaf_fields
+from bywire.core.units import parse
+from bywire.data.toml_file import read_toml
+from bywire.life.declaration import LIVES, Life, StopConditions
+from bywire.life.plan import CONDITION, LifePlan
+from bywire.studies.distribution import read_distribution
+from bywire.studies.plan import Varied
+from bywire.studies.study_file import entries_of, read_varied
+
+_KEYS = ("name", "life", "set", "vary", "projection")
+_WEAR = "wear."
+_MOST = 4096  # stops that stand for a population
+CONDITIONS = StopConditions(pause=600.0, T_air=293.15)
+"""a stop every ten minutes at 20 degC"""
+
+
+def read_life(
+    source: str | Path, overrides: Mapping[str, str] = MappingProxyType({})
+) -> LifePlan:
+    """Read a life file.
+
+    Parameters
+    ----------
+    source
+        TOML file with ``life`` and the sections ``[set]``, ``[vary]`` and ``[projection]`` as
+        wanted, see ``docs/life.md``; or the bare name of a life, with its own population of stops.
+    overrides
+        Further changes, which count more than those of ``[set]``.
+
+    Raises
+    ------
+    FileError
+        When the file cannot be read or is no TOML.
+    InputError
+        For anything in it that does not fit, with the file's name in front.
+    """
+    file = Path(source)
+    is_name = file.suffix != ".toml" and not file.is_file()
+    content = {"life": str(source)} if is_name else read_toml(file, "life file")
+    try:
+        return _plan(content, file.stem, overrides)
+    except InputError as error:
+        if is_name:
+            raise
+        raise type(error)(f"{file}: {error}") from None
+
+
+def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -> LifePlan:
+    for key in content:
+        if key not in _KEYS:
+            raise unknown_name("key of a life file", key, _KEYS)
+    for key in ("set", "vary", "projection"):
+        if not isinstance(content.get(key, {}), Mapping):
+            raise ParameterError(f"[{key}] must be a section with key = value lines")
+    for key in ("name", "life"):
+        if not isinstance(content.get(key, name), str):
+            raise ParameterError(f"{key} = {quoted(content[key])}: a text is wanted")
+    if "life" not in content:
+        raise ParameterError("life is missing: write life = \"...\" (see 'bywire list lives')")
+    life = LIVES.find(content["life"])
+    changes = _texts(bench_file.flattened(content.get("set", {}))) | dict(overrides)
+    bench = bench_file.read(
+        life.experiment,
+        {**life.settings, **{k: v for k, v in changes.items() if not _is_of_life(k)}},
+    )
+    conditions = CONDITIONS.replace(_given(StopConditions, changes, CONDITION))
+    wear = life.defaults().replace(_given(life.wear, changes, _WEAR))
+    varied = tuple(_varied(life, bench, conditions, content.get("vary")))
+    _require_free(life, bench, wear, varied)
+    return LifePlan(
+        content.get("name", name), life, bench, wear, conditions, varied,
+        **_projection(content.get("projection", {})),
+    )  # fmt: skip
+
+
+def _is_of_life(name: str) -> bool:
+    return name.startswith((_WEAR, CONDITION))
+
+
+def _texts(changes: Mapping[str, Any]) -> dict[str, str]:
+    for key, value in changes.items():
+        if not isinstance(value, str):
+            raise ParameterError(
+                f"[set] {key} = {quoted(value)}: write the value as a text, with its unit, as "
+                "--set takes it"
+            )
+    return dict(changes)
+
+
+def _given(
+    kind: type[ParameterSet], changes: Mapping[str, str], prefix: str
+) -> dict[str, Any]:
+    """Return the changes of a parameter set whose names begin with a prefix [SI]."""
+    named = {k.removeprefix(prefix): v for k, v in changes.items() if k.startswith(prefix)}
+    require_units(kind, named)
+    return parsed(kind, named, f"name behind {prefix!r}")
+
+
+def _varied(
+    life: Life, bench: Bench, conditions: StopConditions, section: Mapping[str, Any] | None
+) -> list[Varied]:
+    """Return what varies: as the file says, else as the life declares it."""
+    each = dict(entries_of(life.population if section is None else section))
+    of_bench = {name: entry for name, entry in each.items() if not name.startswith(CONDITION)}
+    varied = list(read_varied(bench, of_bench))
+    leaves = {f"{CONDITION}{k}": leaf for k, leaf in leaf_fields(StopConditions).items()}
+    for name, entry in each.items():
+        if name in of_bench:
+            continue
+        if name not in leaves:
+            raise unknown_name("condition of a stop", name, leaves)
+        nominal = float(conditions.value(name.removeprefix(CONDITION)))
+        law = read_distribution(name, entry, leaves[name], nominal)
+        varied.append(Varied(name, leaves[name].unit.symbol, nominal, law))
+    return varied
+
+
+def _require_free(
+    life: Life, bench: Bench, wear: ParameterSet, varied: tuple[Varied, ...]
+) -> None:
+    """Refuse what varies from stop to stop although it follows from slow states."""
+    slow = life.follows(life.begin(bench.par, wear), bench.par, wear)
+    for each in varied:
+        if not each.unit:
+            raise ParameterError(f"[vary] {each.name} is a choice: numbers vary from stop to stop")
+        for name in (each.name, *each.together):
+            if name in slow:
+                raise ParameterError(
+                    f"[vary] {name} follows from what wears: its first value is the bench's, "
+                    "change it by [set]"
+                )
+
+
+def _projection(section: Mapping[str, Any]) -> dict[str, Any]:
+    known: dict[str, tuple[float, float]] = {
+        "stops": (2, _MOST), "seed": (0, 2**63 - 1), "longest": (1, 10_000_000),
+    }  # fmt: skip
+    shares = {"share": (0.001, 0.5), "tolerance": (1e-6, 0.5)}
+    settings: dict[str, Any] = {}
+    for key, value in section.items():
+        if key in shares:
+            low, high = shares[key]
+            settings[key] = parse(value, "1", f"[projection] {key}")
+            if not low <= settings[key] <= high:
+                raise ParameterError(
+                    f"[projection] {key} = {quoted(value)} must lie between {100 * low:g} % and "
+                    f"{100 * high:g} %"
+                )
+        elif key in known:
+            low, high = known[key]
+            is_whole = isinstance(value, int) and not isinstance(value, bool)
+            if not is_whole or not low <= value <= high:
+                raise ParameterError(
+                    f"[projection] {key} = {quoted(value)}: a whole number from {low} to {high} "
+                    "is wanted"
+                )
+            settings[key] = value
+        else:
+            raise unknown_name("key of [projection]", key, (*known, *shares))
+    return settings

@@ -1,0 +1,87 @@
+"""Stop after stop: how hot the friction surface gets, and what that costs of the pads.
+
+One body takes the friction work of every stop and cools between stops. It is what life needs of
+heat: how hot a disc is depends on the pauses more than on the speeds.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from bywire.core.errors import ParameterError
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Unit
+from bywire.core.typing import Array
+from bywire.plant import pad_wear
+
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(8)
+_HOTTEST = 1500.0  # K: cast iron melts
+
+
+class Parameters(ParameterSet):
+    """The disc as a body of one temperature."""
+
+    C_d: Annotated[float, Unit("J/K", 1e3), Field(gt=0, allow_inf_nan=False)]
+    """heat capacity of what takes the friction work"""
+    tau_d: Annotated[float, Unit("s", 300.0), Field(gt=0, allow_inf_nan=False)]
+    """time constant of its cooling"""
+
+
+def temperatures(
+    work: Array, pause: Array, T_air: Array, par: Parameters
+) -> tuple[Array, Array]:
+    """Return the temperature of the disc before and after each of stops that repeat for ever.
+
+    Parameters
+    ----------
+    work, pause, T_air
+        Friction work [J], time until the next stop [s], and temperature of the air [K], shape
+        (stops,) each; after the last stop the first one follows.
+
+    Returns
+    -------
+    tuple
+        Temperatures [K] before and after each stop, shape (stops,) each.
+
+    Raises
+    ------
+    ParameterError
+        When the disc would melt.
+    """
+    rise, kept = work / par.C_d, np.exp(-pause / par.tau_d)
+    factor, offset = 1.0, 0.0  # of the temperature before the first stop, a cycle later
+    for dT, share, air in zip(rise, kept, T_air, strict=True):
+        factor, offset = share * factor, air + share * (offset + dT - air)
+    before = np.empty(work.size)
+    T = offset / (1.0 - factor) if factor < 1.0 else np.inf
+    for k, (dT, share, air) in enumerate(zip(rise, kept, T_air, strict=True)):
+        before[k] = T
+        T = air + share * (T + dT - air)
+    after = before + rise
+    if not (hottest := float(np.max(after))) < _HOTTEST:
+        raise ParameterError(
+            f"the disc would reach {hottest - 273.15:.0f} degC: longer pauses (stop.pause), a "
+            "larger disc, or quicker cooling are wanted"
+        )
+    return before, after
+
+
+def thinned(work: Array, before: Array, after: Array, par: pad_wear.Parameters) -> Array:
+    """Return by how much each stop thins a pad [m], shape (stops,).
+
+    The surface warms in proportion to the work done, from one temperature [K] to the other.
+
+    Notes
+    -----
+    Below the hot range wear is constant; above, it is integrated by Gauss and Legendre's rule.
+    """
+    span = np.maximum(after - before, 1e-9)
+    cold = np.clip((par.T_hot - before) / span, 0.0, 1.0)
+    begin = np.maximum(before, par.T_hot)
+    T = begin[:, None] + 0.5 * (1.0 + _NODES) * (np.maximum(after, begin) - begin)[:, None]
+    hot = 0.5 * (pad_wear.wear_per_work(T, par) @ _WEIGHTS)  # type: ignore[arg-type]
+    worn = work * (cold * par.kappa_0 + (1.0 - cold) * hot)
+    return np.asarray(worn / (par.n_pads * par.A_pad))

@@ -1,0 +1,65 @@
+"""Figure: slow states over a life, and what is left of the limits that end it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from bywire.core.quantities import display_unit
+from bywire.core.typing import Array
+from bywire.core.units import convert
+from bywire.report import style
+from bywire.report.decimation import decimate
+from bywire.report.line_role import Role
+
+_HEIGHT = 1.15  # of a panel [inch]
+
+
+@dataclass(frozen=True)
+class Course:
+    """A quantity over stops.
+
+    Parameters
+    ----------
+    label, unit
+        What the axis says, and the SI unit.
+    values
+        Shape (stops + 1,).
+    is_left
+        Whether it is what is left of a limit: zero is the end.
+    """
+
+    label: str
+    unit: str
+    values: Array
+    is_left: bool = False
+
+
+def life_figure(courses: Sequence[Course], marks: Sequence[int]) -> Figure:
+    """Draw quantities over the number of stops, one panel each; the end is a dotted line at zero.
+
+    Parameters
+    ----------
+    courses
+        What is drawn, from the top.
+    marks
+        Numbers of stops at which runs were made: dots.
+    """
+    figure, rows = style.new_figure(0.5 + _HEIGHT * len(courses), [1.0] * len(courses))
+    for axes, course in zip(rows, courses, strict=True):
+        shown = np.asarray(convert(course.values, course.unit, display_unit(course.unit)))
+        stops = np.arange(shown.size, dtype=float)
+        axes.plot(*decimate(stops, shown), color=style.BLUE, linewidth=1.2)
+        axes.plot(marks, shown[list(marks)], color=style.BLUE, marker="o", markersize=2.2,
+                  linestyle="none")  # fmt: skip
+        if course.is_left:
+            look = style.STROKES[Role.LIMIT]
+            axes.axhline(0.0, color=look.color, linestyle=look.linestyle,
+                         linewidth=look.linewidth)  # fmt: skip
+        style.few_ticks(axes, 4)
+        axes.set_ylabel(style.axis_label(course.label, course.unit, "\n"))
+    rows[-1].set_xlabel("stops")
+    return figure
