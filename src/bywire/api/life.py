@@ -131,14 +131,14 @@ class LifeResult(Answer):
 
     def _rows(self) -> list[KpiRow]:
         made, life = self.projection, self.projection.plan.life
-        runs = made.plan.simulated * (len(made.steps) + 1)
+        runs = sum(len(which) for _, which in made.plan.known)
         end = "ended by: " + life.limits[made.ended_by].label if made.ended_by else "no limit met"
         rows = [
             KpiRow("stops", float(made.stops), "1", f"Stops until the end of life; {end}."),
             KpiRow("interval", made.error, "1",
                    f"Half the width of its {100 * CONFIDENCE:g} % interval, by the sample of "
-                   f"{made.plan.simulated} stops."),
-            KpiRow("runs", float(runs), "1", "Stops that were simulated for it, at least."),
+                   f"{made.plan.count} stop{'s' * (made.plan.count > 1)}."),
+            KpiRow("runs", float(runs), "1", "Stops that were simulated for it."),
         ]  # fmt: skip
         for name, each in life.states.items():
             if not math.isnan(share := self.deviation(name)):

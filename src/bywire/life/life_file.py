@@ -78,7 +78,8 @@ def _plan(content: Mapping[str, Any], name: str, overrides: Mapping[str, str]) -
     )
     conditions = CONDITIONS.replace(_given(StopConditions, changes, CONDITION))
     wear = life.defaults().replace(_given(life.wear, changes, _WEAR))
-    varied = tuple(_varied(life, bench, conditions, content.get("vary")))
+    population = {k: v for k, v in life.population.items() if k not in changes}
+    varied = tuple(_varied(bench, conditions, content.get("vary", population)))
     _require_free(life, bench, wear, varied)
     return LifePlan(
         content.get("name", name), life, bench, wear, conditions, varied,
@@ -110,10 +111,10 @@ def _given(
 
 
 def _varied(
-    life: Life, bench: Bench, conditions: StopConditions, section: Mapping[str, Any] | None
+    bench: Bench, conditions: StopConditions, section: Mapping[str, Any]
 ) -> list[Varied]:
-    """Return what varies: as the file says, else as the life declares it."""
-    each = dict(entries_of(life.population if section is None else section))
+    """Return what varies of the bench, and of the conditions of its stops."""
+    each = dict(entries_of(section))
     of_bench = {name: entry for name, entry in each.items() if not name.startswith(CONDITION)}
     varied = list(read_varied(bench, of_bench))
     leaves = {f"{CONDITION}{k}": leaf for k, leaf in leaf_fields(StopConditions).items()}

@@ -7,7 +7,7 @@ import numpy as np
 from bywire.core.typing import Array, Progress, silent
 from bywire.life.declaration import Values
 from bywire.life.plan import LifePlan
-from bywire.life.rates import conditions, stop_figures
+from bywire.life.rates import conditions, simulated, stop_figures
 
 
 def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[str, Array]:
@@ -32,13 +32,13 @@ def one_by_one(plan: LifePlan, stops: int, progress: Progress = silent) -> dict[
     KeyboardInterrupt
         When interrupted.
     """
-    life, par, wear, count = plan.life, plan.bench.par, plan.wear, plan.simulated
+    life, par, wear, count = plan.life, plan.bench.par, plan.wear, plan.count
     z = life.begin(par, wear)
-    figures, _ = stop_figures(plan, z, range(count))  # of the stops before the first, for its heat
+    figures, _ = stop_figures(plan, z)  # of the stops before the first, for its heat
     path: list[Values] = [z]
     for n in range(stops):
         k = n % count
-        made, _ = stop_figures(plan, z, range(k, k + 1))
+        made, _ = simulated(plan, z, [k])
         for name, value in made.items():
             figures[name][k] = value[0]
         each = life.effects(figures, conditions(plan), z, par, wear)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from bywire.bench.bench import Bench
@@ -47,6 +48,8 @@ class LifePlan:
         Largest share of itself by which a rate may be wrong within a step.
     longest
         Stops after which a life is not followed any more.
+    known
+        What was simulated already, by what of the bench follows from slow states.
     """
 
     name: str
@@ -55,11 +58,12 @@ class LifePlan:
     wear: ParameterSet
     conditions: StopConditions
     varied: tuple[Varied, ...] = ()
-    stops: int = 16
+    stops: int = 20
     seed: int = 1
     share: float = 0.05
     tolerance: float = 2e-2
     longest: int = 200_000
+    known: dict[Any, Any] = field(default_factory=dict, compare=False, repr=False)
 
     @cached_property
     def population(self) -> Mapping[str, NDArray[Any]]:
@@ -71,6 +75,23 @@ class LifePlan:
         return {each.name: v for each, v in zip(self.varied, drawn, strict=True)}
 
     @property
-    def simulated(self) -> int:
-        """How many different stops there are."""
+    def count(self) -> int:
+        """How many stops stand for the population."""
         return self.stops if self.varied else 1
+
+    @cached_property
+    def different(self) -> tuple[list[int], NDArray[np.intp]]:
+        """The stops whose benches differ, and which of these each of the population is.
+
+        Stops that differ in their conditions alone are simulated once.
+        """
+        rows = [
+            tuple(values[k].item() for name, values in self.population.items()
+                  if not name.startswith(CONDITION))
+            for k in range(self.count)
+        ]  # fmt: skip
+        first: dict[tuple[Any, ...], int] = {}
+        for k, row in enumerate(rows):
+            first.setdefault(row, k)
+        places = {k: place for place, k in enumerate(first.values())}
+        return list(places), np.array([places[first[row]] for row in rows])

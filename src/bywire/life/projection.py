@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from bywire.core.errors import ParameterError
@@ -19,6 +20,7 @@ from bywire.core.units import shown
 from bywire.life.declaration import Effects, Values
 from bywire.life.plan import LifePlan
 from bywire.life.rates import Rates, rates
+from bywire.studies.distribution import Distribution
 
 CONFIDENCE = 0.95
 """of the interval of a life"""
@@ -191,7 +193,7 @@ def _interval(plan: LifePlan, steps: Sequence[Step], limit: str) -> float:
     """
     if not limit:
         return math.nan
-    count = plan.simulated
+    count = plan.count
     if count == 1:
         return 0.0
     falls = [(step.count, [_falls(plan, each, limit) for each in step.rates]) for step in steps]
@@ -208,11 +210,24 @@ def standard_error(plan: LifePlan, values: Array) -> float:
     The population is a Latin hypercube: along every quantity it is as even as can be, and the
     spread that a quantity explains is no error of the mean. By successive differences along the
     quantity that explains most (K. M. Wolter, Introduction to Variance Estimation, section 8.2),
-    which counts the spread by all others in full.
+    which counts the spread by all others in full. Where a quantity of single values goes from one
+    to the next exactly between two stops, as their weights want it, the difference is no error.
     """
-    orders = [np.argsort(column, kind="stable") for column in plan.population.values()]
-    least = min(float(np.sum(np.diff(values[order]) ** 2)) for order in orders)
+    squares = [
+        np.diff(values[np.argsort(plan.population[each.name], kind="stable")]) ** 2
+        * _counts(each.distribution, values.size)
+        for each in plan.varied
+    ]
+    least = min(float(np.sum(each)) for each in squares)
     return math.sqrt(least / (2.0 * values.size * (values.size - 1)))
+
+
+def _counts(law: Distribution, stops: int) -> NDArray[np.bool_]:
+    """Return which differences between neighbors are of chance, shape (stops - 1,)."""
+    edges = np.arange(1, stops) / stops
+    if not law.is_discrete:
+        return np.ones(stops - 1, dtype=bool)
+    return np.asarray(law.quantile(edges - 1e-9) == law.quantile(edges + 1e-9))
 
 
 def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
@@ -221,6 +236,6 @@ def _falls(plan: LifePlan, held: Rates, limit: str) -> Array:
     changes, now = held.effects.changes, life.left(held.z, par, wear)[limit]
     each = [
         {**held.z, **{name: held.z[name] + float(change[k]) for name, change in changes.items()}}
-        for k in range(plan.simulated)
+        for k in range(plan.count)
     ]
     return now - np.array([life.left(z, par, wear)[limit] for z in each])

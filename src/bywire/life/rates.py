@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -52,17 +52,37 @@ def rates(plan: LifePlan, z: Values) -> Rates:
     KeyboardInterrupt
         When interrupted.
     """
-    figures, warnings = stop_figures(plan, z, range(plan.simulated))
+    figures, warnings = stop_figures(plan, z)
     given = plan.life.effects(figures, conditions(plan), z, plan.bench.par, plan.wear)
     return Rates(z, given, warnings)
 
 
-def stop_figures(
-    plan: LifePlan, z: Values, which: range
+def stop_figures(plan: LifePlan, z: Values) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Return key figures of the population's stops by name, shape (stops,), and warnings."""
+    which, places = plan.different
+    figures, warnings = simulated(plan, z, which)
+    return {name: values[places] for name, values in figures.items()}, warnings
+
+
+def simulated(
+    plan: LifePlan, z: Values, which: Sequence[int]
 ) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Return key figures of stops of the population by name, shape (stops,), and warnings."""
-    benches = [_stop_bench(plan, z, k) for k in which]
-    made = key_figures_of(benches)
+    """Return key figures of some stops of the population, and what their runs warned of.
+
+    What slow states change nothing of is simulated once.
+    """
+    follows = plan.life.follows(z, plan.bench.par, plan.wear)
+    key = (tuple(follows.items()), tuple(which))
+    if key not in plan.known:
+        plan.known[key] = _simulated(plan, follows, which)
+    figures, warnings = plan.known[key]
+    return dict(figures), warnings
+
+
+def _simulated(
+    plan: LifePlan, follows: Mapping[str, float], which: Sequence[int]
+) -> tuple[dict[str, Array], tuple[str, ...]]:
+    made = key_figures_of([_stop_bench(plan, follows, k) for k in which])
     known = {figure.name: figure for figure in made.figures}
     for name in plan.life.figures:
         lacking = np.flatnonzero(~np.isfinite(known[name].values))
@@ -82,17 +102,17 @@ def conditions(plan: LifePlan) -> Mapping[str, Array]:
     return {
         name: np.broadcast_to(
             np.asarray(given.get(f"{CONDITION}{name}", getattr(plan.conditions, name)), float),
-            (plan.simulated,),
+            (plan.count,),
         )
         for name in StopConditions.model_fields
     }
 
 
-def _stop_bench(plan: LifePlan, z: Values, k: int) -> Bench:
-    """Return a stop of the population with slow states that are held."""
+def _stop_bench(plan: LifePlan, follows: Mapping[str, float], k: int) -> Bench:
+    """Return a stop of the population with what follows from slow states that are held."""
     drawn = {
         name: values[k].item()
         for name, values in plan.population.items()
         if not name.startswith(CONDITION)
     }
-    return changed(plan.bench, {**drawn, **plan.life.follows(z, plan.bench.par, plan.wear)})
+    return changed(plan.bench, {**drawn, **follows})

@@ -82,6 +82,6 @@ def thinned(work: Array, before: Array, after: Array, par: pad_wear.Parameters) 
     cold = np.clip((par.T_hot - before) / span, 0.0, 1.0)
     begin = np.maximum(before, par.T_hot)
     T = begin[:, None] + 0.5 * (1.0 + _NODES) * (np.maximum(after, begin) - begin)[:, None]
-    hot = 0.5 * (pad_wear.wear_per_work(T, par) @ _WEIGHTS)  # type: ignore[arg-type]
+    hot = 0.5 * (pad_wear.wear_per_work(T, par) @ _WEIGHTS)
     worn = work * (cold * par.kappa_0 + (1.0 - cold) * hot)
     return np.asarray(worn / (par.n_pads * par.A_pad))

@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.figure import Figure
 
-from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
-from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.decimation import decimate
 from bywire.report.line_role import Role
+from bywire.report.wording import in_display_unit
 
 _HEIGHT = 1.15  # of a panel [inch]
 
@@ -50,7 +49,7 @@ def life_figure(courses: Sequence[Course], marks: Sequence[int]) -> Figure:
     """
     figure, rows = style.new_figure(0.5 + _HEIGHT * len(courses), [1.0] * len(courses))
     for axes, course in zip(rows, courses, strict=True):
-        shown = np.asarray(convert(course.values, course.unit, display_unit(course.unit)))
+        shown = in_display_unit(1.0, course.unit)[0] * course.values
         stops = np.arange(shown.size, dtype=float)
         axes.plot(*decimate(stops, shown), color=style.BLUE, linewidth=1.2)
         axes.plot(marks, shown[list(marks)], color=style.BLUE, marker="o", markersize=2.2,

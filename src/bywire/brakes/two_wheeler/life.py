@@ -1,0 +1,102 @@
+"""Life of the front brake's pads: they thin, and what they lose is drawn from the reservoir.
+
+The seals draw the pistons back by the same way after every stop, so that the clearance stays: wear
+takes fluid through the compensating port instead. See `bywire.life`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.provenance import chosen, derived
+from bywire.core.quantities import Length, Volume
+from bywire.core.typing import Array
+from bywire.life import warm_stops
+from bywire.life.declaration import Effects, Life, Slow, Values
+from bywire.plant import pad_wear
+
+
+class WearParameters(ParameterSet):
+    """The front axle's pads, its discs, and the fluid that follows the pads."""
+
+    pads: pad_wear.Parameters
+    disc: warm_stops.Parameters
+    h_new: Length
+    """thickness of a new pad's lining"""
+    h_min: Length
+    """thickness at which pads are replaced"""
+    V_new: Volume
+    """fluid in the reservoir with new pads"""
+    V_min: Volume
+    """fluid below which it warns"""
+
+
+def begin(par: TwoWheelerParameters, wear: WearParameters) -> Values:
+    """Return the slow states with new pads and a full reservoir."""
+    return {"h_pad": wear.h_new, "V_reservoir": wear.V_new, "work": 0.0}
+
+
+def follows(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Mapping[str, float]:
+    """Return no changes: a loop that holds its pressure does not feel how thick its pads are."""
+    return {}
+
+
+def effects(
+    figures: Mapping[str, Array], stops: Mapping[str, Array], z: Values,
+    par: TwoWheelerParameters, wear: WearParameters,
+) -> Effects:  # fmt: skip
+    """Return what each stop wears, and the fluid that follows the pistons of all faces."""
+    work = figures["disc_energy"] * figures["disc_share_front"] / 100.0
+    before, after = warm_stops.temperatures(work, stops["pause"], stops["T_air"], wear.disc)
+    thinned = warm_stops.thinned(work, before, after, wear.pads)
+    drawn = par.front.disc.faces * par.front.disc.A_cal * thinned
+    return Effects({"h_pad": -thinned, "V_reservoir": -drawn, "work": work})
+
+
+def left(z: Values, par: TwoWheelerParameters, wear: WearParameters) -> Values:
+    """Return the lining and the fluid that are left."""
+    return {"lining": z["h_pad"] - wear.h_min, "fluid": z["V_reservoir"] - wear.V_min}
+
+
+TWO_WHEELER_PADS = Life(
+    name="two-wheeler-pads",
+    summary="front pads of a motorcycle, and the fluid that follows them",
+    experiment="straight-stop",
+    wear=WearParameters,
+    values={
+        "pads.kappa_0": chosen(3.6e-14, "180 cm^3 of pad over about 5 GJ: a car's front axle"),
+        "pads.T_hot": chosen(503.0, "230 degC, as usual of organic linings"),
+        "pads.T_act": chosen(2760.0, "four times the wear at 400 degC"),
+        "pads.n_pads": chosen(4.0, "two discs"),
+        "pads.A_pad": chosen(20e-4, "front pads of a sport motorcycle"),
+        "pads.E_pad": chosen(5e8, "the order of organic linings under load"),
+        "disc.C_d": derived(1.36e3, "60 K by a stop from 100 km/h, 80 % of it in front"),
+        "disc.tau_d": chosen(60.0, "from 80 to 57 degC in 30 s of driving"),
+        "h_new": chosen(4.5e-3, "lining of a sport motorcycle's pad"),
+        "h_min": chosen(0.5e-3, "4 mm to wear"),
+        "V_new": chosen(35e-6, "reservoir of a radial master cylinder"),
+        "V_min": chosen(10e-6, "mark of its sight glass"),
+    },
+    states={
+        "h_pad": Slow("m", "pad thickness"),
+        "V_reservoir": Slow("m**3", "fluid in the reservoir"),
+        "work": Slow("J", "friction work in front"),
+    },
+    limits={"lining": Slow("m", "lining left"), "fluid": Slow("m**3", "fluid left")},
+    begin=begin,
+    follows=follows,
+    effects=effects,
+    left=left,
+    figures=("disc_energy", "disc_share_front"),
+    settings={
+        "options.p_front": "15.4 bar", "options.p_rear": "37 bar", "options.duration": "7 s",
+    },
+    population={
+        "options.v_0": {
+            "kind": "discrete", "values": ["50 km/h", "100 km/h", "150 km/h"],
+            "weights": [70, 25, 5],
+        },
+    },
+)  # fmt: skip
