@@ -44,4 +44,5 @@ def test_a_life_without_end_says_so(bywire, tmp_path):
 def test_what_is_no_life_is_refused(bywire, tmp_path):
     refused(bywire("life", "wedge-pad"), "did you mean 'wedge-pads'")
     refused(bywire("life", tmp_path / "none.toml"), "cannot read life file")
-    refused(bywire("life", "two-wheeler-pads", "--set", "wear.h_new=0.1mm"), "over before its first")
+    worn = bywire("life", "two-wheeler-pads", "--set", "wear.h_new=0.1mm")
+    refused(worn, "over before its first stop")
