@@ -231,5 +231,14 @@ def test_what_the_edges_show_takes_no_library_of_units():
 
 @pytest.mark.parametrize(("symbol", "unit"), quantities.DISPLAY_UNITS.items())
 def test_what_the_edges_show_is_as_the_library_of_units_has_it(symbol, unit):
-    factor = units.registry().Quantity(1.0, symbol).to(unit).magnitude
-    assert units.convert(3.7, symbol, unit) == pytest.approx(3.7 * factor, rel=1e-14)
+    shown = units.registry().Quantity(3.7, symbol).to(unit).magnitude
+    assert units.convert(3.7, symbol, unit) == pytest.approx(shown, rel=1e-14)
+    assert units.convert(units.convert(3.7, symbol, unit), unit, symbol) == pytest.approx(3.7)
+
+
+def test_temperatures_and_their_differences_are_told_apart():
+    assert units.shown(373.15, "K") == "100 degC"
+    assert units.shown(20.0, "delta_degC") == "20 K"
+    assert (units.display_factor("K"), units.display_factor("Pa")) == (1.0, 1e-5)
+    with pytest.raises(UnitError, match="degC cannot be a temperature difference in K"):
+        units.parse("40 degC", "delta_degC", "dT")

@@ -212,9 +212,9 @@ def cut_table(cut: Cut) -> Table:
             heading.append(name)
             columns.append([str(value) for value in values])
             continue
-        factor, unit = in_display_unit(1.0, str(cut.data[name].attrs["units"]))
+        shown, unit = in_display_unit(values, str(cut.data[name].attrs["units"]))
         heading.append(f"{name} [{unit_text(unit) or '-'}]")
-        columns.append([f"{factor * float(value):.4g}" for value in values])
+        columns.append([f"{float(value):.4g}" for value in shown])
     return text_table(heading, zip(*columns, strict=True))
 
 

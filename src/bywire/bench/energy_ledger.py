@@ -80,8 +80,8 @@ def role_attributes(role: Role | None) -> dict[str, str]:
 def actuator_ledger(recording: xr.Dataset) -> Ledger:
     """Return the books of an actuator or rig, between the ends of a recording.
 
-    ``recording``: recording with energies [J]. Where all of these stand in one further book, as
-    those of a vehicle without actuators do, it is that one.
+    ``recording``: recording with energies [J]. Where all of these stand in further books, as those
+    of a vehicle without actuators do, it is the first of them.
     """
     return _ledger(recording, _main_book(recording))
 
@@ -90,19 +90,27 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     """Return the books beyond the actuator's own that its signals name, by name.
 
     In such a book a source stands in the place of one of the actuator's, and what it gives more is
-    taken by a sink: of a disc that is braked, the heat of the pads.
+    taken by a sink: of a disc that is braked, the heat of the pads. Books in which nothing was
+    posted, of what is switched off, are left out.
     """
-    roles = _roles(recording, _changes(recording)).values()
-    names = dict.fromkeys(role.book for role in roles if role.book)
     main = _main_book(recording)
-    return {name: _ledger(recording, name) for name in names if name != main}
+    books = {name: _ledger(recording, name) for name in _books(recording) if name not in ("", main)}
+    return {
+        name: each for name, each in books.items()
+        if any(np.any(posting.energy) for posting in (*each.sources, *each.sinks))
+    }  # fmt: skip
 
 
 def _main_book(recording: xr.Dataset) -> str:
-    """Return the book that stands first: that of the actuator, or the only one there is."""
+    """Return the book that stands first: that of the actuator where there is one."""
+    books = _books(recording)
+    return "" if "" in books else next(iter(books), "")
+
+
+def _books(recording: xr.Dataset) -> dict[str, None]:
+    """Return the names of all books that take something, in the order of the recording."""
     roles = _roles(recording, _changes(recording)).values()
-    books = {role.book for role in roles if role.side == "sink"}
-    return books.pop() if len(books) == 1 else ""
+    return dict.fromkeys(role.book for role in roles if role.side == "sink")
 
 
 def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]) -> Ledger:

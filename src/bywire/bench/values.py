@@ -128,13 +128,6 @@ def _quantity(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float
     number = units.parse(value, symbol, name, nominal)
     if not isinstance(value, str):
         return number
-    unit = units.split(value)[1]
-    # Parameters hold differences of temperature alone: 40 degC would be taken as 313.15 K.
-    if symbol == "K" and unit != symbol and units.has_own_zero(unit, symbol):
-        raise UnitError(
-            f"{name} = {value!r}: a temperature difference is wanted, in K; "
-            f"write for instance {units.example(symbol)!r}"
-        )
     return units.Written(number, value)
 
 

@@ -39,6 +39,8 @@ DISPLAY_UNITS = {
     "m**2": "mm**2",
     "m/rad": "mm/rad",
     "N/Pa": "N/bar",
+    "K": "degC",
+    "delta_degC": "K",
 }
 
 
@@ -83,6 +85,10 @@ SignedPressure = Annotated[float, Unit("Pa", 2e6), _FINITE]
 Density = Annotated[float, Unit("kg/m**3", 1e3), _POSITIVE]
 KinematicViscosity = Annotated[float, Unit("m**2/s", 5e-4), _POSITIVE]
 Conductance = Annotated[float, Unit("m**3/(s*Pa)", 1e-11), _NOT_NEGATIVE]
+
+# Thermal
+Temperature = Annotated[float, Unit("K", 400.0), _POSITIVE]
+"""absolute, shown in degrees Celsius; a difference has the unit ``delta_degC``, shown in K"""
 
 # Tables
 Nodes = tuple[Annotated[float, _NOT_NEGATIVE], ...]

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 from functools import cache
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 from bywire.core.errors import ParameterError, UnitError, quoted
 from bywire.core.quantities import display_unit
 
 if TYPE_CHECKING:
     import pint
+
+F = TypeVar("F")
 
 
 # The common units, and all that the edges show: most commands then need no pint, whose loading
@@ -41,6 +43,7 @@ _COMMON: dict[str, tuple[float, str]] = {
     "bar/A": (1e5, "Pa/A"),
     "A*bar": (1e5, "A*Pa"),
     "N/bar": (1e-5, "N/Pa"),
+    "K": (1.0, "delta_degC"),
     "%": (1e-2, "1"),
     "": (1.0, "1"),
 }
@@ -52,6 +55,9 @@ _FACTOR = rf"(?:{_POWER}|\({_POWER}(?: *[*·] *{_POWER})*\))"
 _UNIT = re.compile(rf"(?:1? */ *)?{_FACTOR}(?:(?: *[*/·] *| +){_FACTOR})*")
 _MOMENT = re.compile(r"(?<=N)m(s?)(?![A-Za-z])")  # Nm, kNm, Nms: pint knows N*m alone
 _LONGEST = 100  # characters: no quantity is longer, and patterns stay quick on hostile text
+_WORDS = {"1": "a pure number", "delta_degC": "a temperature difference in K"}
+ICE = 273.15
+"""0 degC [K]"""
 # pint takes rad as a pure number: it would turn 60 rpm into 6.28 Hz, 1 into 57 degrees, and 2 mm
 # into 2 mm/rad where 2 mm/rev may be meant.
 _NO_MATTER_OF_RAD = ("Hz", "rad/s", "rad", "1", "m/rad")
@@ -148,6 +154,8 @@ def _number(text: str, symbol: str, name: str, nominal: float) -> float:
     common = _COMMON.get(unit)
     if common is not None and common[1] == symbol:
         return _rounded(size * common[0])
+    if (unit, symbol) == ("degC", "K"):
+        return _rounded(size + ICE)
     import pint
 
     try:
@@ -227,7 +235,7 @@ def _rounded(number: float) -> float:
 
 
 def _wanted(symbol: str) -> str:
-    return "a pure number" if symbol == "1" else symbol
+    return _WORDS.get(symbol, symbol)
 
 
 def shown(value: float, symbol: str) -> str:
@@ -237,15 +245,31 @@ def shown(value: float, symbol: str) -> str:
     return f"{number:.6g}" + ("" if unit == "1" else f" {unit}")
 
 
-def convert(value: float, symbol: str, unit: str) -> float:
-    """Return a value given in one unit in another of the same dimension."""
+def convert(value: F, symbol: str, unit: str) -> F:
+    """Return a value, or an array, given in one unit in another of the same dimension."""
     if symbol == unit:
         return value
+    if {symbol, unit} == {"K", "degC"}:
+        return value - ICE if unit == "degC" else value + ICE  # type: ignore[operator,return-value]
     common = _COMMON.get(unit)
     if common is not None and common[1] == symbol:
-        return value / common[0]
+        return value / common[0]  # type: ignore[operator,return-value]
     factor: float = registry().Quantity(1.0, symbol).to(unit).magnitude
-    return value * factor
+    return value * factor  # type: ignore[operator,return-value]
+
+
+def display_factor(symbol: str) -> float:
+    """Return what a difference of one SI unit is in the unit in which the edges show it.
+
+    Of values themselves it is the scale only where both have the same zero, see `convert`.
+
+    Examples
+    --------
+    >>> display_factor("Pa"), display_factor("K")
+    (1e-05, 1.0)
+    """
+    unit = display_unit(symbol)
+    return 1.0 if unit == "degC" else convert(1.0, symbol, unit)
 
 
 def example(symbol: str, nominal: float = 1.0) -> str:

@@ -21,7 +21,9 @@ from bywire.core.quantities import (
 from bywire.core.signals import Energy, Power, Role, Signal
 
 TemperatureCoefficient = Annotated[float, Unit("1/K", 2e-3), Field(ge=0, allow_inf_nan=False)]
-TemperatureRise = Annotated[float, Unit("K", 20.0), Field(ge=-100, le=200, allow_inf_nan=False)]
+TemperatureRise = Annotated[
+    float, Unit("delta_degC", 20.0), Field(ge=-100, le=200, allow_inf_nan=False)
+]
 PoleCount = Annotated[float, Unit("1", 180.0), Field(gt=0, allow_inf_nan=False)]
 Loss = Annotated[float, Signal("W", "copper loss", role=Role("sink", "copper", split=True))]
 DampingLoss = Annotated[

@@ -31,8 +31,8 @@ def bandwidth_range(
         Its name and SI unit.
     """
     figure, (axes,) = style.new_figure(2.9)
-    factor, _ = in_display_unit(1.0, symbol)
-    x, lowest, highest = factor * np.asarray(labels), *response["frequency"].values[[0, -1]]
+    x, _ = in_display_unit(np.asarray(labels), symbol)
+    lowest, highest = response["frequency"].values[[0, -1]]
     size_unit = str(response["amplitude"].attrs["units"])
     for (j, size), color in zip(enumerate(response["amplitude"].values), cycle(_COLORS)):
         y = response["bandwidth"].values[:, j]

@@ -73,5 +73,5 @@ def channel(recording: xr.Dataset, name: str) -> Channel:
         symbol=symbol,
         unit=unit,
         time=np.asarray(recording["time"].values, dtype=np.float64),
-        values=np.asarray(array.values, dtype=np.float64) * convert(1.0, symbol, unit),
+        values=convert(np.asarray(array.values, dtype=np.float64), symbol, unit),
     )

@@ -124,11 +124,9 @@ def _limits(
 def _curves(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
     """Draw the lines to compare with; return the legend's entries."""
     handles: list[Line2D | Patch] = []
-    factors = [
-        in_display_unit(1.0, str(data[name].attrs["units"]))[0] for name in (shown.x, shown.y)
-    ]  # fmt: skip
+    units = [str(data[name].attrs["units"]) for name in (shown.x, shown.y)]
     for k, (label, points) in enumerate(shown.curves.items()):
-        at = [factor * np.array(part) for factor, part in zip(factors, points, strict=True)]
+        at = [in_display_unit(np.array(part), u)[0] for part, u in zip(points, units, strict=True)]
         (handle,) = axes.plot(
             *at, color=style.VERMILLION, linewidth=1.3, linestyle=_CURVES[k % len(_CURVES)],
             zorder=4, label=style.plain(label),
@@ -161,8 +159,8 @@ def _marks(axes: Axes, data: xr.Dataset, shown: Map) -> list[Line2D | Patch]:
 
 
 def _displayed(variable: xr.DataArray) -> Array:
-    factor, _ = in_display_unit(1.0, str(variable.attrs["units"]))
-    return factor * np.asarray(variable.values, dtype=float)
+    values = np.asarray(variable.values, dtype=float)
+    return in_display_unit(values, str(variable.attrs["units"]))[0]
 
 
 def _label(variable: xr.DataArray) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 
+from bywire.core.units import display_factor
 from bywire.identification.estimate import Estimate
 from bywire.identification.method import Check, Identified
 from bywire.identification.trust import Trust
@@ -45,8 +46,8 @@ def estimate_table(
         number, half, unit = with_interval(float(value), 0.5 * float(high - low), unknown.unit)
         share = _percent(50.0 * float(high - low) / abs(value)) if value else "-"
         shown = in_display_unit(float(value), unknown.unit)[0]
-        reach = in_display_unit(0.5 * float(high - low), unknown.unit)[0]
-        off = abs(in_display_unit(float(error), unknown.unit)[0])
+        reach = display_factor(unknown.unit) * 0.5 * float(high - low)
+        off = display_factor(unknown.unit) * abs(float(error))
         by_step = [] if steps is None else [Cell(f"{off:.1g}", value=off)]
         rows.append(
             (unknown, [Cell(number, value=shown), Cell(half, value=reach), *by_step, Cell(share),
@@ -73,7 +74,7 @@ def estimate_table(
 def with_interval(value: float, half: float, symbol: str) -> tuple[str, str, str]:
     """Return value, half width of its interval and unit as texts, to two digits of the latter."""
     number, unit = in_display_unit(value, symbol)
-    reach = abs(in_display_unit(half, symbol)[0])
+    reach = display_factor(symbol) * abs(half)
     digits = 6
     if reach > 0.0 and number != 0.0:
         digits = min(max(math.floor(math.log10(abs(number)) - math.log10(reach)) + 2, 2), 9)

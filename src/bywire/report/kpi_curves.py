@@ -13,6 +13,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.core.typing import Array
+from bywire.core.units import display_factor
 from bywire.report import style
 from bywire.report.line_role import Role
 from bywire.report.wording import in_display_unit
@@ -62,23 +63,24 @@ def kpi_curves(varied: Varied) -> Figure:
     figure = Figure(figsize=(style.WIDTH, 0.6 + _HEIGHT * rows), layout="constrained",
                     facecolor="white")  # fmt: skip
     grid = figure.subplots(rows, _COLUMNS, sharex=True, squeeze=False)
-    abscissa = np.array([in_display_unit(v, varied.unit)[0] for v in varied.values])
+    abscissa = in_display_unit(np.array(varied.values), varied.unit)[0]
     for axes, name in zip(grid.flat, shown, strict=False):
         style.dress(axes)
         values, errors, unit = shown[name]
-        factor = in_display_unit(1.0, unit)[0]
+        values, errors = in_display_unit(values, unit)[0], display_factor(unit) * errors
         known = np.isfinite(errors)
-        axes.errorbar(abscissa[known], factor * values[known], factor * errors[known],
+        axes.errorbar(abscissa[known], values[known], errors[known],
                       fmt="none", ecolor=style.BLUE, elinewidth=0.8, capsize=2.0)  # fmt: skip
-        axes.plot(abscissa, factor * values, color=style.BLUE, linewidth=1.0, marker="o",
+        axes.plot(abscissa, values, color=style.BLUE, linewidth=1.0, marker="o",
                   markersize=3.0)  # fmt: skip
         if name in varied.bench.requirements:
             look = style.STROKES[Role.LIMIT]
             bound = limit_of(name, varied.bench.requirements[name], unit)[1]
-            axes.axhline(factor * bound, color=look.color, linestyle=look.linestyle,
+            bound = in_display_unit(bound, unit)[0]
+            axes.axhline(bound, color=look.color, linestyle=look.linestyle,
                          linewidth=look.linewidth)  # fmt: skip
             missed = _missed(name, varied.results)
-            axes.plot(abscissa[missed], factor * values[missed], color=look.color, marker="x",
+            axes.plot(abscissa[missed], values[missed], color=look.color, marker="x",
                       linestyle="none", markersize=6.0)  # fmt: skip
         style.few_ticks(axes, 4)
         axes.set_ylabel(style.axis_label(name.replace("_", " "), unit, "\n"))

@@ -8,9 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
-from bywire.core.units import convert
+from bywire.core.units import display_factor
 from bywire.identification.method import Curve
 from bywire.report import style
 from bywire.report.decimation import kept_samples
@@ -173,15 +172,14 @@ def _row(array: xr.DataArray, x: xr.DataArray, k: int) -> Array:
     curve = array.isel({others[0]: k}) if others else array
     values = np.asarray(curve.values, dtype=float)
     symbol = str(array.attrs.get("units", "1"))
-    return np.asarray(values * convert(1.0, symbol, display_unit(symbol)))
+    return in_display_unit(values, symbol)[0]
 
 
 def _abscissa(data: xr.Dataset, x: str, k: int) -> Array:
     """Return where a curve was read, in the display unit: all at the same places, or each alone."""
     symbol = str(data[x].attrs.get("units", "s" if x == "time" else "1"))
-    factor = convert(1.0, symbol, display_unit(symbol))
-    values = np.asarray(data[x].values, dtype=float)
-    return (values[k] if values.ndim > 1 else values) * factor
+    values = in_display_unit(np.asarray(data[x].values, dtype=float), symbol)[0]
+    return np.asarray(values[k] if values.ndim > 1 else values)
 
 
 def _x_label(data: xr.Dataset, x: str) -> str:
@@ -201,6 +199,6 @@ def _band_label(axes: Axes, half: Array, symbol: str) -> str:
     low, high = axes.get_ylim()
     figure = axes.get_figure()
     points = 0.0 if figure is None else 72.0 * axes.bbox.height / figure.dpi
-    drawn = 2.0 * in_display_unit(most, symbol)[0] / max(abs(high - low), 1e-300) * points
+    drawn = 2.0 * display_factor(symbol) * most / max(abs(high - low), 1e-300) * points
     hidden = ", within the line" if drawn < _LINE else ""
     return f"95 % band (± {amount(most, symbol, 2)} at most{hidden})"

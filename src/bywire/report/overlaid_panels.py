@@ -236,7 +236,7 @@ def _draw_limits(
     first: Channel,
 ) -> list[Line2D]:  # fmt: skip
     """Draw the limits of a panel's first trace where it comes near; each once."""
-    factor, stroke = convert(1.0, first.symbol, first.unit), style.STROKES[Role.LIMIT]
+    stroke = style.STROKES[Role.LIMIT]
     levels = [limit_of(recording, panel) for recording in recordings]
     is_one = len(set(levels)) == 1
     drawn = set()
@@ -244,9 +244,10 @@ def _draw_limits(
         if level is None:
             continue
         values = channel(recording, first.name).values
+        level = convert(level, first.symbol, first.unit)
         for side in (1.0, -1.0):
-            at = side * factor * level
-            if float(np.nanmax(side * values)) < NEAR * factor * level or at in drawn:
+            at = side * level
+            if float(np.nanmax(side * values)) < NEAR * level or at in drawn:
                 continue
             drawn.add(at)
             axes.axhline(

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from bywire.analysis.linear.linear_model import LinearModel
 from bywire.core.quantities import display_unit
-from bywire.core.units import convert
+from bywire.core.units import display_factor
 from bywire.report.bode import Response, bode
 from bywire.report.wording import unit_text
 
@@ -32,7 +32,7 @@ def plant_figures(models: Mapping[str, LinearModel], band: float) -> list[tuple[
         if not any(np.any(response[:, row, 0]) for response in values.values()):
             continue
         shown = display_unit(given)
-        scale = convert(1.0, given, shown) / convert(1.0, taken, display_unit(taken))
+        scale = display_factor(given) / display_factor(taken)
         unit = f"{unit_text(shown) or '1'}/{unit_text(display_unit(taken)) or '1'}"
         lines = []
         for k, (label, response) in enumerate(values.items()):

@@ -9,13 +9,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from bywire.core.quantities import display_unit
-from bywire.core.units import convert
+from bywire.core.units import display_factor
 from bywire.identification.replaying.fit import SegmentFit
 from bywire.report import style
 from bywire.report.channel import channel
 from bywire.report.decimation import decimate
 from bywire.report.line_role import Role
+from bywire.report.wording import in_display_unit
 
 _NAMED = 8  # segments up to which there is room for their names
 
@@ -50,17 +50,17 @@ def replay_figure(
         )  # fmt: skip
         top.set_ylabel(style.axis_label("demand", shown.symbol, "\n"))
     symbol = str(pair["measured"].attrs.get("units", "1"))
-    factor = convert(1.0, symbol, display_unit(symbol))
     for values, role, word in (
         (pair["measured"].values, Role.MEASURED, "measured"),
         (pair["modeled"].values, Role.SIMULATED, "simulated"),
     ):
         look = style.STROKES[role]
         middle.plot(
-            *decimate(scale * pair["time"].values, factor * values), color=look.color,
+            *decimate(scale * pair["time"].values, in_display_unit(values, symbol)[0]),
+            color=look.color,
             linestyle=look.linestyle, linewidth=look.linewidth, zorder=look.zorder, label=word,
         )  # fmt: skip
-    error = factor * (pair["modeled"].values - pair["measured"].values)
+    error = display_factor(symbol) * (pair["modeled"].values - pair["measured"].values)
     bottom.plot(*decimate(scale * pair["time"].values, error), color=style.PURPLE, linewidth=0.9)
     bottom.axhline(0.0, color=style.GRAY, linewidth=0.6)
     label = str(pair["measured"].attrs.get("long_name", name))

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from bywire.analysis.linear.rates import STILL
 from bywire.analysis.locus import Border, Locus
+from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.pole_map import slow_radius
 from bywire.report.s_plane import draw_plane, planes, shown_radius
@@ -40,12 +41,12 @@ def root_locus(locus: Locus, bandwidth: float) -> Figure:
     if not math.isfinite(bandwidth) and crossing > 0.0:
         slow = min(crossing, whole)
     figure, panels = planes(("poles", "the slow ones"), 4.6)
-    factor, _ = in_display_unit(1.0, locus.unit)
-    norm = Normalize(factor * locus.values[0], factor * locus.values[-1])
+    values, _ = in_display_unit(np.asarray(locus.values), locus.unit)
+    norm = Normalize(values[0], values[-1])
     for axes, radius in zip(panels, (whole, slow), strict=True):
         inside = rates[np.isfinite(rates) & (np.abs(rates) <= radius)]
         draw_plane(axes, radius, locus.period, float(np.max(inside.real, initial=0.0)))
-        _ways(axes, locus, norm, factor)
+        _ways(axes, locus, norm, values)
     bar = figure.colorbar(ScalarMappable(norm, _COLORS), ax=panels, aspect=40, pad=0.02,
                           format="%g")  # fmt: skip
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
@@ -75,7 +76,7 @@ def border_text(border: Border, name: str, unit: str) -> str:
     return f"unstable {side} {name} = {amount(border.value, unit)}: it {how}"
 
 
-def _ways(axes: Axes, locus: Locus, norm: Normalize, factor: float) -> None:
+def _ways(axes: Axes, locus: Locus, norm: Normalize, values: Array) -> None:
     rates = locus.rates
     for column in rates.T:
         moves = np.isfinite(column) & (np.abs(column) > STILL)
@@ -85,7 +86,7 @@ def _ways(axes: Axes, locus: Locus, norm: Normalize, factor: float) -> None:
         line = np.where(upper, column, np.nan)
         axes.plot(line.real, line.imag, color=style.GRAY, linewidth=0.6, zorder=2.0)
         axes.scatter(
-            line.real, line.imag, c=factor * locus.values, cmap=_COLORS, norm=norm, s=7, zorder=3,
+            line.real, line.imag, c=values, cmap=_COLORS, norm=norm, s=7, zorder=3,
             linewidths=0.0,
         )  # fmt: skip
     for k, marker, text in ((0, "x", "first"), (-1, "o", "last")):

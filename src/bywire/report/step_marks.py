@@ -103,16 +103,18 @@ def draw_limits(axes: Axes, limits: StepLimits, shown: Channel) -> None:
     ``axes``: axes in the display unit of ``shown``; ``limits``: the step; ``shown``: the channel
     that is judged.
     """
-    factor = convert(1.0, shown.symbol, shown.unit)
     scale, _ = style.time_scale(shown.time)
     span = [scale * limits.start, scale * float(shown.time[-1])]
-    low, high = (factor * limits.level(1.0 + side * limits.band) for side in (-1.0, 1.0))
+    low, high = (
+        convert(limits.level(1.0 + side * limits.band), shown.symbol, shown.unit)
+        for side in (-1.0, 1.0)
+    )
     axes.fill_between(
         span, min(low, high), max(low, high), color=style.GREEN, alpha=0.25, linewidth=0,
         zorder=1.5, label=f"±{100 * limits.band:g} % band",
     )
     if limits.overshoot is not None:
-        level = factor * limits.level(1.0 + limits.overshoot)
+        level = convert(limits.level(1.0 + limits.overshoot), shown.symbol, shown.unit)
         look = style.STROKES[Role.LIMIT]
         axes.plot(
             span, [level, level], color=look.color, linestyle=look.linestyle,

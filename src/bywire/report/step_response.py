@@ -82,11 +82,10 @@ def step_response(
 
 def _mark_facts(axes: Axes, shown: Channel, limits: StepLimits, facts: StepFacts) -> None:
     """Mark rise, overshoot and settling; their values stand in the legend, clear of the data."""
-    factor = convert(1.0, shown.symbol, shown.unit)
     scale, _ = style.time_scale(shown.time)
     if _given(facts.rise_time):
         shares = (facts.rise_from, facts.rise_to)
-        levels = [factor * limits.level(share) for share in shares]
+        levels = [convert(limits.level(share), shown.symbol, shown.unit) for share in shares]
         times = [scale * _first_crossing(shown, limits, level) for level in levels]
         label = f"rise {100 * shares[0]:g} to {100 * shares[1]:g} %: {duration(facts.rise_time)}"
         axes.plot(times, levels, "o", color=style.BLACK, markersize=4.5, zorder=4, label=label)

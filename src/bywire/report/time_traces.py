@@ -187,7 +187,7 @@ def _mark_limit(axes: Axes, panel: Panel, recording: xr.Dataset, first: Channel)
     level = limit_of(recording, panel)
     if level is None:
         return
-    level *= convert(1.0, first.symbol, first.unit)
+    level = convert(level, first.symbol, first.unit)
     look = style.STROKES[Role.LIMIT]
     sides = [s for s in (1.0, -1.0) if float(np.nanmax(s * first.values)) >= NEAR * level]
     for k, side in enumerate(sides):

@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.figure import Figure
 
-from bywire.core.quantities import display_unit
-from bywire.core.units import convert
 from bywire.identification.replaying.tracking import Track
 from bywire.report import style
 from bywire.report.line_role import Role
+from bywire.report.wording import in_display_unit
 
 
 def track_figure(track: Track, known: float | None = None) -> Figure:
@@ -25,11 +24,12 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
     figure, (axes,) = style.new_figure(3.6)
     data, name = track.data.isel(parameter=0), track.relation.parameter
     symbol = track.relation.units[0]
-    factor = convert(1.0, symbol, display_unit(symbol))
     scale, unit = style.time_scale(data["time"].values)
     t, used = scale * data["time"].values, data["used"].values > 0
     begun = np.cumsum(used) > 0
-    low, high, value = (factor * data[n].values for n in ("low", "high", "value"))
+    low, high, value = (
+        in_display_unit(data[n].values, symbol)[0] for n in ("low", "high", "value")
+    )
     axes.fill_between(
         t[begun], low[begun], high[begun], color=style.SKY, alpha=0.45, linewidth=0.0,
         label="95 % band",
@@ -40,13 +40,14 @@ def track_figure(track: Track, known: float | None = None) -> Figure:
         label="where the relation holds",
     )  # fmt: skip
     if known is not None:
+        known = in_display_unit(known, symbol)[0]
         look = style.STROKES[Role.SET_POINT]
         axes.axhline(
-            factor * known, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
+            known, color=look.color, linestyle=look.linestyle, linewidth=look.linewidth,
             label="parameter set",
         )  # fmt: skip
     if begun.any():
-        center = np.concatenate((value[used], [] if known is None else [factor * known]))
+        center = np.concatenate((value[used], [] if known is None else [known]))
         reach = float(np.median((high - low)[used]))
         axes.set_ylim(float(center.min()) - 2.0 * reach, float(center.max()) + 2.0 * reach)
     axes.ticklabel_format(axis="y", useOffset=False)

@@ -37,10 +37,10 @@ def value_scale(
     name, unit, values
         Quantity, its SI unit and its values.
     """
-    factor, _ = in_display_unit(1.0, unit)
+    low, high = in_display_unit(np.array([min(values), max(values)]), unit)[0]
     colors = mpl.colormaps[_COLORS].resampled(256)
     shown = ListedColormap(colors(np.linspace(0.0, _BRIGHTEST, 256)))
-    norm = Normalize(factor * min(values), factor * max(values))
+    norm = Normalize(low, high)
     bar = figure.colorbar(ScalarMappable(norm, shown), ax=panels, aspect=40, pad=0.02)
     bar.ax.tick_params(labelsize=style.TEXT_SIZE)
     bar.set_label(style.axis_label(name, unit), fontsize=style.TEXT_SIZE)

@@ -5,13 +5,15 @@ from __future__ import annotations
 import math
 import re
 import unicodedata
+from typing import TypeVar
 
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
 
+F = TypeVar("F")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_NAMES = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°"}
+_NAMES = {"ohm": "Ω", "percent": "%", "degree": "°", "deg": "°", "degC": "°C"}
 
 
 def clean(text: object) -> str:
@@ -43,8 +45,8 @@ def unit_text(symbol: str) -> str:
     return re.sub(r"[A-Za-z]+", lambda m: _NAMES.get(m[0], m[0]), dotted)
 
 
-def in_display_unit(value: float, symbol: str) -> tuple[float, str]:
-    """Return a value and its unit as the edges show them, for instance bar instead of Pa."""
+def in_display_unit(value: F, symbol: str) -> tuple[F, str]:
+    """Return a value, or an array, and its unit as the edges show them: bar instead of Pa."""
     unit = display_unit(symbol)
     return convert(value, symbol, unit), unit
 
@@ -109,7 +111,7 @@ def measured_amount(value: float | None, symbol: str, error: float, digits: int 
     if value is None or not (math.isfinite(value) and math.isfinite(error)):
         return amount(value, symbol, digits)
     number, unit = _readable(value, value, symbol)
-    possible, _ = _readable(error, value, symbol)
+    possible = _readable_difference(error, value, symbol)[0]
     last = math.floor(math.log10(possible)) if possible > 0 else -400  # no float has that place
     first = math.floor(math.log10(abs(number))) if number else last
     if last <= first - digits + 1 or last == -400:
@@ -135,9 +137,14 @@ def error_text(value: float | None, symbol: str, error: float) -> str:
         return "-"
     if math.isinf(error):
         return "unknown"
-    number, unit = _readable(error, value, symbol)
+    number, unit = _readable_difference(error, value, symbol)
     written = unit_text(unit)
     return f"{float(f'{number:.1g}'):g}" + (f" {written}" if written and number else "")
+
+
+def _readable_difference(number: float, value: float, symbol: str) -> tuple[float, str]:
+    """Return a difference in the unit in which a value reads best; of temperatures in K."""
+    return (number, "K") if display_unit(symbol) == "degC" else _readable(number, value, symbol)
 
 
 def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:

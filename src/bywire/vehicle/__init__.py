@@ -1,6 +1,15 @@
 """Vehicles around any brake: what they share, and what is said of their stops."""
 
 from bywire.vehicle.corner import Corner, CornerParameters
+from bywire.vehicle.hot_brakes import HotBrakes, cold_start
 from bywire.vehicle.two_wheeler import TwoWheeler, VehicleParameters, rolling_start
 
-__all__ = ["Corner", "CornerParameters", "TwoWheeler", "VehicleParameters", "rolling_start"]
+__all__ = [
+    "Corner",
+    "CornerParameters",
+    "HotBrakes",
+    "TwoWheeler",
+    "VehicleParameters",
+    "cold_start",
+    "rolling_start",
+]

@@ -20,7 +20,7 @@ BAD = [
     ("wedge.alpha=90deg", "alpha = 90 deg is not admissible: it must be > 0 deg and < 90 deg\n"),
     ("wedge.alpha=1600 mrad", "alpha = 1600 mrad is not admissible: it must be > 0 mrad"),
     ("wedge.alpha=1", "a pure number cannot be rad"),
-    ("motor_1.dT=40 degC", "a temperature difference is wanted, in K"),
+    ("motor_1.dT=40 degC", "degC cannot be a temperature difference in K"),
     ("caliper.n_table=0 mm, 1 mm, 0.5 mm", "as node 3 of 3, 0.0005 m follows 0.001 m"),
     ("wedge.alpha=20mm", "mm cannot be rad"),
     ("screw.eta_f=0", "screw.eta_f = 0.0 is not admissible: it must be > 0 and <= 1"),

@@ -32,6 +32,7 @@ def rolling_case(
     duration: float,
     changes: Mapping[str, Any] | None = None,
     label: str = "run",
+    heat: Mapping[str, Any] | None = None,
 ) -> Case:
     """Return a run that begins rolling at a speed [m/s]; the rider demands from time zero on.
 
@@ -41,9 +42,11 @@ def rolling_case(
         Pressure demand [Pa] by name of the stimulus.
     changes
         Parameters that the experiment sets.
+    heat
+        Temperatures of the brakes at the start, by their parts; cold by default.
     """
     changed = par.replace(dict(changes or {}))
-    state, memory = at_speed(v_0, changed)
+    state, memory = at_speed(v_0, changed, heat)
 
     def stimulus(t: Array) -> dict[str, Array]:
         return {name: np.where(t < -1e-9, 0.0, p) for name, p in demands.items()}

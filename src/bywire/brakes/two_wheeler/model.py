@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any, ClassVar, Self
 
 from bywire.brakes.two_wheeler import ecu
@@ -10,12 +11,13 @@ from bywire.core.model import Task
 from bywire.core.parts import Part
 from bywire.core.signals import zeros
 from bywire.plant import brake_disc, pressure_loop, road, road_wheel, wheel_encoder
-from bywire.vehicle.two_wheeler import TwoWheeler, rolling_start
+from bywire.vehicle.hot_brakes import HotBrakes, cold_start
+from bywire.vehicle.two_wheeler import rolling_start
 
 Par = TwoWheelerParameters
 
 
-class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
+class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
     """Each brake follows its demand as a loop of second order, as fast as its bandwidth."""
 
     name: ClassVar[str] = "two-wheeler-by-wire"
@@ -35,11 +37,12 @@ class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
         "phi_rate", "p_f", "p_r", "p_f_ref", "p_r_ref", "v_hat", "slip_f_hat", "slip_r_hat",
         "a_hat", "eta_f", "abs_f", "abs_r", "lift", "T_f", "T_r", "t_locked_f", "t_locked_r",
         "E_vehicle", "E_brake_f", "E_brake_r", "E_tyre_f", "E_tyre_r", "E_drag", "E_roll",
-        "E_ground", "W_slope", "W_pitch",
+        "E_ground", "W_slope", "W_pitch", "T_disc_f", "T_pads_f", "T_fluid_f", "T_disc_r",
+        "T_pads_r", "T_fluid_r", "E_friction", "E_discs", "E_pads", "E_fluid", "E_air",
     )  # fmt: skip
 
-    def brake_torques(self, w: Self) -> tuple[float, float]:
-        """Return what the discs hold at the pressures of both circuits."""
+    def cold_torques(self, w: Self) -> tuple[float, float]:
+        """Return what cold discs hold at the pressures of both circuits."""
         w.front_circuit.u = pressure_loop.Input(w.m.p_f_ref)
         w.rear_circuit.u = pressure_loop.Input(w.m.p_r_ref)
         w.front_encoder.u = wheel_encoder.Input(w.front.x.omega)
@@ -60,15 +63,21 @@ class TwoWheelerByWire(TwoWheeler[TwoWheelerParameters, ecu.Memory]):
         return at_speed(0.0, par)
 
 
-def at_speed(v: float, par: Par) -> tuple[Any, ecu.Memory]:
-    """Return the vehicle rolling at a speed [m/s], brakes open, its ECU awake."""
+def at_speed(
+    v: float, par: Par, heat: Mapping[str, Any] | None = None
+) -> tuple[Any, ecu.Memory]:
+    """Return the vehicle rolling at a speed [m/s], brakes open, its ECU awake.
+
+    ``heat``: temperatures of the brakes by their parts, see `cold_start`, which is the default.
+    """
     front, rear = v / par.vehicle.front_wheel.r, v / par.vehicle.rear_wheel.r
     T = par.ecu.T_s
     memory = zeros(ecu.Memory)._replace(
         v_hat=v, v_last=v, tread_f=v, tread_r=v, omega_f_hat=front, omega_r_hat=rear,
         edge_f=-front * T, edge_r=-rear * T,
     )  # fmt: skip
-    return TwoWheelerByWire.state(**rolling_start(v, par.vehicle)), memory
+    brakes = cold_start(par.front.heat, par.rear.heat) if heat is None else heat
+    return TwoWheelerByWire.state(**rolling_start(v, par.vehicle), **brakes), memory
 
 
 def _tick(x: Any, m: ecu.Memory, u: ecu.Stimulus, par: Par) -> ecu.Memory:

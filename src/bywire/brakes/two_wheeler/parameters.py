@@ -9,7 +9,7 @@ from pydantic import Field
 from bywire.control import lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
-from bywire.plant import brake_disc, pressure_loop, wheel_encoder
+from bywire.plant import brake_disc, disc_heat, pressure_loop, wheel_encoder
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 PressureRate = Annotated[float, Unit("Pa/s", 2e7), Field(gt=0, allow_inf_nan=False)]
@@ -21,6 +21,12 @@ class BrakeParameters(ParameterSet):
 
     circuit: pressure_loop.Parameters
     disc: brake_disc.Parameters
+
+
+class HotBrakeParameters(BrakeParameters):
+    """A brake that may warm up."""
+
+    heat: disc_heat.Parameters
 
 
 class SensorParameters(ParameterSet):
@@ -64,7 +70,7 @@ class TwoWheelerParameters(ParameterSet):
     """The whole vehicle."""
 
     vehicle: VehicleParameters
-    front: BrakeParameters
-    rear: BrakeParameters
+    front: HotBrakeParameters
+    rear: HotBrakeParameters
     sensors: SensorParameters
     ecu: EcuParameters

@@ -45,13 +45,13 @@ def exceedance(curves: Sequence[Curve]) -> Figure:
     figure, panels = style.new_figure(0.5 + 2.0 * len(curves), [1.0] * len(curves))
     look = style.STROKES[Role.LIMIT]
     for axes, each in zip(panels, curves, strict=True):
-        factor = in_display_unit(1.0, each.unit)[0]
         known = each.probability > 0.0
-        values = factor * each.values[known]
+        values = in_display_unit(each.values[known], each.unit)[0]
+        limit = in_display_unit(each.limit, each.unit)[0]
         axes.fill_between(values, each.low[known], each.high[known], color=style.SHADE,
                           label="interval")  # fmt: skip
         axes.plot(values, each.probability[known], color=style.BLUE, label="estimate")
-        axes.axvline(factor * each.limit, color=look.color, linestyle=look.linestyle,
+        axes.axvline(limit, color=look.color, linestyle=look.linestyle,
                      linewidth=look.linewidth, label="limit, admitted")  # fmt: skip
         axes.axhline(each.admitted, color=look.color, linestyle=look.linestyle,
                      linewidth=look.linewidth)  # fmt: skip

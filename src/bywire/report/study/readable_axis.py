@@ -9,9 +9,11 @@ import numpy as np
 from matplotlib.axis import Axis
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
+from bywire.core.quantities import display_unit
 from bywire.core.typing import Array
+from bywire.core.units import display_factor
 from bywire.report import style
-from bywire.report.wording import in_display_unit, measured_amount, unit_text
+from bywire.report.wording import measured_amount, unit_text
 
 _CHARACTER = 0.62 * style.TEXT_SIZE / 72.0  # width of a digit [inch], rounded off
 _GAP = 2  # characters between two labels, at least
@@ -48,7 +50,9 @@ def scale_of(values: Array, symbol: str) -> Scale:
     >>> scale_of(np.array([0.06]), "s"), scale_of(np.array([1.1e6]), "N/m")
     (Scale(factor=1000.0, unit='ms'), Scale(factor=1e-06, unit='10⁶ N/m'))
     """
-    factor, unit = in_display_unit(1.0, symbol)
+    factor, unit = display_factor(symbol), display_unit(symbol)
+    if unit == "degC":  # an axis has a factor and no offset
+        unit = "K"
     largest = float(np.max(np.abs(values[np.isfinite(values)]), initial=0.0))
     if symbol == "s" and 0.0 < largest < 1.0:
         factor, unit = 1e3, "ms"

@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
+from bywire.core.units import display_factor
 from bywire.report import style
-from bywire.report.wording import in_display_unit
 from bywire.studies.sensitivity import ElementaryEffects, VarianceShares
 
 Drivers = Sequence[VarianceShares] | Sequence[ElementaryEffects]
@@ -46,7 +46,7 @@ def sensitivity_bars(drivers: Mapping[str, Drivers], units: Mapping[str, str]) -
         style.dress(axes)
         axes.set_title(style.plain(name.replace("_", " ")), fontsize=style.TEXT_SIZE, loc="left")
         is_share = isinstance(each[0], VarianceShares)
-        _draw(axes, each, 1.0 if is_share else in_display_unit(1.0, units[name])[0])
+        _draw(axes, each, 1.0 if is_share else display_factor(units[name]))
         axes.set_xlabel(
             "share of the variance [-]" if is_share
             else style.axis_label("elementary effect", units[name])

@@ -9,7 +9,8 @@ from bywire.core.provenance import chosen, derived
 from bywire.plant.road import SURFACES
 
 _FROM = {
-    "wheel": "vehicle.front_wheel", "tyre": "vehicle.front_tyre", "brake": "front",
+    "wheel": "vehicle.front_wheel", "tyre": "vehicle.front_tyre", "brake.circuit": "front.circuit",
+    "brake.disc": "front.disc",
     "slip": "ecu.front_slip",
 }  # fmt: skip
 
