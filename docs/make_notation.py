@@ -34,8 +34,8 @@ from bywire.report.wording import amount, range_text, unit_text
 
 HERE = Path(__file__).parent
 NOTE = "<!-- Written by docs/make_notation.py; change the code that it lists, not this page. -->"
-GREEK = ("alpha", "beta", "gamma", "delta", "eta", "theta", "mu", "nu", "rho", "sigma", "tau",
-         "omega", "zeta")  # fmt: skip
+GREEK = ("alpha", "beta", "gamma", "delta", "epsilon", "eta", "theta", "mu", "nu", "psi", "rho",
+         "sigma", "tau", "omega", "zeta")  # fmt: skip
 # Heads of names whose symbol in the literature is another one.
 SYMBOLS = {"omega": r"\Omega", "duty": "D", "torque": "T", "voltage": "v", "force": "F",
            "current": "i", "friction": "T_{fr}", "Re": r"\mathrm{Re}"}  # fmt: skip

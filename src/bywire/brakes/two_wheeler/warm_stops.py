@@ -86,6 +86,6 @@ def at_end(rows: Mapping[str, Array]) -> Heat:
     return {part: heat_of(rows, end, -1) for part, (_, end) in BRAKES.items()}
 
 
-def heat_of(rows: Mapping[str, Any], end: str, k: int) -> disc_heat.State:
-    """Return the temperatures of the brake of a suffix in row ``k``."""
+def heat_of(rows: Any, end: str, k: int) -> disc_heat.State:
+    """Return the temperatures of the brake of a suffix in row ``k`` of rows or a recording."""
     return disc_heat.State(*(float(rows[n + end][k]) for n in disc_heat.State._fields))

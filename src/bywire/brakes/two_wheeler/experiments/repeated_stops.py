@@ -18,19 +18,11 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.brakes.two_wheeler import warm_stops
 from bywire.brakes.two_wheeler.case import RidingSpeed, rolling_case
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.brakes.two_wheeler.warm_stops import (
-    BRAKES,
-    TEMPERATURES,
-    WARM,
-    Heat,
-    at_end,
-    braked,
-    cooled,
-    heat_of,
-)
+from bywire.brakes.two_wheeler.warm_stops import BRAKES, TEMPERATURES, WARM, Heat
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Unit, Weight
@@ -118,13 +110,13 @@ def _series(par: TwoWheelerParameters, options: Options) -> tuple[_Stop, ...]:
     stops: list[_Stop] = []
     for k in range(round(options.stops)):
         if stops:
-            t = np.array([0.0, options.pause])
-            heat = at_end(cooled(at_end(stops[-1].rows), par, options.v_pause, t))
+            left, way = warm_stops.at_end(stops[-1].rows), np.array([0.0, options.pause])
+            heat = warm_stops.at_end(warm_stops.cooled(left, par, options.v_pause, way))
         case = _case(par, options, heat, f"stop {k + 1}")
         try:
-            rows = braked(case)
+            rows = warm_stops.braked(case)
         except ParameterError:  # faded brakes take longer
-            rows = braked(replace(case, duration=case.duration * _LONGEST))
+            rows = warm_stops.braked(replace(case, duration=case.duration * _LONGEST))
         stops.append(_Stop(case, rows))
     return tuple(stops)
 
@@ -157,7 +149,8 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
         is_last = k + 1 == len(every)
         v = 0.0 if is_last else options.v_pause
         whole, count = (options.parked, _PARKED_ROWS) if is_last else (options.pause, _ROWS)
-        after = cooled(at_end(rows), warm, v, np.linspace(0.0, whole, count + 1))
+        t = np.linspace(0.0, whole, count + 1)
+        after = warm_stops.cooled(warm_stops.at_end(rows), warm, v, t)
         inside = slice(1, None if is_last else -1)  # the next stop has the last instant
         rest = {name: y[inside] for name, y in after.items()}
         still = 0.0 * rest["time"]
@@ -176,7 +169,7 @@ def _dataset(par: TwoWheelerParameters, pieces: list[dict[str, Array]]) -> xr.Da
         for brake, end in BRAKES.values()
         for text in disc_heat.watch(
             t,
-            disc_heat.State(*(rows[name + end] for name in disc_heat.State._fields)),
+            disc_heat.State._make(rows[name + end] for name in disc_heat.State._fields),
             par.value(f"{brake}.heat"),
         )
     ]
@@ -199,8 +192,8 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         for kpi in EACH(f"_{k}", disc_before=float(T[0]), disc_after=float(T[-1]))
     ]
     last = int(np.flatnonzero(number)[-1])
-    hot = heat_of(course, "_f", last)
-    par = TwoWheelerParameters.model_validate_json(course.attrs["parameters"]).replace(WARM)
+    hot = warm_stops.heat_of(course, "_f", last)
+    par = TwoWheelerParameters.model_validate_json(recordings["first"].attrs["parameters"])
     cold = options.share * _pressure(par, options, "front")
     fluid, t = course["T_fluid_f"].values, course["time"].values
     distances = [_distance(recordings[label]) for label in ("first", "last")]
