@@ -94,7 +94,8 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     posted, of what is switched off, are left out.
     """
     main = _main_book(recording)
-    books = {name: _ledger(recording, name) for name in _books(recording) if name not in ("", main)}
+    names = [name for name in _books(recording) if name not in ("", main)]
+    books = {name: _ledger(recording, name) for name in names}
     return {
         name: each for name, each in books.items()
         if any(np.any(posting.energy) for posting in (*each.sources, *each.sinks))
@@ -102,15 +103,17 @@ def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
 
 
 def _main_book(recording: xr.Dataset) -> str:
-    """Return the book that stands first: that of the actuator where there is one."""
-    books = _books(recording)
+    """Return the book that stands first: that of the actuator where it takes anything."""
+    books = _books(recording, ("sink",))
     return "" if "" in books else next(iter(books), "")
 
 
-def _books(recording: xr.Dataset) -> dict[str, None]:
-    """Return the names of all books that take something, in the order of the recording."""
+def _books(
+    recording: xr.Dataset, sides: tuple[str, ...] = ("source", "sink", "standstill")
+) -> dict[str, None]:
+    """Return the names of all books with postings on some sides, in the recording's order."""
     roles = _roles(recording, _changes(recording)).values()
-    return dict.fromkeys(role.book for role in roles if role.side == "sink")
+    return dict.fromkeys(role.book for role in roles if role.side in sides)
 
 
 def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str, str]) -> Ledger:
