@@ -19,7 +19,7 @@ _DERIVED = {
     "1": "", "rad": "", "Hz": "1/s", "N": "kg*m/s**2", "Pa": "kg/(m*s**2)", "J": "kg*m**2/s**2",
     "N*m": "kg*m**2/s**2", "W": "kg*m**2/s**3", "C": "A*s", "V": "kg*m**2/(s**3*A)",
     "ohm": "kg*m**2/(s**3*A**2)", "H": "kg*m**2/(s**2*A**2)", "F": "s**4*A**2/(kg*m**2)",
-    "T": "kg/(s**2*A)", "Wb": "kg*m**2/(s**2*A)", "N*m/A": "kg*m**2/(s**2*A)",
+    "delta_degC": "K", "T": "kg/(s**2*A)", "Wb": "kg*m**2/(s**2*A)", "N*m/A": "kg*m**2/(s**2*A)",
 }  # fmt: skip
 _PURE = frozenset({"exp", "log", "sin", "cos", "floor"})
 

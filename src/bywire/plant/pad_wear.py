@@ -15,7 +15,7 @@ from bywire.core.signals import ContactCompliance, Signal
 Count = Annotated[float, Unit("1", 2.0), Field(ge=1, allow_inf_nan=False)]
 WearPerWork = Annotated[float, Unit("m**3/J", 3e-14), Field(gt=0, allow_inf_nan=False)]
 AbsoluteTemperature = Annotated[float, Unit("K", 400.0), Field(gt=0, le=2000, allow_inf_nan=False)]
-Activation = Annotated[float, Unit("K", 3e3), Field(ge=0, allow_inf_nan=False)]
+Activation = Annotated[float, Unit("delta_degC", 3e3), Field(ge=0, allow_inf_nan=False)]
 Modulus = Annotated[float, Unit("Pa", 5e8), Field(gt=0, allow_inf_nan=False)]
 
 

@@ -49,7 +49,7 @@ def life_figure(courses: Sequence[Course], marks: Sequence[int]) -> Figure:
     """
     figure, rows = style.new_figure(0.5 + _HEIGHT * len(courses), [1.0] * len(courses))
     for axes, course in zip(rows, courses, strict=True):
-        shown = in_display_unit(1.0, course.unit)[0] * course.values
+        shown = in_display_unit(course.values, course.unit)[0]
         stops = np.arange(shown.size, dtype=float)
         axes.plot(*decimate(stops, shown), color=style.BLUE, linewidth=1.2)
         axes.plot(marks, shown[list(marks)], color=style.BLUE, marker="o", markersize=2.2,

@@ -8,7 +8,7 @@ from bywire.bench.energy_ledger import further_ledgers
 from bywire.bench.experiment import as_run
 from bywire.brakes.two_wheeler.case import rolling_case
 from bywire.brakes.two_wheeler.experiments import repeated_stops
-from bywire.brakes.two_wheeler.warm_stops import WARM, cooled
+from bywire.brakes.two_wheeler.stop_series import WARM, cooled
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import disc_heat
 from bywire.simulation.run import simulate

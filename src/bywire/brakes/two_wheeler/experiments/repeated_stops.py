@@ -18,11 +18,11 @@ from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.brakes.two_wheeler import warm_stops
+from bywire.brakes.two_wheeler import stop_series
 from bywire.brakes.two_wheeler.case import RidingSpeed, rolling_case
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
-from bywire.brakes.two_wheeler.warm_stops import BRAKES, TEMPERATURES, WARM, Heat
+from bywire.brakes.two_wheeler.stop_series import BRAKES, TEMPERATURES, WARM, Heat
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Unit, Weight
@@ -110,13 +110,13 @@ def _series(par: TwoWheelerParameters, options: Options) -> tuple[_Stop, ...]:
     stops: list[_Stop] = []
     for k in range(round(options.stops)):
         if stops:
-            left, way = warm_stops.at_end(stops[-1].rows), np.array([0.0, options.pause])
-            heat = warm_stops.at_end(warm_stops.cooled(left, par, options.v_pause, way))
+            left, way = stop_series.at_end(stops[-1].rows), np.array([0.0, options.pause])
+            heat = stop_series.at_end(stop_series.cooled(left, par, options.v_pause, way))
         case = _case(par, options, heat, f"stop {k + 1}")
         try:
-            rows = warm_stops.braked(case)
+            rows = stop_series.braked(case)
         except ParameterError:  # faded brakes take longer
-            rows = warm_stops.braked(replace(case, duration=case.duration * _LONGEST))
+            rows = stop_series.braked(replace(case, duration=case.duration * _LONGEST))
         stops.append(_Stop(case, rows))
     return tuple(stops)
 
@@ -150,7 +150,7 @@ def static(par: TwoWheelerParameters, options: Options) -> dict[str, xr.Dataset]
         v = 0.0 if is_last else options.v_pause
         whole, count = (options.parked, _PARKED_ROWS) if is_last else (options.pause, _ROWS)
         t = np.linspace(0.0, whole, count + 1)
-        after = warm_stops.cooled(warm_stops.at_end(rows), warm, v, t)
+        after = stop_series.cooled(stop_series.at_end(rows), warm, v, t)
         inside = slice(1, None if is_last else -1)  # the next stop has the last instant
         rest = {name: y[inside] for name, y in after.items()}
         still = 0.0 * rest["time"]
@@ -192,7 +192,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         for kpi in EACH(f"_{k}", disc_before=float(T[0]), disc_after=float(T[-1]))
     ]
     last = int(np.flatnonzero(number)[-1])
-    hot = warm_stops.heat_of(course, "_f", last)
+    hot = stop_series.heat_of(course, "_f", last)
     par = TwoWheelerParameters.model_validate_json(recordings["first"].attrs["parameters"])
     cold = options.share * _pressure(par, options, "front")
     fluid, t = course["T_fluid_f"].values, course["time"].values
