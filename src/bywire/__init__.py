@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bywire.api.replay import Replay, replay
     from bywire.api.reproduce import reproduce
     from bywire.api.run import BenchResult, run
+    from bywire.api.run_faults import run_faults
     from bywire.api.run_over import BenchRange
     from bywire.api.run_study import resume_study, run_study, study_report
     from bywire.api.study import study
@@ -75,6 +76,7 @@ _HOMES = {
     "Sensitivity": "simulation.sensitivity",
     "Trajectory": "simulation.run",
     "StudyRun": "api.study_run",
+    "run_faults": "api.run_faults",
     "run_study": "api.run_study",
     "resume_study": "api.run_study",
     "study_report": "api.run_study",
@@ -156,6 +158,7 @@ __all__ = [
     "resample",
     "resume_study",
     "run",
+    "run_faults",
     "run_study",
     "simulate",
     "simulate_ensemble",

@@ -17,7 +17,8 @@ from bywire.report.tables import Table, text_table
 
 TOPICS = (
     "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-    "plants", "studies", "lives", "methods", "stimuli", "faults", "kpis", "kpis_of_experiments",
+    "plants", "studies", "lives", "methods", "stimuli", "faults", "campaigns", "kpis",
+    "kpis_of_experiments",
 )  # fmt: skip
 """kinds of things that have a name"""
 _WIDTH = 80  # characters of a line of the index

@@ -11,6 +11,7 @@ from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
+from bywire.campaigns.declared import CAMPAIGNS
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import unknown_name
@@ -44,6 +45,7 @@ def all_things() -> dict[str, Any]:
         "methods": {m.name: _method(m) for m in _in_order(METHODS)} | for_benches,
         "stimuli": {stimulus.name: stimulus.summary for stimulus in STIMULI.all().values()},
         "faults": fault_summaries(),
+        "campaigns": {each.name: each.summary for each in CAMPAIGNS.all().values()},
         "kpis": {kpi.name: kpi.definition for kpi in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments},
     }

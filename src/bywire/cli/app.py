@@ -17,6 +17,7 @@ from bywire.cli.bench_commands import (
 from bywire.cli.brake_commands import check_command, new_command
 from bywire.cli.compare_command import compare
 from bywire.cli.data_commands import convert
+from bywire.cli.fault_commands import faults_command
 from bywire.cli.identification_commands import identify, replay
 from bywire.cli.life_command import life_command
 from bywire.cli.loop_commands import (
@@ -48,7 +49,11 @@ app.command("agreement")(agreement_command)
 app.command("margins")(margins_command)
 study_app.command("size")(study_command)
 app.add_typer(study_app, name="study")
+<<<<<<< HEAD
 app.command("life")(life_command)
+=======
+app.command("faults")(faults_command)
+>>>>>>> 72b9b2d (Campaigns of faults: every failure beside its healthy twin, residuals tuned and judged apart, coverage, reactions)
 app.command("design")(design_command)
 app.command("convert")(convert)
 app.command("identify")(identify)

@@ -264,6 +264,8 @@ class StudyPlan:
             "design": self.design, "seed": self.seed, "chunk": CHUNK,
             "levels": 0 if self.is_sampled else self.levels,
         }  # fmt: skip
+        if bench.faults:
+            said["faults"] = bench.faults
         if self.sensitivity is not None:
             # Indices are of all groups together. The points themselves, for a library draws them.
             said["groups"] = self.sensitivity.base

@@ -74,11 +74,13 @@ def _plan(
     name = content.get("name", file.stem)
     if not isinstance(name, str) or not name.strip():
         raise ParameterError(f"name = {quoted(name)}: a text is wanted")
-    bench = _bench(content, file.parent, overrides)
+    bench = read_bench(content, file.parent, overrides)
     demands = tuple(_demands(bench, content.get("requirements", {})))
     limits = {demand.kpi: demand.limit for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or name)
-    varied, measured = _all_varied(bench, content, file.parent)
+    varied, measured = read_varied(bench, content, file.parent)
+    if not varied:
+        raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
     correlations = {**measured, **_correlations(content.get("correlation", []), varied, measured)}
     plan = StudyPlan(
         name, bench, varied, demands=demands, correlations=correlations,
@@ -88,9 +90,10 @@ def _plan(
     return plan
 
 
-def _bench(
+def read_bench(
     content: Mapping[str, Any], folder: Path, overrides: Mapping[str, str]
 ) -> Bench:
+    """Return the bench that a file names, with the changes of its ``[set]`` and further ones."""
     source = content.get("bench")
     if not isinstance(source, str) or not source.strip():
         raise ParameterError(
@@ -128,7 +131,7 @@ def _probability(kpi: str, text: str) -> float:
     return share
 
 
-def _all_varied(
+def read_varied(
     bench: Bench, content: Mapping[str, Any], folder: Path
 ) -> tuple[tuple[Varied, ...], Mapping[tuple[str, str], float]]:
     """Return what varies, as the file says or as it was measured, and what goes together so."""
@@ -136,9 +139,13 @@ def _all_varied(
     correlations: Mapping[tuple[str, str], float] = {}
     if "measured" in content:
         measured, correlations = varied_as_measured(bench, content["measured"], folder)
+<<<<<<< HEAD
     varied = (*measured, *read_varied(bench, content.get("vary", {})))
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
+=======
+    varied = (*measured, *_varied(bench, content.get("vary", {})))
+>>>>>>> 72b9b2d (Campaigns of faults: every failure beside its healthy twin, residuals tuned and judged apart, coverage, reactions)
     names = [name for each in varied for name in (each.name, *each.together)]
     for name in names:
         if names.count(name) > 1:

@@ -127,14 +127,26 @@ def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
             raise ParameterError(f"{where}: {mode.name} takes no value: leave it out")
         return 0.0
     value = number(section.get("value", mode.value), mode.unit, f"{where}.value")
+    require_admissible(mode, value, f"{where}.value")
+    return value
+
+
+def require_admissible(mode: Mode, value: float, where: str) -> None:
+    """Refuse a value that a mode cannot have.
+
+    Raises
+    ------
+    ParameterError
+        With the range; what changes parameters is checked with these.
+    """
     low, high = _RANGES.get(mode.falsified, (float("-inf"), float("inf")))
-    if not low <= value <= high or (mode.falsified in ("late", "dropped") and value % 1):
-        kind = "a whole number" if mode.falsified in ("late", "dropped") else "a number"
+    is_whole = mode.falsified in ("late", "dropped")
+    if not low <= value <= high or (is_whole and value % 1):
+        kind = "a whole number" if is_whole else "a number"
         raise ParameterError(
-            f"{where}.value = {value:g} of {mode.name} is not admissible: {kind} from {low:g} to "
+            f"{where} = {value:g} of {mode.name} is not admissible: {kind} from {low:g} to "
             f"{high:g} is wanted"
         )
-    return value
 
 
 def _unknown(name: str, modes: Mapping[str, Mode]) -> UnknownNameError:

@@ -92,13 +92,13 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     U_caliper = Shown("J", "energy of the caliper")
 
     records: ClassVar[tuple[str, ...]] = (
-        "M_set", "M_B", "y_M", "mode", "rate", "sat_rate", "theta_c", "theta_ref", "theta_1_ref",
-        "theta_2_ref", "theta_1", "theta_2", "omega_1", "omega_2", "i_1_ref", "i_2_ref", "i_1",
-        "i_2", "voltage_1", "voltage_2", "x", "v", "f_1", "f_2", "f_12", "F_M", "F_N", "F_end",
-        "T_fr_1", "T_fr_2", "F_fr", "Omega", "phi", "contacts", "stuck", "P_in", "P_meas",
-        "E_source", "E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart", "E_caliper",
-        "E_stop", "E_stored", "U_caliper", "W_supply", "W_electric", "W_disc", "W_runout",
-        "W_brake", "t_stuck",
+        "M_set", "M_B", "y_M", "M_meas", "mode", "rate", "sat_rate", "theta_c", "theta_ref",
+        "theta_1_ref", "theta_2_ref", "theta_1", "theta_2", "omega_1", "omega_2", "i_1_ref",
+        "i_2_ref", "i_1", "i_2", "voltage_1", "voltage_2", "x", "v", "f_1", "f_2", "f_12", "F_M",
+        "F_N", "F_end", "T_fr_1", "T_fr_2", "F_fr", "Omega", "phi", "contacts", "stuck", "P_in",
+        "P_meas", "E_source", "E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart",
+        "E_caliper", "E_stop", "E_stored", "U_caliper", "W_supply", "W_electric", "W_disc",
+        "W_runout", "W_brake", "t_stuck",
     )  # fmt: skip
 
     def wire(self, w: Self) -> None:

@@ -1,0 +1,83 @@
+"""What the motorcycle's ECU can compute to see a failure, of what its sensors and demands say.
+
+Source of the relations: Dardanelli et al. (2010), eqs. (1), (4) and (8). The paper's rear brake has
+no sensor of angle or stroke. Residuals are looked at while the demand is steady: during a step all
+of them are large in a healthy brake, and thresholds above that would see nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.campaigns.lasting import largest_of_the_last, least_of_the_last, mean_of_the_last
+from bywire.campaigns.residual import Residual
+from bywire.core.typing import Array
+
+NAME = MotorcycleBrake.name
+Signals = Mapping[str, Array]
+
+
+_STEADY = 0.3  # s after which a step of the demand is over: several times the loop's rise
+_NEVER = -1e9  # of a residual that is not looked at
+
+
+def _period(par: Any, dt: float) -> int:
+    """Return the rows of a period of the dither."""
+    period: float = 1.0 / par.ecu.dither.f_dit
+    return max(round(period / dt), 1)
+
+
+def _steady(signals: Signals, dt: float, values: Array) -> Array:
+    """Return a residual where the demand has not changed for a while, else none."""
+    rows = round(_STEADY / dt)
+    p = signals["p_ref"]
+    still = largest_of_the_last(p, rows) - least_of_the_last(p, rows) <= 0
+    return np.where(still, values, _NEVER)
+
+
+def _current(signals: Signals, par: Any, dt: float) -> Array:
+    error = np.abs(signals["i_ref"] - signals["i_meas"])
+    return _steady(signals, dt, mean_of_the_last(error, 5))
+
+
+def _pressure(signals: Signals, par: Any, dt: float) -> Array:
+    error = mean_of_the_last(signals["p_ref"] - signals["p_meas"], _period(par, dt))
+    return _steady(signals, dt, np.abs(error))
+
+
+def _winding(signals: Signals, par: Any, dt: float) -> Array:
+    """Return the voltage that the resistance does not take, averaged over the dither: the speed."""
+    back_emf = par.supply.V_bat * signals["duty"] - par.motor.R_m * signals["i_meas"]
+    return _steady(signals, dt, np.abs(mean_of_the_last(back_emf, _period(par, dt))))
+
+
+def _balance(signals: Signals, par: Any, dt: float) -> Array:
+    """Return the motor's torque less what the pressure asks for, averaged over the dither."""
+    torque = par.gear.eta_g * par.ecu.est_par.K_e * signals["i_meas"]
+    load = par.gear.k_g * par.master_cylinder.A_mc * signals["p_meas"]
+    return _steady(signals, dt, np.abs(mean_of_the_last(torque - load, _period(par, dt))))
+
+
+def _still(signals: Signals, par: Any, dt: float) -> Array:
+    """Return by how little the pressure moves in two periods of the dither: nothing where stuck."""
+    rows = 2 * _period(par, dt)
+    p = signals["p_meas"]
+    return _steady(signals, dt, least_of_the_last(p, rows) - largest_of_the_last(p, rows))
+
+
+RESIDUALS = (
+    Residual("current-error", "demand and measured current", NAME, "A",
+             ("i_ref", "i_meas", "p_ref"), _current, hold=5e-3),
+    Residual("pressure-error", "demand and measured pressure", NAME, "Pa", ("p_ref", "p_meas"),
+             _pressure, hold=20e-3),
+    Residual("winding", "voltage of the bridge and that of the resistance", NAME, "V",
+             ("duty", "i_meas", "p_ref"), _winding, hold=5e-3),
+    Residual("torque-balance", "torque of the motor and load of the pressure", NAME, "N*m",
+             ("i_meas", "p_meas", "p_ref"), _balance, hold=20e-3),
+    Residual("still-pressure", "ripple of the dither in the measured pressure", NAME, "Pa",
+             ("p_meas", "p_ref"), _still, hold=5e-3),
+)  # fmt: skip

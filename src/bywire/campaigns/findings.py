@@ -1,0 +1,183 @@
+"""What a campaign found of every fault, and what is covered by its residuals."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+
+from bywire.campaigns.judging import FACTORS, Healthy
+from bywire.campaigns.plan import CampaignPlan, Failing
+from bywire.core.typing import Array
+from bywire.studies.statistics import Share, share
+
+CONFIDENCE = 0.95
+_AT = FACTORS.index(1.0)
+Class = Literal["covered", "too late", "undetected", "harmless, seen", "latent"]
+
+
+@dataclass(frozen=True)
+class FaultFinding:
+    """What all runs with a fault did.
+
+    Parameters
+    ----------
+    failing
+        What failed.
+    reached
+        Time from onset until each criterion is violated [s], by name; NaN where it is not.
+    detected
+        Time from onset until each residual sees it [s], by name; shape (factors, cases).
+    extremes
+        By signal: how far it comes off the healthy run, least, largest and at the end.
+    reacted
+        What is reached with the reaction, by criterion, of the runs in which it could be taken.
+    """
+
+    failing: Failing
+    reached: Mapping[str, Array]
+    detected: Mapping[str, Array]
+    extremes: Mapping[str, Sequence[Array]]
+    reacted: Mapping[str, Array]
+
+    @property
+    def cases(self) -> int:
+        """How many runs."""
+        return len(next(iter(self.reached.values())))
+
+    @cached_property
+    def violated(self) -> Array:
+        """Time until the first criterion is violated [s], NaN where none is; shape (cases,)."""
+        return _first([*self.reached.values()])
+
+    @cached_property
+    def seen(self) -> Array:
+        """Time until the first residual sees it [s], NaN where none does; shape (cases,)."""
+        never = np.full(self.cases, math.nan)
+        return _first([never, *(each[_AT] for each in self.detected.values())])
+
+    @property
+    def dangerous(self) -> int:
+        """Runs in which a criterion is violated."""
+        return int(np.sum(~np.isnan(self.violated)))
+
+    @property
+    def tolerance(self) -> float:
+        """Fault tolerant time: that of its worst run [s]; NaN where nothing is violated."""
+        return float(np.nanmin(self.violated)) if self.dangerous else math.nan
+
+    @property
+    def in_time(self) -> int:
+        """Dangerous runs in which it is seen before the fault tolerant time is over."""
+        there = ~np.isnan(self.violated)
+        return int(np.sum(self.seen[there] < self.tolerance)) if self.dangerous else 0
+
+    @property
+    def criteria(self) -> dict[str, int]:
+        """How many runs violate each criterion, of those that any does."""
+        counts = {name: int(np.sum(~np.isnan(times))) for name, times in self.reached.items()}
+        return {name: count for name, count in counts.items() if count}
+
+    @property
+    def first_seen_by(self) -> str:
+        """Residual that sees it first in most runs; empty where none does."""
+        names = [*self.detected]
+        times = np.array([self.detected[name][_AT] for name in names])
+        if not times.size:
+            return ""
+        ranked = np.where(np.isnan(times), np.inf, times)
+        firsts = [names[k] for k, least in zip(ranked.argmin(0), ranked.min(0), strict=True)
+                  if np.isfinite(least)]  # fmt: skip
+        return Counter(firsts).most_common(1)[0][0] if firsts else ""
+
+    @property
+    def kind(self) -> Class:
+        """What becomes of it, by its worst run."""
+        if self.dangerous:
+            if self.in_time == self.dangerous:
+                return "covered"
+            missed = np.isnan(self.seen[~np.isnan(self.violated)])
+            return "undetected" if missed.any() else "too late"
+        return "latent" if np.isnan(self.seen).any() else "harmless, seen"
+
+    def severity(self, plan: CampaignPlan) -> str:
+        """Return the worst class of the criteria that are violated, in alphabetical order."""
+        return max((c.severity for c in plan.criteria if c.name in self.criteria), default="")
+
+
+@dataclass(frozen=True)
+class CampaignFindings:
+    """What a campaign found, as far as it is computed."""
+
+    plan: CampaignPlan
+    healthy: Healthy
+    faults: tuple[FaultFinding, ...]
+
+    @property
+    def is_weighted(self) -> bool:
+        """Whether failure rates weigh the faults."""
+        return bool(self.plan.rates)
+
+    @property
+    def coverage(self) -> float:
+        """Share of dangerous runs that are seen in time, by the rates; NaN without any."""
+        rows = [(self.plan.rate(f.failing) / f.cases, f.in_time, f.dangerous) for f in self.faults]
+        total = sum(weight * dangerous for weight, _, dangerous in rows)
+        return sum(weight * seen for weight, seen, _ in rows) / total if total else math.nan
+
+    @property
+    def coverage_of_cases(self) -> Share:
+        """The same of plain runs, with its interval."""
+        seen = sum(each.in_time for each in self.faults)
+        return share(seen, sum(each.dangerous for each in self.faults), CONFIDENCE)
+
+    @property
+    def false_alarms(self) -> Share:
+        """Healthy runs, unseen by thresholds, in which any residual exceeds its own."""
+        plan = self.plan
+        return share(self.healthy.any_alarm, plan.healthy - plan.tuning, CONFIDENCE)
+
+    def kinds(self) -> Counter[Class]:
+        """Return how many faults are of each class."""
+        return Counter(each.kind for each in self.faults)
+
+    def curve(self, residual: str) -> list[tuple[float, int, float, int]]:
+        """Return factor of the threshold, false alarms, median delay [s], runs in which it sees.
+
+        Of the dangerous runs of all faults; one row for each of the factors.
+        """
+        rows = []
+        for k, factor in enumerate(FACTORS):
+            times = [each.detected[residual][k][~np.isnan(each.violated)] for each in self.faults]
+            seen = np.concatenate(times) if times else np.empty(0)
+            seen = seen[~np.isnan(seen)]
+            median = float(np.median(seen)) if seen.size else math.nan
+            rows.append((factor, self.healthy.alarms[residual][k], median, int(seen.size)))
+        return rows
+
+
+def finding(failing: Failing, outcome: Mapping[str, Any]) -> FaultFinding:
+    """Return what an outcome says, nulls as NaN."""
+    reacted = outcome.get("reacted", {}).get("reached", {})
+    return FaultFinding(
+        failing,
+        {name: _numbers(times) for name, times in outcome["reached"].items()},
+        {name: _numbers(times) for name, times in outcome["detected"].items()},
+        {name: [_numbers(each) for each in sides] for name, sides in outcome["extremes"].items()},
+        {name: _numbers(times) for name, times in reacted.items()},
+    )
+
+
+def _numbers(values: Any) -> Array:
+    return np.array(values, dtype=np.float64)
+
+
+def _first(columns: Sequence[Array]) -> Array:
+    times = np.array(columns)
+    ranked = np.where(np.isnan(times), np.inf, times).min(axis=0)
+    return np.where(np.isfinite(ranked), ranked, np.nan)

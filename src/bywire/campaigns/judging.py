@@ -1,0 +1,171 @@
+"""Runs with a fault, judged: what they did, when it was too much, and when it was seen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bywire.campaigns.plan import CampaignPlan, Failing
+from bywire.campaigns.residual import detected, threshold
+from bywire.campaigns.simulating import Traces, faulty_traces
+from bywire.core.typing import Array
+
+FACTORS = (0.5, 0.7, 1.0, 1.4, 2.0, 3.0, 5.0)
+"""multiples of each threshold, for delay over false alarms"""
+
+Outcome = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Healthy:
+    """What healthy runs show: signals, thresholds, false alarms.
+
+    Parameters
+    ----------
+    traces
+        Of all healthy runs.
+    thresholds
+        Of every residual, tuned on the first half.
+    alarms
+        Runs of the other half in which each residual exceeds its threshold times `FACTORS`,
+        by name, shape (factors,).
+    any_alarm
+        Runs of the other half in which any of them does.
+    """
+
+    traces: Traces
+    thresholds: Mapping[str, float]
+    alarms: Mapping[str, list[int]]
+    any_alarm: int
+
+
+def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
+    """Return thresholds and false alarms of healthy runs, each of its own half."""
+    thresholds: dict[str, float] = {}
+    alarms: dict[str, list[int]] = {}
+    alarmed = np.zeros(plan.healthy - plan.tuning, dtype=bool)
+    start = np.full(alarmed.size, traces.time[0])
+    for residual in plan.watched:
+        lasted = residual.lasted(traces.signals, plan.bench.par, traces.time)
+        limit = threshold(lasted[: plan.tuning].max(axis=1), plan.false_alarms)
+        thresholds[residual.name] = limit
+        judged = lasted[plan.tuning :]
+        each = [~np.isnan(detected(judged, _scaled(limit, factor), traces.time, start))
+                for factor in FACTORS]  # fmt: skip
+        alarms[residual.name] = [int(alarm.sum()) for alarm in each]
+        alarmed |= each[FACTORS.index(1.0)]
+    return Healthy(traces, thresholds, alarms, int(alarmed.sum()))
+
+
+def _scaled(limit: float, factor: float) -> float:
+    """Return a threshold that is farther from what is healthy by a factor, whatever its sign."""
+    return limit * factor if limit >= 0 else limit / factor
+
+
+def judge_fault(plan: CampaignPlan, failing: Failing, number: int, healthy: Healthy) -> Outcome:
+    """Return what all runs with a fault did, as plain numbers.
+
+    ``number``: of the fault in the plan.
+    """
+    onsets = np.array(plan.onsets_of(failing))
+    samples = [plan.sample_of(number * onsets.size + k) for k in range(onsets.size)]
+    traces = faulty_traces(plan, failing, onsets.tolist(), samples)
+    beside = healthy.traces.of(samples)
+    seen = _detections(plan, traces, onsets, healthy.thresholds)
+    earliest = _earliest([column[FACTORS.index(1.0)] for column in seen.values()], onsets.size)
+    outcome: Outcome = {
+        "reached": _reached(plan, traces, beside, onsets),
+        "extremes": _extremes(plan, traces, beside, onsets),
+        "detected": {name: _plain(np.array(column)) for name, column in seen.items()},
+    }
+    if plan.reaction is not None:
+        outcome["reacted"] = _with_reaction(plan, failing, samples, earliest, beside)
+    return outcome
+
+
+def _reached(
+    plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
+) -> dict[str, list[Any]]:
+    """Return how long after its onset a fault has done too much [s], by criterion."""
+    return {
+        c.name: _plain(c.reached(traces.signals[c.signal], beside.signals[c.signal], traces.time,
+                                 onsets) - onsets)
+        for c in plan.criteria
+    }  # fmt: skip
+
+
+def _extremes(
+    plan: CampaignPlan, traces: Traces, beside: Traces, onsets: Array
+) -> dict[str, list[Any]]:
+    """Return how far every judged signal comes off its healthy run: least, largest, at the end."""
+    later = traces.time >= onsets[:, None] - 1e-9
+    extremes = {}
+    for name in dict.fromkeys(c.signal for c in plan.criteria):
+        off = np.where(later, traces.signals[name] - beside.signals[name], 0.0)
+        tail = max(off.shape[1] // 20, 1)
+        extremes[name] = [_plain(off.min(axis=1)), _plain(off.max(axis=1)),
+                          _plain(off[:, -tail:].mean(axis=1))]  # fmt: skip
+    return extremes
+
+
+def _detections(
+    plan: CampaignPlan, traces: Traces, onsets: Array, thresholds: Mapping[str, float]
+) -> dict[str, list[Array]]:
+    """Return how long after its onset a fault is seen [s], by residual and factor."""
+    seen = {}
+    for residual in plan.watched:
+        lasted = residual.lasted(traces.signals, plan.bench.par, traces.time)
+        limit = thresholds[residual.name]
+        seen[residual.name] = [
+            detected(lasted, _scaled(limit, factor), traces.time, onsets) - onsets
+            for factor in FACTORS
+        ]
+    return seen
+
+
+def _with_reaction(
+    plan: CampaignPlan, failing: Failing, samples: Sequence[int], earliest: Array, beside: Traces
+) -> dict[str, Any]:
+    """Return what is reached where the fault is answered, of the runs in which it is seen."""
+    assert plan.reaction is not None
+    onsets = np.array(plan.onsets_of(failing))
+    cases = np.flatnonzero(~np.isnan(earliest)).tolist()
+    if not cases or _is_the_same(plan, failing):
+        return {}
+    begun = (onsets + earliest + plan.reaction.delay)[cases]
+    traces = faulty_traces(
+        plan, failing, onsets[cases].tolist(), [samples[k] for k in cases], begun.tolist()
+    )
+    return {
+        "cases": cases,
+        "reached": _reached(plan, traces, beside.of(cases), onsets[cases]),
+        "extremes": _extremes(plan, traces, beside.of(cases), begun),
+    }
+
+
+def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
+    """Return whether fault and reaction change the same: nothing is left to be done then."""
+    assert plan.reaction is not None
+    par = plan.case(0).par
+    both = [each.mode.changes for each in (failing, plan.reaction.failing)]
+    names = [set() if change is None else {*change(par, 1.0)} for change in both]
+    same = plan.reaction.failing.mode.place == failing.mode.place
+    return same or bool(names[0] & names[1])
+
+
+def _earliest(columns: Sequence[Array], count: int) -> Array:
+    """Return the least of several times in each case; NaN where there is none."""
+    times = np.array([np.full(count, np.nan), *columns])
+    missing = np.isnan(times).all(axis=0)
+    return np.where(missing, np.nan, np.nanmin(np.where(np.isnan(times), np.inf, times), axis=0))
+
+
+def _plain(values: Array) -> list[Any]:
+    """Return numbers for a file of JSON, null for what is not defined."""
+    if values.ndim > 1:
+        return [_plain(row) for row in values]
+    return [None if math.isnan(value) else value for value in values.tolist()]

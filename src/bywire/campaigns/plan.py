@@ -1,0 +1,221 @@
+"""The plan of a campaign: which maneuver, what fails and when, what is judged, who sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from bywire.bench.bench import Bench
+from bywire.bench.experiment import Case
+from bywire.bench.faults.course import AT_ZERO
+from bywire.bench.faults.fault_section import Injection
+from bywire.bench.faults.injected import taps_of
+from bywire.bench.faults.modes import Mode
+from bywire.campaigns.criterion import Criterion
+from bywire.campaigns.residual import Residual, missed_ticks
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.version import __version__
+from bywire.simulation.tapped import Tap
+from bywire.studies.identity import as_json, digest_of, source_digest
+from bywire.studies.plan import CHUNK, StudyPlan, Varied
+
+_LONG_AGO = -1e6  # s: before any run starts
+
+
+@dataclass(frozen=True)
+class Failing:
+    """A fault of the campaign.
+
+    Parameters
+    ----------
+    mode, value
+        What fails, and how much [SI].
+    is_present
+        Whether it is there before the run starts; times then count from zero.
+    """
+
+    mode: Mode
+    value: float
+    is_present: bool = False
+
+    @property
+    def name(self) -> str:
+        """The mode, and the value [SI] where it takes one."""
+        unit = "" if self.mode.unit == "1" else f" {self.mode.unit}"
+        return f"{self.mode.name} {self.value:.6g}{unit}" if self.mode.unit else self.mode.name
+
+    def at(self, onset: float, seed: int) -> Injection:
+        """Return the fault from an onset [s] on, or all along."""
+        onset = _LONG_AGO if self.is_present else onset
+        return Injection(self.mode, self.value, AT_ZERO.replace({"onset": onset}), seed)
+
+
+@dataclass(frozen=True)
+class Reaction:
+    """What is done once a fault is seen: a fail-safe mode of the brake.
+
+    Parameters
+    ----------
+    failing
+        Mode that is taken.
+    delay
+        From detection to its effect [s].
+    """
+
+    failing: Failing
+    delay: float
+
+
+@dataclass(frozen=True)
+class CampaignPlan:
+    """What a campaign file says.
+
+    Parameters
+    ----------
+    name
+        What reports call it.
+    bench
+        The maneuver.
+    faults
+        What fails, one at a time.
+    onsets
+        When [s].
+    criteria, residuals
+        What is judged, and how a fault is seen.
+    varied
+        What scatters from run to run.
+    healthy
+        Healthy runs: on one half thresholds are tuned, on the other all is judged.
+    false_alarms
+        Share of healthy runs in which a residual may exceed its threshold.
+    seed
+        Of what scatters, and of noise.
+    rates
+        Failure rates by fault, or by its place.
+    reaction
+        What is done once a fault is seen; None for nothing.
+    """
+
+    name: str
+    bench: Bench
+    faults: tuple[Failing, ...]
+    onsets: tuple[float, ...]
+    criteria: tuple[Criterion, ...]
+    residuals: tuple[Residual, ...]
+    varied: tuple[Varied, ...] = ()
+    healthy: int = 64
+    false_alarms: float = 0.01
+    seed: int = 1
+    rates: Mapping[str, float] = field(default_factory=dict)
+    reaction: Reaction | None = None
+
+    @property
+    def tuning(self) -> int:
+        """Healthy runs on which thresholds are tuned: the first ones."""
+        return self.healthy // 2
+
+    @property
+    def total(self) -> int:
+        """Runs with a fault."""
+        return len(self.faults) * len(self.onsets)
+
+    def onsets_of(self, failing: Failing) -> tuple[float, ...]:
+        """Return from when on the times of a fault count [s]."""
+        return (0.0,) * len(self.onsets) if failing.is_present else self.onsets
+
+    def sample_of(self, number: int) -> int:
+        """Return whose scatter a run with a fault has: healthy runs that no threshold has seen."""
+        return self.tuning + number % (self.healthy - self.tuning)
+
+    @cached_property
+    def benches(self) -> tuple[Bench, ...]:
+        """The bench of every healthy run, with its scatter and its noise."""
+        study = StudyPlan(self.name, self.bench, self.varied, seed=self.seed)
+        drawn: dict[str, list[Any]] = {each.name: [] for each in self.varied}
+        for chunk in range(-(-self.healthy // CHUNK)) if self.varied else ():
+            for name, values in study.values(chunk).items():
+                drawn.setdefault(name, []).extend(values.tolist())
+        made = []
+        for k in range(self.healthy):
+            given = {name: column[k] for name, column in drawn.items()}
+            options = {n.removeprefix("options."): v for n, v in given.items()
+                       if n.startswith("options.")}  # fmt: skip
+            parameters = {n: v for n, v in given.items() if not n.startswith("options.")}
+            made.append(self.bench.varied(parameters, options, self.bench.seed + k))
+        return tuple(made)
+
+    def case(self, sample: int) -> Case:
+        """Return the healthy run of a sample."""
+        return self.benches[sample].cases()[0]
+
+    @cached_property
+    def taps(self) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
+        """Taps and resting tasks of the model that healthy runs and most faults share."""
+        return taps_of([each.at(0.0, 0) for each in self.faults if not self.is_apart(each)])
+
+    @cached_property
+    def _choices(self) -> Mapping[str, Any]:
+        return self.case(0).par.choices()
+
+    def is_apart(self, failing: Failing) -> bool:
+        """Return whether a fault needs a model of its own: laws change, or a drive comes late."""
+        mode = failing.mode
+        if mode.changes is None:
+            return mode.falsified == "late"
+        par = self.case(0).par
+        changed = mode.changes(par, failing.value)
+        lengths = [name for name, value in changed.items() if isinstance(value, tuple)]
+        return bool(lengths) or any(name in self._choices for name in changed)
+
+    @cached_property
+    def watched(self) -> tuple[Residual, ...]:
+        """All residuals: the declared ones, and a watchdog of every task that can fail."""
+        model, par = self.case(0).model, self.case(0).par
+        tasks = {task.name: task.period for task in model.tasks(par)}
+        dogs = [missed_ticks(name, model.name, tasks[name]) for name in self.taps[1]]
+        return (*self.residuals, *dogs)
+
+    @cached_property
+    def signals(self) -> tuple[str, ...]:
+        """Recorded signals that criteria and residuals look at."""
+        wanted = [criterion.signal for criterion in self.criteria]
+        wanted += [name for residual in self.residuals for name in residual.signals]
+        return tuple(dict.fromkeys(wanted))
+
+    def rate(self, failing: Failing) -> float:
+        """Return the failure rate of a fault; that of its place, or 1, unless it has its own."""
+        mode = failing.mode
+        return self.rates.get(mode.name, self.rates.get(mode.place, 1.0))
+
+    @cached_property
+    def digest(self) -> str:
+        """What tells a campaign from another."""
+        return digest_of(self.identity)
+
+    @cached_property
+    def identity(self) -> Mapping[str, Any]:
+        """All that the figures of its runs depend on."""
+        bench, reaction = self.bench, self.reaction
+        return as_json({
+            "version": __version__,
+            "brake": source_digest(PARAMETER_SETS.owner(bench.parameters)),
+            "experiment": bench.experiment,
+            "parameters": bench.par.flat(),
+            "options": bench.chosen_options.flat(),
+            "stimulus": str(dict(bench.stimulus)),
+            "step": bench.step, "record": bench.record, "noise": bench.seed,
+            "varied": {v.name: [v.distribution.text, v.together] for v in self.varied},
+            "faults": [[each.name, each.is_present] for each in self.faults],
+            "onsets": self.onsets,
+            "criteria": [repr(each) for each in self.criteria],
+            "residuals": [each.name for each in self.residuals],
+            "healthy": self.healthy, "false_alarms": self.false_alarms, "seed": self.seed,
+            "reaction": None if reaction is None else [reaction.failing.name, reaction.delay],
+        })  # fmt: skip
+
+
+def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:
+    """Return onsets evenly over a span [s], the end left out: of a period, it is its beginning."""
+    return tuple(float(f"{first + k * spread / count:.12g}") for k in range(count))

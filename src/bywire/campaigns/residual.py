@@ -1,0 +1,90 @@
+"""Residuals: what a controller can compute to see that something has failed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
+from bywire.core.registry import Kind, instances
+from bywire.core.typing import Array
+
+
+@dataclass(frozen=True)
+class Residual:
+    """What should be small while nothing has failed.
+
+    Parameters
+    ----------
+    name
+        What reports call it.
+    summary
+        What it compares.
+    assembly
+        Name of the assembly whose controller computes it.
+    unit
+        SI unit.
+    signals
+        Recorded signals that it takes: such as the controller knows.
+    compute
+        ``compute(signals, par, dt)``: its magnitude in every row, shape (cases, rows); ``signals``
+        by name, of that shape; ``par`` what the controller believes; ``dt`` time between rows [s].
+    hold
+        Time for which it has to exceed its threshold without a break [s].
+    """
+
+    name: str
+    summary: str
+    assembly: str
+    unit: str
+    signals: tuple[str, ...]
+    compute: Callable[[Mapping[str, Array], Any, float], Array]
+    hold: float = 0.0
+
+    def lasted(self, signals: Mapping[str, Array], par: Any, time: Array) -> Array:
+        """Return what it has exceeded for the time that it has to, shape (cases, rows)."""
+        dt = float(time[1] - time[0])
+        return least_of_the_last(self.compute(signals, par, dt), round(self.hold / dt) + 1)
+
+
+RESIDUALS = Kind("residual", ("residuals",), instances(Residual),
+                 declared="a Residual")  # fmt: skip
+"""the residuals of every brake"""
+
+
+def missed_ticks(task: str, assembly: str, period: float) -> Residual:
+    """Return the watchdog of a task: ticks of the last five that it has missed.
+
+    It takes a signal ``missed_TASK`` that counts 1 where a tick is missed.
+    """
+    signal = f"missed_{task}"
+
+    def count(signals: Mapping[str, Array], par: Any, dt: float) -> Array:
+        return mean_of_the_last(signals[signal], max(round(5.0 * period / dt), 1))
+
+    return Residual(f"watchdog.{task}", f"missed ticks of task {task}", assembly, "1",
+                    (signal,), count)  # fmt: skip
+
+
+def threshold(largest: Array, share: float) -> float:
+    """Return what a share of healthy runs exceeds at most.
+
+    Parameters
+    ----------
+    largest
+        Of each healthy run, shape (cases,).
+    share
+        Of false alarms that is admitted; where it is less than one run, none of them exceeds it.
+    """
+    ordered = np.sort(largest)
+    admitted = int(np.floor(share * ordered.size))
+    return float(ordered[-1 - admitted]) if admitted < ordered.size else float(ordered[0])
+
+
+def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
+    """Return when a residual exceeds its threshold first [s]; NaN where never; shape (cases,)."""
+    margin = 1e-9 * max(abs(limit), 1e-12)  # rounding is no failure
+    return first_time(np.where(lasted > limit + margin, 1.0, 0.0), time, since)

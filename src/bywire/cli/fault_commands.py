@@ -1,0 +1,30 @@
+"""Options of the command that runs campaigns of faults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
+from bywire.cli.show import show
+
+
+def faults_command(
+    campaign: Annotated[
+        str,
+        typer.Argument(help="Campaign file (TOML), or a campaign's name, e.g. motorcycle.",
+                       show_default=False),
+    ],
+    set_: BenchChanges = None,
+    out: OutFolder = None,
+    json: JsonFlag = False,
+) -> None:  # fmt: skip
+    """Let every part fail in a maneuver: what it does, when it is seen, what is covered."""
+    from bywire.api.run_faults import run_faults
+
+    place = None if out is None else Path(out)
+    show(
+        lambda progress: run_faults(campaign, place, changes(set_), progress=progress), place, json
+    )

@@ -1,0 +1,218 @@
+"""Campaigns of faults: effects, times and coverage as single runs show them; kept and resumed."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.bench.running import run
+from bywire.campaigns.campaign_file import read_campaign
+from bywire.campaigns.findings import CampaignFindings, finding
+from bywire.campaigns.judging import FACTORS, judge_healthy
+from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
+from bywire.campaigns.residual import threshold
+from bywire.campaigns.simulating import healthy_traces
+from bywire.core.errors import FileError, InputError
+
+SMALL = """
+bench = "hard-braking"
+[set]
+"options.p_from" = "36 bar"
+"options.p_to" = "37 bar"
+"options.settle" = "0.1 s"
+"options.duration" = "0.6 s"
+[vary]
+"motor.R_m" = "+-10 %"
+"seal.T_pr" = "+-10 %"
+[campaign]
+only = ["pressure.stuck", "battery.lost", "motor.hot", "ecu.frozen", "bridge.late", "fluid.cold"]
+present = ["fluid.*"]
+onset = "0.4 s"
+spread = "20 ms"
+onsets = 2
+healthy = 8
+[values]
+"pressure.stuck" = ["0 bar", "50 bar"]
+[[criteria]]
+name = "loss"
+signal = "p_pd"
+below_share = "80 %"
+lasting = "20 ms"
+severity = "S2"
+[[criteria]]
+name = "too much"
+signal = "p_pd"
+above_healthy = "5 bar"
+lasting = "20 ms"
+severity = "S3"
+[rates]
+"pressure.stuck" = 3
+battery = 1
+[reaction]
+fault = "bridge.open-phase"
+delay = "5 ms"
+"""
+LAWS = "{ kind = 'discrete', values = ['ideal', 'quantized'] }"
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    """Return a campaign file of seven faults and two onsets."""
+    path = tmp_path_factory.mktemp("campaign") / "small.toml"
+    path.write_text(SMALL)
+    return path
+
+
+@pytest.fixture(scope="module")
+def folder(file):
+    """Return the folder that the campaign is run into."""
+    return file.parent / "out"
+
+
+@pytest.fixture(scope="module")
+def campaign(file, folder):
+    """Return the campaign, run."""
+    return bywire.run_faults(file, folder)
+
+
+def of(campaign, name):
+    return [each for each in campaign.findings.faults if each.failing.mode.name == name]
+
+
+def test_a_fault_does_in_the_campaign_what_it_does_alone(campaign):
+    plan = campaign.findings.plan
+    for name, sign in (("pressure.stuck", 1), ("battery.lost", -1)):
+        each = of(campaign, name)[0]
+        number = plan.faults.index(each.failing)
+        for k, onset in enumerate(plan.onsets):
+            sample = plan.sample_of(number * len(plan.onsets) + k)
+            section = {"fault": name, "value": 0.0, "onset": onset}
+            section = section if each.failing.mode.unit else {"fault": name, "onset": onset}
+            benches = [plan.benches[sample], plan.benches[sample]]
+            healthy, alone = (
+                run(bench.varied({}, {}) if faults is None else _with(bench, faults)).recording
+                for bench, faults in zip(benches, (None, section), strict=True)
+            )
+            off = (alone["p_pd"] - healthy["p_pd"]).values
+            extremes = each.extremes["p_pd"]
+            assert extremes[0][k] == pytest.approx(off.min(), rel=1e-6, abs=1.0)
+            assert extremes[1][k] == pytest.approx(off.max(), rel=1e-6, abs=1.0)
+            time, level = alone["time"].values, alone["p_pd"].values
+            beyond = off > 5e5 if sign > 0 else level < 0.8 * healthy["p_pd"].values
+            begins = time[np.flatnonzero(beyond & (time >= onset))[0]]
+            assert each.violated[k] == pytest.approx(begins + 0.02 - onset, abs=2e-3)
+
+
+def _with(bench, section):
+    """Return a bench with a fault and the same scatter and noise."""
+    flat = {name: bench.par.value(name) for name in ("motor.R_m", "seal.T_pr")}
+    made = bywire.Bench(bench.experiment, bench.parameters, overrides=flat, options=bench.options,
+                        seed=bench.seed, faults=[section])  # fmt: skip
+    assert made.par == bench.par
+    return made
+
+
+def test_classes_coverage_and_reaction_follow_from_the_runs(campaign):
+    findings = campaign.findings
+    assert len(findings.faults) == 7
+    kinds = {f"{each.failing.mode.name} {each.failing.value:g}": each.kind
+             for each in findings.faults}  # fmt: skip
+    assert kinds["battery.lost 0"] == kinds["pressure.stuck 0"] == "covered"
+    assert kinds["fluid.cold 3"] in ("latent", "harmless, seen")
+    assert of(campaign, "ecu.frozen")[0].first_seen_by == "watchdog.ecu"
+    low, high = of(campaign, "pressure.stuck")
+    assert (*low.criteria, *high.criteria) == ("too much", "loss")
+    assert (low.severity(findings.plan), high.severity(findings.plan)) == ("S3", "S2")
+    assert of(campaign, "motor.hot")[0].severity(findings.plan) == ""
+    # Opened in time the bridge leaves a sensor that reads nothing without its overshoot.
+    assert low.dangerous == 2
+    assert np.isnan(low.reacted["too much"]).all()
+    weights = {"pressure.stuck": 3.0, "battery.lost": 1.0, "ecu.frozen": 1.0}
+    dangerous = [each for each in findings.faults if each.dangerous]
+    total = sum(weights[e.failing.mode.name] * e.dangerous for e in dangerous)
+    seen = sum(weights[e.failing.mode.name] * e.in_time for e in dangerous)
+    assert findings.coverage == pytest.approx(seen / total)
+    assert findings.is_weighted
+    object_ = campaign.as_object()
+    assert json.loads(json.dumps(object_))["runs"] == 14
+    assert {table for table in campaign.tables()} >= {"Faults", "Residuals", "Criteria"}
+    assert len(campaign.write(campaign.folder)) >= 3
+
+
+def test_healthy_halves_are_apart_and_alarms_fall_with_the_threshold(campaign):
+    plan, healthy = campaign.findings.plan, campaign.findings.healthy
+    assert {plan.sample_of(k) for k in range(100)} == set(range(4, 8))
+    for counts in healthy.alarms.values():
+        assert counts == sorted(counts, reverse=True)
+        assert counts[-1] == 0
+    again = judge_healthy(plan, healthy_traces(plan))
+    assert again.thresholds == healthy.thresholds
+    assert len(FACTORS) == len(next(iter(healthy.alarms.values())))
+
+
+def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder):
+    kept = sorted((folder / "faults").glob("*.json"))
+    texts = [path.read_bytes() for path in kept]
+    kept[1].unlink()
+    kept[2].write_text('{"reached"')  # a damaged one
+    again = bywire.run_faults(file, folder)
+    assert [path.read_bytes() for path in kept] == texts
+    first = CampaignFindings(
+        campaign.findings.plan, campaign.findings.healthy,
+        tuple(finding(each.failing, json.loads(text))
+              for each, text in zip(campaign.findings.faults, texts, strict=True)),
+    )  # fmt: skip
+    assert again.findings.coverage == first.coverage == campaign.findings.coverage
+    with pytest.raises(FileError, match="holds another campaign"):
+        bywire.run_faults(file, folder, {"options.p_to": "36.5 bar"})
+
+
+@pytest.mark.parametrize(
+    ("right", "wrong", "message"),
+    [
+        ("[campaign]", "[campain]", "unknown key of a campaign file 'campain'"),
+        ('"motor.hot"', '"motor.hott"', "unknown fault of .campaign. only 'motor.hott'"),
+        ('onset = "0.4 s"', 'onset = "0.9 s"', "must lie between"),
+        ("healthy = 8", "healthy = 2", "a whole number from 4"),
+        ('"pressure.stuck" = ["0 bar"', '"pressure.stuck" = ["0 A"', "wrong unit"),
+        ('signal = "p_pd"\nbelow', 'signal = "p_pads"\nbelow', "unknown signal of criterion"),
+        ('below_share = "80 %"', 'beneath = "80 %"', "unknown key of ..criteria.. 'beneath'"),
+        ('below_share = "80 %"', 'above = "1 bar"\nbelow = "2 bar"', "say exactly one of"),
+        ('name = "too much"', 'name = "loss"', "stands there twice"),
+        ("battery = 1", "batery = 1", "unknown fault in .rates. 'batery'"),
+        ('delay = "5 ms"', 'delay = "-5 ms"', "must be >= 0 s"),
+        ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers vary"),
+        ('bench = "hard-braking"', 'bench = "hard-braking"\nresiduals = ["x"]',
+         "unknown residual 'x'"),
+        (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
+    ],
+)  # fmt: skip
+def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
+    assert SMALL.count(right) >= 1
+    (tmp_path / "bad.toml").write_text(SMALL.replace(right, wrong, 1))
+    with pytest.raises(InputError, match=message):
+        read_campaign(tmp_path / "bad.toml")
+
+
+def test_campaigns_of_brakes_can_be_read_and_others_are_not_known():
+    for name in ("motorcycle", "wedge"):
+        plan = read_campaign(name)
+        assert plan.total >= 200
+        assert plan.residuals
+        assert plan.case(0).model.name == plan.residuals[0].assembly
+    with pytest.raises(InputError, match="did you mean 'motorcycle'"):
+        read_campaign("motorcycel")
+
+
+def test_what_lasts_is_counted_over_the_rows_before():
+    values = np.array([[0.0, 3.0, 1.0, 2.0, 5.0, 4.0]])
+    assert least_of_the_last(values, 2)[0].tolist() == [0, 0, 1, 1, 2, 4]
+    assert mean_of_the_last(values, 2)[0, 1:].tolist() == [1.5, 2.0, 1.5, 3.5, 4.5]
+    time = np.arange(6.0)
+    assert first_time(values > 2, time, np.array([2.0])).tolist() == [4.0]
+    assert np.isnan(first_time(values > 9, time, np.array([0.0]))).all()
+    assert threshold(np.arange(100.0), 0.02) == 97.0
+    assert threshold(np.arange(10.0), 0.01) == 9.0
