@@ -22,7 +22,7 @@ from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import choice_fields
 from bywire.core.signals import signals_of
 from bywire.data.toml_file import read_toml
-from bywire.studies.study_file import read_bench, read_varied
+from bywire.studies.study_file import read_all_varied, read_bench
 
 _KEYS = ("name", "bench", "set", "vary", "measured", "campaign", "values", "criteria", "residuals",
          "rates", "reaction")  # fmt: skip
@@ -75,7 +75,7 @@ def _plan(
             raise ParameterError(f"[{key}] must be a section with key = value lines")
     bench = read_bench(content, folder, overrides)
     case = _only_case(bench)
-    varied, _ = read_varied(bench, content, folder)
+    varied, correlations = read_all_varied(bench, content, folder)
     chosen = [v.name for v in varied if v.name in choice_fields(type(bench.par))]
     if chosen:
         raise ParameterError(f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary")
@@ -93,7 +93,8 @@ def _plan(
         _residuals(content.get("residuals"), case), varied,
         healthy=_whole(section, "healthy", 64, 4),
         false_alarms=_share(section), seed=_whole(section, "seed", 1, 0),
-        rates=_rates(content.get("rates", {}), modes), reaction=_reaction(content, modes),
+        correlations=correlations, rates=_rates(content.get("rates", {}), modes),
+        reaction=_reaction(content, modes),
     )  # fmt: skip
 
 

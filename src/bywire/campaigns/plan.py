@@ -84,8 +84,8 @@ class CampaignPlan:
         When [s].
     criteria, residuals
         What is judged, and how a fault is seen.
-    varied
-        What scatters from run to run.
+    varied, correlations
+        What scatters from run to run; pairs of names -> correlation of their normal scores.
     healthy
         Healthy runs: on one half thresholds are tuned, on the other all is judged.
     false_alarms
@@ -108,6 +108,7 @@ class CampaignPlan:
     healthy: int = 64
     false_alarms: float = 0.01
     seed: int = 1
+    correlations: Mapping[tuple[str, str], float] = field(default_factory=dict)
     rates: Mapping[str, float] = field(default_factory=dict)
     reaction: Reaction | None = None
 
@@ -132,7 +133,9 @@ class CampaignPlan:
     @cached_property
     def benches(self) -> tuple[Bench, ...]:
         """The bench of every healthy run, with its scatter and its noise."""
-        study = StudyPlan(self.name, self.bench, self.varied, seed=self.seed)
+        study = StudyPlan(
+            self.name, self.bench, self.varied, seed=self.seed, correlations=self.correlations
+        )
         drawn: dict[str, list[Any]] = {each.name: [] for each in self.varied}
         for chunk in range(-(-self.healthy // CHUNK)) if self.varied else ():
             for name, values in study.values(chunk).items():
@@ -207,6 +210,7 @@ class CampaignPlan:
             "stimulus": str(dict(bench.stimulus)),
             "step": bench.step, "record": bench.record, "noise": bench.seed,
             "varied": {v.name: [v.distribution.text, v.together] for v in self.varied},
+            "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
             "faults": [[each.name, each.is_present] for each in self.faults],
             "onsets": self.onsets,
             "criteria": [repr(each) for each in self.criteria],

@@ -49,11 +49,8 @@ app.command("agreement")(agreement_command)
 app.command("margins")(margins_command)
 study_app.command("size")(study_command)
 app.add_typer(study_app, name="study")
-<<<<<<< HEAD
 app.command("life")(life_command)
-=======
 app.command("faults")(faults_command)
->>>>>>> 72b9b2d (Campaigns of faults: every failure beside its healthy twin, residuals tuned and judged apart, coverage, reactions)
 app.command("design")(design_command)
 app.command("convert")(convert)
 app.command("identify")(identify)

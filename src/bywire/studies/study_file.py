@@ -78,7 +78,7 @@ def _plan(
     demands = tuple(_demands(bench, content.get("requirements", {})))
     limits = {demand.kpi: demand.limit for demand in demands}
     bench = replace(bench, requirements=limits, name=bench.name or name)
-    varied, measured = read_varied(bench, content, file.parent)
+    varied, measured = read_all_varied(bench, content, file.parent)
     if not varied:
         raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
     correlations = {**measured, **_correlations(content.get("correlation", []), varied, measured)}
@@ -131,7 +131,7 @@ def _probability(kpi: str, text: str) -> float:
     return share
 
 
-def read_varied(
+def read_all_varied(
     bench: Bench, content: Mapping[str, Any], folder: Path
 ) -> tuple[tuple[Varied, ...], Mapping[tuple[str, str], float]]:
     """Return what varies, as the file says or as it was measured, and what goes together so."""
@@ -139,13 +139,7 @@ def read_varied(
     correlations: Mapping[tuple[str, str], float] = {}
     if "measured" in content:
         measured, correlations = varied_as_measured(bench, content["measured"], folder)
-<<<<<<< HEAD
     varied = (*measured, *read_varied(bench, content.get("vary", {})))
-    if not varied:
-        raise ParameterError("[vary] is empty: say what varies, such as \"motor.R_m\" = '+-10 %'")
-=======
-    varied = (*measured, *_varied(bench, content.get("vary", {})))
->>>>>>> 72b9b2d (Campaigns of faults: every failure beside its healthy twin, residuals tuned and judged apart, coverage, reactions)
     names = [name for each in varied for name in (each.name, *each.together)]
     for name in names:
         if names.count(name) > 1:
