@@ -300,7 +300,8 @@ static void record(const Plant *k, const Saved *z, double *o)
     const bool on = m[M_on] > 0.5;
     const double V_1 = voltage(k, k->motor, a, on), V_2 = voltage(k, k->motor + 1, c, on);
     o[O_M_set] = m[M_M_set], o[O_M_B] = k->per_F_N * direction_of(k, b->Om) * t.F_N;
-    o[O_y_M] = b->y_M, o[O_mode] = m[M_mode], o[O_rate] = m[M_rate], o[O_sat_rate] = m[M_sat_rate];
+    o[O_y_M] = b->y_M, o[O_M_meas] = m[M_M_meas], o[O_mode] = m[M_mode];
+    o[O_rate] = m[M_rate], o[O_sat_rate] = m[M_sat_rate];
     o[O_theta_c] = m[M_theta_c], o[O_theta_ref] = m[M_theta_ref];
     o[O_theta_1_ref] = m[M_theta_1_ref], o[O_theta_2_ref] = m[M_theta_2_ref];
     o[O_theta_1] = a->th, o[O_theta_2] = c->th, o[O_omega_1] = a->om, o[O_omega_2] = c->om;
