@@ -90,9 +90,8 @@ class LifeResult(Answer):
         if not self.checked:
             return math.nan
         truth = self.checked[name]
-        last = min(truth.size, self.projection.stops + 1) - 1
-        change = float(truth[last] - truth[0])
-        made = float(self.projection.states[name][last] - truth[0])
+        change = float(truth[-1] - truth[0])
+        made = float(self.projection.states[name][truth.size - 1] - truth[0])
         return made / change - 1.0 if change else math.nan
 
     def document(self) -> Document:
@@ -175,7 +174,8 @@ class LifeResult(Answer):
         made, life = self.projection, self.projection.plan.life
         courses = [
             Course(each.label, each.unit, made.states[name])
-            for name, each in life.states.items() if np.ptp(made.states[name]) > 0.0
+            for name, each in life.states.items()
+            if each.is_drawn and np.ptp(made.states[name]) > 0.0
         ] + [
             Course(each.label, each.unit, made.left[name], is_left=True)
             for name, each in life.limits.items()
@@ -230,7 +230,8 @@ def project_life(
         Changes of the bench, of wear (``wear.NAME``) and of what is between stops
         (``stop.NAME``), as texts with units.
     check
-        Stops that are also run one by one, to check the projection; none by default.
+        Stops that are also run one by one, to check the projection, in whole rounds of the
+        population; none by default.
     progress
         Called with a label and the finished share, 0 to 1.
 
@@ -254,6 +255,11 @@ def project_life(
         raise ParameterError(f"check = {quoted(check)}: a whole number from 0 to {_MOST} is wanted")
     shown = progress or silent
     plan = read_life(source, overrides)
+    if 0 < check < plan.count:
+        raise ParameterError(
+            f"check = {check}: fewer than the {plan.count} stops that stand for the population say "
+            "nothing of it; give as many at least"
+        )
     made = projected(plan, shown)
-    checked = one_by_one(plan, min(check, made.stops), shown) if check else {}
-    return LifeResult(made, checked)
+    rounds = min(check, made.stops) // plan.count
+    return LifeResult(made, one_by_one(plan, rounds * plan.count, shown) if rounds else {})

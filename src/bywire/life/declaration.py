@@ -41,10 +41,13 @@ class Slow:
         SI unit; ``"1"`` for a count.
     label
         What figures and tables say.
+    is_drawn
+        Whether the figure has a panel of it.
     """
 
     unit: str
     label: str
+    is_drawn: bool = True
 
 
 @dataclass(frozen=True)

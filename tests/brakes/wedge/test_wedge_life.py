@@ -15,7 +15,6 @@ ALIKE = {"wear.mechanism": "none", "stop.pause": "1 h"}
 MIX = """
 life = "wedge-pads"
 [set]
-wear.mechanism = "none"
 options.t_hold = "8 s"
 options.M_brake = "800 N*m"
 [vary]
@@ -83,20 +82,23 @@ def test_the_adjuster_clicks_for_every_tooth_of_wear():
 
 
 @pytest.mark.trust
-def test_two_hundred_stops_one_by_one_confirm_the_projection(tmp_path):
+@pytest.mark.parametrize(("mechanism", "clearance"), [("none", "0.2 mm"), ("teeth", "0.285 mm")])
+def test_two_hundred_stops_one_by_one_confirm_the_projection(tmp_path, mechanism, clearance):
     file = tmp_path / "mix.toml"
     file.write_text(MIX)
-    plan = read_life(file)
+    plan = read_life(file, {"wear.mechanism": mechanism, "caliper.clearance": clearance})
     made, truth = projected(plan), one_by_one(plan, 200)
     for name in ("h_pad", "clearance", "work"):
         change = made.states[name][200] - made.states[name][0]
         assert change == pytest.approx(truth[name][200] - truth[name][0], rel=0.01)
+    assert made.states["clicks"][200] == truth["clicks"][200]
+    assert (truth["clicks"][200] > 0) == (mechanism == "teeth")
 
 
 def test_some_stops_one_by_one_confirm_the_projection(tmp_path):
     file = tmp_path / "mix.toml"
     file.write_text(MIX.replace('t_hold = "8 s"', 't_hold = "3 s"').replace("150 km/h", "60 km/h")
                     .replace("100 km/h", "40 km/h") + 'share = "50 %"\n')  # fmt: skip
-    made = bywire.project_life(file, check=8)
+    made = bywire.project_life(file, {"wear.mechanism": "none"}, check=8)
     assert abs(made.deviation("h_pad")) < 0.01
     assert abs(made.deviation("work")) < 0.01

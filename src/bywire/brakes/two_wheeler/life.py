@@ -82,7 +82,7 @@ TWO_WHEELER_PADS = Life(
     states={
         "h_pad": Slow("m", "pad thickness"),
         "V_reservoir": Slow("m**3", "fluid in the reservoir"),
-        "work": Slow("J", "friction work in front"),
+        "work": Slow("J", "friction work in front", is_drawn=False),
     },
     limits={"lining": Slow("m", "lining left"), "fluid": Slow("m**3", "fluid left")},
     begin=begin,

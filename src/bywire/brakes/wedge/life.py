@@ -45,14 +45,14 @@ class WearParameters(ParameterSet):
 def begin(par: WedgeCornerParameters, wear: WearParameters) -> Values:
     """Return the slow states of the brake with new pads."""
     return {
-        "h_pad": wear.h_new, "clearance": par.caliper.clearance, "clicks": 0.0, "counted": 0.0,
-        "wide": 0.0, "work": 0.0,
+        "h_pad": wear.h_new, "clearance": par.caliper.clearance, "K_cal": par.caliper.K_cal,
+        "clicks": 0.0, "counted": 0.0, "wide": 0.0, "work": 0.0,
     }  # fmt: skip
 
 
 def follows(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Mapping[str, float]:
     """Return clearance and stiffness of the caliper with worn pads."""
-    return {"caliper.clearance": z["clearance"], "caliper.K_cal": _stiffness(z, par, wear)}
+    return {"caliper.clearance": z["clearance"], "caliper.K_cal": z["K_cal"]}
 
 
 def effects(
@@ -77,7 +77,9 @@ def effects(
 def between(
     z: Values, readings: Mapping[str, float], par: WedgeCornerParameters, wear: WearParameters
 ) -> Values:
-    """Return the slow states after the adjuster, the brake parked again."""
+    """Return the slow states with the stiffness of thinner pads, and after the adjuster."""
+    worn = wear.h_new - z["h_pad"]
+    z = {**z, "K_cal": pad_wear.stiffness(par.caliper.K_cal, worn, wear.pads)}
     if wear.mechanism == "none":
         return z
     law, T = wear.adjuster, readings["T_disc"]
@@ -106,13 +108,9 @@ def left(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> Values:
     reach = par.wedge.x_stop * wedge.slope(par.wedge)
     return {
         "lining": z["h_pad"] - wear.h_min,
-        "travel": reach - z["clearance"] - F_N / _stiffness(z, par, wear),
+        "travel": reach - z["clearance"] - F_N / z["K_cal"],
         "free": z["clearance"] - wear.adjuster.gap_min,
     }
-
-
-def _stiffness(z: Values, par: WedgeCornerParameters, wear: WearParameters) -> float:
-    return pad_wear.stiffness(par.caliper.K_cal, wear.h_new - z["h_pad"], wear.pads)
 
 
 WEDGE_PADS = Life(
@@ -146,14 +144,15 @@ WEDGE_PADS = Life(
         "h_pad": Slow("m", "pad thickness"),
         "clearance": Slow("m", "clearance"),
         "clicks": Slow("1", "teeth turned"),
-        "counted": Slow("1", "teeth turned, as the adjuster counts them"),
-        "wide": Slow("1", "applications in a row with too much clearance"),
-        "work": Slow("J", "friction work"),
+        "K_cal": Slow("N/m", "stiffness"),
+        "counted": Slow("1", "teeth as the adjuster counts them", is_drawn=False),
+        "wide": Slow("1", "applications in a row with too much clearance", is_drawn=False),
+        "work": Slow("J", "friction work", is_drawn=False),
     },
     limits={
         "lining": Slow("m", "lining left"),
         "travel": Slow("m", "travel left"),
-        "free": Slow("m", "clearance left for a hot disc"),
+        "free": Slow("m", "free when hot"),
     },
     begin=begin,
     follows=follows,
