@@ -114,13 +114,13 @@ def test_what_happens_between_stops_is_never_skipped(made):
     assert len(asked) < 12
 
 
-def test_readings_are_those_of_the_step(made):
+def test_readings_go_from_one_end_of_a_step_to_the_other(made):
     def noted(z, readings, par, wear):
         return {**z, "n": readings["h_seen"]}
 
     made(lambda z: 1e-3, readings=lambda z: {"h_seen": z["h"]})
     life = projected(_plan(_life(noted)))
-    assert np.abs(life.states["n"][1:] - life.states["h"][1:]).max() < 0.03
+    assert np.abs(life.states["n"][1:] - life.states["h"][1:]).max() < 1e-9
 
 
 def test_a_life_without_an_end_is_followed_as_long_as_asked(made):

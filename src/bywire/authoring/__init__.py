@@ -96,6 +96,7 @@ if TYPE_CHECKING:
     from bywire.identification.replaying.tracking import track
     from bywire.identification.residuals import lack_of_fit
     from bywire.identification.unknown import Unknown, parameters_of
+    from bywire.life.declaration import Effects, Life, Slow
     from bywire.report import style
     from bywire.report.bench_figures import FigureKind
     from bywire.report.bench_figures import Shown as ShownFigure
@@ -157,6 +158,7 @@ _HOMES = {
     "analysis.linear.linearize": "linearize",
     "analysis.linear.plant": "Plant PlantPoint",
     "synthesis.study": "Cut Findings Map Mark Study require_ranges variable variables",
+    "life.declaration": "Effects Life Slow",
     "core.typing": "Array Progress",
     # identification
     "identification.differentiation": "differentiated",
@@ -220,6 +222,7 @@ __all__ = [
     "Duration",
     "DutyPerCurrent",
     "DutyPerCurrentTime",
+    "Effects",
     "Effort",
     "Energy",
     "Estimate",
@@ -245,6 +248,7 @@ __all__ = [
     "Item",
     "Kpi",
     "Length",
+    "Life",
     "LineRole",
     "LinearModel",
     "Loop",
@@ -285,6 +289,7 @@ __all__ = [
     "ShownFigure",
     "Signal",
     "SignedCurrent",
+    "Slow",
     "Source",
     "SourcePart",
     "Speed",

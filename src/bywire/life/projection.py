@@ -17,7 +17,7 @@ from scipy import stats
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array, Progress, silent
 from bywire.core.units import shown
-from bywire.life.declaration import Effects, Values
+from bywire.life.declaration import Values
 from bywire.life.plan import LifePlan
 from bywire.life.rates import Rates, rates
 from bywire.studies.distribution import Distribution
@@ -108,14 +108,13 @@ def projected(plan: LifePlan, progress: Progress = silent) -> Projection:
     before = rates(plan, z)
     whole = 0
     while not ended and len(path) <= plan.longest:
-        held, _ = _walked(plan, path[-1], before.effects, plan.longest + 1 - len(path))
+        room = plan.longest + 1 - len(path)
+        held, _ = _walked(plan, path[-1], (before, before), 1, room)
         whole = whole or len(held)
         progress("life", (len(path) - 1) / (len(path) - 1 + len(held)))
         count, after = _step(plan, before, held, whole)
-        mean = _mean(before.effects, after.effects)
-        is_last = count == len(held)
-        room = plan.longest + 1 - len(path)
-        more, ended = _walked(plan, path[-1], mean, min(2 * count if is_last else count, room))
+        most = min(2 * count, room) if count == len(held) else count
+        more, ended = _walked(plan, path[-1], (before, after), count, most)
         steps.append(Step(len(path) - 1, len(more), (before, after)))
         path += more
         before = after
@@ -138,17 +137,23 @@ def _require_alive(plan: LifePlan, z: Values) -> None:
 
 
 def _walked(
-    plan: LifePlan, z: Values, effects: Effects, most: int
+    plan: LifePlan, z: Values, ends: tuple[Rates, Rates], count: int, most: int
 ) -> tuple[list[Values], str]:
-    """Return the slow states after each stop with rates that are held, and what ended them."""
+    """Return the slow states after each of at most some stops, and what ended them.
+
+    Rates are the mean of those at both ends of the step (Heun's corrector); readings go from the
+    one to the other over its ``count`` stops.
+    """
     life, par, wear = plan.life, plan.bench.par, plan.wear
-    changes = {name: float(np.mean(change)) for name, change in effects.changes.items()}
+    first, last = ends
+    changes = {name: 0.5 * (rate + last.mean[name]) for name, rate in first.mean.items()}
+    begin = first.effects.readings
+    slopes = {name: (last.effects.readings[name] - x) / count for name, x in begin.items()}
     path: list[Values] = []
-    for _ in range(most):
-        z = life.between(
-            {name: value + changes.get(name, 0.0) for name, value in z.items()},
-            effects.readings, par, wear,
-        )  # fmt: skip
+    for n in range(1, most + 1):
+        readings = {name: x + slopes[name] * n for name, x in begin.items()}
+        worn = {name: value + changes.get(name, 0.0) for name, value in z.items()}
+        z = life.between(worn, readings, par, wear)
         path.append(z)
         for name, value in life.left(z, par, wear).items():
             if value <= 0.0:
@@ -175,14 +180,6 @@ def _distance(first: Values, second: Values) -> float:
     return max(
         (abs(second[name] - first[name]) / size for name, size in largest.items() if size > 0.0),
         default=0.0,
-    )
-
-
-def _mean(first: Effects, second: Effects) -> Effects:
-    """Return the mean of two effects: Heun's corrector."""
-    return Effects(
-        {name: 0.5 * (change + second.changes[name]) for name, change in first.changes.items()},
-        {name: 0.5 * (value + second.readings[name]) for name, value in first.readings.items()},
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -34,7 +35,7 @@ class Rates:
     effects: Effects
     warnings: tuple[str, ...] = field(default=(), repr=False)
 
-    @property
+    @cached_property
     def mean(self) -> Values:
         """Mean change of each slow state per stop [SI]."""
         return {name: float(np.mean(change)) for name, change in self.effects.changes.items()}
