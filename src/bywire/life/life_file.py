@@ -147,7 +147,7 @@ def _require_free(
 
 def _projection(section: Mapping[str, Any]) -> dict[str, Any]:
     known: dict[str, tuple[float, float]] = {
-        "stops": (2, _MOST), "seed": (0, 2**63 - 1), "longest": (1, 10_000_000),
+        "stops": (2, _MOST), "seed": (0, 2**63 - 1), "longest": (1, 1_000_000),
     }  # fmt: skip
     shares = {"share": (0.001, 0.5), "tolerance": (1e-6, 0.5)}
     settings: dict[str, Any] = {}
