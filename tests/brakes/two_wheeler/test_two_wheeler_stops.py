@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.experiment import as_run
-from bywire.brakes.two_wheeler.case import rolling_case
-from bywire.simulation.run import simulate
 
 KMH_100 = "100 km/h"
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
 WET = {"options.surface": "wet-asphalt"}
+SURFACES = ["dry-asphalt", "wet-asphalt", "snow", "dry-cobble", "wet-cobble"]
 KNOWN = {"ecu.sees": "known", "sensors.encoder.law": "ideal"}
 
 
@@ -66,12 +64,48 @@ def test_a_controlled_stop_on_wet_road(controlled):
     assert all(verdict.met for verdict in controlled.verdicts)
 
 
-@pytest.mark.parametrize("surface", ["dry-asphalt", "wet-asphalt", "snow", "dry-cobble"])
+@pytest.mark.parametrize("surface", SURFACES)
 def test_a_larger_slip_does_for_every_surface(surface):
     larger = {"ecu.front_slip.slip_set": "0.28", "ecu.rear_slip.slip_set": "0.28"}
     result = stopped(larger, surface=surface, v_0="30 m/s")
     assert result.kpi("braking_efficiency").value >= 85.0
     assert result.kpi("locked_time_front").value == 0.0
+
+
+@pytest.mark.parametrize("surface", SURFACES)
+def test_one_set_of_rules_does_for_every_surface(surface):
+    result = stopped({"ecu.abs": "rules"}, surface=surface, v_0="30 m/s")
+    assert result.kpi("braking_efficiency").value >= 85.0
+    assert result.kpi("locked_time_front").value == result.kpi("locked_time_rear").value == 0.0
+    assert result.kpi("lift_time").value == 0.0
+
+
+def test_rules_only_lower_what_is_demanded_and_say_in_which_phase():
+    run = bywire.run("benches/wet_stop_by_rules.toml", estimate_error=False).recording
+    fast = run.sel(time=slice(0.0, 3.0))
+    assert set(np.unique(fast["phase_f"])) == {0.0, 1.0, 2.0, 3.0}
+    assert float(fast["p_f_ref"].max()) <= 40e5
+    assert (fast["abs_f"] == 1).sum() > 2000
+    # Pressure is built up in the first phase and in steps alone, and never within another.
+    later = fast["phase_f"].values[1:]
+    rises = np.diff(fast["p_f_ref"].values) > 0
+    assert set(later[rises]) == {0.0, 3.0}
+    # The rear brake is too weak for its wheel there: rules leave it alone.
+    assert not fast["phase_r"].values.any()
+
+
+def test_rules_do_not_throw_the_rider_where_the_road_turns_dry():
+    rules = stop(
+        "surface-jump", {"ecu.abs": "rules"}, first="wet-asphalt", further="dry-asphalt"
+    )
+    assert rules.kpi("peak_pitch").value < math.radians(0.5)
+    assert rules.kpi("stopping_distance").value < 52.0
+
+
+def test_rules_free_a_wheel_that_locks_where_the_road_turns_into_snow():
+    for place, longest in (("15 m", 0.1), ("30 m", 0.25)):
+        rules = stop("surface-jump", {"ecu.abs": "rules"}, further="snow", x_change=place)
+        assert rules.kpi("longest_lock_front").value < longest
 
 
 def test_mixed_control_sees_the_deceleration_of_its_wheel():
@@ -133,34 +167,35 @@ def test_a_step_of_half_the_length_changes_a_stop_by_less_than_a_centimeter():
 
 @pytest.mark.parametrize("gradient", ["-0.1", "0", "0.1"])
 def test_it_stands_still_on_any_slope(gradient):
-    result = stop("slow-stop", gradient=gradient, duration="20 s")
-    run = result.recording
+    result = stop("slope-hold", gradient=gradient, t_release="63 s", duration="63.1 s")
     end = result.kpi("stopping_time").value
+    assert result.kpi("held_time").value > 60.0
     assert result.kpi("creep_speed").value < 1e-5
-    late = run["x"].sel(time=slice(end + 5.0, None)).values
-    assert np.ptp(late) < 1e-5 * 15.0 / 60.0
-    assert not run["omega_f"].sel(time=slice(end + 0.2, None)).values.any()
-    assert float(run["omega_f"].min()) == 0.0  # no wheel ever turns back
+    assert result.kpi("creep").value < 1e-5
+    omega = result.recording["omega_f"].sel(time=slice(None, 63.0))
+    assert not omega.sel(time=slice(end + 0.2, None)).values.any()
+    assert float(omega.min()) == 0.0  # no wheel ever turns back
+
+
+@pytest.mark.parametrize("gradient", ["0.05", "-0.05"])
+def test_it_rolls_off_where_nothing_holds_it(gradient):
+    result = stop("slope-hold", gradient=gradient, t_release="3 s", duration="5 s")
+    body, angle = bywire.parameters("sport600").vehicle.body, math.atan(0.05)
+    closed = body.g * (math.sin(angle) - 0.015 * math.cos(angle))
+    closed *= body.m / (body.m + 0.50 / 0.30**2 + 0.65 / 0.31**2)
+    assert result.kpi("free_roll_off").value == pytest.approx(closed, rel=1e-12)
+    assert result.kpi("roll_off").value == pytest.approx(closed, rel=1e-3)
+
+
+def test_a_release_after_the_end_is_refused():
+    with pytest.raises(bywire.BywireError, match=r"options.t_release = 30 s is not within"):
+        stop("slope-hold", t_release="30 s", duration="25 s")
 
 
 def test_a_slow_stop_rings_as_in_the_trial(slow):
     assert slow.kpi("rebound_speed").value == pytest.approx(0.151, abs=0.001)
     assert slow.kpi("ringing_time").value == pytest.approx(0.79, abs=0.01)
     assert slow.kpi("rollback").value == pytest.approx(4.35e-3, abs=0.05e-3)
-
-
-def test_it_rolls_off_where_nothing_holds_it():
-    par = bywire.parameters("sport600").replace(
-        {"vehicle.road.gradient": 0.05, "vehicle.road.gradient_further": 0.05}
-    )
-    case = rolling_case(par, 1e-3, {}, 2.0)
-    run = simulate(as_run(case, 20e-6))
-    body, front, rear = par.vehicle.body, par.vehicle.front_wheel, par.vehicle.rear_wheel
-    angle = math.atan(0.05)
-    pulled = body.g * (math.sin(angle) - front.C_rr * math.cos(angle))
-    inertia = body.m + front.J / front.r**2 + rear.J / rear.r**2
-    a = np.diff(np.interp([0.5, 1.5], run.time, run["v"]))[0]
-    assert -a == pytest.approx(pulled * body.m / inertia, rel=1e-3)
 
 
 def test_lift_control_keeps_the_rear_wheel_on_the_ground():

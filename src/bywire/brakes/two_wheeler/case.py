@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 import numpy as np
@@ -22,13 +22,14 @@ from bywire.vehicle import ideal_stop, stop_figures
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 RidingSpeed = ideal_stop.RidingSpeed
+Course = Callable[[Array], Array]
 Demand = Annotated[float, Unit("Pa", 4e6), Field(ge=0, allow_inf_nan=False)]
 
 
 def rolling_case(
     par: TwoWheelerParameters,
     v_0: float,
-    demands: Mapping[str, float],
+    demands: Mapping[str, float | Course],
     duration: float,
     changes: Mapping[str, Any] | None = None,
     label: str = "run",
@@ -39,7 +40,7 @@ def rolling_case(
     Parameters
     ----------
     demands
-        Pressure demand [Pa] by name of the stimulus.
+        Pressure demand [Pa] by name of the stimulus, constant or over time [s].
     changes
         Parameters that the experiment sets.
     heat
@@ -49,7 +50,10 @@ def rolling_case(
     state, memory = at_speed(v_0, changed, heat)
 
     def stimulus(t: Array) -> dict[str, Array]:
-        return {name: np.where(t < -1e-9, 0.0, p) for name, p in demands.items()}
+        return {
+            name: np.where(t < -1e-9, 0.0, p(t) if callable(p) else p)
+            for name, p in demands.items()
+        }
 
     return Case(label, TwoWheelerByWire(), changed, state, memory, stimulus, duration)
 

@@ -8,7 +8,14 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters as Par
-from bywire.control import lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
+from bywire.control import (
+    abs_rules,
+    lift_pi,
+    mixed_slip,
+    slip_pi,
+    vehicle_speed,
+    wheel_speed,
+)
 from bywire.core import ops
 from bywire.core.signals import Signal
 
@@ -48,6 +55,20 @@ class Memory(NamedTuple):
     slip_f_integral: Annotated[float, Signal("Pa", "integral part of the front slip PI", 2e6)]
     slip_r_integral: Annotated[float, Signal("Pa", "integral part of the rear slip PI", 2e6)]
     lift_integral: Annotated[float, Signal("Pa", "integral part of the lift PI", 2e6)]
+    phase_f: Annotated[float, Signal("1", "phase of the front rules", 3.0)]
+    phase_r: Annotated[float, Signal("1", "phase of the rear rules", 3.0)]
+    since_f: Annotated[float, Signal("s", "time since the front rules' last phase or step", 0.1)]
+    since_r: Annotated[float, Signal("s", "time since the rear rules' last phase or step", 0.1)]
+    p_left_f: Annotated[float, Signal("Pa", "front demand that rules left", 2e6)]
+    p_left_r: Annotated[float, Signal("Pa", "rear demand that rules left", 2e6)]
+    p_hat_f: Annotated[float, Signal("Pa", "front pressure as rules believe it", 2e6)]
+    p_hat_r: Annotated[float, Signal("Pa", "rear pressure as rules believe it", 2e6)]
+    p_held_f: Annotated[float, Signal("Pa", "pressure that the front wheel's road held", 2e6)]
+    p_held_r: Annotated[float, Signal("Pa", "pressure that the rear wheel's road held", 2e6)]
+    rise_f: Annotated[float, Signal("Pa", "next step of the front pressure", 1e5)]
+    rise_r: Annotated[float, Signal("Pa", "next step of the rear pressure", 1e5)]
+    slowing_f: Annotated[float, Signal("m/s**2", "front wheel's deceleration, filtered", 10.0)]
+    slowing_r: Annotated[float, Signal("m/s**2", "rear wheel's deceleration, filtered", 10.0)]
 
 
 class Readings(NamedTuple):
@@ -72,6 +93,10 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
         p_r_most=ops.fmin(u.p_r_set, m.p_r_most + rise),
     )
     p_f, p_r = m.p_f_most, m.p_r_most
+    if par.ecu.abs == "rules":
+        # Before lift control, which then knows from where on it lowers: a road may hold more soon.
+        p_f, m = _by_rules("f", p_f, m, before, par.ecu.front_slip, par)
+        p_r, m = _by_rules("r", p_r, m, before, par.ecu.rear_slip, par)
     if par.ecu.lift == "pi":
         seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
         lift, out = lift_pi.output(
@@ -140,6 +165,27 @@ def _lowered(
     return _Lowered(out.p, out.lowered, state.integral, mix.eta)
 
 
+def _by_rules(
+    side: str, p_most: float, m: Memory, before: Memory, own: slip_pi.Parameters, par: Par
+) -> tuple[float, Memory]:
+    """Return what rules leave of the demand of a wheel, "f" or "r", and what they remember."""
+    seen = abs_rules.Input(
+        v=m.v_hat,
+        a=m.a_hat,
+        v_wheel=getattr(m, f"tread_{side}"),
+        v_last=getattr(before, f"tread_{side}"),
+        slip=getattr(m, f"slip_{side}_hat"),
+        inertia=own.J_hat / (own.r_hat * own.k_hat),
+        p_most=p_most,
+        p_before=getattr(before, f"p_{side}_most"),
+        p_ref=getattr(before, f"p_{side}_ref"),
+    )
+    state = abs_rules.State(*(getattr(m, f"{name}_{side}") for name in abs_rules.State._fields))
+    state, out = abs_rules.output(state, seen, par.ecu.T_s, par.ecu.rules)
+    kept = {f"{name}_{side}": value for name, value in state._asdict().items()}
+    return out.p, m._replace(**kept, **{f"abs_{side}": out.lowered})
+
+
 def _measured(r: Readings, m: Memory, par: Par) -> Memory:
     """Return the memory with speeds, slips and deceleration as the ECU sees them."""
     T, ecu, vehicle = par.ecu.T_s, par.ecu, par.vehicle
@@ -175,3 +221,4 @@ def _measured(r: Readings, m: Memory, par: Par) -> Memory:
         age_r=rear.age,
         v_last=r.v,
     )
+

@@ -35,10 +35,10 @@ class TwoWheelerByWire(HotBrakes[TwoWheelerParameters, ecu.Memory]):
         "x", "v", "v_f", "v_r", "a", "omega_f", "omega_r", "slip_f", "slip_r", "mu_f", "mu_r",
         "sliding_f", "sliding_r", "u_f", "u_r", "F_f", "F_r", "N_f", "N_r", "support", "phi",
         "phi_rate", "p_f", "p_r", "p_f_ref", "p_r_ref", "v_hat", "slip_f_hat", "slip_r_hat",
-        "a_hat", "eta_f", "abs_f", "abs_r", "lift", "T_f", "T_r", "t_locked_f", "t_locked_r",
-        "E_vehicle", "E_brake_f", "E_brake_r", "E_tyre_f", "E_tyre_r", "E_drag", "E_roll",
-        "E_ground", "W_slope", "W_pitch", "T_disc_f", "T_pads_f", "T_fluid_f", "T_disc_r",
-        "T_pads_r", "T_fluid_r", "E_friction", "E_discs", "E_pads", "E_fluid", "E_air",
+        "a_hat", "eta_f", "abs_f", "abs_r", "lift", "phase_f", "phase_r", "T_f", "T_r",
+        "t_locked_f", "t_locked_r", "E_vehicle", "E_brake_f", "E_brake_r", "E_tyre_f", "E_tyre_r",
+        "E_drag", "E_roll", "E_ground", "W_slope", "W_pitch", "T_disc_f", "T_pads_f", "T_fluid_f",
+        "T_disc_r", "T_pads_r", "T_fluid_r", "E_friction", "E_discs", "E_pads", "E_fluid", "E_air",
     )  # fmt: skip
 
     def cold_torques(self, w: Self) -> tuple[float, float]:

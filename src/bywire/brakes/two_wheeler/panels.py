@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bywire.control import abs_rules
 from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Panels, Trace
 
@@ -24,6 +25,8 @@ PANELS = Panels(
             "rear pressure", (Trace("p_r"), Trace("p_r_ref", Role.SET_POINT)),
             saturation="abs_r", saturated="slip control",
         ),
+        Panel("rules, front", (Trace("phase_f"),), levels=abs_rules.PHASES, height=0.8),
+        Panel("rules, rear", (Trace("phase_r"),), levels=abs_rules.PHASES, height=0.8),
         Panel("load", (Trace("N_f"), Trace("N_r", Role.SECOND))),
         Panel("pitch", (Trace("phi"),)),
     ),

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from bywire.control import lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
+from bywire.control import abs_rules, lift_pi, mixed_slip, slip_pi, vehicle_speed, wheel_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, TimeConstant, Unit
 from bywire.plant import brake_disc, disc_heat, pressure_loop, wheel_encoder
@@ -42,7 +42,8 @@ class SensorParameters(ParameterSet):
 class EcuParameters(ParameterSet):
     """What runs on the ECU.
 
-    ``abs``: ``"pi"`` controls the slip of both wheels; ``"off"`` leaves them to the rider.
+    ``abs``: ``"pi"`` controls the slip of both wheels; ``"rules"`` build, dump and hold their
+    pressures by thresholds; ``"off"`` leaves them to the rider.
     ``lift``: ``"pi"`` keeps the rear wheel on the ground.
     ``sees``: the speed and slip of the controllers are ``"estimated"`` from the sensors, or
     ``"known"``, for comparison.
@@ -50,7 +51,7 @@ class EcuParameters(ParameterSet):
 
     T_s: Duration
     """sample time"""
-    abs: Literal["off", "pi"]
+    abs: Literal["off", "pi", "rules"]
     """control of the wheels' slip"""
     lift: Literal["off", "pi"]
     """control of the rear wheel's lift"""
@@ -63,6 +64,7 @@ class EcuParameters(ParameterSet):
     mix: mixed_slip.Parameters
     front_slip: slip_pi.Parameters
     rear_slip: slip_pi.Parameters
+    rules: abs_rules.Parameters
     front_lift: lift_pi.Parameters
 
 

@@ -48,6 +48,13 @@ _AXLE = {  # of the heat of front and rear brake
     "T_wet": derived(428.15, "DOT 4, 155 degC: FMVSS 116"),
     "T_most": chosen(923.15, "650 degC: discs of stainless steel begin to temper and warp"),
 }
+_SOUGHT = "found by search for the shortest stops on five surfaces at once, rounded"
+_RULES = {
+    "slip_keep": 0.35, "slip_dump": 0.46, "slip_back": 0.2, "t_lead": 0.13, "a_hold": 14.0,
+    "t_hold": 0.035, "t_most": 0.24, "dump": 90.0, "depth": 0.92, "back": 1.02, "t_step": 0.025,
+    "step": 0.05, "growth": 1.12, "tau_a": 0.005, "tau_p": 0.025,
+    "v_fall": 5.0,
+}  # fmt: skip
 _DRY = {
     name: derived(value, "dry asphalt for car tyres, as circulated")
     for name, value in SURFACES["dry-asphalt"]._asdict().items()
@@ -152,6 +159,8 @@ SPORT600 = CitedSet(
         "ecu.rear_slip.J_hat": chosen(0.65, "that of the wheel"),
         "ecu.rear_slip.r_hat": chosen(0.31, "that of the wheel"),
         "ecu.rear_slip.k_hat": derived(2 * 0.40 * 3e-4 * 0.095, "that of the disc"),
+        **{f"ecu.rules.{name}": chosen(value, _SOUGHT) for name, value in _RULES.items()},
+        "ecu.rules.v_off": chosen(2.0, "as that of slip control"),
         "ecu.front_lift.a_lim": derived(0.95 * 9.81 * 0.69 / 0.62, "0.95 of g l_f/h"),
         "ecu.front_lift.k_p": chosen(1e5, "1 bar for 1 m/s^2: an eighth of the static gain"),
         "ecu.front_lift.T_i": chosen(0.05, "crosses over at 1.3 Hz, below the load's transfer"),
