@@ -110,9 +110,16 @@ def drawable(
     moving = [
         (panel, traces)
         for panel, traces in present
-        if any(bool(np.any(recording[trace.variable].values)) for trace in traces)
+        if any(_moves(recording[trace.variable]) for trace in traces)
     ]
     return moving or present
+
+
+def _moves(variable: xr.DataArray) -> bool:
+    """Return whether a signal is ever anything but 0, or a temperature but its first."""
+    values = variable.values
+    is_temperature = variable.attrs.get("units") == "K"
+    return bool(np.any(values != (values[:1] if is_temperature else 0.0)))
 
 
 def _present(panel: Panel, recording: xr.Dataset) -> list[Trace]:

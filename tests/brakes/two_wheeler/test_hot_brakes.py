@@ -8,9 +8,11 @@ from bywire.bench.energy_ledger import further_ledgers
 from bywire.bench.experiment import as_run
 from bywire.brakes.two_wheeler.case import rolling_case
 from bywire.brakes.two_wheeler.experiments import repeated_stops
+from bywire.brakes.two_wheeler.panels import PANELS
 from bywire.brakes.two_wheeler.stop_series import WARM, cooled
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import disc_heat
+from bywire.report.time_traces import drawable
 from bywire.simulation.run import simulate
 from bywire.vehicle import stop_figures
 
@@ -168,3 +170,12 @@ def test_the_series_is_told_to_the_substep():
     end = float(course["T_disc_f"].values[course["stop"].values == 2.0][-1])
     still = stop_figures.standstill(run.time, run["v"])
     assert np.interp(still, run.time, run["T_disc_f"]) == pytest.approx(end, abs=1e-5)
+
+
+def test_time_traces_show_temperatures_that_move():
+    cold, warm = stop({"front.heat.law": "off", "rear.heat.law": "off"}), stop()
+    shown = [
+        {panel.quantity for panel, _ in drawable(each.recording, PANELS.panels)}
+        for each in (cold, warm)
+    ]
+    assert shown[1] - shown[0] == {"discs", "pads"}

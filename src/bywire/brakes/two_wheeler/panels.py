@@ -29,5 +29,7 @@ PANELS = Panels(
         Panel("rules, rear", (Trace("phase_r"),), levels=abs_rules.PHASES, height=0.8),
         Panel("load", (Trace("N_f"), Trace("N_r", Role.SECOND))),
         Panel("pitch", (Trace("phi"),)),
+        Panel("discs", (Trace("T_disc_f"), Trace("T_disc_r", Role.SECOND))),
+        Panel("pads", (Trace("T_pads_f"), Trace("T_pads_r", Role.SECOND))),
     ),
 )  # fmt: skip
