@@ -5,7 +5,14 @@ from __future__ import annotations
 import pytest
 
 from bywire.report.style import axis_label
-from bywire.report.wording import amount, clean, duration, unit_text
+from bywire.report.wording import (
+    amount,
+    clean,
+    duration,
+    error_text,
+    measured_amount,
+    unit_text,
+)
 
 
 @pytest.mark.parametrize(
@@ -43,6 +50,14 @@ def test_axis_labels_name_quantity_and_unit() -> None:
     assert axis_label("motor current", "A") == "motor current [A]"
     assert axis_label("piston travel", "m") == "piston travel [mm]"
     assert axis_label("cost in $", "1") == r"cost in \$ [-]"
+
+
+def test_temperatures_are_in_degrees_celsius_and_their_errors_in_kelvin() -> None:
+    assert amount(623.15, "K") == "350 °C"
+    assert (amount(20.0, "delta_degC"), amount(-5.0, "delta_degC")) == ("20 K", "-5 K")
+    assert measured_amount(623.27, "K", 0.2) == "350.1 °C"
+    assert error_text(623.15, "K", 0.2) == "0.2 K"
+    assert axis_label("front discs", "K") == "front discs [°C]"
 
 
 def test_durations_choose_their_unit() -> None:

@@ -93,3 +93,13 @@ def test_choices_are_drawn_by_their_weights():
     assert np.mean(values == "a") == pytest.approx(0.75)
     with pytest.raises(InputError, match="'d'"):
         read_choice("law", {"values": ["d"]}, ("a", "b", "c"))
+
+
+def test_widths_of_a_temperature_are_differences():
+    leaf = Leaf("heat.T_1", Unit("K"), 0.0, math.inf, True, True)
+    for entry in ("+-10 K", {"kind": "tolerance", "tolerance": "10 K"}):
+        made = read(entry, 623.15, leaf)
+        assert (made.low, made.high) == pytest.approx((613.15, 633.15))
+        assert "350 degC +- 10 K" in made.text
+    with pytest.raises(InputError, match="degC cannot be a temperature difference in K"):
+        read("+-10 degC", 623.15, leaf)

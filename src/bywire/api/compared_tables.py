@@ -9,6 +9,7 @@ from typing import Any
 
 from bywire.api.compared_run import ComparedRun, Setting
 from bywire.bench.step_error import are_distinct
+from bywire.core.units import difference_unit
 from bywire.report.tables import Cell, Column, Table, value_text
 from bywire.report.wording import clean, measured_amount
 
@@ -130,8 +131,9 @@ def _change(row: Compared) -> Cell:
     first, change = known[low], known[high] - known[low]
     if not row.is_distinct:
         return Cell("not distinct", value=change)
-    written = measured_amount(change, row.unit, row.errors[low] + row.errors[high], 3)
-    is_share = is_pair and first and row.unit != "%"
+    error = row.errors[low] + row.errors[high]
+    written = measured_amount(change, difference_unit(row.unit), error, 3)
+    is_share = is_pair and first and row.unit not in ("%", "K")
     share = f" ({100 * change / abs(first):+.3g} %)" if is_share else ""
     sign = "+" if is_pair and change > 0 else ""
     return Cell(f"{sign}{written}{share}", value=change)

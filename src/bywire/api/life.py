@@ -16,6 +16,7 @@ import xarray as xr
 from bywire.bench.running import Progress
 from bywire.core.errors import ParameterError, quoted
 from bywire.core.typing import Array, silent
+from bywire.core.units import difference_unit
 from bywire.life.life_file import read_life
 from bywire.life.one_by_one import one_by_one
 from bywire.life.projection import CONFIDENCE, Projection, projected
@@ -157,7 +158,7 @@ class LifeResult(Answer):
             rows.append((
                 name, each.label, amount(path[0], each.unit), amount(path[-1], each.unit),
                 amount(float(path.min()), each.unit), amount(float(path.max()), each.unit),
-                amount(rate, each.unit),
+                amount(rate, difference_unit(each.unit)),
             ))  # fmt: skip
         return text_table(("state", "meaning", "new", "at end", "least", "largest", "per stop"),
                           rows)  # fmt: skip

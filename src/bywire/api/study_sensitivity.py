@@ -8,6 +8,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 from bywire.api.study_tables import shown_figures
+from bywire.core.units import difference_unit
 from bywire.report.document import FigureBlock, TableBlock
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import amount, clean
@@ -89,7 +90,8 @@ def _table(
             cells = [*_cells(each.first), *_cells(each.total)]
         else:
             heads = ["mu*", "interval", "sigma"]
-            cells = [*_cells(each.mu_star, unit), Cell(amount(each.sigma, unit, 3))]
+            of = difference_unit(unit)
+            cells = [*_cells(each.mu_star, of), Cell(amount(each.sigma, of, 3))]
         rows.append((Cell(clean(each.quantity)), *cells))
     columns += [Column(head, numeric=head != "interval") for head in heads]
     return Table(tuple(columns), tuple(rows))

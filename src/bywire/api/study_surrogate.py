@@ -14,6 +14,7 @@ from bywire.api.study_tables import shown_figures, varied_table
 from bywire.bench.relative_changes import share_of
 from bywire.bench.values import number
 from bywire.core.errors import ParameterError, unknown_name
+from bywire.core.units import difference_unit
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Section, TableBlock, spaced
 from bywire.report.tables import Cell, Column, Table
@@ -87,8 +88,9 @@ class StudySurrogates(Answer):
         for s in self.surrogates.values():
             told = [amount(float(s(self.at)), s.unit)] if self.at else []
             texts = [
-                *told, f"{100.0 * s.explained:.2f} %", amount(s.rms, s.unit),
-                amount(s.largest, s.unit), str(s.degree), str(s.terms), str(s.cases),
+                *told, f"{100.0 * s.explained:.2f} %",
+                *(amount(error, difference_unit(s.unit)) for error in (s.rms, s.largest)),
+                str(s.degree), str(s.terms), str(s.cases),
             ]  # fmt: skip
             rows.append((Cell(clean(s.kpi)), *map(Cell, texts)))
         columns = (Column("name"), *(Column(head, numeric=True) for head in (*at, *heads)))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from bywire.core.units import difference_unit
 from bywire.report.document import Listing, TableBlock
 from bywire.report.tables import Cell, Column, Table, Verdict, text_table, value_text
 from bywire.report.wording import amount, clean
@@ -139,7 +140,8 @@ def _effect_table(effects: Sequence[Effect], unit: str) -> Table:
         figures = [float(each.figures[0]), float(each.figures[-1]), each.least, each.largest]
         rows.append((
             Cell(each.quantity), *map(Cell, ends),
-            *(Cell(amount(v, unit), value=v) for v in (*figures, each.swing)),
+            *(Cell(amount(v, unit), value=v) for v in figures),
+            Cell(amount(each.swing, difference_unit(unit)), value=each.swing),
         ))  # fmt: skip
     return Table((Column("quantity"), *(Column(h, numeric=True) for h in heads)), tuple(rows))
 

@@ -258,6 +258,17 @@ def convert(value: F, symbol: str, unit: str) -> F:
     return value * factor  # type: ignore[operator,return-value]
 
 
+def difference_unit(symbol: str) -> str:
+    """Return the SI unit of differences: of temperatures one whose zero is no temperature.
+
+    Examples
+    --------
+    >>> shown(20.0, "K"), shown(20.0, difference_unit("K")), difference_unit("Pa")
+    ('-253.15 degC', '20 K', 'Pa')
+    """
+    return "delta_degC" if symbol == "K" else symbol
+
+
 def display_factor(symbol: str) -> float:
     """Return what a difference of one SI unit is in the unit in which the edges show it.
 
@@ -268,8 +279,8 @@ def display_factor(symbol: str) -> float:
     >>> display_factor("Pa"), display_factor("K")
     (1e-05, 1.0)
     """
-    unit = display_unit(symbol)
-    return 1.0 if unit == "degC" else convert(1.0, symbol, unit)
+    symbol = difference_unit(symbol)
+    return convert(1.0, symbol, display_unit(symbol))
 
 
 def example(symbol: str, nominal: float = 1.0) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.core.units import shown
+from bywire.core.units import difference_unit, shown
 from bywire.identification.leftover import Leftover, Part
 from bywire.identification.unknown import Unknown
 
@@ -173,7 +173,8 @@ class Estimate:
             for k in self.kept
         ]
         left = [
-            f"{leftover.label} leaves {shown(float(f'{leftover.rms:.3g}'), leftover.unit)}"
+            f"{leftover.label} leaves "
+            + shown(float(f"{leftover.rms:.3g}"), difference_unit(leftover.unit))
             + (f", fit {leftover.fit:.1f} %" if math.isfinite(leftover.fit) else "")
             for leftover in self.leftovers()
         ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.core.units import shown
+from bywire.core.units import difference_unit, shown
 from bywire.identification.estimate import Estimate
 from bywire.identification.noise import robust_scale
 
@@ -36,7 +36,7 @@ def misfit(estimate: Estimate) -> str:
     low, high = _AS_ASSUMED
     if worst.noise is not None and low <= worst.rms / worst.noise <= high:
         return ""
-    size = shown(float(f"{worst.rms:.3g}"), worst.unit)
+    size = shown(float(f"{worst.rms:.3g}"), difference_unit(worst.unit))
     return (
         f"{worst.label}: the model leaves {size}, {worst.over_noise:.2g} times the noise between "
         "neighboring samples: something is missing in it or wrong, and the intervals do not hold, "
@@ -61,7 +61,7 @@ def untold(estimate: Estimate, J: Array) -> tuple[int, str] | None:
     unknown = estimate.unknowns[index]
     return index, (
         f"its standard deviation would be {relative[index]:.2g} times its usual magnitude "
-        f"{shown(float(f'{unknown.scale:.3g}'), unknown.unit)} ({reason})"
+        f"{shown(float(f'{unknown.scale:.3g}'), difference_unit(unknown.unit))} ({reason})"
     )
 
 
@@ -102,8 +102,9 @@ def notes_of(estimate: Estimate) -> tuple[str, ...]:
         if away > _CONTRADICTED:
             notes.append(
                 f"{u.label} = {shown(float(f'{value:.4g}'), u.unit)} lies {away:.2g} deviations "
-                f"of its prior ({shown(mean, u.unit)} ± {shown(deviation, u.unit)}) away: the "
-                "prior or the model is wrong"
+                f"of its prior ({shown(mean, u.unit)} ± "
+                f"{shown(deviation, difference_unit(u.unit))}) away: the prior or the model is "
+                "wrong"
             )
     wrong = misfit(estimate)
     return (*notes, wrong) if wrong else tuple(notes)

@@ -13,7 +13,7 @@ import numpy as np
 
 from bywire.bench.step_error import NO_ESTIMATE, of_difference
 from bywire.core.typing import Array
-from bywire.core.units import shown
+from bywire.core.units import difference_unit, shown
 from bywire.identification.estimate import Estimate
 from bywire.identification.loss import Loss, influence
 from bywire.identification.problem import Problem
@@ -68,8 +68,9 @@ def with_step_share(
 def _exceeding(best: Estimate, errors: Array) -> list[str]:
     half = 0.5 * np.diff(best.intervals(), axis=1).ravel()
     return [
-        f"{u.label} is off by about {shown(float(f'{error:.2g}'), u.unit)} from the step of the "
-        f"simulation, more than its 95 % interval reaches, {shown(float(f'{reach:.2g}'), u.unit)}: "
+        f"{u.label} is off by about {shown(float(f'{error:.2g}'), difference_unit(u.unit))} from "
+        "the step of the simulation, more than its 95 % interval reaches, "
+        f"{shown(float(f'{reach:.2g}'), difference_unit(u.unit))}: "
         "take a smaller step"
         for u, error, reach in zip(best.unknowns, errors, half, strict=True)
         if error > reach

@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
-from bywire.core.units import display_factor
+from bywire.core.units import difference_unit, display_factor
 from bywire.identification.method import Curve
 from bywire.report import style
 from bywire.report.decimation import kept_samples
@@ -201,4 +201,4 @@ def _band_label(axes: Axes, half: Array, symbol: str) -> str:
     points = 0.0 if figure is None else 72.0 * axes.bbox.height / figure.dpi
     drawn = 2.0 * display_factor(symbol) * most / max(abs(high - low), 1e-300) * points
     hidden = ", within the line" if drawn < _LINE else ""
-    return f"95 % band (± {amount(most, symbol, 2)} at most{hidden})"
+    return f"95 % band (± {amount(most, difference_unit(symbol), 2)} at most{hidden})"

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from bywire.core.units import difference_unit
 from bywire.report.wording import amount, clean, error_text, measured_amount, unit_text
 
 Verdict = Literal["good", "bad", "open", "none"]
@@ -259,7 +260,7 @@ def _tolerance(row: ReproductionRow) -> str:
         return "-"
     if isinstance(row.tolerance, str):
         return clean(row.tolerance) or "-"
-    return amount(row.tolerance, row.unit)
+    return amount(row.tolerance, difference_unit(row.unit))
 
 
 def value_text(value: object, unit: str) -> str:

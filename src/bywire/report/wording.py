@@ -9,7 +9,7 @@ from typing import TypeVar
 
 from bywire.core.leaf import Leaf
 from bywire.core.quantities import display_unit
-from bywire.core.units import convert
+from bywire.core.units import convert, difference_unit
 
 F = TypeVar("F")
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
@@ -144,7 +144,7 @@ def error_text(value: float | None, symbol: str, error: float) -> str:
 
 def _readable_difference(number: float, value: float, symbol: str) -> tuple[float, str]:
     """Return a difference in the unit in which a value reads best; of temperatures in K."""
-    return (number, "K") if display_unit(symbol) == "degC" else _readable(number, value, symbol)
+    return _readable(number, value, difference_unit(symbol))
 
 
 def _readable(number: float, value: float, symbol: str) -> tuple[float, str]:

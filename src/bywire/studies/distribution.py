@@ -21,7 +21,7 @@ from bywire.bench.values import number
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.leaf import Leaf
 from bywire.core.typing import Array
-from bywire.core.units import parse, shown
+from bywire.core.units import difference_unit, parse, shown
 
 NEVER = 1e-9
 """probability that counts as none: of values that the model would not admit"""
@@ -165,7 +165,7 @@ class _Entry:
         if isinstance(text, str) and text.strip().endswith("%"):
             width = abs(of) * parse(text, "1", f"[vary] {self.name}.{key}")
         else:
-            width = self._number(key, text)
+            width = self._number(key, text, difference_unit(self.leaf.unit.symbol))
         if not width > 0.0 or not math.isfinite(width):
             raise ParameterError(
                 f"[vary] {self.name}.{key} = {quoted(text)}: a width > 0 is wanted"
@@ -182,12 +182,16 @@ class _Entry:
             raise ParameterError(f"[vary] {self.name} of kind {self.section['kind']} needs {key!r}")
         return self.section[key]
 
-    def _number(self, key: str, value: Any) -> float:
+    def breadth(self, value: float) -> str:
+        """Return a width with its unit."""
+        return shown(value, difference_unit(self.leaf.unit.symbol))
+
+    def _number(self, key: str, value: Any, symbol: str = "") -> float:
         unit = self.leaf.unit
         where = f"[vary] {self.name}.{key}"
         if isinstance(value, (int, float)) and not isinstance(value, bool) and value != 0:
             value = repr(value)  # a file's plain number: 37 is not 37 bar, and hardly 37 Pa
-        return float(number(value, unit.symbol, where, unit.nominal))
+        return float(number(value, symbol or unit.symbol, where, unit.nominal))
 
     def refused(self, why: str) -> ParameterError:
         """Return the error of a section that contradicts itself."""
@@ -215,7 +219,7 @@ def _between(entry: _Entry, low: float, high: float, text: str) -> Distribution:
 def _tolerance(entry: _Entry) -> Distribution:
     width = entry.width("tolerance", entry.nominal)
     shape = entry.section.get("shape", "uniform")
-    text = f"{entry.amount(entry.nominal)} +- {entry.amount(width)}"
+    text = f"{entry.amount(entry.nominal)} +- {entry.breadth(width)}"
     if shape == "uniform":
         return _between(entry, entry.nominal - width, entry.nominal + width, f"{text}, uniform")
     if shape != "normal":
@@ -227,7 +231,7 @@ def _tolerance(entry: _Entry) -> Distribution:
 def _normal(entry: _Entry) -> Distribution:
     mean = entry.level("mean", entry.nominal)
     sd = entry.width("sd", mean)
-    text = f"normal, mean {entry.amount(mean)}, sd {entry.amount(sd)}"
+    text = f"normal, mean {entry.amount(mean)}, sd {entry.breadth(sd)}"
     low = entry.level("low", -math.inf)
     high = entry.level("high", math.inf)
     if math.isinf(low) and math.isinf(high):

@@ -12,7 +12,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
-from bywire.core.units import shown
+from bywire.core.units import difference_unit, shown
 from bywire.identification.measured import NOISE_OF_SAMPLES
 from bywire.identification.noise import is_told, noise_of, robust_scale
 from bywire.identification.output_error import Trial
@@ -109,7 +109,7 @@ def overestimated(
             why = f"is met by the model within {left:.2g} of that"
         else:
             continue
-        unit = signals_of(runs[trial.label].case.model.Output)[name].unit
+        unit = difference_unit(signals_of(runs[trial.label].case.model.Output)[name].unit)
         size = shown(float(f"{trial.noise[name]:.3g}"), unit)
         key = f"{trial.label}:{name}" if trial.label else name
         doubtful[key] = (

@@ -15,7 +15,7 @@ from bywire.core.leaf import Leaf
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
-from bywire.core.units import shown, split
+from bywire.core.units import difference_unit, shown, split
 from bywire.identification.fitting.question import Question
 from bywire.identification.unknown import Unknown, parameters_of, scattered
 
@@ -140,20 +140,27 @@ def _pair(
     unknown: Unknown, text: str, parts: Sequence[str], kind: str, sign: str
 ) -> tuple[float, float]:
     """Return two quantities; a unit that only the second one has counts for both."""
+    low, high = _EXAMPLES[kind]
     if len(parts) != 2 or not all(part.strip() for part in parts):
         raise ParameterError(
             f"{kind} of {unknown.name}: {quoted(text)} cannot be read; write for instance "
-            f"'{sign.join(shown(k * unknown.scale, unknown.unit) for k in _EXAMPLES[kind])}'"
+            f"'{shown(low * unknown.scale, unknown.unit)}{sign}"
+            f"{shown(high * unknown.scale, _second_unit(unknown, kind))}'"
         )
     first, second = (part.strip() for part in parts)
     unit = split(second)[1]
-    if unit and not split(first)[1]:
+    if unit and not split(first)[1] and _second_unit(unknown, kind) == unknown.unit:
         first = f"{first} {unit}"
     what = f"{kind} of {unknown.name}"
     return (
         number(first, unknown.unit, what, unknown.scale),
-        number(second, unknown.unit, what, unknown.scale),
+        number(second, _second_unit(unknown, kind), what, unknown.scale),
     )  # fmt: skip
+
+
+def _second_unit(unknown: Unknown, kind: str) -> str:
+    """Return the SI unit of the second quantity: a deviation is a difference."""
+    return difference_unit(unknown.unit) if kind == "prior" else unknown.unit
 
 
 def starts_of(
