@@ -18,7 +18,8 @@ class Parameters(ParameterSet):
     """Share of both, and the deceleration that goes with the slip that is held.
 
     ``alpha`` 1 is slip alone, 0 deceleration alone. Between them less slip is asked for where the
-    road holds more; beyond the peak, where it holds less, more: gains have to be its own.
+    road holds more. Deceleration has the rate of the slip in it, times speed over gravity: gains
+    have to be its own, and fixed ones do at every speed.
     """
 
     alpha: Weight
