@@ -19,7 +19,7 @@ from bywire.campaigns.store import CampaignStore
 from bywire.core.quantities import display_unit
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array, silent
-from bywire.core.units import convert
+from bywire.core.units import difference_unit, display_factor
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Banner, Document, FigureBlock, Listing, Section, TableBlock
 from bywire.report.subject import Subject
@@ -285,7 +285,7 @@ def _at_threshold() -> int:
 
 def _range(low: Array, high: Array, unit: str) -> str:
     """Return how far runs come off, least and largest of all."""
-    scale, shown = convert(1.0, unit, display_unit(unit)), display_unit(unit)
+    scale, shown = display_factor(unit), display_unit(difference_unit(unit))
     text = f"{scale * low.min():.3g} to {scale * high.max():.3g}"
     return text if unit == "1" else f"{text} {shown}"
 

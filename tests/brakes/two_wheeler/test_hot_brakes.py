@@ -151,6 +151,16 @@ def test_fluid_that_gets_too_hot_is_reported():
     assert "front brake: the brake fluid passes the boiling point of wet fluid, 22 degC" in text
 
 
+def test_the_time_of_the_peak_is_that_of_the_fluid_and_not_of_a_row():
+    short, long, brief = (
+        bywire.run("repeated-stops", {"options.stops": "1", "options.parked": parked},
+                   estimate_error=False).kpi("fluid_peak_time")
+        for parked in ("900 s", "2000 s", "30 s")
+    )  # fmt: skip
+    assert short.value == pytest.approx(long.value, abs=0.02)
+    assert "longer options.parked" in brief.note
+
+
 @pytest.mark.parametrize(
     ("changes", "text"),
     [({"vehicle.road.gradient": "-0.9", "options.v_0": "10 m/s"}, "standstill"),

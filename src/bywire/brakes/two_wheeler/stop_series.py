@@ -89,3 +89,14 @@ def at_end(rows: Mapping[str, Array]) -> Heat:
 def heat_of(rows: Any, end: str, k: int) -> disc_heat.State:
     """Return the temperatures of the brake of a suffix in row ``k`` of rows or a recording."""
     return disc_heat.State(*(float(rows[n + end][k]) for n in disc_heat.State._fields))
+
+
+def peak_time(t: Array, T: Array) -> float | tuple[float, str]:
+    """Return when a temperature is highest [s], by a parabola through its highest rows."""
+    k = int(T.argmax())
+    if k + 1 == t.size:
+        return math.nan, "the fluid still warms up at the end: give a longer options.parked"
+    if k == 0:
+        return 0.0
+    bend, slope, _ = np.polyfit(t[k - 1 : k + 2] - t[k], T[k - 1 : k + 2] - T[k], 2)
+    return float(t[k] - 0.5 * slope / bend)

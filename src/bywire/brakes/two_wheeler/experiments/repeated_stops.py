@@ -209,7 +209,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
             pressure_cold=cold,
             pressure_hot=cold / disc_heat.friction(hot.T_disc, par.front.heat),
             fluid_peak=float(fluid.max()),
-            fluid_peak_time=float(t[fluid.argmax()] - t[last]),
+            fluid_peak_time=stop_series.peak_time(t[last:] - t[last], fluid[last:]),
         ),
     )
 
