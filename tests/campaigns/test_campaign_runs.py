@@ -198,13 +198,28 @@ def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
 
 
 def test_campaigns_of_brakes_can_be_read_and_others_are_not_known():
-    for name in ("motorcycle", "wedge"):
+    for name in ("motorcycle", "wedge", "two-wheeler"):
         plan = read_campaign(name)
-        assert plan.total >= 200
-        assert plan.residuals
-        assert plan.case(0).model.name == plan.residuals[0].assembly
+        assert plan.total >= 160
+        assert plan.residuals or name == "two-wheeler"
+        assert {each.assembly for each in plan.residuals} <= {plan.case(0).model.name}
     with pytest.raises(InputError, match="did you mean 'motorcycle'"):
         read_campaign("motorcycel")
+
+
+def test_double_faults_stand_beside_the_latent_one(tmp_path):
+    text = SMALL.replace('present =', 'latent = ["seal.swollen"]\npresent =').replace(
+        "healthy = 8", "healthy = 4"
+    ).replace(', "ecu.frozen", "bridge.late", "fluid.cold"]', ', "fluid.cold"]')
+    text = text.replace('"pressure.stuck" = ["0 bar", "50 bar"]', '"seal.swollen" = 3')
+    (tmp_path / "pairs.toml").write_text(text.replace('"pressure.stuck", ', ""))
+    campaign = bywire.run_faults(tmp_path / "pairs.toml")
+    single, double = of(campaign, "battery.lost")
+    assert (single.failing.latent, double.failing.latent.mode.name) == (None, "seal.swollen")
+    # Swollen seals hold the brake without power: the loss of the battery does not release it.
+    assert single.dangerous == 2
+    assert double.dangerous == 0
+    assert "battery.lost after seal.swollen 3" in [f.failing.name for f in campaign.findings.faults]
 
 
 def test_what_lasts_is_counted_over_the_rows_before():

@@ -134,7 +134,9 @@ class FaultCampaign(Answer):
     def _name(self, each: FaultFinding) -> str:
         mode, value = each.failing.mode, each.failing.value
         size = f" {amount(value, mode.unit)}" if mode.unit else ""
-        return f"{mode.name}{size}" + (" (there from the start)" if each.failing.is_present else "")
+        beside = f" after {each.failing.latent.mode.name}" if each.failing.latent else ""
+        start = " (there from the start)" if each.failing.is_present else ""
+        return f"{mode.name}{size}{beside}{start}"
 
     def _reacted(self, each: FaultFinding) -> str:
         """Return what is still violated where the fault is answered."""
@@ -214,6 +216,7 @@ class FaultCampaign(Answer):
             "fault": each.failing.mode.name, "summary": each.failing.mode.summary,
             "value": each.failing.value if each.failing.mode.unit else None,
             "unit": each.failing.mode.unit, "present": each.failing.is_present,
+            "after": each.failing.latent.mode.name if each.failing.latent else None,
             "class": each.kind, "severity": each.severity(self.findings.plan),
             "runs": each.cases, "violated": each.criteria, "tolerated_for": each.tolerance,
             "violated_after": each.violated.tolist(), "seen_after": each.seen.tolist(),
@@ -291,7 +294,9 @@ def _range(low: Array, high: Array, unit: str) -> str:
 
 
 def _milliseconds(time: float) -> str:
-    return "-" if math.isnan(time) else f"{1e3 * time:.3g} ms"
+    if math.isnan(time):
+        return "-"
+    return f"{time:.3g} s" if time >= 1.0 else f"{1e3 * time:.3g} ms"
 
 
 def _worst(times: Array) -> str:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from fnmatch import fnmatchcase
 from pathlib import Path
 from types import MappingProxyType
@@ -15,7 +16,7 @@ from bywire.bench.faults.modes import Mode, modes_of
 from bywire.bench.values import number
 from bywire.campaigns.criterion import read_criteria
 from bywire.campaigns.declared import CAMPAIGNS
-from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly
+from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly, touch_alike
 from bywire.campaigns.residual import RESIDUALS, Residual
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.model import ASSEMBLIES
@@ -27,7 +28,7 @@ from bywire.studies.study_file import read_all_varied, read_bench
 _KEYS = ("name", "bench", "set", "vary", "measured", "campaign", "values", "criteria", "residuals",
          "rates", "reaction")  # fmt: skip
 _SECTIONS = ("set", "vary", "campaign", "values", "rates", "reaction")
-_CAMPAIGN = ("only", "leave_out", "present", "onset", "onsets", "spread", "healthy",
+_CAMPAIGN = ("only", "leave_out", "present", "latent", "onset", "onsets", "spread", "healthy",
              "false_alarms", "seed")  # fmt: skip
 _REACTION = ("fault", "value", "delay")
 
@@ -84,7 +85,15 @@ def _plan(
     for key in section:
         if key not in _CAMPAIGN:
             raise unknown_name("key of [campaign]", key, _CAMPAIGN)
-    faults = tuple(_failing(modes, section, content.get("values", {})))
+    singles = tuple(_failing(modes, section, content.get("values", {})))
+    latent = [
+        Failing(mode, size, is_present=True)
+        for name, mode in modes.items()
+        if any(fnmatchcase(name, each) for each in _patterns(section, "latent", modes))
+        for size in _sizes(mode, content.get("values", {}))
+    ]
+    pairs = _pairs(singles, latent, case)
+    faults = (*singles, *pairs)
     criteria = read_criteria(content.get("criteria", []), signals_of(case.model.Output))
     if not criteria:
         raise ParameterError("[[criteria]] are missing: say what a fault must not do")
@@ -122,11 +131,28 @@ def _failing(
             continue
         if any(fnmatchcase(name, each) for each in without):
             continue
-        given = values.get(name, mode.value)
-        for value in given if isinstance(given, list) else [given]:
-            size = number(value, mode.unit, f"[values] {name}") if mode.unit else 0.0
-            require_admissible(mode, size, f"[values] {name}")
-            yield Failing(mode, size, any(fnmatchcase(name, each) for each in present))
+        is_present = any(fnmatchcase(name, each) for each in present)
+        for size in _sizes(mode, values):
+            yield Failing(mode, size, is_present)
+
+
+def _sizes(mode: Mode, values: Mapping[str, Any]) -> Iterator[float]:
+    """Yield the values that a mode has in the campaign [SI]."""
+    given = values.get(mode.name, mode.value)
+    for value in given if isinstance(given, list) else [given]:
+        size = number(value, mode.unit, f"[values] {mode.name}") if mode.unit else 0.0
+        require_admissible(mode, size, f"[values] {mode.name}")
+        yield size
+
+
+def _pairs(
+    singles: Sequence[Failing], latent: Sequence[Failing], case: Case
+) -> Iterator[Failing]:
+    """Yield every fault once more beside each of the latent ones, where both can be there."""
+    for before in latent:
+        for each in singles:
+            if not touch_alike(each, before, case.par):
+                yield replace(each, latent=before)
 
 
 def _patterns(section: Mapping[str, Any], key: str, modes: Mapping[str, Mode]) -> list[str]:

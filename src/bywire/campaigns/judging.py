@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from bywire.campaigns.plan import CampaignPlan, Failing
+from bywire.campaigns.plan import CampaignPlan, Failing, touch_alike
 from bywire.campaigns.residual import detected, threshold
 from bywire.campaigns.simulating import Traces, faulty_traces
 from bywire.core.typing import Array
@@ -151,10 +151,9 @@ def _is_the_same(plan: CampaignPlan, failing: Failing) -> bool:
     """Return whether fault and reaction change the same: nothing is left to be done then."""
     assert plan.reaction is not None
     par = plan.case(0).par
-    both = [each.mode.changes for each in (failing, plan.reaction.failing)]
-    names = [set() if change is None else {*change(par, 1.0)} for change in both]
-    same = plan.reaction.failing.mode.place == failing.mode.place
-    return same or bool(names[0] & names[1])
+    return touch_alike(failing, plan.reaction.failing, par) or (
+        failing.latent is not None and touch_alike(failing.latent, plan.reaction.failing, par)
+    )
 
 
 def _earliest(columns: Sequence[Array], count: int) -> Array:

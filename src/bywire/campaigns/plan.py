@@ -16,6 +16,7 @@ from bywire.bench.faults.modes import Mode
 from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.residual import Residual, missed_ticks
 from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.parameters import ParameterSet
 from bywire.core.version import __version__
 from bywire.simulation.tapped import Tap
 from bywire.studies.identity import as_json, digest_of, source_digest
@@ -34,22 +35,27 @@ class Failing:
         What fails, and how much [SI].
     is_present
         Whether it is there before the run starts; times then count from zero.
+    latent
+        Another fault that was there before, unseen; None for none.
     """
 
     mode: Mode
     value: float
     is_present: bool = False
+    latent: Failing | None = None
 
     @property
     def name(self) -> str:
         """The mode, and the value [SI] where it takes one."""
         unit = "" if self.mode.unit == "1" else f" {self.mode.unit}"
-        return f"{self.mode.name} {self.value:.6g}{unit}" if self.mode.unit else self.mode.name
+        name = f"{self.mode.name} {self.value:.6g}{unit}" if self.mode.unit else self.mode.name
+        return f"{name} after {self.latent.name}" if self.latent is not None else name
 
-    def at(self, onset: float, seed: int) -> Injection:
-        """Return the fault from an onset [s] on, or all along."""
-        onset = _LONG_AGO if self.is_present else onset
-        return Injection(self.mode, self.value, AT_ZERO.replace({"onset": onset}), seed)
+    def at(self, onset: float, seed: int) -> list[Injection]:
+        """Return the fault from an onset [s] on, or all along, and the latent one beside it."""
+        begin = _LONG_AGO if self.is_present else onset
+        fault = Injection(self.mode, self.value, AT_ZERO.replace({"onset": begin}), seed)
+        return [fault, *([] if self.latent is None else self.latent.at(onset, seed))]
 
 
 @dataclass(frozen=True)
@@ -156,7 +162,8 @@ class CampaignPlan:
     @cached_property
     def taps(self) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
         """Taps and resting tasks of the model that healthy runs and most faults share."""
-        return taps_of([each.at(0.0, 0) for each in self.faults if not self.is_apart(each)])
+        shared = [each for each in self.faults if not self.is_apart(each)]
+        return taps_of([fault for each in shared for fault in each.at(0.0, 0)])
 
     @cached_property
     def _choices(self) -> Mapping[str, Any]:
@@ -164,6 +171,8 @@ class CampaignPlan:
 
     def is_apart(self, failing: Failing) -> bool:
         """Return whether a fault needs a model of its own: laws change, or a drive comes late."""
+        if failing.latent is not None and self.is_apart(failing.latent):
+            return True
         mode = failing.mode
         if mode.changes is None:
             return mode.falsified == "late"
@@ -223,3 +232,10 @@ class CampaignPlan:
 def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:
     """Return onsets evenly over a span [s], the end left out: of a period, it is its beginning."""
     return tuple(float(f"{first + k * spread / count:.12g}") for k in range(count))
+
+
+def touch_alike(first: Failing, second: Failing, par: ParameterSet) -> bool:
+    """Return whether two faults are of one place or change one parameter: not both can be there."""
+    both = [each.mode.changes for each in (first, second)]
+    names = [set() if change is None else {*change(par, 1.0)} for change in both]
+    return first.mode.place == second.mode.place or bool(names[0] & names[1])

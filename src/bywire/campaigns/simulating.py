@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -44,7 +42,7 @@ class Traces:
 
 def healthy_traces(plan: CampaignPlan) -> Traces:
     """Return the signals of all healthy runs."""
-    cases = [_case(plan, sample, ()) for sample in range(plan.healthy)]
+    cases = [_case(plan, sample, (), False) for sample in range(plan.healthy)]
     return _traces(plan, cases, list(range(plan.healthy)))
 
 
@@ -67,17 +65,20 @@ def faulty_traces(
     """
     cases = []
     for k, (onset, sample) in enumerate(zip(onsets, samples, strict=True)):
-        faults = [failing.at(onset, plan.seed + sample)]
+        faults = failing.at(onset, plan.seed + sample)
+        is_apart = plan.is_apart(failing)
         if reactions is not None and plan.reaction is not None:
-            faults.append(plan.reaction.failing.at(reactions[k], 0))
-        cases.append(_case(plan, sample, faults))
+            faults += plan.reaction.failing.at(reactions[k], 0)
+            is_apart |= plan.is_apart(plan.reaction.failing)
+        cases.append(_case(plan, sample, faults, is_apart))
     return _traces(plan, cases, list(samples))
 
 
-def _case(plan: CampaignPlan, sample: int, faults: Sequence[Injection]) -> Case:
-    """Return a run of a sample with faults, of the model that most share where they allow it."""
-    apart = any(plan.is_apart(Failing(each.mode, each.value)) for each in faults)
-    taps, tasks = ((), ()) if apart else plan.taps
+def _case(
+    plan: CampaignPlan, sample: int, faults: Sequence[Injection], is_apart: bool
+) -> Case:
+    """Return a run of a sample with faults, of the model that most share or of one of its own."""
+    taps, tasks = ((), ()) if is_apart else plan.taps
     return injected(plan.case(sample), faults, taps, tasks)
 
 
@@ -98,11 +99,10 @@ def _traces(plan: CampaignPlan, cases: Sequence[Case], samples: Sequence[int]) -
     return Traces(time, signals)
 
 
-def _computed(runs: Sequence[Run], signals: Sequence[str]) -> list[Trajectory]:
+def _computed(runs: Sequence[Run], signals: Sequence[str]) -> Sequence[Trajectory]:
     if len(runs) > 1 and fit_lanes(runs):
-        return list(simulate_group(runs, signals))
-    with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        return list(pool.map(lambda run: simulate(run, signals), runs))
+        return simulate_group(runs, signals)
+    return [simulate(run, signals) for run in runs]
 
 
 def _missed(case: Case, task: str, time: Array) -> Array:

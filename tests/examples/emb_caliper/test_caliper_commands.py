@@ -178,3 +178,23 @@ def test_benches_of_the_caliper_are_compared(command, tmp_path):
     assert [row["name"] for row in found["settings"]] == ["motor.R_m"]
     assert found["settings"][0]["unit"] == "ohm"
     assert (tmp_path / "out" / "overlay.png").is_file()
+
+
+def test_what_fails_in_it_is_known_and_can_be_put_in(command: Any, tmp_path: Path) -> None:
+    code, out, _ = command("list", "faults")
+    assert code == 0
+    for name in ("encoder.offset", "bridge.stuck", "force.frozen", "F_set.lost", "motor.hot"):
+        assert name in out, name
+    changes = ("--set", "options.duration=0.3 s", "--fault", "bridge.stuck@0.2 s")
+    code, out, err = command("run", "clamp-step", *changes, "--json")
+    assert code == 0, err
+    campaign = tmp_path / "small.toml"
+    campaign.write_text(
+        'bench = "clamp-step"\n[campaign]\nonly = ["motor.*", "bridge.stuck"]\nhealthy = 4\n'
+        'onset = "0.15 s"\n[[criteria]]\nname = "loss"\nsignal = "F_cl"\nbelow_share = "80 %"\n'
+        'lasting = "20 ms"\n'
+    )
+    code, out, err = command("faults", campaign, "--json")
+    assert code == 0, err
+    kinds = {each["fault"]: each["class"] for each in json.loads(out)["faults"]}
+    assert set(kinds) == {"motor.hot", "motor.demagnetized", "bridge.stuck"}
