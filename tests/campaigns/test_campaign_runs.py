@@ -162,8 +162,8 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder):
     assert [path.read_bytes() for path in kept] == texts
     first = CampaignFindings(
         campaign.findings.plan, campaign.findings.healthy,
-        tuple(finding(each.failing, json.loads(text))
-              for each, text in zip(campaign.findings.faults, texts, strict=True)),
+        tuple(finding(campaign.findings.plan, k, json.loads(text))
+              for k, text in enumerate(texts)),
     )  # fmt: skip
     assert again.findings.coverage == first.coverage == campaign.findings.coverage
     with pytest.raises(FileError, match="holds another campaign"):

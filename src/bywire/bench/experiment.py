@@ -207,9 +207,7 @@ def as_run(
     noises = [k for k, name in enumerate(fields) if name.startswith("noise_")]
 
     def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
-        given = begun.stimulus(t - begun.settle)
-        if isinstance(begun, FaultyCase):
-            given = {**given, **begun.falsified(t - begun.settle)}
+        given = driven_at(begun, t - begun.settle)
         rows = np.zeros((t.size, len(fields)))
         for k, name in enumerate(fields):
             if name in given:
@@ -219,7 +217,6 @@ def as_run(
             rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
         return rows
 
-    changes = begun.changes if isinstance(begun, FaultyCase) else ()
     return Run(
         model=begun.model,
         par=begun.par,
@@ -229,8 +226,22 @@ def as_run(
         duration=begun.settle + begun.duration,
         step=step,
         record=begun.record,
-        changes=tuple(Change(begun.settle + t, par) for t, par in changes),
+        changes=changes_of(begun, begun.settle),
     )
+
+
+def driven_at(
+    case: Case, t: NDArray[np.float64]
+) -> Mapping[str, NDArray[np.float64]]:
+    """Return the signals that a case drives at times of its recording [s], faults among them."""
+    given = case.stimulus(t)
+    return {**given, **case.falsified(t)} if isinstance(case, FaultyCase) else given
+
+
+def changes_of(case: Case, zero: float) -> tuple[Change, ...]:
+    """Return the changes of a run of a case; ``zero``: time of the run at its recording's zero."""
+    changes = case.changes if isinstance(case, FaultyCase) else ()
+    return tuple(Change(zero + t, par) for t, par in changes)
 
 
 def fixed(**levels: float) -> Callable[[NDArray[np.float64]], Mapping[str, NDArray[np.float64]]]:

@@ -37,6 +37,8 @@ class FaultFinding:
         By signal: how far it comes off the healthy run, least, largest and at the end.
     reacted
         What is reached with the reaction, by criterion, of the runs in which it could be taken.
+    delay
+        From detection until the reaction takes effect [s]; 0 where there is none.
     """
 
     failing: Failing
@@ -44,6 +46,7 @@ class FaultFinding:
     detected: Mapping[str, Array]
     extremes: Mapping[str, Sequence[Array]]
     reacted: Mapping[str, Array]
+    delay: float = 0.0
 
     @property
     def cases(self) -> int:
@@ -73,9 +76,11 @@ class FaultFinding:
 
     @property
     def in_time(self) -> int:
-        """Dangerous runs in which it is seen before the fault tolerant time is over."""
+        """Dangerous runs in which it is seen, and answered, before the tolerant time is over."""
         there = ~np.isnan(self.violated)
-        return int(np.sum(self.seen[there] < self.tolerance)) if self.dangerous else 0
+        if not self.dangerous:
+            return 0
+        return int(np.sum(self.seen[there] + self.delay < self.tolerance))
 
     @property
     def criteria(self) -> dict[str, int]:
@@ -161,15 +166,16 @@ class CampaignFindings:
         return rows
 
 
-def finding(failing: Failing, outcome: Mapping[str, Any]) -> FaultFinding:
-    """Return what an outcome says, nulls as NaN."""
+def finding(plan: CampaignPlan, number: int, outcome: Mapping[str, Any]) -> FaultFinding:
+    """Return what the outcome of a fault says, nulls as NaN; ``number``: of it in the plan."""
     reacted = outcome.get("reacted", {}).get("reached", {})
     return FaultFinding(
-        failing,
+        plan.faults[number],
         {name: _numbers(times) for name, times in outcome["reached"].items()},
         {name: _numbers(times) for name, times in outcome["detected"].items()},
         {name: [_numbers(each) for each in sides] for name, sides in outcome["extremes"].items()},
         {name: _numbers(times) for name, times in reacted.items()},
+        0.0 if plan.reaction is None else plan.reaction.delay,
     )
 
 

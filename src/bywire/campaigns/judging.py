@@ -143,7 +143,6 @@ def _with_reaction(
     return {
         "cases": cases,
         "reached": _reached(plan, traces, beside.of(cases), onsets[cases]),
-        "extremes": _extremes(plan, traces, beside.of(cases), begun),
     }
 
 

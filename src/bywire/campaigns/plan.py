@@ -11,7 +11,7 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.faults.course import AT_ZERO
 from bywire.bench.faults.fault_section import Injection
-from bywire.bench.faults.injected import taps_of
+from bywire.bench.faults.injected import taps_of, touched
 from bywire.bench.faults.modes import Mode
 from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.residual import Residual, missed_ticks
@@ -235,7 +235,6 @@ def evenly(first: float, spread: float, count: int) -> tuple[float, ...]:
 
 
 def touch_alike(first: Failing, second: Failing, par: ParameterSet) -> bool:
-    """Return whether two faults are of one place or change one parameter: not both can be there."""
-    both = [each.mode.changes for each in (first, second)]
-    names = [set() if change is None else {*change(par, 1.0)} for change in both]
-    return first.mode.place == second.mode.place or bool(names[0] & names[1])
+    """Return whether two faults change the same: not both can be there then."""
+    one, other = (touched(each.mode, each.value, par) for each in (first, second))
+    return bool(one & other)

@@ -53,5 +53,5 @@ def complete(plan: CampaignPlan, store: CampaignStore, progress: Progress) -> Ca
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     progress("judged", 1.0)
-    findings = (finding(each, outcomes[k]) for k, each in enumerate(plan.faults))
+    findings = (finding(plan, k, outcomes[k]) for k in range(len(plan.faults)))
     return CampaignFindings(plan, healthy, tuple(findings))

@@ -41,6 +41,18 @@ def test_a_wedge_recording_gives_itself_back(stop: xr.Dataset) -> None:
         assert np.abs(pair["modeled"] - pair["measured"]).max() < 1e-9 * span
 
 
+def test_a_record_with_a_fault_is_explained_by_the_bench_that_has_it(stop: xr.Dataset) -> None:
+    faults = [{"fault": "moment.offset", "value": "50 N*m", "onset": "0.1 s"},
+              {"set": {"bearing.C_0": "+50%"}, "onset": "0.12 s"}]  # fmt: skip
+    failing = bywire.Bench(STOP.experiment, STOP.parameters, options=STOP.options, faults=faults)
+    measured = bywire.run(failing, estimate_error=False).recording
+    known, unknown = (replay(bench, measured, {"M_set": "M_set"}, ["y_M"]).outputs["y_M"]
+                      for bench in (failing, STOP))  # fmt: skip
+    span = float(np.ptp(measured["y_M"].values))
+    assert np.abs(known["modeled"] - known["measured"]).max() < 1e-9 * span
+    assert np.abs(unknown["modeled"] - unknown["measured"]).max() > 0.05 * span
+
+
 def test_a_motorcycle_starts_at_the_measured_pressure(ramp: xr.Dataset) -> None:
     """The part after the first slip, from a pressure of its own."""
     later = ramp[["i", "p_mc"]].sel(time=slice(0.0, None)).rename(i="current")

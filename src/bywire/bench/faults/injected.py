@@ -12,7 +12,7 @@ import numpy as np
 
 from bywire.bench.experiment import Case, FaultyCase
 from bywire.bench.faults.fault_section import Injection, injections
-from bywire.bench.faults.modes import falsify, missed
+from bywire.bench.faults.modes import Mode, falsify, missed
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
@@ -171,7 +171,7 @@ def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
         first, second = one.course, other.course
         if first.onset >= second.gone or second.onset >= first.gone:
             continue
-        both = {*_touched(one, par)} & {*_touched(other, par)}
+        both = touched(one.mode, one.value, par) & touched(other.mode, other.value, par)
         if both:
             raise ParameterError(
                 f"faults {one.mode.name} and {other.mode.name} contradict each other: both change "
@@ -179,10 +179,8 @@ def _require_apart(faults: Sequence[Injection], par: ParameterSet) -> None:
             )
 
 
-def _touched(fault: Injection, par: ParameterSet) -> Iterator[str]:
-    mode = fault.mode
-    if mode.channel is not None:
-        yield f"the signal {mode.channel.name}"
-    if mode.task:
-        yield f"the task {mode.task}"
-    yield from _full(fault, par)
+def touched(mode: Mode, value: float, par: ParameterSet) -> set[str]:
+    """Return what a fault changes, for people: of two at one time that must not be the same."""
+    signal = set() if mode.channel is None else {f"the signal {mode.channel.name}"}
+    task = {f"the task {mode.task}"} if mode.task else set()
+    return signal | task | ({*mode.changes(par, value)} if mode.changes is not None else set())

@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.bench import Bench
-from bywire.bench.experiment import Case
+from bywire.bench.experiment import Case, changes_of, driven_at
 from bywire.core.errors import ParameterError, StepError, nearest_first, unknown_name
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
@@ -211,7 +211,7 @@ def _run(
     def stimulus(t: Array) -> Array:
         """Measured values, from one sample to the next; the first one while it settles."""
         rows = np.zeros((t.size, len(fields)))
-        given = case.stimulus(t - case.settle + begin)
+        given = driven_at(case, t - case.settle + begin)
         at = (t - case.settle) / interval
         at = np.floor(at + 1e-6) if between == "held" else at
         for k, name in enumerate(fields):
@@ -223,5 +223,6 @@ def _run(
 
     duration = case.settle + (data.sizes["time"] - 1) * interval
     return Run(
-        case.model, case.par, case.state, case.memory, stimulus, duration, bench.step, interval
-    )
+        case.model, case.par, case.state, case.memory, stimulus, duration, bench.step, interval,
+        changes_of(case, case.settle - begin),
+    )  # fmt: skip
