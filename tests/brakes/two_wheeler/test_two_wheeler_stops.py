@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.report.bench_figures import bench_figures
 
 KMH_100 = "100 km/h"
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
@@ -224,3 +225,47 @@ def test_quicker_brakes_stop_shorter():
     distances = [result.kpi(f"stopping_distance_{f}Hz").value for f in (2, 10, 40)]
     assert distances[0] > distances[1] > distances[2]
     assert distances[0] - distances[2] == pytest.approx(64.57 - 59.56, rel=0.1)
+
+
+def test_the_road_shows_where_tyres_slide_on_what():
+    jump = {"further": "snow", "x_change": "30 m", "duration": "13 s"}
+    result = stop("surface-jump", {"ecu.abs": "rules"}, **jump)
+    figure = next(each.figure for each in bench_figures(result) if each.name == "road-marks")
+    _, road = figure.axes
+    legend = {text.get_text() for text in road.get_legend().get_texts()}
+    assert legend == {"dry asphalt", "snow", "tyre slides", "wheel stands"}
+    # Of the lanes' bars, the front wheel's are below: it stands from the change of the road on.
+    lanes = {each.get_label(): each for each in road.collections}
+    bars = [path.get_extents() for path in lanes["wheel stands"].get_paths()]
+    run = result.recording
+    stands = (run["omega_f"] == 0) & (run["v"] > 5.0)
+    locked = run["x"].values[stands.values]
+    assert 30.0 < locked[0] < 32.0
+    assert bars[0].x0 == pytest.approx(locked[0], abs=0.1)
+    assert bars[0].x1 == pytest.approx(locked[-1], abs=0.1)
+
+
+def test_a_rider_who_asks_for_less_than_the_road_holds_gets_all_of_it():
+    gentle = {"kind": "table", "times": "0 s, 0.3 s, 9 s", "values": "0 bar, 6 bar, 6 bar"}
+    result = bywire.run(
+        "rider-trace",
+        {
+            **{f"stimulus.p_f_set.{key}": value for key, value in gentle.items()},
+            "stimulus.p_f_set.between": "linear",
+            "options.duration": "14 s",
+        },
+        estimate_error=False,
+    )
+    # All but what is still under way to the brake.
+    assert 98.0 < result.kpi("rider_share_front").value < 100.0
+    assert "demands nothing" in result.kpi("rider_share_rear").note
+    assert result.kpi("rider_share").value == result.kpi("rider_share_front").value
+
+
+def test_a_rider_who_asks_for_more_gets_a_share():
+    result = bywire.run("benches/rider_trace.toml", estimate_error=False)
+    run = result.recording.sel(time=slice(0.0, result.kpi("stopping_time").value))
+    shares = run["p_f"].mean() / run["p_f_set"].mean()
+    assert result.kpi("rider_share_front").value == pytest.approx(100.0 * shares, abs=0.1)
+    assert result.kpi("rider_share_front").value < 50.0 < result.kpi("rider_share_rear").value
+    assert all(verdict.met for verdict in result.verdicts)

@@ -12,7 +12,7 @@ PANELS = Panels(
     (
         Panel(
             "speed",
-            (Trace("v"), Trace("v_f", Role.SECOND), Trace("v_r", Role.MEASURED)),
+            (Trace("v"), Trace("v_f", Role.SECOND), Trace("v_r", Role.SIMULATED)),
             height=1.8,
         ),
         Panel("slip", (Trace("slip_f"), Trace("slip_r", Role.SECOND)), height=1.4),

@@ -83,5 +83,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,
-    figures=("time-traces", "energy-balance"),
+    figures=("road-marks", "time-traces", "energy-balance"),
 )

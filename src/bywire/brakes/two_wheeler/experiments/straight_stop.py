@@ -60,5 +60,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=stop_figures.units(),
-    figures=("time-traces", "energy-balance"),
+    figures=("road-marks", "time-traces", "energy-balance"),
 )

@@ -103,5 +103,5 @@ EXPERIMENT = Experiment(
     cases=cases,
     judge=judge,
     kpis=FIGURES.units | stop_figures.units(),
-    figures=("time-traces", "energy-balance"),
+    figures=("road-marks", "time-traces", "energy-balance"),
 )

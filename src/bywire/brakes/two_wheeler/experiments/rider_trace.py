@@ -1,0 +1,107 @@
+"""Rider's trace: the rider's demand moves, as a measured file or any stimulus says."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.stimuli.registry import Stimulus
+from bywire.brakes.two_wheeler.case import (
+    Course,
+    RidingSpeed,
+    judged_stop,
+    on_surface,
+    rolling_case,
+)
+from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration
+from bywire.plant import brake_disc
+from bywire.plant.road import SurfaceName
+from bywire.vehicle import stop_figures
+
+# Built-in ride, our choice: a light pull, a moment's doubt, then all that the hand gives.
+_TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s
+_FRONT = (0.0, 8e5, 10e5, 4e5, 5e5, 38e5, 34e5)  # Pa
+_REAR = (0.0, 3e5, 6e5, 6e5, 8e5, 20e5, 20e5)  # Pa
+_DRIVEN = {"p_f_set": _FRONT, "p_r_set": _REAR}
+
+FIGURES = Figures(
+    undefined="the rider demands nothing",
+    rider_share_front=("%", "Impulse of the front pressure over that of the rider's demand."),
+    rider_share_rear=("%", "The same of the rear brake."),
+    rider_share=("%", "The same of both brakes' torques, until the vehicle stands."),
+)
+
+
+class Options(ParameterSet):
+    """The ride; demands are [stimulus.p_f_set] and [stimulus.p_r_set], built in without them."""
+
+    v_0: RidingSpeed
+    """speed at the start"""
+    surface: SurfaceName
+    """what the road is made of"""
+    duration: Duration
+    """time recorded"""
+
+
+def driven(_: Options) -> Mapping[str, str]:
+    """Return the unit of the demands."""
+    return dict.fromkeys(_DRIVEN, "Pa")
+
+
+def cases(
+    par: TwoWheelerParameters, options: Options, stimuli: Mapping[str, Stimulus] | None = None
+) -> tuple[Case, ...]:
+    """Return the one run; of two demands, one that is not given stays at zero."""
+    given: dict[str, float | Course] = {name: each.sample for name, each in (stimuli or {}).items()}
+    built_in: dict[str, float | Course] = {name: _course(p) for name, p in _DRIVEN.items()}
+    demands = {**dict.fromkeys(_DRIVEN, 0.0), **given} if given else built_in
+    return (rolling_case(par, options.v_0, demands, options.duration, on_surface(options.surface)),)
+
+
+def _course(values: tuple[float, ...]) -> Course:
+    return lambda t: np.interp(t, _TIMES, values)
+
+
+def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
+    """Return what was left of the demand, and the key figures of the stop."""
+    run = recordings["run"]
+    return (*FIGURES(**_shares(run)), *judged_stop(run, options.v_0))
+
+
+def _shares(run: xr.Dataset) -> dict[str, float]:
+    par = TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
+    t = run["time"].values
+    end = stop_figures.standstill(t, run["v"].values)
+    braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
+    left, asked = 0.0, 0.0
+    shares = {}
+    for wheel, side, disc in (("front", "f", par.front.disc), ("rear", "r", par.rear.disc)):
+        p, wanted = (
+            float(np.trapezoid(run[name].values[braked], t[braked]))
+            for name in (f"p_{side}", f"p_{side}_set")
+        )
+        shares[f"rider_share_{wheel}"] = 100.0 * p / wanted if wanted > 0 else math.nan
+        torque = brake_disc.torque_per_pressure(disc)
+        left, asked = left + torque * p, asked + torque * wanted
+    return {**shares, "rider_share": 100.0 * left / asked if asked > 0 else math.nan}
+
+
+EXPERIMENT = Experiment(
+    name="rider-trace",
+    assembly="two-wheeler-by-wire",
+    summary="stop from 30 m/s on wet asphalt by a rider's trace, built in or given by stimuli",
+    options=Options,
+    defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
+    cases=cases,
+    judge=judge,
+    kpis=FIGURES.units | stop_figures.units(),
+    figures=("road-marks", "time-traces", "energy-balance"),
+    beside=driven,
+)
