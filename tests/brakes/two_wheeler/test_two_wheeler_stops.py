@@ -265,7 +265,7 @@ def test_a_rider_who_asks_for_less_than_the_road_holds_gets_all_of_it():
 def test_a_rider_who_asks_for_more_gets_a_share():
     result = bywire.run("benches/rider_trace.toml", estimate_error=False)
     run = result.recording.sel(time=slice(0.0, result.kpi("stopping_time").value))
-    shares = run["p_f"].mean() / run["p_f_set"].mean()
-    assert result.kpi("rider_share_front").value == pytest.approx(100.0 * shares, abs=0.1)
+    share = float(run["p_f"].mean() / run["p_f_set"].mean())
+    assert result.kpi("rider_share_front").value == pytest.approx(100.0 * share, abs=0.1)
     assert result.kpi("rider_share_front").value < 50.0 < result.kpi("rider_share_rear").value
     assert all(verdict.met for verdict in result.verdicts)

@@ -9,10 +9,13 @@ import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from bywire.bench.result import Result
+from bywire.brakes.two_wheeler.case import vehicle_of
 from bywire.core.typing import Array
 from bywire.plant import road
 from bywire.plant.road import SURFACES
 from bywire.report import style
+from bywire.report.bench_figures import FigureKind, Shown
 from bywire.report.channel import channel
 from bywire.report.decimation import decimate, phases
 from bywire.vehicle.ideal_stop import ideal_distance
@@ -117,3 +120,19 @@ def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int)
             spans, (row - 0.5 * width, width), facecolor=color, linewidth=0, zorder=order,
             label=label if row == 0 else None,
         )  # fmt: skip
+
+
+def _of_runs(result: Result) -> list[Shown]:
+    """Return a figure for each run."""
+    several = len(result.recordings) > 1
+    return [
+        Shown(
+            f"road-marks-{label}" if several else "road-marks",
+            road_marks(run, vehicle_of(run)),
+            f"The road{f', {label}' if several else ''}, and where tyres slide on it.",
+        )
+        for label, run in result.recordings.items()
+    ]
+
+
+FIGURE = FigureKind("road-marks", _of_runs)
