@@ -10,9 +10,10 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 
 from bywire.contracts.start import Start
-from bywire.core.model import Bounds, Matrix, Model, Task
+from bywire.core.model import Bounds, Model, Task
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
+from bywire.core.wrapping import Wrapping
 from bywire.simulation.run import Run, Trajectory, simulate
 
 
@@ -31,7 +32,7 @@ def _recorded(model: type[Model], state: type[NamedTuple], memory: type[NamedTup
     return NamedTuple("Recorded", annotated)
 
 
-class Probe(Model):
+class Probe(Wrapping):
     """A model whose states and memory are recorded, and no energies.
 
     Parameters
@@ -45,22 +46,8 @@ class Probe(Model):
     """
 
     def __init__(self, model: Model, held: bool, frictions: bool = True) -> None:
-        self.inner, self.held, self.rubs = model, held, frictions
-
-    @property
-    def name(self) -> str:
-        """Name of the model."""
-        return self.inner.name
-
-    @property
-    def State(self) -> type[NamedTuple]:
-        """States of the model."""
-        return self.inner.State
-
-    @property
-    def Memory(self) -> type[NamedTuple]:
-        """Memory of the model."""
-        return self.inner.Memory
+        super().__init__(model)
+        self.held, self.rubs = held, frictions
 
     @property
     def Stimulus(self) -> type[NamedTuple]:
@@ -83,16 +70,6 @@ class Probe(Model):
         """Frictions of the model, or none."""
         return self.inner.frictions if self.rubs else ()
 
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """Limits of the model."""
-        return self.inner.limits
-
-    @property
-    def usually_open(self) -> tuple[bool, ...]:
-        """Contact groups of the model that rarely touch."""
-        return self.inner.usually_open
-
     def tasks(self, par: Any) -> tuple[Task, ...]:
         """Return the controllers, or the task that hands on what is prescribed."""
         tasks = self.inner.tasks(par)
@@ -103,27 +80,11 @@ class Probe(Model):
     def _prescribed(self, x: Any, m: Any, u: Any, par: Any) -> Any:
         return u
 
-    def mass(self, xe: Any, par: Any) -> Any:
-        """Return the masses of the model."""
-        return self.inner.mass(xe, par)
-
-    def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
-        """Return the balance of the model."""
-        return self.inner.balance(x, xe, memory, par, contact)
-
     def bounds(
         self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
     ) -> tuple[Bounds, ...]:
-        """Return the bounds of the frictions."""
-        return self.inner.bounds(x, xe, memory, par, contact) if self.rubs else ()
-
-    def compliance(self, par: Any) -> tuple[Matrix, ...]:
-        """Return the compliances of the model."""
-        return self.inner.compliance(par)
-
-    def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:
-        """Return the overlaps of the model."""
-        return self.inner.gap(x, xe, par)
+        """Return the bounds of the frictions, if there are any."""
+        return super().bounds(x, xe, memory, par, contact) if self.rubs else ()
 
     def powers(self, *_: Any) -> Any:
         """Return the rate of time."""

@@ -14,8 +14,9 @@ from functools import cache, partial
 from typing import Annotated, Any, Literal, NamedTuple
 
 from bywire.core import ops
-from bywire.core.model import Bounds, Matrix, Model, Task
+from bywire.core.model import Model, Task
 from bywire.core.signals import Signal, signals_of
+from bywire.core.wrapping import Wrapping
 
 
 class Tap(NamedTuple):
@@ -53,8 +54,8 @@ def rests(task: str) -> str:
     return f"rest_{task.replace('-', '_')}"
 
 
-class Tapped(Model):
-    """A model with taps.
+class Tapped(Wrapping):
+    """A model with taps; a drive is recorded as the plant feels it.
 
     Parameters
     ----------
@@ -67,48 +68,14 @@ class Tapped(Model):
     """
 
     def __init__(self, inner: Model, taps: tuple[Tap, ...], resting: tuple[str, ...] = ()) -> None:
-        self.inner, self.taps, self.resting = inner, taps, resting
+        super().__init__(inner)
+        self.taps, self.resting = taps, resting
 
     def __getattr__(self, name: str) -> Any:
         """Return what the model inside has beside the protocol: parts, what it records."""
         if name.startswith("__") or name == "inner":
             raise AttributeError(name)
         return getattr(self.inner, name)
-
-    @property
-    def name(self) -> str:
-        """That of the model inside."""
-        return self.inner.name
-
-    @property
-    def State(self) -> type[NamedTuple]:
-        """As inside."""
-        return self.inner.State
-
-    @property
-    def Flow(self) -> type[NamedTuple]:
-        """As inside."""
-        return self.inner.Flow
-
-    @property
-    def Output(self) -> type[NamedTuple]:
-        """As inside; a drive is recorded as the plant feels it."""
-        return self.inner.Output
-
-    @property
-    def frictions(self) -> tuple[str, ...]:
-        """As inside."""
-        return self.inner.frictions
-
-    @property
-    def limits(self) -> tuple[str, ...]:
-        """As inside."""
-        return self.inner.limits
-
-    @property
-    def usually_open(self) -> tuple[bool, ...]:
-        """As inside."""
-        return self.inner.usually_open
 
     @property
     def Memory(self) -> type[NamedTuple]:
@@ -170,59 +137,11 @@ class Tapped(Model):
     def _inside(self, memory: Any) -> Any:
         return self.inner.Memory._make(memory[: len(self.inner.Memory._fields)])
 
-    def _felt(self, memory: Any) -> Any:
-        """Return the memory as the plant feels it."""
+    def memory_inside(self, memory: Any) -> Any:
+        """Return the memory as the plant feels it: with the drives behind their taps."""
         drives = {t.field: getattr(memory, f"last_{t.name}") for t in self.taps
                   if t.side == "drive"}  # fmt: skip
         return self._inside(memory)._replace(**drives)
-
-    def mass(self, xe: Any, par: Any) -> Any:
-        """As inside."""
-        return self.inner.mass(xe, par)
-
-    def balance(self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]) -> Any:
-        """As inside, with the drives as they are felt."""
-        return self.inner.balance(x, xe, self._felt(memory), par, contact)
-
-    def bounds(
-        self, x: Any, xe: Any, memory: Any, par: Any, contact: tuple[float, ...]
-    ) -> tuple[Bounds, ...]:
-        """As inside, with the drives as they are felt."""
-        return self.inner.bounds(x, xe, self._felt(memory), par, contact)
-
-    def compliance(self, par: Any) -> tuple[Matrix, ...]:
-        """As inside."""
-        return self.inner.compliance(par)
-
-    def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:
-        """As inside."""
-        return self.inner.gap(x, xe, par)
-
-    def powers(
-        self, x: Any, xe: Any, rate: Any, memory: Any, par: Any, contact: tuple[float, ...],
-        reaction: tuple[float, ...],
-    ) -> Any:  # fmt: skip
-        """As inside, with the drives as they are felt."""
-        return self.inner.powers(x, xe, rate, self._felt(memory), par, contact, reaction)
-
-    def output(
-        self, x: Any, memory: Any, par: Any, contact: tuple[float, ...],
-        reaction: tuple[float, ...], flow: Any,
-    ) -> Any:  # fmt: skip
-        """As inside, with the drives as they are felt."""
-        return self.inner.output(x, self._felt(memory), par, contact, reaction, flow)
-
-    def watch(self, recording: Any, par: Any) -> list[str]:
-        """As inside."""
-        return self.inner.watch(recording, par)
-
-    def watched(self, par: Any) -> tuple[str, ...] | None:
-        """As inside."""
-        return self.inner.watched(par)
-
-    def silent(self, rows: Any, pars: Any) -> frozenset[str]:
-        """As inside."""
-        return self.inner.silent(rows, pars)
 
 
 def _tapped(tap: Tap, source: Any, memory: Any, stimulus: Any, last: dict[str, Any]) -> Any:
