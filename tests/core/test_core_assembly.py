@@ -249,6 +249,12 @@ def test_mistakes_of_wiring_have_a_line(model: type[Screw]) -> None:
         check_wiring(model(), PAR)
 
 
+class Sampled(NamedTuple):
+    """A memory with the name of a state."""
+
+    i: Annotated[float, Signal("A", "sampled current")]
+
+
 def declared(**body: Any) -> None:
     type("Wrong", (Screw,), body)
 
@@ -262,6 +268,8 @@ def test_mistakes_of_declaration_are_named() -> None:
         declared(records=("thteta",))
     with pytest.raises(ModelError, match=r"unknown output 'y': did you mean|known are v, x"):
         declared(second=Part(ball_screw_gear, suffix="_2", output=("y",)))
+    with pytest.raises(ModelError, match=r"Wrong.Memory has a field 'i', and so has the recording"):
+        declared(Memory=Sampled)
     with pytest.raises(ModelError, match=r"dc_motor has no function heat"):
         declared(second=Part(dc_motor, suffix="_2", loss={"E_heat": "heat"}))
     with pytest.raises(ModelError, match=r"Part\(dc_motor\): unknown option 'sufix'"):

@@ -49,6 +49,12 @@ def gather(cls: type[Any]) -> None:
     for kind, signals in (("State", states), ("Flow", flows)):
         if _derives(declared.get(kind)):
             setattr(cls, kind, _named_tuple(cls, kind, signals))
+    for name in signals_of(cls.Memory):
+        if name in states or name in flows or name in shown:
+            raise ModelError(
+                f"{cls.__name__}.Memory has a field {name!r}, and so has the recording from a part "
+                "or a wire: it would show the one in place of the other; rename the field"
+            )
     if _derives(declared.get("Output")):
         known = signals_of(cls.State) | signals_of(cls.Memory) | signals_of(cls.Flow)
         known |= {"E_stored": STORED} | shown
