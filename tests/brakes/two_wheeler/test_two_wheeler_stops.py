@@ -95,12 +95,14 @@ def test_rules_only_lower_what_is_demanded_and_say_in_which_phase():
     assert not fast["phase_r"].values.any()
 
 
-def test_rules_do_not_throw_the_rider_where_the_road_turns_dry():
-    rules = stop(
-        "surface-jump", {"ecu.abs": "rules"}, first="wet-asphalt", further="dry-asphalt"
-    )
-    assert rules.kpi("peak_pitch").value < math.radians(0.5)
-    assert rules.kpi("stopping_distance").value < 52.0
+SLIPS = {"ecu.front_slip.slip_set": 0.28, "ecu.rear_slip.slip_set": 0.28}
+
+
+@pytest.mark.parametrize("changes", [{"ecu.abs": "rules"}, SLIPS], ids=["rules", "pi"])
+def test_no_control_throws_the_rider_where_the_road_turns_dry(changes):
+    result = stop("surface-jump", changes, first="wet-asphalt", further="dry-asphalt")
+    assert result.kpi("peak_pitch").value < math.radians(0.5)
+    assert result.kpi("stopping_distance").value < 52.0
 
 
 def test_rules_free_a_wheel_that_locks_where_the_road_turns_into_snow():

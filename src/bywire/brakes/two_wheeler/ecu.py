@@ -94,15 +94,8 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
     )
     p_f, p_r = m.p_f_most, m.p_r_most
     if par.ecu.abs == "rules":
-        # Before lift control, which then knows from where on it lowers: a road may hold more soon.
         p_f, m = _by_rules("f", p_f, m, before, par.ecu.front_slip, par)
         p_r, m = _by_rules("r", p_r, m, before, par.ecu.rear_slip, par)
-    if par.ecu.lift == "pi":
-        seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
-        lift, out = lift_pi.output(
-            lift_pi.State(m.lift_integral), seen, par.ecu.T_s, par.ecu.front_lift
-        )
-        p_f, m = out.p, m._replace(lift_integral=lift.integral, lift=out.lowered)
     if par.ecu.abs == "pi":
         front = _Wheel(m.slip_f_hat, m.tread_f, before.tread_f, m.eta_f, m.slip_f_integral)
         rear = _Wheel(m.slip_r_hat, m.tread_r, before.tread_r, m.eta_r, m.slip_r_integral)
@@ -121,6 +114,13 @@ def tick(r: Readings, m: Memory, u: Stimulus, par: Par) -> Memory:
             abs_f=on_front.acts,
             abs_r=on_rear.acts,
         )
+    if par.ecu.lift == "pi":
+        # Last, so that it knows from where on it lowers: a road may hold more soon.
+        seen = lift_pi.Input(m.a_hat, u.p_f_set, p_f, before.p_f_most)
+        lift, out = lift_pi.output(
+            lift_pi.State(m.lift_integral), seen, par.ecu.T_s, par.ecu.front_lift
+        )
+        p_f, m = out.p, m._replace(lift_integral=lift.integral, lift=out.lowered)
     return m._replace(p_f_ref=p_f, p_r_ref=p_r)
 
 
