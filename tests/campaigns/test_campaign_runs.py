@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,11 +11,12 @@ import pytest
 import bywire
 from bywire.bench.running import run
 from bywire.campaigns.campaign_file import read_campaign
+from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.findings import CampaignFindings, finding
 from bywire.campaigns.judging import FACTORS, judge_healthy
 from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
 from bywire.campaigns.residual import threshold
-from bywire.campaigns.simulating import healthy_traces
+from bywire.campaigns.simulating import faulty_traces, healthy_traces
 from bywire.core.errors import FileError, InputError
 
 SMALL = """
@@ -187,6 +189,17 @@ def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder):
         ('"motor.R_m" = "+-10 %"', f'"adc.law" = {LAWS}', "only numbers vary"),
         ('bench = "hard-braking"', 'bench = "hard-braking"\nresiduals = ["x"]',
          "unknown residual 'x'"),
+        ('bench = "hard-braking"', 'bench = "hard-braking"\nresiduals = [["x"]]',
+         "unknown residual"),
+        ("healthy = 8", "healthy = 1000000", "a whole number from 4 to 10000"),
+        ('"0 bar", "50 bar"]', '20]', "wrong unit"),
+        ('["0 bar", "50 bar"]', '[]', "give a value, or use leave_out"),
+        ("[values]", '[values]\n"battery.lost" = 3', "battery.lost takes no value"),
+        ('above_healthy = "5 bar"', "above_healthy = 5", "wrong unit"),
+        ('signal = "p_pd"\nbelow', 'signal = ["p_pd"]\nbelow', "unknown signal of criterion"),
+        ('present =', 'leave_out = ["*"]\npresent =', "leaves no fault"),
+        ('delay = "5 ms"', 'value = 3', "bridge.open-phase takes no value"),
+        ("battery = 1", "battery = 1" + "0" * 400, "0 to 1e12 is wanted"),
         (SMALL, 'bench = "bandwidths"', "makes one run without faults, but 'bandwidths' makes"),
     ],
 )  # fmt: skip
@@ -195,6 +208,41 @@ def test_what_does_not_fit_is_refused(tmp_path, right, wrong, message):
     (tmp_path / "bad.toml").write_text(SMALL.replace(right, wrong, 1))
     with pytest.raises(InputError, match=message):
         read_campaign(tmp_path / "bad.toml")
+
+
+def test_a_campaign_that_does_not_fit_into_memory_is_refused(tmp_path):
+    text = SMALL.replace("healthy = 8", "healthy = 10000").replace('"0.6 s"', '"60 s"')
+    text = text.partition("[vary]")[0] + "[campaign]" + text.partition("[campaign]")[2]
+    (tmp_path / "large.toml").write_text(text)
+    with pytest.raises(InputError, match=r"10000 runs of 6.01e\+04 rows of"):
+        read_campaign(tmp_path / "large.toml")
+
+
+def test_a_reaction_may_be_a_fault_that_the_campaign_leaves_out(tmp_path):
+    text = SMALL.replace('"bridge.open-phase"', '"current.stuck"').replace('"0.6 s"', '"0.5 s"')
+    text = text.replace('["pressure.stuck", "battery.lost", "motor.hot", "ecu.frozen", '
+                        '"bridge.late", "fluid.cold"]', '["pressure.*"]')  # fmt: skip
+    (tmp_path / "other.toml").write_text(text)
+    plan = read_campaign(tmp_path / "other.toml")
+    assert [tap.name for tap in plan.taps[0]] == ["current", "pressure"]
+    stuck = next(each for each in plan.faults if each.mode.name == "pressure.stuck")
+    traces = faulty_traces(plan, stuck, [0.4], [4], [0.42])
+    assert np.isfinite(traces.signals["p_pd"]).all()
+
+
+def test_a_drift_that_is_there_from_the_start_grows_from_time_zero():
+    drift = next(each for each in read_campaign("motorcycle").faults
+                 if each.mode.name == "pressure.drift")  # fmt: skip
+    (fault,) = replace(drift, is_present=True).at(0.0, 0)
+    assert fault.course.onset == 0.0
+
+
+def test_what_must_not_last_longer_than_the_run_is_not_reached():
+    criterion = Criterion("c", "p_pd", "above", 0.0, lasting=1e308)
+    time = np.arange(5.0) * 1e-3
+    reached = criterion.reached(np.ones((1, 5)), np.zeros((1, 5)), time, np.zeros(1))
+    assert np.isnan(reached).all()
+    assert least_of_the_last(np.ones((1, 5)), 0).shape == (1, 5)
 
 
 def test_campaigns_of_brakes_can_be_read_and_others_are_not_known():

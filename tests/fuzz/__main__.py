@@ -30,7 +30,7 @@ if __package__ in (None, ""):
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from bywire.data import limited_source
-from fuzz import inputs, kills, sound, study_kills
+from fuzz import failing, inputs, kills, sound, study_kills
 from fuzz.judge import Verdict, judged, judged_alone
 
 
@@ -74,8 +74,23 @@ def measurement(rng: Random, folder: Path) -> Verdict:
     return judged(["replay", str(path), "--bench", "hard-braking", "--input", "p_mc_set=p_mc"])
 
 
+def faulty(rng: Random, folder: Path) -> Verdict:
+    """Run a bench with generated faults."""
+    path = folder / "bench.toml"
+    path.write_text(failing.bench_text(rng), encoding="utf-8")
+    return judged(["run", str(path)])
+
+
+def campaign(rng: Random, folder: Path) -> Verdict:
+    """Run a generated campaign of faults."""
+    path = folder / "campaign.toml"
+    path.write_text(failing.campaign_text(rng), encoding="utf-8")
+    return judged(["faults", str(path)])
+
+
 KINDS: dict[str, Callable[[Random, Path], Verdict]] = {
     "bench": bench, "command": command, "extreme": extreme, "measurement": measurement,
+    "faulty": faulty, "campaign": campaign,
 }  # fmt: skip
 
 

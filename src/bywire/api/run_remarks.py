@@ -31,8 +31,12 @@ def _faults(result: Result) -> list[str]:
         mode, course = fault.mode, fault.course
         size = f" = {amount(fault.value, mode.unit)}" if mode.unit else ""
         until = f" to {amount(course.end, 's')}" if math.isfinite(course.end) else " on"
+        is_met = any(course.is_there(each["time"].values).any()
+                     for each in result.recordings.values() if "time" in each)  # fmt: skip
+        unmet = "" if is_met else "; no recorded row meets it"
         texts.append(
-            f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: {mode.summary}"
+            f"fault {mode.name}{size}, from {amount(course.onset, 's')}{until}: "
+            f"{mode.summary}{unmet}"
         )
     return texts
 

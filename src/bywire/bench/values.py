@@ -50,6 +50,12 @@ def number(value: Any, symbol: str, name: str, nominal: float = 1.0) -> float:
     return _quantity(value, symbol, name, nominal)
 
 
+def written(value: Any, symbol: str, name: str) -> float:
+    """Return one value of a file, where a plain number is refused if a unit is wanted."""
+    require_unit(value, symbol, name)
+    return number(value, symbol, name)
+
+
 def nodes(value: Any, symbol: str, name: str, nominal: float = 1.0) -> tuple[float, ...]:
     """Return the nodes of a table: of a sequence, or of one text with commas, each with its unit.
 

@@ -13,11 +13,12 @@ from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.faults.fault_section import require_admissible
 from bywire.bench.faults.modes import Mode, modes_of
-from bywire.bench.values import number
+from bywire.bench.values import number, written
 from bywire.campaigns.criterion import read_criteria
 from bywire.campaigns.declared import CAMPAIGNS
 from bywire.campaigns.plan import CampaignPlan, Failing, Reaction, evenly, touch_alike
 from bywire.campaigns.residual import RESIDUALS, Residual
+from bywire.campaigns.simulating import require_small
 from bywire.core.errors import InputError, ParameterError, quoted, unknown_name
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import choice_fields
@@ -81,11 +82,14 @@ def _plan(
     if chosen:
         raise ParameterError(f"[vary] {chosen[0]} is a choice: in a campaign only numbers vary")
     modes = modes_of(case.model, case.par)
+    _require_known_values(content.get("values", {}), modes)
     section = content.get("campaign", {})
     for key in section:
         if key not in _CAMPAIGN:
             raise unknown_name("key of [campaign]", key, _CAMPAIGN)
     singles = tuple(_failing(modes, section, content.get("values", {})))
+    if not singles:
+        raise ParameterError("[campaign] leaves no fault: only and leave_out contradict each other")
     latent = [
         Failing(mode, size, is_present=True)
         for name, mode in modes.items()
@@ -97,14 +101,16 @@ def _plan(
     criteria = read_criteria(content.get("criteria", []), signals_of(case.model.Output))
     if not criteria:
         raise ParameterError("[[criteria]] are missing: say what a fault must not do")
-    return CampaignPlan(
+    plan = CampaignPlan(
         str(content["name"]), bench, faults, _onsets(section, case), criteria,
         _residuals(content.get("residuals"), case), varied,
         healthy=_whole(section, "healthy", 64, 4),
-        false_alarms=_share(section), seed=_whole(section, "seed", 1, 0),
+        false_alarms=_share(section), seed=_whole(section, "seed", 1, 0, 1_000_000),
         correlations=correlations, rates=_rates(content.get("rates", {}), modes),
         reaction=_reaction(content, modes),
     )  # fmt: skip
+    require_small(plan)
+    return plan
 
 
 def _only_case(bench: Bench) -> Case:
@@ -123,9 +129,6 @@ def _failing(
     only, without, present = (
         _patterns(section, key, modes) for key in ("only", "leave_out", "present")
     )
-    for name in values:
-        if name not in modes:
-            raise unknown_name("fault in [values]", name, modes)
     for name, mode in modes.items():
         if only and not any(fnmatchcase(name, each) for each in only):
             continue
@@ -136,13 +139,31 @@ def _failing(
             yield Failing(mode, size, is_present)
 
 
+def _require_known_values(values: Mapping[str, Any], modes: Mapping[str, Mode]) -> None:
+    for name, given in values.items():
+        if name not in modes:
+            raise unknown_name("fault in [values]", name, modes)
+        if not modes[name].unit:
+            raise ParameterError(f"[values] {name} takes no value: leave it out")
+        if given == []:
+            raise ParameterError(f"[values] {name} = []: give a value, or use leave_out")
+
+
 def _sizes(mode: Mode, values: Mapping[str, Any]) -> Iterator[float]:
     """Yield the values that a mode has in the campaign [SI]."""
     given = values.get(mode.name, mode.value)
     for value in given if isinstance(given, list) else [given]:
-        size = number(value, mode.unit, f"[values] {mode.name}") if mode.unit else 0.0
-        require_admissible(mode, size, f"[values] {mode.name}")
-        yield size
+        yield _size(mode, value, f"[values] {mode.name}")
+
+
+def _size(mode: Mode, value: Any, where: str) -> float:
+    """Return a value of a mode [SI]; the mode's own is a plain number."""
+    if not mode.unit:
+        return 0.0
+    size = number(value, mode.unit, where) if value is mode.value else written(
+        value, mode.unit, where)  # fmt: skip
+    require_admissible(mode, size, where)
+    return size
 
 
 def _pairs(
@@ -166,8 +187,8 @@ def _patterns(section: Mapping[str, Any], key: str, modes: Mapping[str, Mode]) -
 
 
 def _onsets(section: Mapping[str, Any], case: Case) -> tuple[float, ...]:
-    first = number(section.get("onset", 0.0), "s", "[campaign] onset")
-    spread = number(section.get("spread", 0.0), "s", "[campaign] spread")
+    first = written(section.get("onset", 0.0), "s", "[campaign] onset")
+    spread = written(section.get("spread", 0.0), "s", "[campaign] spread")
     onsets = evenly(first, spread, _whole(section, "onsets", 8 if spread > 0 else 1, 1))
     if not (spread >= 0 and -case.keep <= first and onsets[-1] < case.duration):
         raise ParameterError(
@@ -185,16 +206,18 @@ def _residuals(names: Any, case: Case) -> tuple[Residual, ...]:
     if not isinstance(names, list):
         raise ParameterError(f"residuals = {quoted(names)}: a list of names is wanted")
     for name in names:
-        if name not in known:
+        if not isinstance(name, str) or name not in known:
             raise unknown_name("residual", str(name), known)
     return tuple(known[name] for name in names)
 
 
-def _whole(section: Mapping[str, Any], key: str, default: int, least: int) -> int:
+def _whole(
+    section: Mapping[str, Any], key: str, default: int, least: int, most: int = 10_000
+) -> int:
     value = section.get(key, default)
-    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= 1_000_000:
+    if not isinstance(value, int) or isinstance(value, bool) or not least <= value <= most:
         raise ParameterError(
-            f"[campaign] {key} = {quoted(value)}: a whole number from {least} to 1000000 is wanted"
+            f"[campaign] {key} = {quoted(value)}: a whole number from {least} to {most} is wanted"
         )
     return value
 
@@ -212,8 +235,8 @@ def _rates(section: Mapping[str, Any], modes: Mapping[str, Mode]) -> dict[str, f
         if name not in modes and name not in places:
             raise unknown_name("fault in [rates]", name, {*modes, *places})
         is_number = isinstance(rate, (int, float)) and not isinstance(rate, bool)
-        if not is_number or not 0 <= rate < float("inf"):
-            raise ParameterError(f"[rates] {name} = {quoted(rate)}: a number >= 0 is wanted")
+        if not is_number or not 0 <= rate <= 1e12:
+            raise ParameterError(f"[rates] {name} = {quoted(rate)}: 0 to 1e12 is wanted")
     return {name: float(rate) for name, rate in section.items()}
 
 
@@ -228,9 +251,11 @@ def _reaction(content: Mapping[str, Any], modes: Mapping[str, Mode]) -> Reaction
     if name not in modes:
         raise unknown_name("mode of [reaction]", name, modes)
     mode = modes[name]
+    if "value" in section and not mode.unit:
+        raise ParameterError(f"[reaction] {name} takes no value: leave it out")
     size = section.get("value", mode.value)
-    value = number(size, mode.unit, "[reaction] value") if mode.unit else 0.0
-    delay = number(section.get("delay", 0.0), "s", "[reaction] delay")
+    value = _size(mode, size, "[reaction] value")
+    delay = written(section.get("delay", 0.0), "s", "[reaction] delay")
     if delay < 0:
         raise ParameterError(f"[reaction] delay = {delay:g} s must be >= 0 s")
     return Reaction(Failing(mode, value), delay)

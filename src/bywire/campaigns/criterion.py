@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from bywire.bench.values import number
+from bywire.bench.values import written
 from bywire.campaigns.lasting import first_time, least_of_the_last
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.signals import Signal
@@ -59,7 +59,8 @@ class Criterion:
 
     def reached(self, values: Array, healthy: Array, time: Array, onset: Array) -> Array:
         """Return when it has lasted as long as it must not [s], NaN where never; shape (cases,)."""
-        rows = round(self.lasting / (time[1] - time[0])) + 1
+        dt = float(time[1] - time[0])
+        rows = round(min(self.lasting, dt * time.size) / dt) + 1
         lasted = least_of_the_last(self.excess(values, healthy), rows)
         beyond = np.where(lasted > 0, 1.0, 0.0)
         return first_time(beyond, time, onset + self.lasting)
@@ -97,7 +98,7 @@ def _criterion(entry: Mapping[str, Any], signals: Mapping[str, Signal]) -> Crite
     name, signal = entry.get("name"), entry.get("signal")
     if not isinstance(name, str) or not name.strip():
         raise ParameterError(f"[[criteria]] name = {quoted(name)}: a text is wanted")
-    if signal not in signals:
+    if not isinstance(signal, str) or signal not in signals:
         raise unknown_name(f"signal of criterion {name!r}", str(signal), signals)
     senses = [sense for sense in SENSES if sense in entry]
     if len(senses) != 1:
@@ -107,8 +108,8 @@ def _criterion(entry: Mapping[str, Any], signals: Mapping[str, Signal]) -> Crite
         )
     (sense,) = senses
     unit = "1" if sense == "below_share" else signals[str(signal)].unit
-    level = number(entry[sense], unit, f"criterion {name}.{sense}")
-    lasting = number(entry.get("lasting", 0.0), "s", f"criterion {name}.lasting")
+    level = written(entry[sense], unit, f"criterion {name}.{sense}")
+    lasting = written(entry.get("lasting", 0.0), "s", f"criterion {name}.lasting")
     if lasting < 0:
         raise ParameterError(f"criterion {name}.lasting = {lasting:g} s must be >= 0 s")
     severity = entry.get("severity", "")

@@ -10,7 +10,7 @@ from bywire.core.typing import Array
 
 def least_of_the_last(values: Array, rows: int) -> Array:
     """Return the least of the last rows, the present one among them, along the last axis."""
-    size = min(rows, values.shape[-1])
+    size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(minimum_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 
@@ -21,7 +21,7 @@ def largest_of_the_last(values: Array, rows: int) -> Array:
 
 def mean_of_the_last(values: Array, rows: int) -> Array:
     """Return the mean of the last rows, the present one among them, along the last axis."""
-    size = min(rows, values.shape[-1])
+    size = max(min(rows, values.shape[-1]), 1)
     return np.asarray(uniform_filter1d(values, size, axis=-1, origin=(size - 1) // 2))
 
 

@@ -53,7 +53,8 @@ class Failing:
 
     def at(self, onset: float, seed: int) -> list[Injection]:
         """Return the fault from an onset [s] on, or all along, and the latent one beside it."""
-        begin = _LONG_AGO if self.is_present else onset
+        start = 0.0 if self.mode.falsified == "drift" else _LONG_AGO  # a drift grows from then on
+        begin = start if self.is_present else onset
         fault = Injection(self.mode, self.value, AT_ZERO.replace({"onset": begin}), seed)
         return [fault, *([] if self.latent is None else self.latent.at(onset, seed))]
 
@@ -162,7 +163,8 @@ class CampaignPlan:
     @cached_property
     def taps(self) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
         """Taps and resting tasks of the model that healthy runs and most faults share."""
-        shared = [each for each in self.faults if not self.is_apart(each)]
+        answer = () if self.reaction is None else (self.reaction.failing,)
+        shared = [each for each in (*self.faults, *answer) if not self.is_apart(each)]
         return taps_of([fault for each in shared for fault in each.at(0.0, 0)])
 
     @cached_property
@@ -220,12 +222,13 @@ class CampaignPlan:
             "step": bench.step, "record": bench.record, "noise": bench.seed,
             "varied": {v.name: [v.distribution.text, v.together] for v in self.varied},
             "correlation": {" and ".join(pair): r for pair, r in self.correlations.items()},
-            "faults": [[each.name, each.is_present] for each in self.faults],
+            "faults": [[each.name, each.value, each.is_present] for each in self.faults],
             "onsets": self.onsets,
             "criteria": [repr(each) for each in self.criteria],
             "residuals": [each.name for each in self.residuals],
             "healthy": self.healthy, "false_alarms": self.false_alarms, "seed": self.seed,
-            "reaction": None if reaction is None else [reaction.failing.name, reaction.delay],
+            "reaction": None if reaction is None else [
+                reaction.failing.name, reaction.failing.value, reaction.delay],
         })  # fmt: skip
 
 

@@ -11,6 +11,7 @@ from bywire.bench.experiment import Case, FaultyCase, as_run
 from bywire.bench.faults.fault_section import Injection
 from bywire.bench.faults.injected import injected
 from bywire.campaigns.plan import CampaignPlan, Failing
+from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.run_group import fit_lanes, simulate_group
@@ -18,6 +19,7 @@ from bywire.simulation.tapped import rests
 
 LANES = 64
 """runs that are computed side by side at most, so that their recordings stay small"""
+_MOST = 250e6  # numbers that are held at once: 2 GB
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,26 @@ class Traces:
     def of(self, cases: Sequence[int]) -> Traces:
         """Return the signals of some of the runs."""
         return Traces(self.time, {name: rows[cases] for name, rows in self.signals.items()})
+
+
+def require_small(plan: CampaignPlan) -> None:
+    """Refuse a campaign whose recordings do not fit into memory.
+
+    Raises
+    ------
+    ParameterError
+        With what there would be.
+    """
+    case = plan.case(0)
+    rows = (case.keep + case.duration) / case.record
+    signals = len(plan.signals) + len(plan.taps[1])
+    runs = max(plan.healthy, len(plan.onsets))
+    if runs * rows * signals > _MOST:
+        raise ParameterError(
+            f"{runs} runs of {rows:.3g} rows of {signals} signals are more than {_MOST:.3g} "
+            "numbers: take fewer healthy runs or onsets, a shorter maneuver, or a longer "
+            "simulation.record"
+        )
 
 
 def healthy_traces(plan: CampaignPlan) -> Traces:

@@ -100,6 +100,12 @@ def test_a_bench_file_with_faults_is_read_and_written_and_read_again(tmp_path):
         ({"fault": "motor.hot", "ramp": "1 ms", "every": "1 ms"}, "not both"),
         ({"fault": "motor.hot", "seed": -1}, "a whole number >= 0"),
         ({"value": 3}, "names no fault"),
+        ({"fault": "motor.hot", "onset": "-2 s", "lasts": "1 s"}, "is over at -1 s, but the run"),
+        ({"fault": "motor.hot", "every": "1 us"}, "more than 10000 times until 0.06 s"),
+        ({"fault": "motor.hot", "share": "50 %"}, "give every, in which it comes back"),
+        ({"fault": "motor.hot", "onset": "-1e300 s"}, "it must be >= -1e\\+06 s"),
+        ({"fault": "pressure.noise", "value": "-1 bar"}, "a number from 0 to inf is wanted"),
+        ({"fault": "motor.hot", "set": {"motor.R_m": "+1%"}}, "neither fault nor value beside it"),
         ({"set": {"motor.R": 3}}, "unknown parameter of faults\\[1\\] 'motor.R'"),
         ({"set": {"ecu.T_s": "2 ms"}, "onset": "20 ms"}, "alters a sample time"),
         ({"fault": "fluid.air", "value": "9 ml"}, "fluid.V_air"),
@@ -118,6 +124,30 @@ def test_faults_that_contradict_each_other_are_refused_unless_they_follow_each_o
     bench({**stuck, "lasts": "20 ms"}, other)
     with pytest.raises(InputError, match="both change motor"):
         bench({"fault": "motor.demagnetized"}, {"set": {"motor.K_e": "-10%"}, "onset": "30 ms"})
+
+
+def test_a_drive_comes_late_by_one_number_of_ticks_in_a_run():
+    late = {"fault": "bridge.late", "value": 5, "lasts": "20 ms"}
+    again = {"fault": "bridge.late", "value": 2, "onset": "30 ms"}
+    with pytest.raises(InputError, match="5 and 2 ticks in one run"):
+        run(bench(late, again))
+    bench(late, {**again, "value": 5}).cases()
+
+
+def test_a_fault_that_no_row_meets_is_told():
+    section = {"fault": "pressure.stuck", "onset": "10.3 ms", "lasts": "1 us"}
+    said = bywire.run(bench(section), estimate_error=False).document().data["remarks"]
+    assert "no recorded row meets it" in said[0]
+
+
+def test_a_fault_that_came_and_went_for_long_before_the_run_still_does():
+    course = AT_ZERO.replace({"onset": -1e3, "every": 0.01, "share": 0.5})
+    inside = [t for t in course.instants(0.0, 0.03) if 0.001 < t < 0.03]
+    assert inside == pytest.approx([0.005, 0.01, 0.015, 0.02, 0.025, 0.03][: len(inside)])
+    assert len(inside) >= 5
+    shortest = AT_ZERO.replace({"ramp": 5e-324})
+    with np.errstate(all="raise", under="ignore"):
+        np.testing.assert_array_equal(shortest.size(np.array([-1.0, 0.5])), [0.0, 1.0])
 
 
 def test_text_and_files_want_units(tmp_path):
@@ -141,7 +171,7 @@ def test_a_course_comes_and_goes_as_it_says():
     assert course.is_there(t).mean() == pytest.approx(0.6, abs=0.002)
     again = AT_ZERO.replace({"onset": 0.1, "every": 0.2, "share": 0.25})
     assert again.is_there(t).mean() == pytest.approx(0.25, abs=0.002)
-    assert again.instants(0.35) == pytest.approx([0.1, 0.15, 0.3, 0.35])
+    assert again.instants(0.0, 0.35) == pytest.approx([0.1, 0.15, 0.3, 0.35])
 
 
 def test_noise_and_dropouts_are_drawn_anew_by_their_seed_alone():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import takewhile
+import math
 from typing import Annotated
 
 import numpy as np
@@ -12,10 +12,11 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant, Unit
 from bywire.core.typing import Array
 
-Instant = Annotated[float, Unit("s", 1.0), Field(allow_inf_nan=False)]
+Instant = Annotated[float, Unit("s", 1.0), Field(ge=-1e6, le=1e6, allow_inf_nan=False)]
 Share = Annotated[float, Unit("1", 0.5), Field(gt=0, le=1, allow_inf_nan=False)]
 STAGES = 50  # in which a parameter follows a ramp
-_MOST = 10_000  # times that a fault may come and go
+MOST = 10_000
+"""times that a fault may come and go in a run"""
 _EDGE = 1e-9  # s, within which an instant counts as reached
 
 
@@ -37,6 +38,8 @@ class Course(ParameterSet):
     def _comes_and_goes(self) -> Course:
         if self.every > 0 and self.ramp > 0:
             raise ValueError("a fault either grows (ramp) or comes and goes (every), not both")
+        if self.share < 1 and not self.every > 0:
+            raise ValueError("share is that of an interval: give every, in which it comes back")
         return self
 
     @property
@@ -62,19 +65,26 @@ class Course(ParameterSet):
         there = self.is_there(t)
         if not self.ramp > 0:
             return there
-        grown = np.clip((t - self.onset) / self.ramp, 0.0, 1.0)
-        if np.isfinite(self.gone):
-            grown = np.minimum(grown, np.clip((self.gone - t) / self.ramp, 0.0, 1.0))
+        with np.errstate(over="ignore"):  # of the shortest ramps: fully grown
+            grown = np.clip((t - self.onset) / self.ramp, 0.0, 1.0)
+            if np.isfinite(self.gone):
+                grown = np.minimum(grown, np.clip((self.gone - t) / self.ramp, 0.0, 1.0))
         return there * grown
 
-    def instants(self, last: float) -> list[float]:
-        """Return when parameters change that follow it, up to a time [s]; ramps in stages."""
+    def returns(self, first: float, last: float) -> float:
+        """Return how often it comes and goes between two times [s]."""
+        span = min(last, self.end) - max(first, self.onset)
+        return max(span / self.every, 0.0) if self.every > 0 else 0.0
+
+    def instants(self, first: float, last: float) -> list[float]:
+        """Return when parameters change that follow it, of times [s]; ramps in stages."""
         ends = self.end
         if self.every > 0:
+            begun = max(math.floor((first - self.onset) / self.every), 0)
+            count = math.ceil(self.returns(first, last)) + 1
             pairs = ((self.onset + k * self.every, self.onset + (k + self.share) * self.every)
-                     for k in range(_MOST))  # fmt: skip
-            each = [t for pair in takewhile(lambda p: p[0] < min(last, ends), pairs) for t in pair]
-            return [min(t, ends) for t in each]
+                     for k in range(begun, begun + count))  # fmt: skip
+            return [min(t, ends) for pair in pairs if pair[0] < min(last, ends) for t in pair]
         edges = [self.onset, *([ends] if np.isfinite(ends) else [])]
         if not self.ramp > 0:
             return edges

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,8 +16,8 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 
 _OWN = ("fault", "value", "seed", "set")
-_RANGES = {"dropout": (0.0, 1.0), "missed": (0.0, 1.0), "late": (1.0, 1000.0),
-           "dropped": (2.0, 1e6)}  # fmt: skip
+_RANGES = {"dropout": (0.0, 1.0), "missed": (0.0, 1.0), "noise": (0.0, math.inf),
+           "late": (1.0, 1000.0), "dropped": (2.0, 1e6)}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,12 +114,13 @@ def _read(
 def _of_parameters(where: str, section: Mapping[str, Any], par: ParameterSet) -> Mode:
     """Return the mode in which parameters are set as a section says."""
     values = section["set"]
-    if not isinstance(values, Mapping) or not values or "value" in section:
-        raise ParameterError(f'{where}.set: write {{"motor.R_m" = "+50%"}}, and no value beside it')
-    name = str(section.get("fault", "") or "changed")
+    if not isinstance(values, Mapping) or not values or {"value", "fault"} & {*section}:
+        raise ParameterError(
+            f'{where}.set: write {{"motor.R_m" = "+50%"}}, and neither fault nor value beside it'
+        )
     given = parsed(type(par), settled(par, values), f"parameter of {where}")
     par.replace(given)
-    return Mode(name, f"{', '.join(given)} changed", changes=lambda now, value: given)
+    return Mode("changed", f"{', '.join(given)} changed", changes=lambda now, value: given)
 
 
 def _value(where: str, section: Mapping[str, Any], mode: Mode) -> float:
@@ -139,7 +141,7 @@ def require_admissible(mode: Mode, value: float, where: str) -> None:
     ParameterError
         With the range; what changes parameters is checked with these.
     """
-    low, high = _RANGES.get(mode.falsified, (float("-inf"), float("inf")))
+    low, high = _RANGES.get(mode.falsified, (-math.inf, math.inf))
     is_whole = mode.falsified in ("late", "dropped")
     if not low <= value <= high or (is_whole and value % 1):
         kind = "a whole number" if is_whole else "a number"

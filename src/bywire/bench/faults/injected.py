@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from bywire.bench.experiment import Case, FaultyCase
+from bywire.bench.faults.course import MOST, Course
 from bywire.bench.faults.fault_section import Injection, injections
 from bywire.bench.faults.modes import Mode, falsify, missed
 from bywire.core.errors import ParameterError
@@ -49,24 +50,50 @@ def with_faults(
             "this experiment makes no run, so that nothing can fail in it: leave [[faults]] out"
         )
     read = [injections(sections, case.model, case.par) for case in cases]
+    first, longest = -max(case.settle for case in cases), max(case.duration for case in cases)
     for k, fault in enumerate(read[0]):
-        longest = max(case.duration for case in cases)
-        if fault.course.onset >= longest:
-            raise ParameterError(
-                f"faults[{k + 1}]: {fault.mode.name} begins at {fault.course.onset:g} s, but the "
-                f"run ends at {longest:g} s: give an earlier onset, or a longer run"
-            )
+        _require_within(f"faults[{k + 1}]: {fault.mode.name}", fault.course, first, longest)
     return tuple(injected(case, each) for case, each in zip(cases, read, strict=True))
 
 
+def _require_within(fault: str, course: Course, first: float, last: float) -> None:
+    """Refuse a fault that is never there, or too often, between the ends of the runs [s]."""
+    if course.onset >= last:
+        raise ParameterError(
+            f"{fault} begins at {course.onset:g} s, but the run ends at {last:g} s: give an "
+            "earlier onset, or a longer run"
+        )
+    if course.gone <= first:
+        raise ParameterError(
+            f"{fault} is over at {course.gone:g} s, but the run starts at {first:g} s: let it "
+            "last longer, or give a later onset"
+        )
+    if course.returns(first, last) > MOST:
+        raise ParameterError(
+            f"{fault} comes back every {course.every:g} s, more than {MOST} times until "
+            f"{last:g} s: give a longer interval, or let it last"
+        )
+
+
 def taps_of(faults: Sequence[Injection]) -> tuple[tuple[Tap, ...], tuple[str, ...]]:
-    """Return the taps that some faults take, and the tasks that miss their ticks."""
+    """Return the taps that some faults take, and the tasks that miss their ticks.
+
+    Raises
+    ------
+    ParameterError
+        When one drive comes late by different numbers of ticks.
+    """
     taps: dict[str, Tap] = {}
     for fault in faults:
         tap = fault.mode.tap(fault.value)
         if tap is not None:
-            late = max(tap.late, taps[tap.name].late if tap.name in taps else 0)
-            taps[tap.name] = tap._replace(late=late)
+            before = taps.get(tap.name, tap)
+            if before.late and tap.late and before.late != tap.late:
+                raise ParameterError(
+                    f"fault {fault.mode.name}: {before.late} and {tap.late} ticks in one run; "
+                    "give both the same value"
+                )
+            taps[tap.name] = tap._replace(late=max(before.late, tap.late))
     tasks = dict.fromkeys(fault.mode.task for fault in faults if fault.mode.task)
     return tuple(taps[name] for name in sorted(taps)), tuple(sorted(tasks))
 
@@ -138,7 +165,8 @@ def _falsified(
 def _changes(faults: Sequence[Injection], case: Case) -> Iterator[tuple[float, ParameterSet]]:
     """Yield when parameters change, and what they are from then on."""
     changing = [fault for fault in faults if fault.mode.changes is not None]
-    instants = {t for fault in changing for t in fault.course.instants(case.duration)}
+    instants = {t for fault in changing
+                for t in fault.course.instants(-case.settle, case.duration)}  # fmt: skip
     times = sorted({max(t, -case.settle) for t in instants if t < case.duration})
     for t in times:
         yield t, _at(changing, t, case.par)
