@@ -95,7 +95,7 @@ def test_list_is_complete(bywire):
     titles = {
         "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
         "plants",
-        "studies", "lives", "methods", "stimuli", "faults", "campaigns", "kpis",
+        "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals", "kpis",
     }  # fmt: skip
     assert set(found) == titles | {"kpis_of_experiments"}
     for topic, content in found.items():

@@ -17,7 +17,7 @@ from bywire.report.tables import Table, text_table
 
 TOPICS = (
     "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
-    "plants", "studies", "lives", "methods", "stimuli", "faults", "campaigns", "kpis",
+    "plants", "studies", "lives", "methods", "stimuli", "faults", "campaigns", "residuals", "kpis",
     "kpis_of_experiments",
 )  # fmt: skip
 """kinds of things that have a name"""

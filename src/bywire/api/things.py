@@ -12,10 +12,12 @@ from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.campaigns.declared import CAMPAIGNS
+from bywire.campaigns.residual import RESIDUALS
 from bywire.core.brake import brakes, loaded_files
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import unknown_name
 from bywire.core.model import ASSEMBLIES
+from bywire.core.quantities import display_unit
 from bywire.core.registry import Kind
 from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS, Method
@@ -46,6 +48,10 @@ def all_things() -> dict[str, Any]:
         "stimuli": {stimulus.name: stimulus.summary for stimulus in STIMULI.all().values()},
         "faults": fault_summaries(),
         "campaigns": {each.name: each.summary for each in CAMPAIGNS.all().values()},
+        "residuals": {
+            each.name: f"{each.summary} [{display_unit(each.unit)}] ({each.assembly})"
+            for each in RESIDUALS.all().values()
+        },
         "kpis": {kpi.name: kpi.definition for kpi in definitions().values()},
         "kpis_of_experiments": {e.name: dict(e.kpis) for e in experiments},
     }
