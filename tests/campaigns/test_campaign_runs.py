@@ -15,7 +15,7 @@ from bywire.campaigns.criterion import Criterion
 from bywire.campaigns.findings import CampaignFindings, finding
 from bywire.campaigns.judging import FACTORS, judge_healthy
 from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
-from bywire.campaigns.residual import threshold
+from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.campaigns.simulating import faulty_traces, healthy_traces
 from bywire.core.errors import FileError, InputError
 
@@ -279,3 +279,6 @@ def test_what_lasts_is_counted_over_the_rows_before():
     assert np.isnan(first_time(values > 9, time, np.array([0.0]))).all()
     assert threshold(np.arange(100.0), 0.02) == 97.0
     assert threshold(np.arange(10.0), 0.01) == 9.0
+    shown = np.array([[0.0, 1.0, 2.0]])
+    assert detected(shown, 0.5, np.arange(3.0), np.zeros(1)).tolist() == [1.0]
+    assert np.isnan(detected(shown, NEVER, np.arange(3.0), np.zeros(1))).all()

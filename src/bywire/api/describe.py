@@ -30,6 +30,7 @@ from bywire.bench.experiment import EXPERIMENTS, Experiment
 from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS, GenericExperiment
 from bywire.bench.kpis.registry import definitions
 from bywire.bench.stimuli.registry import STIMULI, StimulusKind
+from bywire.campaigns.declared import CAMPAIGNS, DeclaredCampaign
 from bywire.core.catalog import PARAMETER_SETS, main_set
 from bywire.core.catalog import CitedSet as Set
 from bywire.core.errors import UnknownNameError, unknown_name
@@ -74,6 +75,7 @@ def described(name: str) -> list[Object]:
         "plant": (PLANTS.all(), described_plant),
         "stimulus": (STIMULI.all(), _stimulus),
         "fault": (faults(), described_fault),
+        "campaign": (CAMPAIGNS.all(), _campaign),
         "KPI": (definitions(), lambda kpi: described_kpi(kpi.name, kpi.definition)),
         "parameter": ({n: n for n in parameters()}, described_parameter),
         "parameter group": ({n: n for n in groups()}, described_group),
@@ -268,6 +270,16 @@ def _set(cited: Set) -> Object:
         row["provenance"] = ": ".join(part for part in parts if part)
     return {**_in_short(cited), "source": cited.source, "parameters": rows,
             "changed_with": "--set NAME=VALUE"}  # fmt: skip
+
+
+def _campaign(campaign: DeclaredCampaign) -> Object:
+    criteria = [{"name": each["name"], "signal": each["signal"]}
+                for each in campaign.content["criteria"]]  # fmt: skip
+    return {
+        "summary": campaign.summary, "experiment": campaign.content["bench"], "signals": criteria,
+        "see": f"run by 'bywire faults {campaign.name}'; its faults, criteria and residuals are "
+        "listed in the answer",
+    }  # fmt: skip
 
 
 def _stimulus(stimulus: StimulusKind) -> Object:

@@ -14,6 +14,7 @@ import numpy as np
 from bywire.bench.running import Progress
 from bywire.campaigns.campaign_file import read_campaign
 from bywire.campaigns.findings import CampaignFindings, FaultFinding
+from bywire.campaigns.residual import NEVER
 from bywire.campaigns.running import complete
 from bywire.campaigns.store import CampaignStore
 from bywire.core.quantities import display_unit
@@ -153,9 +154,10 @@ class FaultCampaign(Answer):
         for residual in findings.plan.watched:
             _, alarms, delay, seen = findings.curve(residual.name)[_at_threshold()]
             limit = findings.healthy.thresholds[residual.name]
+            said = "never looked at" if limit <= NEVER else amount(limit, residual.unit, 3)
             rows.append([
-                residual.name, residual.summary, amount(limit, residual.unit, 3), str(alarms),
-                f"{seen} of {dangerous}", _milliseconds(delay),
+                residual.name, residual.summary, said, str(alarms), f"{seen} of {dangerous}",
+                _milliseconds(delay),
             ])  # fmt: skip
         heads = ["residual", "compares", "threshold", "false alarms", "sees", "median delay"]
         return text_table(heads, rows)

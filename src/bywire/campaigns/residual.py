@@ -12,6 +12,9 @@ from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_
 from bywire.core.registry import Kind, instances
 from bywire.core.typing import Array
 
+NEVER = -1e9
+"""of a residual where it is not looked at; one that never is in healthy runs judges nothing"""
+
 
 @dataclass(frozen=True)
 class Residual:
@@ -30,7 +33,8 @@ class Residual:
     signals
         Recorded signals that it takes: such as the controller knows.
     compute
-        ``compute(signals, par, dt)``: its magnitude in every row, shape (cases, rows); ``signals``
+        ``compute(signals, par, dt)``: its magnitude in every row, shape (cases, rows), `NEVER`
+        where it is not looked at; ``signals``
         by name, of that shape; ``par`` what the controller believes; ``dt`` time between rows [s].
     hold
         Time for which it has to exceed its threshold without a break [s].
@@ -85,6 +89,11 @@ def threshold(largest: Array, share: float) -> float:
 
 
 def detected(lasted: Array, limit: float, time: Array, since: Array) -> Array:
-    """Return when a residual exceeds its threshold first [s]; NaN where never; shape (cases,)."""
+    """Return when a residual exceeds its threshold first [s]; NaN where never; shape (cases,).
+
+    One that healthy runs have never looked at has no threshold, and sees nothing.
+    """
+    if limit <= NEVER:
+        return np.full(len(lasted), np.nan)
     margin = 1e-9 * max(abs(limit), 1e-12)  # rounding is no failure
     return first_time(np.where(lasted > limit + margin, 1.0, 0.0), time, since)

@@ -14,7 +14,7 @@ import numpy as np
 
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.campaigns.lasting import largest_of_the_last, least_of_the_last, mean_of_the_last
-from bywire.campaigns.residual import Residual
+from bywire.campaigns.residual import NEVER, Residual
 from bywire.core.typing import Array
 
 NAME = MotorcycleBrake.name
@@ -22,7 +22,6 @@ Signals = Mapping[str, Array]
 
 
 _STEADY = 0.3  # s after which a step of the demand is over: several times the loop's rise
-_NEVER = -1e9  # of a residual that is not looked at
 
 
 def _period(par: Any, dt: float) -> int:
@@ -36,7 +35,7 @@ def _steady(signals: Signals, dt: float, values: Array) -> Array:
     rows = round(_STEADY / dt)
     p = signals["p_ref"]
     still = largest_of_the_last(p, rows) - least_of_the_last(p, rows) <= 0
-    return np.where(still, values, _NEVER)
+    return np.where(still, values, NEVER)
 
 
 def _current(signals: Signals, par: Any, dt: float) -> Array:

@@ -13,21 +13,20 @@ import numpy as np
 
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.campaigns.lasting import largest_of_the_last, least_of_the_last, mean_of_the_last
-from bywire.campaigns.residual import Residual
+from bywire.campaigns.residual import NEVER, Residual
 from bywire.core.typing import Array
 
 NAME = WedgeBrake.name
 Signals = Mapping[str, Array]
 _STEADY = 0.1  # s after which a step of the demand is over
 _AVERAGE = 10e-3  # s, over which contacts and free-play are averaged
-_NEVER = -1e9  # of a residual that is not looked at
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
     """Return the mean of a residual where the demand has not changed for a while, else none."""
     rows, M_set = round(_STEADY / dt), signals["M_set"]
     still = largest_of_the_last(M_set, rows) - least_of_the_last(M_set, rows) <= 0
-    return np.where(still, mean_of_the_last(values, max(round(_AVERAGE / dt), 1)), _NEVER)
+    return np.where(still, mean_of_the_last(values, max(round(_AVERAGE / dt), 1)), NEVER)
 
 
 def _moment(signals: Signals, par: Any, dt: float) -> Array:
