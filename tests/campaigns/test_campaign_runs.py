@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import threading
 from dataclasses import replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from bywire.campaigns.judging import FACTORS, judge_healthy
 from bywire.campaigns.lasting import first_time, least_of_the_last, mean_of_the_last
 from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.campaigns.simulating import faulty_traces, healthy_traces
+from bywire.campaigns.store import CampaignStore
 from bywire.core.errors import FileError, InputError
 
 SMALL = """
@@ -155,13 +157,18 @@ def test_healthy_halves_are_apart_and_alarms_fall_with_the_threshold(campaign):
     assert len(FACTORS) == len(next(iter(healthy.alarms.values())))
 
 
-def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder):
+def test_what_was_killed_goes_on_with_the_same_bits(campaign, file, folder, monkeypatch):
+    threads, keep = set(), CampaignStore.keep
+    monkeypatch.setattr(CampaignStore, "keep", lambda *given: (
+        threads.add(threading.current_thread()), keep(*given)))  # fmt: skip
     kept = sorted((folder / "faults").glob("*.json"))
     texts = [path.read_bytes() for path in kept]
     kept[1].unlink()
     kept[2].write_text('{"reached"')  # a damaged one
     again = bywire.run_faults(file, folder)
     assert [path.read_bytes() for path in kept] == texts
+    # Two that write into one folder at a time would take each other's scratch files away.
+    assert threads == {threading.main_thread()}
     first = CampaignFindings(
         campaign.findings.plan, campaign.findings.healthy,
         tuple(finding(campaign.findings.plan, k, json.loads(text))

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import os
-from concurrent.futures import ThreadPoolExecutor
-from typing import Any
+from concurrent.futures import ThreadPoolExecutor, as_completed
 
 from bywire.bench.running import Progress
 from bywire.campaigns.findings import CampaignFindings, finding
@@ -37,18 +36,18 @@ def complete(plan: CampaignPlan, store: CampaignStore, progress: Progress) -> Ca
     outcomes = {k: kept for k in range(len(plan.faults)) if (kept := store.kept(k)) is not None}
     missing = [k for k in range(len(plan.faults)) if k not in outcomes]
 
-    def judged(number: int) -> dict[str, Any]:
-        outcome = judge_fault(plan, plan.faults[number], number, healthy)
-        store.keep(number, outcome)
-        return outcome
-
     # A few lanes each: faults side by side use the cores better than the runs of one.
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
-        made = {number: pool.submit(judged, number) for number in missing}
+        made = {
+            pool.submit(judge_fault, plan, plan.faults[number], number, healthy): number
+            for number in missing
+        }
         try:
-            for number, future in made.items():
-                progress(plan.faults[number].name, number / len(plan.faults))
+            for future in as_completed(made):  # here alone files are written, one at a time
+                number = made[future]
                 outcomes[number] = future.result()
+                store.keep(number, outcomes[number])
+                progress(plan.faults[number].name, len(outcomes) / len(plan.faults))
         except BaseException:
             pool.shutdown(wait=True, cancel_futures=True)
             raise
