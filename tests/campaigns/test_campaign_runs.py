@@ -277,6 +277,17 @@ def test_double_faults_stand_beside_the_latent_one(tmp_path):
     assert "battery.lost after seal.swollen 3" in [f.failing.name for f in campaign.findings.faults]
 
 
+def test_an_interrupt_says_what_is_kept(campaign, file, folder):
+    (folder / "faults" / "0003.json").unlink()
+
+    def interrupt(label, share):
+        if share > 0:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt, match="7 of 7 faults are kept: the same command goes"):
+        bywire.run_faults(file, folder, progress=interrupt)
+
+
 def test_what_lasts_is_counted_over_the_rows_before():
     values = np.array([[0.0, 3.0, 1.0, 2.0, 5.0, 4.0]])
     assert least_of_the_last(values, 2)[0].tolist() == [0, 0, 1, 1, 2, 4]

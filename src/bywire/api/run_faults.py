@@ -268,7 +268,15 @@ def run_faults(
     """
     plan = read_campaign(campaign, overrides)
     store = CampaignStore(None if out is None else Path(out))
-    return FaultCampaign(complete(plan, store, progress or silent), store.folder)
+    try:
+        return FaultCampaign(complete(plan, store, progress or silent), store.folder)
+    except KeyboardInterrupt:
+        if store.folder is None:
+            raise
+        kept = sum(store.kept(number) is not None for number in range(len(plan.faults)))
+        raise KeyboardInterrupt(
+            f"{kept} of {len(plan.faults)} faults are kept: the same command goes on"
+        ) from None
 
 
 def coverage_class(coverage: float) -> str:
