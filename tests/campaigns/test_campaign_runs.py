@@ -277,6 +277,17 @@ def test_double_faults_stand_beside_the_latent_one(tmp_path):
     assert "battery.lost after seal.swollen 3" in [f.failing.name for f in campaign.findings.faults]
 
 
+def test_a_residual_that_is_never_looked_at_sees_nothing_by_any_threshold(campaign):
+    plan = campaign.findings.plan
+    alive = plan.residuals[0]
+    dead = replace(alive, name="dead", compute=lambda signals, par, dt: np.where(
+        signals["i_meas"] < 1e3, NEVER, 0.0))  # fmt: skip
+    judged = judge_healthy(replace(plan, residuals=(alive, dead)), healthy_traces(plan))
+    assert judged.thresholds["dead"] == NEVER
+    assert not any(judged.alarms["dead"])
+    assert any(judged.alarms[alive.name])
+
+
 def test_an_interrupt_says_what_is_kept(campaign, file, folder):
     (folder / "faults" / "0003.json").unlink()
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from bywire.campaigns.plan import CampaignPlan, Failing, touch_alike
-from bywire.campaigns.residual import detected, threshold
+from bywire.campaigns.residual import NEVER, detected, threshold
 from bywire.campaigns.simulating import Traces, faulty_traces
 from bywire.core.typing import Array
 
@@ -63,6 +63,8 @@ def judge_healthy(plan: CampaignPlan, traces: Traces) -> Healthy:
 
 def _scaled(limit: float, factor: float) -> float:
     """Return a threshold that is farther from what is healthy by a factor, whatever its sign."""
+    if limit <= NEVER:  # there is none to scale
+        return limit
     return limit * factor if limit >= 0 else limit / factor
 
 

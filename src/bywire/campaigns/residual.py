@@ -34,8 +34,8 @@ class Residual:
         Recorded signals that it takes: such as the controller knows.
     compute
         ``compute(signals, par, dt)``: its magnitude in every row, shape (cases, rows), `NEVER`
-        where it is not looked at; ``signals``
-        by name, of that shape; ``par`` what the controller believes; ``dt`` time between rows [s].
+        where it is not looked at; ``signals`` by name, of that shape; ``par`` what the controller
+        believes; ``dt`` time between rows [s].
     hold
         Time for which it has to exceed its threshold without a break [s].
     """

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import bywire
+from bywire.bench.energy_ledger import actuator_ledger
 from bywire.report.bench_figures import bench_figures
 
 KMH_100 = "100 km/h"
@@ -57,6 +58,19 @@ def test_energy_of_the_vehicle_closes(locked, controlled, slow):
         left = (taken - run["W_slope"] - run["W_pitch"]).values
         assert np.abs(left - left[0]).max() < 1e-11 * float(run["E_vehicle"][0])
         assert float(run["E_brake_f"][-1]) > 0.0  # it is no balance of zeros
+
+
+def test_a_mass_that_comes_on_top_while_it_rolls_stands_in_the_books():
+    faults = [{"set": {"vehicle.body.m": "+20%"}, "onset": 1.0}]
+    bench = bywire.Bench("straight-stop", "sport600", options={"duration": 2.0}, faults=faults)
+    recording = bywire.run(bench, estimate_error=False).recording
+    books = actuator_ledger(recording)
+    v, phi = (recording[name].sel(time=1.0, method="nearest").item() for name in ("v", "phi"))
+    # Its speed, and its height above that of a rear wheel that does not sink into the ground.
+    height = 0.69 * math.sin(phi) - 0.62 * (1.0 - math.cos(phi))
+    wanted = 53.0 * (0.5 * v * v + 9.81 * height)
+    assert recording["E_change"][-1].item() == pytest.approx(wanted, rel=1e-9)
+    assert abs(books.closing_error) < 1e-6 * books.turnover
 
 
 def test_a_controlled_stop_on_wet_road(controlled):
