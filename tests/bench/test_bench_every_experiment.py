@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import bywire
@@ -13,10 +15,13 @@ from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.key_figures import key_figures_of
 from bywire.bench.rows import Rows
+from bywire.bench.running import run_of
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.brake import brakes
 from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import InputError
 from bywire.report.bench_figures import bench_figures
+from bywire.simulation.run_group import fit_lanes
 
 NAMES = sorted(EXPERIMENTS.all())
 PAIRS = [
@@ -117,14 +122,44 @@ def _rows(recording):
     "name", [pytest.param(n, marks=pytest.mark.trust) if n in LARGE else n for n in NAMES]
 )
 def test_figures_of_many_cases_are_those_of_their_recordings(results, name):
-    """By families of all at once, of no more signals than they need; by hand one by one."""
+    """By families of all at once, of no more signals than they need; and in lanes as alone."""
     bench = results[name].bench
-    first = next(iter(bench.par.leaves()))
-    larger = bench.varied({first: 1.02 * bench.par.leaves()[first]}, {})
-    figures = key_figures_of([bench, larger])
-    for k, recorded in enumerate(run_benches([bench, larger])):
+    (other,) = random_cases(bench, 1)
+    figures = key_figures_of([bench, other])
+    alone = (results[name], bywire.run(other, estimate_error=False))
+    for k, recorded in enumerate(run_benches([bench, other])):
         assert figures.kpis(k) == recorded.kpis  # to the last digit, reasons too
-        assert list(figures.warnings[k]) == recorded.warnings
+        assert figures.kpis(k) == alone[k].kpis
+        assert list(figures.warnings[k]) == recorded.warnings == alone[k].warnings
+        assert all("lanes" in each.attrs["engine"] for each in recorded.recordings.values()
+                   if "engine" in each.attrs)  # fmt: skip
+
+
+@pytest.mark.trust
+@pytest.mark.parametrize("name", NAMES)
+def test_random_cases_in_lanes_are_those_alone(results, name):
+    """To the last digit, of which 1e-9 was wanted: both kernels do the same in the same order."""
+    cases = random_cases(results[name].bench, 1000)
+    for begin in range(0, len(cases), 50):
+        each = cases[begin : begin + 50]
+        figures = key_figures_of(each)
+        for k, case in enumerate(each):
+            assert figures.kpis(k) == key_figures_of([case]).kpis(0)
+
+
+def random_cases(bench, count):
+    """Return benches with ten parameters up to 5 % off and noise of their own, alike in plan."""
+    rng = np.random.default_rng([count, *bench.experiment.encode()])
+    leaves, found = bench.par.leaves(), []
+    while len(found) < count:
+        names = rng.choice(list(leaves), 10, replace=False)
+        values = {n: leaves[n] * rng.uniform(0.95, 1.05) for n in names}
+        with suppress(InputError):  # sample times that do not divide, ranges that cross
+            case = bench.varied(values, {}, int(rng.integers(1000)))
+            both = [run_of(each, each.cases()[0], 0) for each in (bench, case)]
+            if fit_lanes(both):
+                found.append(case)
+    return found
 
 
 @pytest.mark.parametrize(("name", "parameters"), PAIRS)

@@ -50,8 +50,8 @@ PLAIN_C = Dialect(
     calls={
         **{op: f"bw_{op}" for op in OWN},
         **{op: op for op in _LIBRARY},
-        "pow": "pow",
-        "constpow": "pow",
+        "pow": "bw_pow",
+        "constpow": "bw_pow",
     },
     select="{c} ? {a} : {b}",
     compare={

@@ -34,6 +34,16 @@ class Quadrature:
     products: list[Node]
     combinations: list[list[tuple[Node, int]]]
 
+    def of(self, wanted: Sequence[bool]) -> Quadrature:
+        """Return what the wanted integrals take; the others stay as they are."""
+        chosen = [pairs if is_wanted else [] for pairs, is_wanted in
+                  zip(self.combinations, wanted, strict=True)]  # fmt: skip
+        places = sorted({k for pairs in chosen for _, k in pairs})
+        return Quadrature(
+            [self.products[k] for k in places],
+            [[(c, places.index(k)) for c, k in pairs] for pairs in chosen],
+        )
+
 
 def factored(
     graph: Graph, rates: Sequence[Node], computed: Collection[Node], level: Levels

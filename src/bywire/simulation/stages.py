@@ -117,17 +117,15 @@ def build_stages(
     output = add(program.output, "xmprqh")[0]
     output = output if outputs is None else [output[k] for k in outputs]
     fast = dict(zip(parts, add(program.fast, "xdmph"), strict=True))
-    if outputs is not None:
-        read = graph.read_by(output)
-        zero = graph.constant(0.0)
-        fast["q"] = [
-            node if leaf in read else zero
-            for node, leaf in zip(fast["q"], leaves["q"], strict=True)
-        ]
     level = Levels(graph, LEVEL)
     substep = frozenset(needed(graph, _all_but(fast, "q"), lambda _: False))
     quadrature = factored(graph, fast["q"], substep, level)
     fast, quadrature = _balanced(graph, fast, quadrature, level)
+    if outputs is not None:  # only now: the order of operations is that of all outputs
+        read = graph.read_by(output)
+        wanted, zero = [leaf in read for leaf in leaves["q"]], graph.constant(0.0)
+        quadrature = quadrature.of(wanted)
+        fast["q"] = [n if is_read else zero for n, is_read in zip(fast["q"], wanted, strict=True)]
     return Stages(
         graph=graph,
         fast=fast,
