@@ -156,8 +156,9 @@ def random_cases(bench, count):
         values = {n: leaves[n] * rng.uniform(0.95, 1.05) for n in names}
         with suppress(InputError):  # sample times that do not divide, ranges that cross
             case = bench.varied(values, {}, int(rng.integers(1000)))
-            both = [run_of(each, each.cases()[0], 0) for each in (bench, case)]
-            if fit_lanes(both):
+            pairs = zip(bench.cases(), case.cases(), strict=True)
+            runs = [[run_of(b, c, 0) for b, c in zip((bench, case), p, strict=True)] for p in pairs]
+            if all(map(fit_lanes, runs)):
                 found.append(case)
     return found
 

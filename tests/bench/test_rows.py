@@ -28,14 +28,38 @@ def test_what_figures_and_warnings_ask_for(rows):
     assert "dataset" not in vars(rows)  # none was made
 
 
-def test_whatever_else_is_asked_for_a_dataset_answers(rows):
+@pytest.mark.parametrize(("begin", "end"), [(-1e-9, None), (None, 0.1), (0.05, 0.15), (0.2, 0.0)])
+def test_windows_sums_and_extremes_are_those_of_a_dataset(rows, begin, end):
+    recording, window = rows.dataset, slice(begin, end)
+    del rows.dataset
     power = rows["x"] * rows["y"] + 1.0
-    assert isinstance(power, xr.DataArray)
     np.testing.assert_array_equal(power, SIGNALS["x"] * SIGNALS["y"] + 1.0)
-    assert float(rows["x"].max()) == 5.0
+    seen, same = (each.sel(time=window) for each in (rows, recording))
+    assert seen["time"].values.tolist() == same["time"].values.tolist()
+    assert seen["x"].values.tolist() == rows["x"].sel(time=window).values.tolist()
+    assert seen.sizes["time"] == same.sizes["time"]
+    assert seen["y"].attrs == same["y"].attrs
+    if same.sizes["time"]:
+        for name in ("max", "min", "mean"):
+            assert float(getattr(seen["x"], name)()) == float(getattr(same["x"], name)())
     assert np.abs(rows["y"]).values.tolist() == [0.0, 1.0, 0.0, 1.0]
-    assert rows.sel(time=slice(-1e-9, None)).sizes["time"] == 3
+    assert float(np.abs(rows["y"]).max()) == 1.0
+    more = rows.assign(z=("time", TIME, {"units": "s"}), y=0.0 - rows["y"])
+    assert list(more) == ["x", "y", "z"]
+    assert more["y"].values.tolist() == [0.0, -1.0, 0.0, 1.0]
+    assert more.isel(time=slice(None, 2))["z"].values.tolist() == [-0.1, 0.0]
+    assert "dataset" not in vars(rows)  # none was made
+
+
+def test_a_missing_value_is_left_out_of_extremes(rows):
+    holed = rows.assign(x=("time", np.array([1.0, np.nan, 3.0, 5.0])))["x"]
+    assert [float(holed.max()), float(holed.min()), float(holed.mean())] == [5.0, 1.0, 3.0]
+
+
+def test_whatever_else_is_asked_for_a_dataset_answers(rows):
+    assert isinstance(rows["x"] * rows.dataset["y"], xr.DataArray)
     assert rows["x"].sel(time=0.1) == 3.0
+    assert rows["x"].cumsum().values.tolist() == [1.0, 3.0, 6.0, 11.0]
     assert "z" in rows.assign(z=rows["x"].copy())
     assert rows[["x"]].sizes["time"] == 4
     assert np.asarray(rows["x"]).tolist() == [1.0, 2.0, 3.0, 5.0]

@@ -169,6 +169,8 @@ def main() -> int:
     for kind, case in ONE_BY_ONE.items():
         if count := getattr(asked, kind):
             wrong += each_in(kind, asked.seed, asked.first, count, case)
+    if study_kills.KILLED:
+        print("killed:", ", ".join(f"{n} {what}" for what, n in study_kills.KILLED.items()))
     return 1 if wrong else 0
 
 

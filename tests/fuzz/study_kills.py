@@ -8,6 +8,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -18,50 +20,107 @@ import pandas as pd
 import bywire
 from bywire.core.scratch import PREFIX
 
-CASES = 512
-"""of a study: eight chunks"""
+RARE = 19.05  # A, which few cases exceed
 _STUDY = """
 bench = "hard-braking"
 [set]
 "options.duration" = "40 ms"
 "options.settle" = "10 ms"
 [vary]
-"motor.R_m" = { kind = "normal", sd = "4 %" }
+"motor.R_m" = {{ kind = "normal", sd = "4 %" }}
 "motor.K_e" = "+-5 %"
 [requirements]
-peak_current = "<= 25 A with 90 %"
+peak_current = "<= {limit} A with {probability} %"
+[design]
+{design}
 """
+DESIGNS = {
+    "monte-carlo": _STUDY.format(
+        limit=25, probability=90, design='kind = "monte-carlo"\ncases = 512'
+    ),
+    "subset-simulation": _STUDY.format(
+        limit=RARE, probability=99.9,
+        design='kind = "subset-simulation"\ncases = 3200\ncases_per_level = 640',
+    ),
+    "importance-sampling": _STUDY.format(
+        limit=RARE, probability=99.9, design='kind = "importance-sampling"\ncases = 1280'
+    ),
+}  # fmt: skip
+_CLUSTER = """
+import sys
+from bywire.core.unneeded import allow_dask
+allow_dask()
+from distributed import LocalCluster
+if __name__ == "__main__":
+    with LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster:
+        print(cluster.scheduler_address, flush=True)
+        sys.stdin.read()
+"""
+KILLED: Counter[str] = Counter()
+"""processes killed until now, by what they were"""
 _MOST = 4  # kills of a case
 _LONGEST = 120.0  # s that a command may take to end
 
 
-def case(rng: Random, folder: Path, kills: int = 0) -> str:
-    """Kill a study again and again, finish it, and say what is wrong with what it gave."""
+def case(rng: Random, folder: Path, kills: int = 0, design: str = "", where: str = "") -> str:
+    """Kill a study again and again, finish it, and say what is wrong with what it gave.
+
+    ``design``, ``where``: one of `DESIGNS`, and ``pool`` or ``cluster``; drawn where empty.
+    """
+    design = design or rng.choice(("monte-carlo", "monte-carlo", *DESIGNS))
+    where = where or rng.choice(("pool", "pool", "cluster"))
     path, out = folder / "study.toml", folder / "out"
-    path.write_text(_STUDY, encoding="utf-8")
-    for _ in range(kills or rng.randint(1, _MOST)):
-        workers = rng.choice(("1", "2"))
-        wrong = _killed(rng, path, out, workers)
-        if wrong:
-            return f"with {workers} workers: {wrong}"
-    whole = bywire.run_study(path, out, cases=CASES, workers=1).cases
-    if not whole.equals(_reference()):
-        return "the finished study is not the one that nobody killed"
+    path.write_text(DESIGNS[design], encoding="utf-8")
+    with _computing(rng, folder, where) as (options, further):
+        for _ in range(kills or rng.randint(1, _MOST)):
+            wrong = _killed(rng, path, out, options, further)
+            if wrong:
+                return f"{design} with {' '.join(options)}: {wrong}"
+    whole = bywire.run_study(path, out, workers=1).cases
+    if not whole.equals(_reference(design)):
+        return f"the finished study ({design}, {where}) is not the one that nobody killed"
     left = [str(p) for p in out.rglob(f"{PREFIX}*")]
     return f"{left} stay" if left else ""
 
 
-def _killed(rng: Random, path: Path, out: Path, workers: str) -> str:
+@contextlib.contextmanager
+def _computing(rng: Random, folder: Path, where: str) -> Iterator[tuple[list[str], int]]:
+    """Yield options that say who computes, and the process whose children do; 0 for none."""
+    if where == "pool":
+        yield ["--workers", rng.choice(("1", "2"))], 0
+        return
+    path = folder / "cluster.py"
+    path.write_text(_CLUSTER, encoding="utf-8")
+    with subprocess.Popen(
+        [sys.executable, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL, text=True, env=_environment(),
+    ) as cluster:  # fmt: skip
+        assert cluster.stdout is not None
+        address = cluster.stdout.readline().strip()
+        try:
+            yield ["--cluster", address], cluster.pid
+        finally:
+            cluster.communicate("")
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def _killed(rng: Random, path: Path, out: Path, options: list[str], further: int) -> str:
     """Start a study, and kill its client or a worker of it after a while."""
     line = [sys.executable, "-m", "bywire.cli", "study", "run", str(path), "--out", str(out),
-            "--cases", str(CASES), "--workers", workers]  # fmt: skip
-    env = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+            *options]  # fmt: skip
     with subprocess.Popen(
-        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=env
+        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=_environment()
     ) as process:
-        time.sleep(rng.uniform(0.5, 7.0))
+        time.sleep(rng.uniform(0.5, 9.0))
         below = _children(process.pid)
-        victim = rng.choice(below) if below and rng.random() < 0.5 else process.pid
+        workers = [*below, *(_children(further) if further else [])]
+        victim = rng.choice(workers) if workers and rng.random() < 0.5 else process.pid
+        if process.poll() is None:
+            KILLED["clients" if victim == process.pid else "workers"] += 1
+            KILLED["of a cluster"] += bool(further)
         with contextlib.suppress(ProcessLookupError):
             os.kill(victim, signal.SIGKILL)
         try:
@@ -90,8 +149,8 @@ def _children(pid: int) -> list[int]:
 
 
 @cache
-def _reference() -> pd.DataFrame:
+def _reference(design: str) -> pd.DataFrame:
     with TemporaryDirectory() as folder:
         path = Path(folder) / "study.toml"
-        path.write_text(_STUDY, encoding="utf-8")
-        return bywire.run_study(path, Path(folder) / "out", cases=CASES, workers=1).cases
+        path.write_text(DESIGNS[design], encoding="utf-8")
+        return bywire.run_study(path, Path(folder) / "out", workers=1).cases

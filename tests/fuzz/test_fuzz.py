@@ -65,7 +65,7 @@ def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Pa
 @pytest.mark.skipif(sys.platform != "linux", reason="signals, and the list of a process's children")
 def test_a_study_whose_client_is_killed_leaves_no_worker_and_goes_on(tmp_path: Path) -> None:
     """Its workers would wait for jobs forever."""
-    assert study_kills.case(Random(KILLED_STUDY), tmp_path, kills=1) == ""
+    assert study_kills.case(Random(KILLED_STUDY), tmp_path, 1, "monte-carlo", "pool") == ""
 
 
 def test_a_case_comes_again() -> None:

@@ -89,7 +89,7 @@ def rows_of(
     signals = {name: kept[name] for name in attributes if name in kept}
     return Rows(
         np.round(time[begin:], 12), signals, attributes,
-        lambda: {**run_notes(run, trajectory), **notes()},
+        lambda: {**run_notes(run, trajectory), **notes()}, run.par,
     )  # fmt: skip
 
 
@@ -202,8 +202,7 @@ def energy_residual(recording: xr.Dataset) -> xr.DataArray:
         for name in recording
         if str(name).startswith("E_") and name not in ("E_source", "E_stored")
     )
-    start = {"time": 0}
     balance = recording["E_source"] - losses - recording["E_stored"]
-    residual: xr.DataArray = balance - balance.isel(start)
+    residual: xr.DataArray = balance - float(balance.values[0])
     residual.attrs = {"units": "J", "long_name": "residual of the energy balance"}
     return residual

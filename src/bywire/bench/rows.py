@@ -1,20 +1,24 @@
 """The rows of a run as plain arrays, in place of a recording: for many runs that nobody looks at.
 
 To make a Dataset of thirty signals takes longer than to simulate them. Key figures, warnings and
-books of energy ask a recording for little; whatever else a brake's own code asks for, the Dataset
-is made and answers.
+books of energy ask a recording for little: signals, windows of time, sums and products of signals,
+their extremes and means. Whatever else a brake's own code asks for, the Dataset, or the DataArray
+of a signal, is made and answers.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cached_property
+from numbers import Number
 from typing import Any
 
 import numpy as np
 import xarray as xr
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 
 TIME = "time"
@@ -54,8 +58,42 @@ class Row(NDArrayOperatorsMixin):
         return np.array(self.values, dtype=dtype, copy=copy)
 
     def __array_ufunc__(self, function: np.ufunc, method: str, *inputs: Any, **given: Any) -> Any:
+        is_plain = method == "__call__" and not given and function.nout == 1
+        if is_plain and all(map(self._fits, inputs)):
+            plain = (each.values if isinstance(each, Row) else each for each in inputs)
+            return Row(self._rows, "", function(*plain), {})
         arrays = [each._array if isinstance(each, Row) else each for each in inputs]
         return getattr(function, method)(*arrays, **given)
+
+    def _fits(self, other: Any) -> bool:
+        if isinstance(other, Row):
+            return other._time is self._time and other.values.shape == self.values.shape
+        return isinstance(other, Number)
+
+    def max(self, *asked: Any, **given: Any) -> Any:
+        """Return the largest value, as a DataArray does."""
+        return self._reduced("max", *asked, **given)
+
+    def min(self, *asked: Any, **given: Any) -> Any:
+        """Return the smallest value, as a DataArray does."""
+        return self._reduced("min", *asked, **given)
+
+    def mean(self, *asked: Any, **given: Any) -> Any:
+        """Return the mean, as a DataArray does."""
+        return self._reduced("mean", *asked, **given)
+
+    def _reduced(self, how: str, *asked: Any, **given: Any) -> Any:
+        is_plain = not asked and not given and self.values.ndim == 1 and self.values.size
+        value = getattr(self.values, how)() if is_plain else math.nan
+        return getattr(self._array, how)(*asked, **given) if np.isnan(value) else value
+
+    def sel(self, *asked: Any, **given: Any) -> Any:
+        """Return the rows within a window of time, ``time=slice(begin, end)``, as a DataArray."""
+        window = _window(self._time, asked, given)
+        if window is None:
+            return self._array.sel(*asked, **given)
+        rows = Rows(self._time[window], {}, {})
+        return Row(rows, self._name, self.values[window], self.attrs)
 
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
@@ -66,8 +104,25 @@ class Row(NDArrayOperatorsMixin):
         return self._array[key]
 
     @property
+    def _time(self) -> Array:
+        return self._rows._values[TIME]
+
+    @property
     def _array(self) -> xr.DataArray:
-        return self._rows.dataset[self._name]
+        axis = (TIME, self._time, dict(self._rows._attributes[TIME]))
+        return xr.DataArray(
+            self.values, {TIME: axis}, (TIME,), self._name or None, dict(self.attrs)
+        )
+
+
+def _window(time: Array, asked: tuple[Any, ...], given: Mapping[str, Any]) -> slice | None:
+    """Return the places of rows within a window of time that `sel` asks for; None for others."""
+    wanted = given.get(TIME)
+    if asked or len(given) != 1 or not isinstance(wanted, slice) or wanted.step is not None:
+        return None
+    begin = 0 if wanted.start is None else int(np.searchsorted(time, wanted.start, "left"))
+    end = time.size if wanted.stop is None else int(np.searchsorted(time, wanted.stop, "right"))
+    return slice(begin, max(begin, end))
 
 
 class Rows:
@@ -85,6 +140,8 @@ class Rows:
         Unit, label and role of each signal, as a recording has them.
     notes
         ``notes()``: the attributes of the whole recording, of which few are ever asked for.
+    par
+        Parameters of the run, where they are known.
     """
 
     def __init__(
@@ -93,20 +150,67 @@ class Rows:
         signals: Mapping[str, Array],
         attributes: Mapping[str, Mapping[str, Any]],
         notes: Callable[[], Mapping[str, Any]] = dict,
+        par: ParameterSet | None = None,
     ) -> None:
-        self._notes = notes
+        self._notes, self.par = notes, par
         self._values = {**signals, TIME: time}
         self._attributes = {**attributes, TIME: {"units": "s", "long_name": "time"}}
         self._signals = tuple(signals)
         self.silent: frozenset[str] = frozenset()  # parts of the model that have nothing to say
         self.sizes = {TIME: time.size}
 
-    def case(self, k: int, notes: Callable[[], Mapping[str, Any]] = dict) -> Rows:
+    def case(
+        self,
+        k: int,
+        notes: Callable[[], Mapping[str, Any]] = dict,
+        par: ParameterSet | None = None,
+    ) -> Rows:
         """Return the rows of one run of several."""
         signals = {name: self._values[name][k] for name in self._signals}
-        rows = Rows(self._values[TIME], signals, self._attributes, notes)
+        rows = Rows(self._values[TIME], signals, self._attributes, notes, par)
         rows.silent = self.silent
         return rows
+
+    def sel(self, *asked: Any, **given: Any) -> Any:
+        """Return the rows within a window of time, ``time=slice(begin, end)``, as a Dataset."""
+        window = _window(self._values[TIME], asked, given)
+        return self.dataset.sel(*asked, **given) if window is None else self._within(window)
+
+    def isel(self, *asked: Any, **given: Any) -> Any:
+        """Return the rows of some places, ``time=slice(begin, end)``, as a Dataset."""
+        window = given.get(TIME)
+        if asked or len(given) != 1 or not isinstance(window, slice):
+            return self.dataset.isel(*asked, **given)
+        return self._within(window)
+
+    def _within(self, window: slice) -> Rows:
+        signals = {name: self._values[name][window] for name in self._signals}
+        return self._like(signals, self._attributes, self._values[TIME][window])
+
+    def _like(
+        self,
+        signals: Mapping[str, Array],
+        attributes: Mapping[str, Mapping[str, Any]],
+        time: Array | None = None,
+    ) -> Rows:
+        """Return other signals of the same run."""
+        here = self._values[TIME] if time is None else time
+        rows = Rows(here, signals, attributes, lambda: self.attrs, self.par)
+        rows.silent = self.silent
+        return rows
+
+    def assign(self, signals: Mapping[str, Any] | None = None, **named: Any) -> Any:
+        """Return the rows with further signals, or others, as a Dataset."""
+        given = {**(signals or {}), **named}
+        plain = {name: _plain(each, self._values[TIME]) for name, each in given.items()}
+        if any(each is None for each in plain.values()):
+            return self.dataset.assign(given)
+        known = {name: each for name, each in plain.items() if each is not None}
+        every = {name: self._values[name] for name in self._signals}
+        return self._like(
+            every | {name: values for name, (values, _) in known.items()},
+            {**self._attributes, **{name: attrs for name, (_, attrs) in known.items()}},
+        )
 
     def with_signals(
         self, signals: Mapping[str, Array], attributes: Mapping[str, Mapping[str, Any]]
@@ -158,6 +262,15 @@ class Rows:
         }
         time = each.pop(TIME)
         return xr.Dataset(each, coords={TIME: time}, attrs=self.attrs)
+
+
+def _plain(given: Any, time: Array) -> tuple[Array, Mapping[str, Any]] | None:
+    """Return the values and attributes of a signal that `Rows.assign` takes; None if it cannot."""
+    if isinstance(given, Row):
+        return (given.values, given.attrs) if given._time is time else None
+    if isinstance(given, tuple) and given[0] == TIME and np.shape(given[1]) == time.shape:
+        return np.asarray(given[1]), given[2] if len(given) > 2 else {}
+    return None
 
 
 class _Named(Mapping[str, Row]):

@@ -183,7 +183,7 @@ def rows_of_case(
     def notes() -> dict[str, Any]:
         return {**run_notes(group[k].run, group[k]), **_case_notes(bench, case)}
 
-    return _finished(bench, case, cast(xr.Dataset, rows.case(k, notes)))
+    return _finished(bench, case, cast(xr.Dataset, rows.case(k, notes, group[k].run.par)))
 
 
 def judged(

@@ -118,6 +118,9 @@ def _contact(held: xr.Dataset) -> float:
 
 def parameters_of(run: xr.Dataset) -> WedgeParameters:
     """Return the parameters with which a recording was made."""
+    known = getattr(run, "par", None)  # of plain rows
+    if isinstance(known, WedgeParameters):
+        return known
     return WedgeParameters.model_validate_json(run.attrs["parameters"])
 
 
