@@ -252,7 +252,10 @@ class Bench:
         known["overrides"] = {**self.overrides, **overrides}
         known["options"] = {**self.options, **options}
         known["seed"] = self.seed if seed is None else seed
-        known["par"] = self.par.replace(overrides)
+        known["par"] = par = self.par.replace(overrides)
+        following = self.definition.following
+        if not options and (following is None or following(par) == following(self.par)):
+            known["chosen_options"] = self.chosen_options
         made.cases()
         return made
 

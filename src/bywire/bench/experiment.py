@@ -81,8 +81,9 @@ class Case:
         periods = {task.name: task.period for task in self.model.tasks(self.par)}
         schedule = plan(self.settle + self.duration, step, periods, record)
         common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
-        settle = math.ceil(self.settle / common - 1e-9) * common
-        return replace(self, settle=float(f"{settle:.12g}"), record=record)
+        settle = float(f"{math.ceil(self.settle / common - 1e-9) * common:.12g}")
+        is_aligned = settle == self.settle and record == self.record
+        return self if is_aligned else replace(self, settle=settle, record=record)
 
 
 @dataclass(frozen=True)
@@ -193,6 +194,30 @@ class Experiment:
         return {name: unit for name, unit in kpis.items() if name not in left_out}
 
 
+@dataclass(frozen=True)
+class _Driven:
+    """The stimulus of a run of a case, whose noise a seed draws."""
+
+    case: Case
+    seed: tuple[int, ...]
+
+    def __call__(self, t: NDArray[np.float64]) -> NDArray[np.float64]:
+        rows = np.zeros((t.size, len(self.case.model.Stimulus._fields)))
+        self.put_into(rows, t)
+        return rows
+
+    def put_into(self, rows: NDArray[np.float64], t: NDArray[np.float64]) -> None:
+        """Put it into rows of zeros; see `bywire.simulation.run.put_into`."""
+        given, drawn = driven_at(self.case, t - self.case.settle), 0
+        for k, name in enumerate(self.case.model.Stimulus._fields):
+            if name.startswith("noise_"):  # as children of one sequence, quicker than spawned
+                child = np.random.SeedSequence(self.seed, spawn_key=(drawn,))
+                rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
+                drawn += 1
+            elif name in given:
+                rows[:, k] = given[name]
+
+
 def as_run(
     case: Case, step: float, interval: float | None = None, seed: tuple[int, ...] = (0,)
 ) -> Run:
@@ -203,26 +228,12 @@ def as_run(
     drawn from a generator of its own, so that a longer run begins with the same samples.
     """
     begun = case.aligned(step, interval)
-    fields = begun.model.Stimulus._fields
-    noises = [k for k, name in enumerate(fields) if name.startswith("noise_")]
-
-    def stimulus(t: NDArray[np.float64]) -> NDArray[np.float64]:
-        given = driven_at(begun, t - begun.settle)
-        rows = np.zeros((t.size, len(fields)))
-        for k, name in enumerate(fields):
-            if name in given:
-                rows[:, k] = given[name]
-        for number, k in enumerate(noises):  # as children of one sequence, quicker than spawned
-            child = np.random.SeedSequence(seed, spawn_key=(number,))
-            rows[:, k] = np.random.default_rng(child).standard_normal(t.size)
-        return rows
-
     return Run(
         model=begun.model,
         par=begun.par,
         state=begun.state,
         memory=begun.memory,
-        stimulus=stimulus,
+        stimulus=_Driven(begun, seed),
         duration=begun.settle + begun.duration,
         step=step,
         record=begun.record,

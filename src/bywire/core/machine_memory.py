@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 
 _FALLBACK = 8e9  # bytes
 
 
+@cache
 def machine_memory() -> float:
     """Return the machine's memory in bytes; 8 GB where the system does not tell."""
     try:

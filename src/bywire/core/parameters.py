@@ -51,7 +51,12 @@ class ParameterSet(BaseModel):
         return _validated(cls, {}, values)
 
     def replace(self, values: Mapping[str, Any]) -> Self:
-        """Return a copy with other values at dotted names; groups that hold them are validated."""
+        """Return a copy with other values at dotted names; groups that hold them are validated.
+
+        It is the set itself where it has these numbers and choices.
+        """
+        if all(self._has(name, value) for name, value in values.items()):
+            return self
         made = _validated(type(self), _fields(self), values)
         # All others are known: thousands of sets a second differ from one in few values.
         numbers, choices = self._by_name("numbers"), self._by_name("choices")
@@ -63,6 +68,13 @@ class ParameterSet(BaseModel):
             made._known["numbers", ""] = numbers | new
             made._known["choices", ""] = choices | chosen if chosen else choices
         return made
+
+    def _has(self, name: str, value: Any) -> bool:
+        """Return whether a plain number or text is what stands at a dotted name."""
+        if type(value) not in (float, str):
+            return False
+        known = self._by_name("numbers" if type(value) is float else "choices")
+        return bool(known.get(name) == value)
 
     def flat(self) -> dict[str, Any]:
         """Return all leaves and choices by dotted name."""

@@ -25,6 +25,8 @@ def warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
     """Return the warnings of an assembly's elements; see `Assembly.watch`."""
     silent = getattr(recording, "silent", ())
     felt = tuple(each for each in _felt(model, par) if each[0].name not in silent)
+    if not felt:
+        return []
     return [text for _, texts in _said(model, felt, recording, (par,)) for text in texts]
 
 

@@ -26,11 +26,12 @@ SIGNATURE = """int bw_lanes(void) { return W; }
 void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, double *restrict rec)"""
 
-# As `emission.PLAN`; then whether each lane has a stimulus of its own, and the distance between
-# the recordings of two lanes.
+# As `emission.PLAN`; then whether each lane has a stimulus of its own, how many lanes are recorded,
+# and the distances between the entries of two lanes, rows and signals.
 PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps = plan[3];
   const int64_t stim = plan[4], every = plan[5], row0 = plan[6];
-  const int64_t own = plan[{at}], apart = plan[{at} + 1];"""
+  const int64_t own = plan[{at}], used = plan[{at} + 1], by_lane = plan[{at} + 2];
+  const int64_t by_row = plan[{at} + 3], by_signal = plan[{at} + 4];"""
 
 
 class _Lanes:
@@ -194,10 +195,9 @@ def _record(t: _Lanes) -> list[str]:
         *t.block(roots, 1),
         f"V o[{max(len(roots), 1)}];",
         *(f"o[{j}] = {t.number(n)};" for j, n in enumerate(roots)),
-        "for (int l = 0; l < W; ++l) {",
-        f"  double *row = rec + l * apart + (f / every - row0) * {len(roots)};",
-        f"  for (int j = 0; j < {len(roots)}; ++j) row[j] = o[j][l];",
-        "}",
+        "double *row = rec + (f / every - row0) * by_row;",
+        f"for (int j = 0; j < {len(roots)}; ++j)",
+        "  for (int l = 0; l < used; ++l) row[j * by_signal + l * by_lane] = o[j][l];",
     ]
 
 

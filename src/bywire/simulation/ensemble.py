@@ -111,14 +111,13 @@ class LaneKernel:
         vector
             State vectors, shape (entries, lanes).
         rows
-            Shape (lanes, recorded rows of these frames, signals).
+            Shape (cases, recorded rows of these frames, signals), of any strides; lanes beyond
+            the cases are not recorded.
         """
         own = stimulus.ndim == 3
+        apart = [stride // rows.itemsize for stride in rows.strides]
         plan = np.concatenate(
-            (
-                plan_array(schedule, begin, end, self._signals),
-                [int(own), rows.strides[0] // rows.itemsize],
-            )
+            (plan_array(schedule, begin, end, self._signals), [int(own), len(rows), *apart])
         ).astype(np.int64)
         self._run(
             pointer(parameters),
@@ -126,7 +125,7 @@ class LaneKernel:
             pointer(stimulus),
             pointer(vector),
             pointer(plan),
-            pointer(rows),
+            ctypes.c_void_p(rows.ctypes.data),
         )
 
 

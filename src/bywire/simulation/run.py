@@ -264,6 +264,18 @@ def sampled_stimulus(run: Run, schedule: Schedule) -> Array:
     return rows
 
 
+def put_into(rows: Array, run: Run, t: Array) -> None:
+    """Put the stimulus of a run at times [s] into rows of zeros, shape (len(t), nu).
+
+    A stimulus that knows how, by ``put_into(rows, t)``, leaves out what is zero.
+    """
+    put = getattr(run.stimulus, "put_into", None)
+    if put is None:
+        rows[:] = run.stimulus(t)
+    else:
+        put(rows, t)
+
+
 def selected(names: Sequence[str], signals: Sequence[str]) -> NDArray[np.int32]:
     """Return the indices of signals among the outputs' names.
 

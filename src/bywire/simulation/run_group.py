@@ -29,6 +29,7 @@ from bywire.simulation.run import (
     Run,
     Trajectory,
     initial_vector,
+    put_into,
     sampled_stimulus,
     selected,
 )
@@ -46,10 +47,9 @@ def fit_lanes(runs: Sequence[Run]) -> bool:
     first = runs[0]
     structure, schedule = structure_of(first.model, first.par), first.schedule()
     return all(
-        structure_of(run.model, par) == structure
-        and replace(run, par=par, changes=()).schedule() == schedule
+        structure_of(each.model, each.par) == structure and each.schedule() == schedule
         for run in runs
-        for par in (run.par, *(change.par for change in run.changes))
+        for each in (run, *(replace(run, par=change.par, changes=()) for change in run.changes))
     )
 
 
@@ -208,6 +208,20 @@ class _Watch:
                 self._progress(self._done / self._pieces)
 
 
+def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
+    """Return the rows of the stimuli of runs, shape (rows, nu, width); (rows, nu) of equal ones."""
+    t = schedule.stimulus_times
+    rows = np.zeros((t.size, len(group[0].model.Stimulus._fields), width))
+    for lane, run in enumerate(group):
+        put_into(rows[:, :, lane], run, t)
+    rows[:, :, len(group) :] = rows[:, :, len(group) - 1 : len(group)]
+    if not np.isfinite(rows).all():
+        for run in group:
+            sampled_stimulus(run, schedule)  # says which and when
+    is_shared = bool((rows == rows[:, :, :1]).all())
+    return rows[:, :, 0].copy() if is_shared else rows
+
+
 class _Carried:
     """Runs that are carried on side by side.
 
@@ -228,12 +242,7 @@ class _Carried:
         for lane, run in enumerate(filled):
             for begin, _, par in pieces(run.par, run.changes, schedule) if run.changes else ():
                 self._changes.setdefault(begin, []).append((lane, par))
-        each = [sampled_stimulus(run, schedule) for run in group]
-        self._stimulus = each[0]
-        if any(not np.array_equal(rows, each[0]) for rows in each[1:]):
-            self._stimulus = np.empty((*each[0].shape, width))
-            for lane in range(width):
-                self._stimulus[:, :, lane] = each[min(lane, len(each) - 1)]
+        self._stimulus = _stimuli(group, schedule, width)
 
     def to_the_end(
         self, values: Array, edges: Sequence[int], skipped: int, watch: _Watch
@@ -247,15 +256,13 @@ class _Carried:
             first = -(-begin // every) - skipped
             self._change(begin, values[:, :, max(first, 0) :])
             last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
-            is_recorded = first >= 0
             signals = values.shape[0] - bool(self._jumping)
-            height = max(last - first, 1) if is_recorded else 1
-            rows = np.empty((self._kernel.lanes, height, signals))
-            plan = schedule if is_recorded else silent
-            self._advance(plan, rows, begin, end)
-            if is_recorded:  # a kernel fills a block: here the rows of a signal come in one piece
-                block = rows[: self._count, : last - first].transpose(2, 0, 1)
-                values[:signals, :, first:last] = block
+            if first >= 0:
+                rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
+                self._advance(schedule, rows, begin, end)
+            else:
+                rows = np.empty((self._count, 1, signals))
+                self._advance(silent, rows, begin, end)
             require_finite(
                 self._kernel.layout, self._vector,
                 f"one of {self._count} runs left the numbers before t = {end * schedule.frame:g} s",
