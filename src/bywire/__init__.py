@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from bywire.api.convert import Conversion, convert
     from bywire.api.describe import describe
     from bywire.api.design import design
+    from bywire.api.export_controller import ControllerExport, export_controller
     from bywire.api.frequency_response import frequency_response
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
@@ -65,6 +66,8 @@ _HOMES = {
     "BenchEnsemble": "bench.ensemble",
     "BenchRange": "api.run_over",
     "BenchResult": "api.run",
+    "ControllerExport": "api.export_controller",
+    "export_controller": "api.export_controller",
     "Check": "api.check",
     "check": "api.check",
     "Comparison": "api.compare",
@@ -123,6 +126,7 @@ __all__ = [
     "Check",
     "CitedSet",
     "Comparison",
+    "ControllerExport",
     "Conversion",
     "Ensemble",
     "Identification",
@@ -141,6 +145,7 @@ __all__ = [
     "convert",
     "describe",
     "design",
+    "export_controller",
     "frequency_response",
     "identify",
     "linearize",

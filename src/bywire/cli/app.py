@@ -17,6 +17,7 @@ from bywire.cli.bench_commands import (
 from bywire.cli.brake_commands import check_command, new_command
 from bywire.cli.compare_command import compare
 from bywire.cli.data_commands import convert
+from bywire.cli.export_commands import export_app
 from bywire.cli.fault_commands import faults_command
 from bywire.cli.identification_commands import identify, replay
 from bywire.cli.life_command import life_command
@@ -52,6 +53,7 @@ app.add_typer(study_app, name="study")
 app.command("life")(life_command)
 app.command("faults")(faults_command)
 app.command("design")(design_command)
+app.add_typer(export_app, name="export")
 app.command("convert")(convert)
 app.command("identify")(identify)
 app.command("replay")(replay)

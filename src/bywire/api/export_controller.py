@@ -1,0 +1,137 @@
+"""The ECU of a bench as C: laws, plant's side, parameters, test vectors, description."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from bywire.bench.bench import Bench
+from bywire.bench.bench_file import read
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.errors import FileError, ParameterError, unknown_name
+from bywire.core.scratch import scratch_folder
+from bywire.export.controller.c_text import PRECISIONS
+from bywire.export.controller.files import files
+from bywire.export.controller.program import program
+from bywire.report.answer import Answer, use_case
+from bywire.report.document import Document, Listing, Paragraph, Section
+
+if TYPE_CHECKING:
+    from bywire.export.controller.program import Program
+
+VECTORS = 200
+
+
+@dataclass(frozen=True)
+class ControllerExport(Answer):
+    """An ECU that was written as C.
+
+    Parameters
+    ----------
+    folder
+        Where it stands.
+    files
+        Names of its files.
+    program
+        What was translated.
+    vectors
+        Test vectors of each task.
+    """
+
+    folder: Path
+    files: tuple[str, ...]
+    program: Program
+    vectors: int
+
+    def document(self) -> Document:
+        """Return what was written, and how it is tried."""
+        tasks = ", ".join(f"{s.task.name} ({s.task.period:.9g} s)" for s in self.program.steps)
+        what = Paragraph(
+            f"{self.program.name}_ecu.c: {len(self.program.functions)} functions, "
+            f"{len(self.program.parameters())} parameters, tasks {tasks}, "
+            f"{self.program.precision.name} precision"
+        )
+        following = Listing([f"make -C {self.folder} check"], "Next, with a C compiler:")
+        return Document(
+            f"The ECU of {self.program.model.name} in C",
+            f"written to {self.folder}",
+            sections=[Section("Files", [what, Listing(list(self.files)), following])],
+            brief=[what, Paragraph(f"written: {self.folder}"), following],
+            data=self._data(),
+            is_paged=False,
+        )
+
+    def _data(self) -> dict[str, Any]:
+        made = self.program
+        return {
+            "folder": str(self.folder),
+            "files": list(self.files),
+            "model": made.model.name,
+            "precision": made.precision.name,
+            "tasks": {step.task.name: step.task.period for step in made.steps},
+            "parameters": [name for name, _ in made.parameters()],
+            "memory": [each.name for each in made.members(made.model.Memory)],
+            "library": list(made.libraries),
+            "vectors": self.vectors,
+        }
+
+
+@use_case
+def export_controller(
+    bench: Bench | str | Path,
+    out: str | Path,
+    *,
+    precision: str = "double",
+    vectors: int = VECTORS,
+) -> ControllerExport:
+    """Write the ECU of a bench's model as readable C99, with all that is needed to try it.
+
+    Parameters
+    ----------
+    bench
+        Bench, bench file, or name of an experiment: its parameters and choices are those of the
+        ECU; of several cases the first one's. Faults of the bench are left out.
+    out
+        Folder, made where it is missing; files of an earlier export in it are replaced.
+    precision
+        ``"double"``, equal to Python in every bit, or ``"single"``.
+    vectors
+        Test vectors of each task.
+
+    Returns
+    -------
+    ControllerExport
+        Files, functions and parameters.
+
+    Raises
+    ------
+    ModelError
+        With file, line and operation of what cannot be translated.
+    FileError
+        When the folder cannot be written.
+    """
+    if precision not in PRECISIONS:
+        raise unknown_name("precision", precision, PRECISIONS)
+    if isinstance(vectors, bool) or not isinstance(vectors, int) or not 1 <= vectors <= 100_000:
+        raise ParameterError(f"vectors = {vectors!r}: a whole number from 1 to 100000 is wanted")
+    chosen = bench if isinstance(bench, Bench) else read(bench, {})
+    case = replace(chosen, faults=()).cases()[0]
+    made = program(case.model, case.par, precision)
+    cited = PARAMETER_SETS.find(chosen.parameters).values
+    texts = files(made, case.memory, cited, vectors)
+    folder = Path(out).expanduser()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with scratch_folder(folder) as scratch:  # all, or none
+            for name, text in texts.items():
+                (scratch / name).write_text(text, encoding="utf-8")
+            for name in texts:
+                os.replace(scratch / name, folder / name)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise FileError(
+            f"{folder} cannot be written: {reason}; name another folder"
+        ) from None
+    return ControllerExport(folder, tuple(texts), made, vectors)

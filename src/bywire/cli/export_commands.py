@@ -1,0 +1,50 @@
+"""Options of the commands that take a bench's parts out of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from bywire.cli.options import BenchChanges, JsonFlag, changes
+from bywire.cli.output_folder import folder
+from bywire.cli.show import show
+
+export_app = typer.Typer(
+    no_args_is_help=True, help="Write parts of a bench in the form that other tools take."
+)
+
+BenchFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Bench file (TOML), or an experiment.", metavar="BENCH", show_default=False
+    ),
+]
+ExportFolder = Annotated[
+    Path,
+    typer.Option("--out", help="Folder of the export.", parser=folder, metavar="PATH",
+                 show_default=False),
+]  # fmt: skip
+Precision = Annotated[str, typer.Option(help="Numbers of the C: double, or single.")]
+
+
+@export_app.command("controller")
+def export_controller_command(
+    bench: BenchFile,
+    out: ExportFolder,
+    precision: Precision = "double",
+    vectors: Annotated[int, typer.Option(help="Test vectors of each task.")] = 200,
+    set_: BenchChanges = None,
+    json: JsonFlag = False,
+) -> None:
+    """Write the ECU as readable C99 with parameters, test vectors and a harness."""
+    from bywire.api.export_controller import export_controller
+    from bywire.bench.bench_file import read
+
+    show(
+        lambda _: export_controller(
+            read(bench, changes(set_)), out, precision=precision, vectors=vectors
+        ),
+        None, json,
+    )  # fmt: skip

@@ -1,0 +1,254 @@
+"""The body of a C function while it is being written: variables, statements, what is live."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.structs import Structs
+from bywire.export.controller.values import (
+    PRIMARY,
+    UNARY,
+    Array,
+    Built,
+    BuiltGroup,
+    Choice,
+    Expr,
+    Group,
+    Items,
+    Known,
+    Number,
+    Record,
+    Shape,
+    Table,
+    Update,
+    Uses,
+    lifted,
+    shape_of,
+)
+
+
+@dataclass(frozen=True)
+class Statement:
+    """``target = value``, or ``target.member = value``, with comments above."""
+
+    target: str
+    ctype: str
+    value: Expr
+    member: str = ""
+    notes: tuple[str, ...] = ()
+
+
+@dataclass
+class Body:
+    """Statements of a function.
+
+    Parameters
+    ----------
+    stores
+        How often every Python variable is assigned.
+    arguments
+        C names of the function's arguments.
+    """
+
+    structs: Structs
+    stores: Counter[str]
+    arguments: set[str] = field(default_factory=set)
+    statements: list[Statement] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
+    types: dict[str, str] = field(default_factory=dict)
+    moving: set[str] = field(default_factory=set)
+    notes: list[str] = field(default_factory=list)
+
+    def fresh(self, hint: str) -> str:
+        """Return a C name that no variable has yet."""
+        name = unique(c_name(hint), self.names)
+        self.names.add(name)
+        return name
+
+    def write(self, target: str, ctype: str, value: Expr, member: str = "") -> None:
+        """Append a statement."""
+        self.statements.append(Statement(target, ctype, value, member, tuple(self.notes)))
+        self.notes.clear()
+
+    def is_stable(self, expr: Expr) -> bool:
+        """Return whether a text means the same further down: it reads nothing that changes."""
+        changing = {use[1] for use in expr.uses if use[0] == "local"} & self.moving
+        return expr.is_path and not changing
+
+    def ctype_of(self, value: Any) -> str:
+        """Return the C type of a number, a truth value or a structure."""
+        value = lifted(value)
+        if isinstance(value, (Record, Built)):
+            return self.structs.of_tuple(value.cls).name
+        if isinstance(value, Update):
+            return self.structs.of_tuple(value.record.cls).name
+        if isinstance(value, Group):
+            return self.structs.of_group(value.shape).name
+        if isinstance(value, BuiltGroup):
+            return self.structs.of_group(built_shape(value)).name
+        return "bool" if isinstance(value, Expr) and value.truth else self.structs.precision.real
+
+    def settled(self, value: Any, hint: str) -> Any:
+        """Return a value that means the same further down; what has to be kept gets a variable."""
+        value = lifted(value)
+        if isinstance(value, Expr):
+            return value if self.is_stable(value) else self.variable(hint, value)
+        if isinstance(value, Record):
+            return value if self.is_stable(value.expr) else self.variable(hint, value)
+        if isinstance(value, (Update, BuiltGroup)):
+            return self.variable(hint, value)
+        if isinstance(value, Group) and not self.is_stable(value.expr):
+            return self.variable(hint, value)
+        if isinstance(value, Built):
+            return Built(value.cls, self._all_settled(value.items, hint))
+        if isinstance(value, Table):
+            return Table(self._all_settled(value.items, hint))
+        if isinstance(value, Items):
+            each = enumerate(value.values)
+            return Items(tuple(self.settled(v, f"{hint}_{k}") for k, v in each))
+        return value
+
+    def _all_settled(self, items: Mapping[str, Any], hint: str) -> dict[str, Any]:
+        return {name: self.settled(v, f"{hint}_{name}") for name, v in items.items()}
+
+    def variable(self, hint: str, value: Any, name: str = "") -> Any:
+        """Return a value that was put into a variable, a new one unless a name is given."""
+        target = name or self.fresh(hint)
+        ctype = self.ctype_of(value)
+        here = Expr(target, uses=frozenset({("local", target)}))
+        if isinstance(value, Update):
+            self.write(target, ctype, self.rvalue(value.record))
+            self.moving.add(target)
+            self.update(Record(value.record.cls, here), value.items)
+            return Record(value.record.cls, here)
+        self.write(target, ctype, self.rvalue(value))
+        if isinstance(value, Expr):
+            return replace(here, truth=value.truth)
+        if isinstance(value, (Record, Built)):
+            return Record(value.cls, here)
+        if isinstance(value, (Group, BuiltGroup)):
+            shape = value.shape if isinstance(value, Group) else built_shape(value)
+            return Group(shape, here, pointer=False)
+        return here
+
+    def update(self, record: Record, items: Mapping[str, Any]) -> None:
+        """Write new values of fields of a variable."""
+        struct = self.structs.of_tuple(record.cls)
+        kept = {
+            name: v for name, v in items.items()
+            if struct.is_memory or self.structs.keeps(struct, name)
+        }  # fmt: skip
+        target = record.expr.text
+        # All are computed before the first one is set.
+        values = {name: self.rvalue(lifted(v)) for name, v in kept.items()}
+        for at, (name, value) in enumerate(values.items()):
+            if ("local", target) in value.uses and at > 0:
+                values[name] = self.variable(f"{name}_new", value)
+        for name, value in values.items():
+            uses = value.uses | {("local", target)}
+            if struct.is_memory:
+                uses |= {("field", struct.name, name)}
+            self.write(target, struct.name, replace(value, uses=uses), c_name(name))
+        self.moving.add(target)
+
+    def rvalue(self, value: Any) -> Expr:
+        """Return the C expression of a number or a structure."""
+        value = lifted(value)
+        if isinstance(value, Expr):
+            return value
+        if isinstance(value, Known):
+            return literal(value, self.structs)
+        if isinstance(value, Record):
+            text = f"*{value.expr.text}" if value.pointer else value.expr.text
+            return replace(value.expr, text=text)
+        if isinstance(value, Group):
+            text = f"*{value.expr.text}" if value.pointer else value.expr.text
+            return replace(value.expr, text=text)
+        if isinstance(value, Built):
+            return self._compound(self.structs.of_tuple(value.cls), value.items)
+        if isinstance(value, BuiltGroup):
+            numbers = {
+                n: v for n, v in value.items.items() if isinstance(v, (Expr, Group)) or is_number(v)
+            }
+            return self._compound(self.structs.of_group(built_shape(value)), numbers)
+        if isinstance(value, Update):
+            return self.rvalue(self.variable(f"{c_name(value.record.expr.text)}_new", value))
+        raise TypeError(f"{type(value).__name__} is no value that C has")
+
+    def _compound(self, struct: Any, items: Mapping[str, Any]) -> Expr:
+        uses: set[Any] = set()
+        parts = []
+        for name, value in items.items():
+            if not struct.is_memory and not self.structs.keeps(struct, name):
+                continue
+            expr = self.as_number(self.rvalue(value))
+            uses |= expr.uses
+            parts.append(f".{c_name(name)} = {expr.text}")
+            if struct.is_memory:
+                uses.add(("field", struct.name, name))
+        uses.add(("struct", struct.name))
+        return Expr(f"({struct.name}){{{', '.join(parts)}}}", uses=frozenset(uses))
+
+    def as_number(self, expr: Expr) -> Expr:
+        """Return a truth value as 1 or 0."""
+        if not expr.truth:
+            return expr
+        one, zero = (self.structs.precision.literal(v) for v in (1.0, 0.0))
+        return Expr(f"({expr.at(PRIMARY)} ? {one} : {zero})", uses=expr.uses)
+
+    def live(self, result: Uses) -> list[Statement]:
+        """Return the statements that the result needs."""
+        needed, kept = _locals(result), []
+        for statement in reversed(self.statements):
+            if statement.target not in needed:
+                continue
+            kept.append(statement)
+            if not statement.member:
+                needed.discard(statement.target)
+            needed |= _locals(statement.value.uses)
+        return kept[::-1]
+
+
+def is_number(value: Any) -> bool:
+    """Return whether a value is a known number."""
+    known = value.value if isinstance(value, Known) else None
+    return isinstance(known, (int, float)) and not isinstance(known, bool)
+
+
+def literal(value: Known, structs: Structs) -> Expr:
+    """Return the literal, or the constant's name, of a known number."""
+    if isinstance(value.value, bool):
+        return Expr("true" if value.value else "false", truth=True)
+    if not is_number(value):
+        raise TypeError(f"{value.value!r} is no number")
+    if value.name:
+        return Expr(value.name, uses=frozenset({("constant", value.name, float(value.value))}))
+    text = structs.precision.literal(value.value)
+    return Expr(text, UNARY if text.startswith("-") else PRIMARY)
+
+
+def built_shape(value: BuiltGroup) -> Shape:
+    """Return the structure of a parameter set that is made of values."""
+    fields: list[tuple[str, Any]] = []
+    for name, each in value.items.items():
+        if isinstance(each, Group):
+            fields.append((name, each.shape))
+        elif isinstance(each, BuiltGroup):
+            fields.append((name, built_shape(each)))
+        elif isinstance(each, Expr) or is_number(each):
+            fields.append((name, Number()))
+        elif isinstance(each, Array):
+            raise TypeError("a parameter set with a table cannot be made anew")
+        elif hasattr(type(each.value), "model_fields"):
+            fields.append((name, shape_of(each.value)))
+        else:
+            fields.append((name, Choice(each.value)))
+    return Shape(value.cls, tuple(fields))
+
+
+def _locals(uses: Iterable[Any]) -> set[str]:
+    return {use[1] for use in uses if use[0] == "local"}

@@ -1,0 +1,115 @@
+"""Text of C: names, numbers, comments and lines of a readable length."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Container
+from dataclasses import dataclass
+
+import numpy as np
+
+from bywire.core.errors import ModelError
+
+WIDTH = 96
+_WORDS = """auto bool break case char const continue default do double else enum extern false float
+for goto if inline int long register restrict return short signed sizeof static struct switch true
+typedef union unsigned void volatile while main NULL INFINITY NAN larger smaller
+exp log sqrt sin cos tan fabs floor ceil fmax fmin pow round trunc hypot gamma signgam
+expf logf sqrtf sinf cosf fabsf floorf powf"""
+_RESERVED = frozenset(_WORDS.split())
+
+
+@dataclass(frozen=True)
+class Precision:
+    """Type of numbers in C.
+
+    Parameters
+    ----------
+    name
+        What the user calls it.
+    real
+        C type.
+    suffix
+        What functions of the library and literals end with.
+    """
+
+    name: str
+    real: str
+    suffix: str
+
+    def literal(self, value: float) -> str:
+        """Return the shortest literal that is read back as the value.
+
+        Raises
+        ------
+        ModelError
+            Where the value is none of this type.
+        """
+        number = float(value)
+        if self.suffix and number != 0.0 and not 2.0**-126 <= abs(number) < 2.0**128:
+            raise ModelError(
+                f"{number!r} is no number of single precision: export with precision = 'double'"
+            )
+        if not math.isfinite(number):
+            raise ModelError(f"{number!r} stands in the laws: C has no literal for it")
+        text = str(np.float32(number)) if self.suffix else repr(number)
+        return text + self.suffix
+
+
+PRECISIONS = {
+    "double": Precision("double", "double", ""),
+    "single": Precision("single", "float", "f"),
+}
+
+
+def c_name(text: str) -> str:
+    """Return an identifier of C for a name: other characters become underscores."""
+    name = re.sub(r"\W", "_", text, flags=re.ASCII).lstrip("_") or "value"
+    if name[0].isdigit():
+        name = f"n{name}"
+    return f"{name}_" if name in _RESERVED else name
+
+
+def unique(name: str, taken: Container[str]) -> str:
+    """Return the name, with a number behind it where it is taken."""
+    candidate, number = name, 2
+    while candidate in taken:
+        candidate, number = f"{name}_{number}", number + 1
+    return candidate
+
+
+def in_comment(text: str) -> str:
+    """Return a text that a comment can hold."""
+    return text.replace("*/", "* /").replace("/*", "/ *").replace("??", "? ?").rstrip("\\")
+
+
+def comment(lines: list[str], indent: str = "") -> str:
+    """Return a block comment of lines."""
+    kept = [in_comment(line) for line in lines]
+    if len(kept) == 1 and len(indent) + len(kept[0]) + 6 <= WIDTH:
+        return f"{indent}/* {kept[0]} */"
+    body = "\n".join(f"{indent} * {line}".rstrip() for line in kept)
+    return f"{indent}/*\n{body}\n{indent} */"
+
+
+def wrapped(line: str, indent: str = "") -> str:
+    """Return a statement on lines of a readable length, broken behind commas where it can be."""
+    lines, rest, lead = [], line, indent
+    while len(lead) + len(rest) > WIDTH:
+        room = WIDTH - len(lead)
+        spaces = [at for at in range(1, room + 1) if rest[at] == " " and _may_end(rest, at)]
+        if not spaces:
+            break
+        commas = [at for at in spaces if rest[at - 1] == "," and 3 * at > room]
+        at = (commas or spaces)[-1]
+        lines.append(lead + rest[:at])
+        rest, lead = rest[at + 1 :], indent + "        "
+    return "\n".join([*lines, lead + rest])
+
+
+def _may_end(line: str, at: int) -> bool:
+    """Return whether a line may end at a space: not within a declaration or around an equals."""
+    return not line[:at].endswith(("const", "=", "static", "inline")) and (
+        line[at + 1 : at + 2] != "="
+    )

@@ -1,0 +1,48 @@
+"""All files of an ECU in C, by name."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bywire.core.provenance import Cited
+from bywire.export.controller import render
+from bywire.export.controller.a2l import a2l
+from bywire.export.controller.harness import harness, makefile, vector_header
+from bywire.export.controller.parameter_file import parameter_file
+from bywire.export.controller.program import Program
+from bywire.export.controller.readme import readme
+from bywire.export.controller.vectors import vectors
+
+
+def files(
+    program: Program, memory: Any, cited: Mapping[str, Cited], count: int
+) -> dict[str, str]:
+    """Return the text of every file.
+
+    Parameters
+    ----------
+    memory
+        With which the bench begins.
+    cited
+        Values of the parameter set with their provenance.
+    count
+        Test vectors of each task.
+    """
+    name = program.name
+    made = {
+        f"{name}_ecu.h": render.header(program),
+        f"{name}_ops.h": render.operations(program),
+        f"{name}_ecu.c": render.source(program),
+        f"{name}_parameters.c": parameter_file(program, memory, cited),
+    }
+    if render.has_io(program):
+        made[f"{name}_io.h"] = render.io_header(program)
+        made[f"{name}_io.c"] = render.io_source(program)
+    every = vectors(program, memory, count)
+    made[f"{name}_test_vectors.h"] = vector_header(program, every)
+    made[f"{name}_harness.c"] = harness(program, every)
+    made["Makefile"] = makefile(program, render.has_io(program))
+    made[f"{name}.a2l"] = a2l(program)
+    made["README.txt"] = readme(program, sorted([*made, "README.txt"]), count)
+    return made

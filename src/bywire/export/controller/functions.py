@@ -1,0 +1,284 @@
+"""Functions of C: what they take, what they give back, and how they are called."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from bywire.export.controller.body import Body, Statement, built_shape
+from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.structs import Structs
+from bywire.export.controller.values import (
+    Array,
+    Built,
+    BuiltGroup,
+    Expr,
+    Group,
+    Items,
+    Known,
+    Record,
+    Table,
+    Update,
+    Use,
+    lifted,
+)
+
+
+@dataclass(frozen=True)
+class Argument:
+    """An argument in C."""
+
+    name: str
+    declaration: str
+
+
+@dataclass
+class CFunction:
+    """A function of C.
+
+    Parameters
+    ----------
+    result
+        C type; empty where all that it gives is known at export, and nothing is called.
+    value
+        What it returns, in its own variables.
+    members
+        Fields of the structure in which it returns several values, by their place in ``value``.
+    arguments
+        What it reads.
+    all_arguments
+        Names of what a call passes, read or not.
+    """
+
+    name: str
+    module: str
+    description: list[str]
+    is_plant: bool = False
+    result: str = ""
+    value: Any = None
+    members: dict[tuple[Any, ...], str] = field(default_factory=dict)
+    struct: str = ""
+    arguments: list[Argument] = field(default_factory=list)
+    all_arguments: list[str] = field(default_factory=list)
+    statements: list[Statement] = field(default_factory=list)
+    returned: Expr | None = None
+    own: set[str] = field(default_factory=set)
+    moving: set[str] = field(default_factory=set)
+
+    @property
+    def uses(self) -> frozenset[Use]:
+        """All that its statements need."""
+        every = [each.value.uses for each in self.statements]
+        if self.returned is not None:
+            every.append(self.returned.uses)
+        return frozenset().union(*every)
+
+
+def kind_of(value: Any) -> Any:
+    """Return what of an argument decides which C function serves."""
+    value = lifted(value)
+    if isinstance(value, Expr):
+        return "truth" if value.truth else "number"
+    if isinstance(value, Known):
+        if isinstance(value.value, float):
+            return "number"
+        return ("known", type(value.value), _hashable(value.value))
+    if isinstance(value, (Record, Built)):
+        return ("tuple", value.cls)
+    if isinstance(value, Update):
+        return ("tuple", value.record.cls)
+    if isinstance(value, Items):
+        return ("items", *(kind_of(each) for each in value.values))
+    if isinstance(value, Table):
+        return ("table", *((name, kind_of(each)) for name, each in value.items.items()))
+    if isinstance(value, Array):
+        return ("array", value.length)
+    if isinstance(value, Group):
+        return ("group", value.shape)
+    if isinstance(value, BuiltGroup):
+        return ("group", built_shape(value))
+    return ("other", id(value))
+
+
+def _hashable(value: Any) -> Any:
+    try:
+        hash(value)
+    except TypeError:
+        return id(value)
+    return value
+
+
+def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument | None]]:
+    """Yield what an argument is within the function, then its arguments in C."""
+    value, structs = lifted(value), body.structs
+    if isinstance(value, Known) and not isinstance(value.value, float):
+        yield value, None
+        return
+    if isinstance(value, (Items, Table)):
+        inner: dict[Any, Any] = {}
+        arguments: list[Argument] = []
+        each = value.items.items() if isinstance(value, Table) else enumerate(value.values)
+        for key, entry in each:
+            (inner[key], first), *more = received(entry, f"{name}_{key}", body)
+            arguments += [a for _, a in [(None, first), *more] if a is not None]
+        yield (
+            Table(inner) if isinstance(value, Table) else Items(tuple(inner.values())),
+            arguments[0] if arguments else None,
+        )
+        yield from ((None, a) for a in arguments[1:])
+        return
+    target = body.fresh(name)
+    here = Expr(target, uses=frozenset({("local", target)}))
+    ctype = body.ctype_of(value) if not isinstance(value, Array) else structs.precision.real
+    body.types[target] = ctype
+    if isinstance(value, (Expr, Known)):
+        is_truth = isinstance(value, Expr) and value.truth
+        yield Expr(target, uses=here.uses, truth=is_truth), Argument(target, f"{ctype} {target}")
+    elif isinstance(value, (Record, Built, Update)):
+        cls = value.record.cls if isinstance(value, Update) else value.cls
+        yield Record(cls, here), Argument(target, f"{ctype} {target}")
+    elif isinstance(value, Array):
+        declared = f"const {ctype} {target}[{value.length}]"
+        yield Array(here, value.length), Argument(target, declared)
+    else:
+        shape = value.shape if isinstance(value, Group) else built_shape(value)
+        made = Group(shape, here, pointer=True, origin=(target,))
+        yield made, Argument(target, f"const {ctype} *{target}")
+
+
+def passed(value: Any, body: Body) -> Iterator[Expr]:
+    """Yield the C arguments of a value, in the order of `received`."""
+    value = lifted(value)
+    if isinstance(value, Known) and not isinstance(value.value, float):
+        return
+    if isinstance(value, (Items, Table)):
+        each = value.items.values() if isinstance(value, Table) else value.values
+        for entry in each:
+            yield from passed(entry, body)
+    elif isinstance(value, Array):
+        yield value.expr
+    elif isinstance(value, BuiltGroup) or (isinstance(value, Group) and not value.expr.is_path):
+        yield from passed(body.variable("values", value), body)
+    elif isinstance(value, Group):
+        sign = "" if value.pointer else "&"
+        yield Expr(f"{sign}{value.expr.text}", uses=value.expr.uses)
+    else:
+        yield body.rvalue(value)
+
+
+def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
+    """Let a function return a value: directly, in a structure, or not at all where it is known."""
+    value = lifted(value)
+    if isinstance(value, Update):
+        value = _changed(value, body)
+    made.own = set(body.names)
+    if isinstance(value, (Known, Array)) or (isinstance(value, Group) and value.origin):
+        made.value = value
+    elif isinstance(value, (Items, Table)):
+        _several(made, body, value, node)
+    else:
+        made.result, made.value = body.ctype_of(value), value
+        made.returned = body.rvalue(value)
+    if made.returned is not None:
+        made.statements = body.live(made.returned.uses)
+    needed = {use[1] for use in made.uses if use[0] == "local"}
+    made.arguments = [each for each in made.arguments if each.name in needed]
+    made.moving = body.moving
+
+
+def _changed(value: Update, body: Body) -> Any:
+    """Return a replaced NamedTuple in its own variable where that is the function's."""
+    name = value.record.expr.text
+    if name in body.types and not value.record.pointer:
+        body.update(value.record, value.items)
+        return value.record
+    return body.variable("changed", value)
+
+
+def _several(made: CFunction, body: Body, value: Items | Table, node: ast.AST) -> None:
+    """Return several values in a structure."""
+    updates = [v for v in getattr(value, "values", ()) if isinstance(v, Update)]
+    if isinstance(value, Items) and updates:
+        value = Items(tuple(body.settled(v, "changed") for v in value.values))
+    leaves = list(_leaves(value, ()))
+    names = _member_names(value, node)
+    types: dict[str, str] = {}
+    parts: list[str] = []
+    uses: set[Use] = set()
+    for place, leaf in leaves:
+        name = unique(c_name(names.get(place[0], "item") if len(place) == 1 else
+                             "_".join(map(str, place))), types)  # fmt: skip
+        types[name] = body.ctype_of(leaf)
+        made.members[place] = name
+    made.value = value
+    if not leaves:
+        return
+    struct = body.structs.of_result(made.name, types)
+    made.result = made.struct = struct.name
+    for place, leaf in leaves:
+        name = made.members[place]
+        if body.structs.keeps(struct, name):
+            expr = body.rvalue(leaf)
+            uses |= expr.uses
+            parts.append(f".{name} = {expr.text}")
+    made.returned = Expr(f"({struct.name}){{{', '.join(parts)}}}", uses=frozenset(uses))
+
+
+def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...], Any]]:
+    """Yield what of a result is not known at export, by its place."""
+    value = lifted(value)
+    if isinstance(value, Items):
+        for k, each in enumerate(value.values):
+            yield from _leaves(each, (*place, k))
+    elif isinstance(value, Table):
+        for name, each in value.items.items():
+            yield from _leaves(each, (*place, name))
+    elif not isinstance(value, Known) and not (isinstance(value, Group) and value.origin):
+        yield place, value
+
+
+def _member_names(value: Any, node: ast.AST) -> dict[Any, str]:
+    """Return what the values of a result are called, by the words that they are returned in."""
+    if isinstance(value, Table):
+        return {name: str(name) for name in value.items}
+    names: dict[Any, str] = {}
+    for k, each in enumerate(getattr(node, "elts", ())):
+        while isinstance(each, (ast.Call, ast.Subscript)):
+            each = each.func if isinstance(each, ast.Call) else each.value
+            if isinstance(each, ast.Attribute) and each.attr == "_replace":
+                each = each.value
+        if isinstance(each, (ast.Name, ast.Attribute)):
+            names[k] = (each.id if isinstance(each, ast.Name) else each.attr).lower()
+    return names
+
+
+def given_back(made: CFunction, structs: Structs, result: Expr) -> Any:
+    """Return what a function with a structure gave back, which stands in a variable."""
+
+    def rebuilt(value: Any, place: tuple[Any, ...]) -> Any:
+        value = lifted(value)
+        if isinstance(value, Items):
+            each = enumerate(value.values)
+            return Items(tuple(rebuilt(v, (*place, k)) for k, v in each))
+        if isinstance(value, Table):
+            return Table({n: rebuilt(v, (*place, n)) for n, v in value.items.items()})
+        if place not in made.members:
+            return value
+        name = made.members[place]
+        uses = result.uses | {("field", made.struct, name)}
+        return as_value(value, Expr(f"{result.text}.{name}", uses=uses))
+
+    return rebuilt(made.value, ())
+
+
+def as_value(value: Any, expr: Expr) -> Any:
+    """Return a C expression as the kind of value that it stands for."""
+    if isinstance(value, (Record, Built)):
+        return Record(value.cls, expr)
+    if isinstance(value, (Group, BuiltGroup)):
+        shape = value.shape if isinstance(value, Group) else built_shape(value)
+        return Group(shape, expr, pointer=False)
+    truth = isinstance(value, Expr) and value.truth
+    return Expr(expr.text, expr.level, expr.uses, truth)

@@ -1,0 +1,110 @@
+"""Test vectors as C, and a program that compares the compiled ECU with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from bywire.export.controller.c_text import c_name, comment
+from bywire.export.controller.program import Program
+from bywire.export.controller.vectors import Vectors
+
+WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wfloat-equal", "-Wshadow",
+            "-Wpedantic")  # fmt: skip
+FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
+"""without -ffast-math and its like, and without fused products: else the last digits differ"""
+TOLERANCE = 1e-5
+"""of single precision where functions of the C library are called, whose last digit is free"""
+
+
+def vector_header(program: Program, every: Sequence[Vectors]) -> str:
+    """Return ``NAME_test_vectors.h``."""
+    name, real = program.name, program.precision.real
+    guard = f"{name.upper()}_TEST_VECTORS_H"
+    parts = [comment(["What the Python of the laws makes of inputs that reach every limit."]),
+             f"#ifndef {guard}\n#define {guard}"]  # fmt: skip
+    literal = program.precision.literal
+    for each in every:
+        task = c_name(each.step.task.name)
+        parts.append(f"#define VECTORS_{task} {len(each.given)}")
+        for what, rows in (("given", each.given), ("after", each.after)):
+            lines = [f"    {{{', '.join(map(literal, row))}}}," for row in rows.tolist()]
+            width = max(rows.shape[1], 1)
+            parts.append(
+                f"static const {real} {what}_{task}[VECTORS_{task}][{width}] = {{\n"
+                + "\n".join(lines) + "\n};"
+            )  # fmt: skip
+    return "\n\n".join([*parts, "#endif"]) + "\n"
+
+
+def harness(program: Program, every: Sequence[Vectors]) -> str:
+    """Return ``NAME_harness.c``: exit status 1 where a vector differs."""
+    name = program.name
+    parts = [
+        comment([f"Compares the compiled ECU of {program.model.name} with its test vectors."]),
+        f'#include <stdio.h>\n#include "{name}_ecu.h"\n#include "{name}_test_vectors.h"',
+        _same(program),
+        *(_compared(program, each) for each in every),
+    ]
+    calls = " + ".join(f"differing_{c_name(e.step.task.name)}()" for e in every)
+    count = " + ".join(f"VECTORS_{c_name(e.step.task.name)}" for e in every)
+    parts.append(
+        f"int main(void)\n{{\n    {name}_Memory memory;\n    int wrong;\n\n"
+        f"    {name}_ecu_init(&memory);\n    wrong = {calls};\n"
+        f'    printf("%d vectors, %d values differ\\n", {count}, wrong);\n'
+        "    return (wrong == 0) ? 0 : 1;\n}"
+    )
+    return "\n\n".join(parts) + "\n"
+
+
+def _same(program: Program) -> str:
+    real, literal = program.precision.real, program.precision.literal
+    head = f"static int is_same({real} a, {real} b)\n{{\n"
+    if program.precision.name == "single" and program.libraries:
+        width = literal(TOLERANCE)
+        zero = literal(0.0)
+        return (
+            f"{head}    const {real} size = (b < {zero}) ? -b : b;\n"
+            f"    const {real} apart = (a < b) ? (b - a) : (a - b);\n"
+            f"    return apart <= {width} * size + {width} * {width};\n}}"
+        )
+    return f"{head}    return (a <= b) && (a >= b);\n}}"
+
+
+def _compared(program: Program, vectors: Vectors) -> str:
+    name, task = program.name, c_name(vectors.step.task.name)
+    types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
+    wanted = [short for _, short in vectors.step.arguments]
+    lines = [f"static int differing_{task}(void)", "{", "    int wrong = 0;", "",
+             f"    for (int k = 0; k < VECTORS_{task}; ++k) {{"]  # fmt: skip
+    for kind in ("x", "u", "memory"):
+        if kind in wanted:
+            # A structure of which a task reads nothing is given its zeros.
+            lines.append(f"        {types[kind]} {kind} = {{0}};")
+    for at, (kind, field) in enumerate(vectors.names):
+        if kind in wanted:
+            lines.append(f"        {kind}.{c_name(field)} = given_{task}[k][{at}];")
+    arguments = ", ".join(f"&{each}" if each != "par" else f"&{name}_parameters" for each in wanted)
+    lines.append(f"        {vectors.step.name}({arguments});")
+    lines += [
+        f"        wrong += is_same(memory.{c_name(field)}, after_{task}[k][{at}]) ? 0 : 1;"
+        for at, field in enumerate(vectors.kept)
+    ]
+    return "\n".join([*lines, "    }", "    return wrong;", "}"])
+
+
+def makefile(program: Program, has_io: bool) -> str:
+    """Return a Makefile: ``make check`` compares with the vectors."""
+    name = program.name
+    parts = ["ecu", *(["io"] if has_io else []), "parameters", "harness"]
+    objects = " ".join(f"{name}_{part}.o" for part in parts)
+    library = " -lm" if program.libraries else ""
+    return (
+        "# Any compiler of C99 serves; without fused products and fast mathematics.\n"
+        "CC = gcc\n"
+        f"CFLAGS = {' '.join(FLAGS)} {' '.join(WARNINGS)}\n"
+        f"OBJECTS = {objects}\n\n"
+        f"{name}_harness: $(OBJECTS)\n\t$(CC) $(CFLAGS) -o $@ $(OBJECTS){library}\n\n"
+        f"%.o: %.c $(wildcard *.h)\n\t$(CC) $(CFLAGS) -c -o $@ $<\n\n"
+        f"check: {name}_harness\n\t./{name}_harness\n\n"
+        f"clean:\n\trm -f $(OBJECTS) {name}_harness\n\n.PHONY: check clean\n"
+    )

@@ -1,0 +1,72 @@
+"""``NAME_parameters.c``: the values of a bench, with what they are and where they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.provenance import Cited
+from bywire.export.controller.c_text import c_name, comment
+from bywire.export.controller.program import Program
+from bywire.export.controller.values import Nodes, Shape
+
+
+def parameter_file(program: Program, memory: Any, cited: Mapping[str, Cited]) -> str:
+    """Return the C of parameters and initial memory.
+
+    Parameters
+    ----------
+    memory
+        Memory with which the bench begins.
+    cited
+        Values of the parameter set with their provenance, by dotted name.
+    """
+    name = program.name
+    parts = [comment([f"Values of {program.model.name}, SI units."]),
+             f'#include "{name}_ecu.h"']  # fmt: skip
+    if program.parameters():
+        lines = _group(program, program.shape, program.par, "", cited, "    ")
+        body = "\n".join(lines)
+        parts.append(f"const {name}_Parameters {name}_parameters = {{\n{body}\n}};")
+    literal = program.precision.literal
+    fields = [
+        f"    .{c_name(each.name)} = {literal(getattr(memory, each.name))},"
+        for each in program.members(program.model.Memory)
+    ]
+    body = "\n".join(fields)
+    parts.append(f"const {name}_Memory {name}_initial_memory = {{\n{body}\n}};")
+    return "\n\n".join(parts) + "\n"
+
+
+def _group(
+    program: Program, shape: Shape, values: Any, prefix: str, cited: Mapping[str, Cited],
+    indent: str,
+) -> list[str]:  # fmt: skip
+    literal = program.precision.literal
+    lines: list[str] = []
+    for member in program.structs.kept(program.structs.of_group(shape)):
+        kind, value = shape.by_name[member.name], getattr(values, member.name)
+        place = f"{indent}.{c_name(member.name)} ="
+        dotted = f"{prefix}{member.name}"
+        if isinstance(kind, Shape):
+            inner = _group(program, kind, value, f"{dotted}.", cited, indent + "    ")
+            lines += [f"{place} {{", *inner, f"{indent}}},"]
+            continue
+        nodes = [literal(each) for each in value] if isinstance(kind, Nodes) else []
+        text = f"{{{', '.join(nodes)}}}" if nodes else literal(value)
+        lines += [comment([f"{member.note}; {_source(dotted, value, cited)}"], indent),
+                  f"{place} {text},"]  # fmt: skip
+    return lines
+
+
+def _source(name: str, value: Any, cited: Mapping[str, Cited]) -> str:
+    known = cited.get(name)
+    if known is None or known.value != value:
+        return "set by the bench"
+    return f"{known.kind}{f': {known.where}' if known.where else ''}"
+
+
+def provenance(parameters: str) -> Mapping[str, Cited]:
+    """Return the values of a parameter set with their provenance."""
+    return PARAMETER_SETS.find(parameters).values

@@ -1,0 +1,197 @@
+"""An ECU as a program in C: its tasks, and all functions and structures that they need."""
+
+from __future__ import annotations
+
+import ast
+from collections import Counter
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import FunctionType
+from typing import Any
+
+from bywire.core.errors import ModelError
+from bywire.core.model import Model, Task
+from bywire.core.parameters import ParameterSet
+from bywire.export.controller.body import Body, Statement
+from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, unique
+from bywire.export.controller.calls import called
+from bywire.export.controller.execution import Executor
+from bywire.export.controller.functions import CFunction
+from bywire.export.controller.structs import Member, Structs
+from bywire.export.controller.translation import Translation
+from bywire.export.controller.values import (
+    Expr,
+    Group,
+    Known,
+    Record,
+    Shape,
+    Update,
+    Use,
+    lifted,
+    shape_of,
+)
+
+_ROOMS = frozenset({"plant", "plants", "elements"})
+"""folders whose functions are the plant's: converters, sensors, limits of the bridge"""
+_MOST = 30
+
+
+@dataclass(frozen=True)
+class Step:
+    """One task: the arguments that it reads, its statements, what it writes."""
+
+    task: Task
+    name: str
+    arguments: tuple[tuple[str, str], ...]
+    statements: tuple[Statement, ...]
+    result: Expr
+
+    @property
+    def uses(self) -> frozenset[Use]:
+        """All that it needs."""
+        every = [self.result.uses, *(each.value.uses for each in self.statements)]
+        return frozenset().union(*every)
+
+
+@dataclass(frozen=True)
+class Program:
+    """The ECU of a model in C.
+
+    Parameters
+    ----------
+    name
+        What its files and functions begin with.
+    functions
+        Laws and the plant's side, those first that others call.
+    """
+
+    name: str
+    precision: Precision
+    model: Model
+    par: ParameterSet
+    steps: tuple[Step, ...]
+    functions: tuple[CFunction, ...]
+    structs: Structs
+    constants: Mapping[str, float]
+    uses: frozenset[Use]
+
+    @property
+    def libraries(self) -> tuple[str, ...]:
+        """Functions of the C library that are called."""
+        return tuple(sorted({use[1] for use in self.uses if use[0] == "library"}))
+
+    def members(self, cls: type[Any]) -> list[Member]:
+        """Return the fields of memory, plant or stimulus that C has."""
+        if cls not in self.structs.known:
+            return []
+        return self.structs.kept(self.structs.of_tuple(cls))
+
+    @property
+    def shape(self) -> Shape:
+        """Structure of the parameters."""
+        return shape_of(self.par)
+
+    def parameters(self) -> list[tuple[str, Member]]:
+        """Return what of the parameters is read, by dotted name."""
+        return list(self._leaves(self.shape, ""))
+
+    def _leaves(self, shape: Shape, prefix: str) -> Any:
+        struct = self.structs.of_group(shape)
+        for member in self.structs.kept(struct):
+            inner = shape.by_name[member.name]
+            if isinstance(inner, Shape):
+                yield from self._leaves(inner, f"{prefix}{member.name}.")
+            else:
+                yield f"{prefix}{member.name}", member
+
+
+def program(model: Model, par: ParameterSet, precision: str = "double", name: str = "") -> Program:
+    """Translate the tasks of a model for the structure of its parameters.
+
+    Raises
+    ------
+    ModelError
+        With file, line and operation of what cannot be translated.
+    """
+    short = c_name(name or model.name).lower()
+    used: frozenset[Use] | None = None
+    for _ in range(_MOST):
+        made = _translated(model, par, PRECISIONS[precision], short, used)
+        fields = frozenset(use for use in made.uses if use[0] == "field")
+        if fields == used:
+            return made
+        used = fields
+    raise ModelError(f"{model.name}: what its ECU reads does not settle")  # pragma: no cover
+
+
+def _translated(
+    model: Model, par: ParameterSet, precision: Precision, name: str, used: Any
+) -> Program:
+    public = {model.Stimulus: f"{name}_Stimulus", model.State: f"{name}_Plant",
+              model.Memory: f"{name}_Memory", type(par): f"{name}_Parameters"}  # fmt: skip
+    structs = Structs(precision, used, public, model.Memory, names=set(public.values()))
+    home = type(model).__module__
+
+    def is_plant(function: FunctionType, arguments: Mapping[str, Any]) -> bool:
+        if _ROOMS & set(function.__module__.split(".")[1:]):
+            return True
+        classes = {_class_of(each) for each in arguments.values()}
+        return function.__module__ == home and model.Memory not in classes
+
+    made = Translation(structs, is_plant, names=set(public.values()))
+    steps: list[Step] = []
+    for task in model.tasks(par):
+        steps.append(_step(made, model, par, task, name, {each.name for each in steps}))
+    by_name = {each.name: each for each in made.functions.values()}
+    uses, waiting = set(), [each.uses for each in steps]
+    reached: set[str] = set()
+    while waiting:
+        for use in waiting.pop():
+            uses.add(use)
+            if use[0] == "call" and use[1] not in reached:
+                reached.add(use[1])
+                waiting.append(by_name[use[1]].uses)
+    functions = tuple(each for each in made.functions.values() if each.name in reached)
+    constants = {use[1]: use[2] for use in sorted(u for u in uses if u[0] == "constant")}
+    return Program(name, precision, model, par, tuple(steps), functions, structs, constants,
+                   frozenset(uses))  # fmt: skip
+
+
+def _class_of(value: Any) -> Any:
+    if isinstance(value, Update):
+        value = value.record
+    return getattr(value, "cls", None)
+
+
+def _step(
+    made: Translation, model: Model, par: ParameterSet, task: Task, name: str, taken: set[str]
+) -> Step:
+    """Return the step of a task: its tick, called on what stands behind pointers."""
+    structs = made.structs
+    body = Body(structs, Counter())
+    held = {"memory": model.Memory, "x": model.State, "u": model.Stimulus}
+    given: dict[str, Any] = {}
+    for short, cls in held.items():
+        body.fresh(short)
+        given[short] = Record(cls, Expr(short, uses=frozenset({("local", short)})), pointer=True)
+    body.fresh("par")
+    here = Expr("par", uses=frozenset({("local", "par")}))
+    structs.of_tuple(model.Memory)
+    given["par"] = Group(shape_of(par), here, pointer=True)
+    at = Executor(made, body, f"task {task.name!r} of {model.name}", {}, {})
+    node = ast.parse(f"{c_name(task.name)}(x, m, u, par)", mode="eval").body
+    assert isinstance(node, ast.Call)
+    order = [given["x"], given["memory"], given["u"], given["par"]]
+    value = lifted(called(at, node, Known(task.tick), order, {}))
+    result = body.rvalue(value)
+    statements = body.live(result.uses)
+    needed = {use[1] for each in (result, *(s.value for s in statements)) for use in each.uses
+              if use[0] == "local"}  # fmt: skip
+    arguments = [(f"{structs.of_tuple(model.Memory).name} *memory", "memory")]
+    for short in ("x", "u"):
+        if short in needed:
+            arguments.append((f"const {structs.of_tuple(held[short]).name} *{short}", short))
+    if "par" in needed:
+        arguments.append((f"const {structs.of_group(shape_of(par)).name} *par", "par"))
+    step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
+    return Step(task, step, tuple(arguments), tuple(statements), result)

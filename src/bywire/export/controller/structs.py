@@ -1,0 +1,175 @@
+"""Structures of C for NamedTuples, parameter sets and results of several values."""
+
+from __future__ import annotations
+
+import typing
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bywire.core.field_notes import field_notes
+from bywire.core.parameters import leaf_fields
+from bywire.core.signals import signal_in
+from bywire.export.controller.c_text import Precision, c_name, unique
+from bywire.export.controller.values import (
+    Choice,
+    Nodes,
+    Shape,
+    Use,
+    is_named_tuple,
+)
+
+
+@dataclass(frozen=True)
+class Member:
+    """A field of a structure: its name in Python, its type, its length as an array, its meaning."""
+
+    name: str
+    ctype: str
+    length: int = 0
+    note: str = ""
+
+    @property
+    def declaration(self) -> str:
+        """Its line in the structure, without the meaning."""
+        return f"{self.ctype} {c_name(self.name)}{f'[{self.length}]' if self.length else ''};"
+
+
+@dataclass(frozen=True)
+class Struct:
+    """A structure of C."""
+
+    name: str
+    members: Mapping[str, Member]
+    doc: str = ""
+    public: bool = False
+    is_memory: bool = False
+
+
+@dataclass
+class Structs:
+    """All structures of an export.
+
+    Parameters
+    ----------
+    used
+        What was read of them the last time that all was translated; None where nothing is known.
+    public
+        Names of structures that the header shows, by class.
+    memory
+        The class whose fields are all kept that are written.
+    """
+
+    precision: Precision
+    used: frozenset[Use] | None
+    public: Mapping[type[Any], str]
+    memory: type[Any]
+    known: dict[Any, Struct] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+
+    def of_tuple(self, cls: Any) -> Struct:
+        """Return the structure of a NamedTuple class."""
+        if cls not in self.known:
+            hints = typing.get_type_hints(cls, include_extras=True)
+            members = {name: self._signal(name, hints.get(name)) for name in cls._fields}
+            self.known[cls] = Struct(self._name(cls), members, _doc(cls), cls in self.public,
+                                     cls is self.memory)
+        return self.known[cls]
+
+    def known_tuple(self, ctype: str) -> type[Any] | None:
+        """Return the NamedTuple class behind a C type; None where it is a number's."""
+        for cls, struct in self.known.items():
+            if struct.name == ctype and is_named_tuple(cls):
+                return cls  # type: ignore[no-any-return]
+        return None
+
+    def of_group(self, shape: Shape) -> Struct:
+        """Return the structure of a parameter set."""
+        lengths = _lengths(shape)
+        if lengths not in self.known:
+            members = {}
+            units, notes = _described(shape.cls)
+            for name, kind in shape.fields:
+                if isinstance(kind, Choice):
+                    continue
+                if isinstance(kind, Shape):
+                    members[name] = Member(name, self.of_group(kind).name)
+                    continue
+                unit = units[name].unit.symbol if name in units else "1"
+                length = kind.length if isinstance(kind, Nodes) else 0
+                note = f"[{unit}] {notes.get(name, '')}".rstrip()
+                members[name] = Member(name, self.precision.real, length, note)
+            self.known[lengths] = Struct(self._name(shape.cls), members, _doc(shape.cls), True)
+        return self.known[lengths]
+
+    def of_result(self, function: str, members: Mapping[str, str]) -> Struct:
+        """Return the structure in which a function gives several values back, by their types."""
+        made = {name: Member(name, ctype) for name, ctype in members.items()}
+        name = unique(f"{function}_Result", self.names)
+        self.names.add(name)
+        self.known["result", name] = Struct(name, made, f"What {function} returns.")
+        return self.known["result", name]
+
+    def keeps(self, struct: Struct, name: str) -> bool:
+        """Return whether anybody reads a field."""
+        return self.used is None or ("field", struct.name, name) in self.used
+
+    def kept(self, struct: Struct) -> list[Member]:
+        """Return the fields that are read."""
+        return [each for name, each in struct.members.items() if self.keeps(struct, name)]
+
+    def ordered(self) -> list[Struct]:
+        """Return the structures that have fields, those first that others hold."""
+        by_name = {each.name: each for each in self.known.values()}
+        done: dict[str, Struct] = {}
+
+        def add(struct: Struct) -> None:
+            for member in self.kept(struct):
+                if member.ctype in by_name and member.ctype not in done:
+                    add(by_name[member.ctype])
+            if self.kept(struct):
+                done[struct.name] = struct
+
+        for struct in self.known.values():
+            if struct.name not in done:
+                add(struct)
+        return list(done.values())
+
+    def _signal(self, name: str, hint: Any) -> Member:
+        inner = typing.get_args(hint)[0] if typing.get_origin(hint) is typing.Annotated else hint
+        if is_named_tuple(inner):
+            return Member(name, self.of_tuple(inner).name)
+        signal = signal_in(hint)
+        note = "" if signal is None else f"[{signal.unit}] {signal.label}"
+        return Member(name, self.precision.real, 0, note)
+
+    def _name(self, cls: type[Any]) -> str:
+        if cls in self.public:
+            return self.public[cls]
+        place = cls.__module__.split(".")
+        name = c_name(f"{place[-1]}_{cls.__name__.lstrip('_')}")
+        if name in self.names and len(place) > 1:
+            name = c_name(f"{place[-2]}_{name}")
+        name = unique(name, self.names)
+        self.names.add(name)
+        return name
+
+
+def _described(cls: Any) -> tuple[Mapping[str, Any], Mapping[str, str]]:
+    return leaf_fields(cls), field_notes(cls)
+
+
+def _doc(cls: type[Any]) -> str:
+    return (cls.__doc__ or "").strip().splitlines()[0] if cls.__doc__ else ""
+
+
+def _lengths(shape: Shape) -> Any:
+    """Return what tells structures of a parameter class apart: lengths of tables."""
+    return (
+        shape.cls,
+        tuple(
+            (name, kind.length if isinstance(kind, Nodes) else _lengths(kind))
+            for name, kind in shape.fields
+            if isinstance(kind, (Nodes, Shape))
+        ),
+    )

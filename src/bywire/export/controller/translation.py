@@ -1,0 +1,206 @@
+"""All functions of an ECU in C: each law once for every structure in which it is called."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import types
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from bywire.core.errors import ModelError
+from bywire.export.controller.body import Body
+from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.context import Context
+from bywire.export.controller.execution import Executor, Returned
+from bywire.export.controller.functions import (
+    CFunction,
+    as_value,
+    finish,
+    given_back,
+    kind_of,
+    passed,
+    received,
+)
+from bywire.export.controller.members import attribute
+from bywire.export.controller.source import closure_of, description, node_of, stores
+from bywire.export.controller.structs import Structs
+from bywire.export.controller.values import (
+    Array,
+    Closure,
+    Expr,
+    Group,
+    Items,
+    Known,
+    Table,
+    Uses,
+    lifted,
+)
+
+DEEP = 40
+"""calls within calls beyond which a law counts as recursive"""
+
+
+@dataclass
+class Translation:
+    """Functions, structures and constants of an export.
+
+    Parameters
+    ----------
+    is_plant
+        ``is_plant(function, arguments)``: whether a function belongs to the plant's side.
+    """
+
+    structs: Structs
+    is_plant: Callable[[types.FunctionType, Mapping[str, Any]], bool]
+    functions: dict[Any, CFunction] = field(default_factory=dict)
+    names: set[str] = field(default_factory=set)
+    constants: dict[str, float] = field(default_factory=dict)
+    alive: list[Any] = field(default_factory=list)
+    depth: int = 0
+
+    def constant(self, module: str, name: str, found: Any) -> Known:
+        """Return a module's object; a number of its own is called by its name in C."""
+        if isinstance(found, float) and module != "math" and name.strip("_").isupper():
+            called = c_name(f"{module.rpartition('.')[2]}_{name.strip('_')}").upper()
+            if self.constants.setdefault(called, found) == found:
+                return Known(found, called)
+        return Known(found)
+
+    def call(
+        self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any
+    ) -> Any:
+        """Return what a function gives, called in C where it is not known at export."""
+        function = inspect.unwrap(function)
+        if not isinstance(function, types.FunctionType):
+            raise at.refuse(node, f"{function!r} is not translated")
+        try:
+            bound = inspect.signature(function).bind(*given, **named)
+        except TypeError as error:
+            raise at.refuse(node, f"{function.__qualname__}: {error}") from None
+        arguments = self._arguments(function, bound)
+        made = self.function(function, arguments)
+        if not made.result:
+            return _rooted(at, node, made.value, arguments)
+        expr = self._called(at, made, arguments)
+        if made.struct:
+            result = at.body.fresh("result")
+            at.body.write(result, made.result, expr)
+            here = Expr(result, uses=frozenset({("local", result)}))
+            return _rooted(at, node, given_back(made, self.structs, here), arguments)
+        value = as_value(made.value, expr)
+        return at.body.variable("values", value) if isinstance(value, Group) else value
+
+    def _arguments(self, function: Any, bound: inspect.BoundArguments) -> dict[str, Any]:
+        arguments: dict[str, Any] = {}
+        for name, parameter in bound.signature.parameters.items():
+            if name not in bound.arguments:
+                if parameter.kind is inspect.Parameter.VAR_POSITIONAL:
+                    arguments[name] = Items(())
+                elif parameter.kind is inspect.Parameter.VAR_KEYWORD:
+                    arguments[name] = Table({})
+                else:
+                    arguments[name] = Known(parameter.default)
+                continue
+            value = bound.arguments[name]
+            if parameter.kind is inspect.Parameter.VAR_POSITIONAL:
+                value = Items(tuple(value))
+            elif parameter.kind is inspect.Parameter.VAR_KEYWORD:
+                value = Table(value)
+            arguments[name] = value
+        return arguments
+
+    def _called(self, at: Context, made: CFunction, arguments: Mapping[str, Any]) -> Expr:
+        wanted = {each.name for each in made.arguments}
+        names = [a for a in made.all_arguments]
+        exprs = [e for value in arguments.values() for e in passed(value, at.body)]
+        kept = [e for name, e in zip(names, exprs, strict=True) if name in wanted]
+        uses: Uses = frozenset().union({("call", made.name)}, *(each.uses for each in kept))
+        return Expr(f"{made.name}({', '.join(each.text for each in kept)})", uses=uses)
+
+    def function(self, function: types.FunctionType, arguments: Mapping[str, Any]) -> CFunction:
+        """Return the C function of a Python function for arguments of a kind."""
+        closure = closure_of(function)
+        self.alive += [*closure.values(), *(v for v in arguments.values())]
+        held = tuple((name, kind_of(Known(value))) for name, value in closure.items())
+        key = (function.__code__, held, tuple(kind_of(each) for each in arguments.values()))
+        if key not in self.functions:
+            self.depth += 1
+            if self.depth > DEEP:
+                raise ModelError(
+                    f"{function.__code__.co_filename}, line {function.__code__.co_firstlineno}: "
+                    f"the ECU cannot be exported as C: {function.__qualname__} calls itself"
+                )
+            made = self._translated(function, arguments, closure)
+            self.depth -= 1
+            self.functions[key] = made
+        return self.functions[key]
+
+    def _translated(
+        self, function: types.FunctionType, arguments: Mapping[str, Any], closure: dict[str, Any]
+    ) -> CFunction:
+        node = node_of(function)
+        short = "tick" if isinstance(node, ast.Lambda) else node.name
+        module = function.__module__
+        name = unique(c_name(f"{module.rpartition('.')[2]}_{short.lstrip('_')}"), self.names)
+        self.names.add(name)
+        is_plant = self.is_plant(function, arguments)
+        made = CFunction(name, module, description(function), is_plant)
+        body = Body(self.structs, stores(node))
+        scope: dict[str, Any] = {n: Known(v) for n, v in closure.items()}
+        for python_name, value in arguments.items():
+            (scope[python_name], first), *more = received(value, python_name, body)
+            made.arguments += [a for _, a in [(None, first), *more] if a is not None]
+            if body.stores[python_name] > 1 and first is not None:
+                body.moving.add(first.name)
+        made.all_arguments = [each.name for each in made.arguments]
+        at = Executor(self, body, function.__code__.co_filename, function.__globals__, scope)
+        returned = self._run(at, node)
+        finish(made, body, returned.value, returned.node)
+        return made
+
+    def _run(self, at: Executor, node: ast.FunctionDef | ast.Lambda) -> Returned:
+        if isinstance(node, ast.Lambda):
+            return Returned(at.value(node.body), node.body)
+        returned = at.run(node.body)
+        if returned is None:
+            raise at.refuse(node, "a law returns a value")
+        return returned
+
+    def inlined(
+        self, at: Context, node: ast.AST, closure: Closure, given: list[Any], named: Any
+    ) -> Any:
+        """Return what a function gives that is defined within the caller, written out there."""
+        names = [each.arg for each in closure.node.args.args]
+        values = {**dict(zip(names, given, strict=False)), **named}
+        if set(values) != set(names):
+            raise at.refuse(node, "an inner function is called with all its arguments")
+        inner = Executor(self, at.body, closure.file, closure.module, dict(closure.scope))
+        inner.scope |= {n: at.body.settled(v, n) for n, v in values.items()}
+        self.depth += 1
+        if self.depth > DEEP:
+            raise at.refuse(node, "an inner function calls itself")
+        returned = self._run(inner, closure.node)
+        self.depth -= 1
+        return returned.value
+
+
+def _rooted(at: Context, node: ast.AST, value: Any, arguments: Mapping[str, Any]) -> Any:
+    """Return a function's result in its caller's words: groups are those that it was given."""
+    value = lifted(value)
+    if isinstance(value, Group) and value.origin:
+        root, *path = value.origin
+        group = next(v for n, v in arguments.items() if c_name(n) == root)
+        for name in path:
+            group = attribute(at, node, group, name)
+        return group
+    if isinstance(value, Items):
+        return Items(tuple(_rooted(at, node, each, arguments) for each in value.values))
+    if isinstance(value, Table):
+        return Table({n: _rooted(at, node, v, arguments) for n, v in value.items.items()})
+    if isinstance(value, Array):
+        raise at.refuse(node, "a law returns numbers, not a table of parameters")
+    return value
+
+
