@@ -6,7 +6,7 @@ import pytest
 
 import bywire
 from bywire.brakes.two_wheeler.case import on_surface
-from bywire.plant import brake_disc, road, tyre
+from bywire.plant import adhesion, brake_disc, road
 from bywire.vehicle.ideal_stop import ideal_distance, peak_adhesion
 
 G, L, L_F, H = 9.81, 1.40, 0.69, 0.62
@@ -24,14 +24,15 @@ def vehicle(surface="dry-asphalt", **changes):
      ("dry-cobble", 0.400, 1.000, 0.700), ("snow", 0.060, 0.190, 0.130)],
 )  # fmt: skip
 def test_surfaces_have_their_published_peaks(surface, slip, peak, locked):
-    c1, c2, c3 = road.SURFACES[surface]
-    assert tyre.peak_slip(c1, c2, c3) == pytest.approx(math.log(c1 * c2 / c3) / c2, rel=1e-12)
-    assert tyre.peak_slip(c1, c2, c3) == pytest.approx(slip, abs=6e-4)
-    assert peak_adhesion(vehicle(surface).vehicle) == pytest.approx(peak, abs=6e-4)
-    assert tyre.adhesion(1.0, c1, c2, c3) == pytest.approx(locked, abs=6e-4)
+    ground, tyre = road.SURFACES[surface], vehicle(surface).vehicle.front_tyre
+    c1, c2, c3 = ground[:3]
+    assert adhesion.peak_slip(ground, tyre) == pytest.approx(math.log(c1 * c2 / c3) / c2, rel=1e-12)
+    assert adhesion.peak_slip(ground, tyre) == pytest.approx(slip, abs=6e-4)
+    assert peak_adhesion(vehicle(surface).vehicle) == pytest.approx((peak, peak), abs=6e-4)
+    assert adhesion.adhesion(1.0, ground, tyre) == pytest.approx(locked, abs=6e-4)
     # A peak indeed: to either side there is less.
-    top = tyre.peak_slip(c1, c2, c3)
-    assert max(tyre.adhesion(top * f, c1, c2, c3) for f in (0.99, 1.01)) < peak + 5e-4
+    top = adhesion.peak_slip(ground, tyre)
+    assert max(adhesion.adhesion(top * f, ground, tyre) for f in (0.99, 1.01)) < peak + 5e-4
 
 
 @pytest.mark.parametrize(
@@ -43,7 +44,7 @@ def test_surfaces_have_their_published_peaks(surface, slip, peak, locked):
 )  # fmt: skip
 def test_ideal_stops(surface, v, front_only, distance):
     par = vehicle(surface).vehicle
-    c1, c2, c3 = road.SURFACES[surface]
+    c1, c2, c3 = road.SURFACES[surface][:3]
     slip = math.log(c1 * c2 / c3) / c2
     mu = c1 * (1.0 - math.exp(-c2 * slip)) - c3 * slip
     a = min(mu, L_F / H) * G

@@ -10,7 +10,7 @@ from typing import Any, Self
 from bywire.core import ops
 from bywire.core.units import registry
 
-PURE = ("exp", "log", "sin", "cos", "floor", "power")  # functions of pure numbers only
+PURE = ("exp", "log", "sin", "cos", "arctan", "floor", "power")  # functions of pure numbers only
 
 
 class Dimensioned:

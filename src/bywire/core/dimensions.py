@@ -21,7 +21,7 @@ _DERIVED = {
     "ohm": "kg*m**2/(s**3*A**2)", "H": "kg*m**2/(s**2*A**2)", "F": "s**4*A**2/(kg*m**2)",
     "delta_degC": "K", "T": "kg/(s**2*A)", "Wb": "kg*m**2/(s**2*A)", "N*m/A": "kg*m**2/(s**2*A)",
 }  # fmt: skip
-_PURE = frozenset({"exp", "log", "sin", "cos", "floor"})
+_PURE = frozenset({"exp", "log", "sin", "cos", "arctan", "floor"})
 
 
 class DimensionError(UnitError):

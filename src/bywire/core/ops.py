@@ -19,6 +19,7 @@ _FLOATS: dict[str, Callable[..., Any]] = {
     "sqrt": math.sqrt,
     "sin": math.sin,
     "cos": math.cos,
+    "arctan": math.atan,
     "fabs": abs,
     "floor": math.floor,
     "fmax": max,
@@ -89,6 +90,11 @@ def sin(x: float) -> float:
 def cos(x: float) -> float:
     """Return the cosine of x [rad]."""
     return _apply("cos", x)  # type: ignore[no-any-return]
+
+
+def arctan(x: float) -> float:
+    """Return the angle [rad] between -pi/2 and pi/2 whose tangent is x; x is a pure number."""
+    return _apply("arctan", x)  # type: ignore[no-any-return]
 
 
 def fabs(x: float) -> float:

@@ -10,8 +10,8 @@ from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Factor, Unit
 from bywire.core.signals import Signal
+from bywire.plant.adhesion import Surface, SurfaceParameters, surface_of
 
-Coefficient = Annotated[float, Unit("1", 1.0), Field(gt=0, allow_inf_nan=False)]
 Distance = Annotated[float, Unit("m", 15.0), Field(ge=0, allow_inf_nan=False)]
 Ramp = Annotated[float, Unit("m", 0.1), Field(gt=0, allow_inf_nan=False)]
 Gradient = Annotated[float, Unit("1", 0.05), Field(gt=-1, lt=1, allow_inf_nan=False)]
@@ -22,14 +22,6 @@ SurfaceName = Literal[
 """what experiments call a surface; ``own`` is that of the parameters"""
 
 
-class Surface(NamedTuple):
-    """Coefficients of the adhesion of a tyre on a surface, after Burckhardt."""
-
-    c1: Annotated[float, Signal("1", "adhesion coefficient c1")]
-    c2: Annotated[float, Signal("1", "adhesion coefficient c2", 30.0)]
-    c3: Annotated[float, Signal("1", "adhesion coefficient c3", 0.5)]
-
-
 class Slope(NamedTuple):
     """Angle of the road, uphill positive."""
 
@@ -38,36 +30,18 @@ class Slope(NamedTuple):
 
 
 SURFACES = {
-    "dry-asphalt": Surface(1.2801, 23.99, 0.52),
-    "wet-asphalt": Surface(0.857, 33.822, 0.347),
-    "dry-concrete": Surface(1.1973, 25.168, 0.5373),
-    "dry-cobble": Surface(1.3713, 6.4565, 0.6691),
-    "wet-cobble": Surface(0.4004, 33.708, 0.1204),
-    "snow": Surface(0.1946, 94.129, 0.0646),
-    "ice": Surface(0.05, 306.39, 1e-4),
+    "dry-asphalt": Surface(1.2801, 23.99, 0.52, 9.121, 1.841, 1.17, 0.7324),
+    "wet-asphalt": Surface(0.857, 33.822, 0.347, 12.82, 1.826, 0.8013, 0.7988),
+    "dry-concrete": Surface(1.1973, 25.168, 0.5373, 9.146, 1.887, 1.09, 0.741),
+    "dry-cobble": Surface(1.3713, 6.4565, 0.6691, 2.565, 2.117, 1.0, 0.4782),
+    "wet-cobble": Surface(0.4004, 33.708, 0.1204, 14.82, 1.719, 0.38, 0.8168),
+    "snow": Surface(0.1946, 94.129, 0.0646, 39.04, 1.754, 0.19, 0.9312),
+    "ice": Surface(0.05, 306.39, 1e-4, 148.1, 1.653, 0.05, 1.0),
 }
 """values for car tyres as they circulate in open code under the name of M. Burckhardt,
-Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak"""
-
-
-class SurfaceParameters(ParameterSet):
-    """Adhesion of a tyre on a surface, after Burckhardt."""
-
-    c1: Coefficient
-    """what the adhesion tends to, but for c3"""
-    c2: Coefficient
-    """how fast it rises with slip"""
-    c3: Coefficient
-    """how much it falls up to a locked wheel"""
-
-    @model_validator(mode="after")
-    def _has_a_peak(self) -> SurfaceParameters:
-        if not self.c1 * self.c2 > self.c3:
-            raise ValueError(
-                f"c1 c2 = {self.c1 * self.c2:g} must be above c3 = {self.c3:g}: the adhesion must "
-                "rise with slip first"
-            )
-        return self
+Fahrwerktechnik: Radschlupf-Regelsysteme (1993); c3 of ice circulates as 0, which has no peak. The
+Magic Formulas are fitted to these curves: the same peak at the same slip, and of all such those
+with the least squares from no slip to a locked wheel"""
 
 
 class Parameters(ParameterSet):
@@ -111,12 +85,9 @@ def share(x: Place, par: Parameters) -> Annotated[float, Signal("1", "share of t
 
 def surface(x: Place, par: Parameters) -> Surface:
     """Return the coefficients of the adhesion at a place."""
-    part, first, further = share(x, par), par.first, par.further
-    return Surface(
-        c1=par.grip * (first.c1 + part * (further.c1 - first.c1)),
-        c2=first.c2 + part * (further.c2 - first.c2),
-        c3=par.grip * (first.c3 + part * (further.c3 - first.c3)),
-    )
+    part, first, further = share(x, par), surface_of(par.first), surface_of(par.further)
+    blend = Surface(*(a + part * (b - a) for a, b in zip(first, further, strict=True)))
+    return blend._replace(c1=par.grip * blend.c1, c3=par.grip * blend.c3, D=par.grip * blend.D)
 
 
 def slope(x: Place, par: Parameters) -> Slope:

@@ -9,19 +9,15 @@ from annotated_types import Ge, Gt
 from pydantic import Field
 
 from bywire.core import ops
-from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Length, Unit
 from bywire.core.signals import Power, Signal
+from bywire.plant import adhesion
 
 Slip = Annotated[float, Signal("1", "slip", 0.1)]
-Coefficient1 = Annotated[float, Signal("1", "adhesion coefficient c1"), Ge(0.5)]
-Coefficient2 = Annotated[float, Signal("1", "adhesion coefficient c2", 30.0), Ge(10)]
-Coefficient3 = Annotated[float, Signal("1", "adhesion coefficient c3", 0.5), Gt(0)]
-_STEPS, _LEVEL, _LEAST = 3, 1e-4, 1e-16  # of Newton's method; least slope, in slip; floor of roots
 
 
-class Parameters(ParameterSet):
-    """Carcass and tread together, as one deflection; the curve of adhesion is the surface's."""
+class Parameters(adhesion.Parameters):
+    """Carcass and tread together, as one deflection; its adhesion's numbers are the surface's."""
 
     sigma: Length
     """relaxation length"""
@@ -44,9 +40,13 @@ class Contact(NamedTuple):
 
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
-    c1: Coefficient1
-    c2: Coefficient2
-    c3: Coefficient3
+    c1: adhesion.C1
+    c2: adhesion.C2
+    c3: adhesion.C3
+    B: adhesion.Stiffness
+    C: adhesion.Shape
+    D: adhesion.Largest
+    E: adhesion.Curvature
 
 
 class Limits(NamedTuple):
@@ -62,9 +62,13 @@ class Input(NamedTuple):
     v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
     v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
     N: Annotated[float, Signal("N", "load", 1e3), Ge(0)]
-    c1: Coefficient1
-    c2: Coefficient2
-    c3: Coefficient3
+    c1: adhesion.C1
+    c2: adhesion.C2
+    c3: adhesion.C3
+    B: adhesion.Stiffness
+    C: adhesion.Shape
+    D: adhesion.Largest
+    E: adhesion.Curvature
     mu_max: Annotated[float, Signal("1", "largest adhesion", 1.0), Ge(0)]
     u_max: Annotated[float, Signal("m", "largest deflection", 1e-2), Gt(0)]
 
@@ -73,23 +77,6 @@ class Output(NamedTuple):
     """What the tyre does."""
 
     F: Annotated[float, Signal("N", "braking force of the tyre", 1e3)]
-
-
-def adhesion(
-    slip: Slip, c1: Coefficient1, c2: Coefficient2, c3: Coefficient3
-) -> Annotated[float, Signal("1", "adhesion", 1.0)]:
-    r"""Return the adhesion at a slip >= 0, :math:`\mu = c_1 (1 - e^{-c_2 \lambda}) - c_3 \lambda`.
-
-    References
-    ----------
-    M. Burckhardt, Fahrwerktechnik: Radschlupf-Regelsysteme, 1993.
-    """
-    return c1 * (1.0 - ops.exp(-c2 * slip)) - c3 * slip
-
-
-def peak_slip(c1: Coefficient1, c2: Coefficient2, c3: Coefficient3) -> Slip:
-    r"""Return the slip of the largest adhesion, :math:`\lambda^* = \ln(c_1 c_2/c_3)/c_2`, <= 1."""
-    return ops.fmin(ops.log(c1 * c2 / c3) / c2, 1.0)
 
 
 def braking_slip(u: Contact, par: Parameters) -> Slip:
@@ -107,30 +94,12 @@ def limits(u: Contact, par: Parameters) -> Limits:
 
     The deflection is that which the rising branch of the curve needs for the adhesion.
     """
-    slip, peak = ops.fabs(braking_slip(u, par)), peak_slip(u.c1, u.c2, u.c3)
-    mu = adhesion(ops.fmax(slip, peak), u.c1, u.c2, u.c3)
-    return Limits(mu, par.sigma * ops.where(slip > peak, rising_slip(mu, u), peak))
+    mu, slip = adhesion.held(ops.fabs(braking_slip(u, par)), _ground(u), par)
+    return Limits(mu, par.sigma * slip)
 
 
-def rising_slip(
-    mu: Annotated[float, Signal("1", "adhesion", 1.0), Ge(0)], u: Contact
-) -> Annotated[float, Signal("1", "slip", 0.1)]:
-    """Return the slip below the peak's at which the adhesion is ``mu``, within 5e-6.
-
-    By Newton's method from below: from the slip without the curve's linear fall, or from the
-    parabola through the peak, whichever is closer.
-    """
-    peak = peak_slip(u.c1, u.c2, u.c3)
-    bend = u.c2 * u.c3
-    below = ops.fmax(adhesion(peak, u.c1, u.c2, u.c3) - mu, 0.0)
-    straight = -ops.log(ops.fmax(1.0 - mu / u.c1, _LEAST)) / u.c2
-    slip = ops.fmax(peak - ops.sqrt(2.0 * below / bend + _LEAST), straight)
-    for _ in range(_STEPS):
-        decay = ops.exp(-u.c2 * slip)
-        left = mu - u.c1 * (1.0 - decay) + u.c3 * slip
-        # At the peak itself, where the curve is level, rounding must not be divided by nothing.
-        slip = slip + left / ops.fmax(u.c1 * u.c2 * decay - u.c3, _LEVEL * bend)
-    return ops.fmin(slip, peak)
+def _ground(u: Contact | Input) -> adhesion.Surface:
+    return adhesion.Surface(u.c1, u.c2, u.c3, u.B, u.C, u.D, u.E)
 
 
 def rate(x: State, u: Input, par: Parameters) -> Annotated[float, Signal("m/s", "rate", 0.5)]:
@@ -157,7 +126,7 @@ def force_over_load(
     slides = sliding(x, u)
     # No magnitude: its slope at zero, where a free wheel rolls, would be none.
     bent = ops.where(x.u < 0, -x.u, x.u)
-    held = adhesion(bent / par.sigma, u.c1, u.c2, u.c3)
+    held = adhesion.adhesion(bent / par.sigma, _ground(u), par)
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))
     elastic = ops.where(x.u < 0, -size, size)
     slow = ops.fmin(ops.fabs(u.v) / par.v_low, 1.0)

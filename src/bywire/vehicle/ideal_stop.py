@@ -8,33 +8,44 @@ from typing import Annotated
 from pydantic import Field
 
 from bywire.core.quantities import Unit
-from bywire.plant import road, tyre
+from bywire.plant import adhesion, road
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 RidingSpeed = Annotated[float, Unit("m/s", 28.0), Field(gt=0, allow_inf_nan=False)]
 
 
-def peak_adhesion(par: VehicleParameters) -> float:
-    """Return the largest adhesion on the first stretch of the road."""
+def peak_adhesion(par: VehicleParameters) -> tuple[float, float]:
+    """Return the largest adhesion of each wheel on the first stretch of the road."""
     ground = road.surface(0.0, par.road)
-    return float(tyre.adhesion(tyre.peak_slip(*ground), *ground))
+    front, rear = (
+        float(adhesion.adhesion(adhesion.peak_slip(ground, rubber), ground, rubber))
+        for rubber in (par.front_tyre, par.rear_tyre)
+    )
+    return front, rear
 
 
 def ideal_deceleration(par: VehicleParameters, *, front_only: bool = False) -> float:
     r"""Return the largest deceleration, air drag apart [m/s^2].
 
-    Both wheels at their peak, :math:`a = \mu^* g`, as long as the rear wheel stays on the ground,
-    :math:`a \le g\, l_f/h`; of the front wheel alone
-    :math:`a = \mu^* g (1 - l_f/L)/(1 - \mu^* h/L)`. On a slope, with its share of the weight.
+    Both wheels at their peak, as long as the rear wheel stays on the ground,
+    :math:`a \le g\, l_f/h`:
+
+    .. math:: a = g \frac{\mu_f^* (1 - l_f/L) + \mu_r^* l_f/L}{1 - (\mu_f^* - \mu_r^*) h/L}
+
+    which is :math:`\mu^* g` for tyres of one curve; of the front wheel alone with
+    :math:`\mu_r^* = 0`. On a slope, with its share of the weight.
     """
-    body, mu = par.body, peak_adhesion(par)
+    body, (mu, rear) = par.body, peak_adhesion(par)
     slope = road.slope(0.0, par.road)
     pressed = body.g * slope.cosine
     if front_only:
-        left = 1.0 - mu * body.h / body.L
-        share = mu * (1.0 - body.l_f / body.L) / left if left > 0 else math.inf
-    else:
+        rear = 0.0
+    if rear == mu:
         share = mu
+    else:
+        left = 1.0 - (mu - rear) * body.h / body.L
+        carried = mu * (1.0 - body.l_f / body.L) + rear * body.l_f / body.L
+        share = carried / left if left > 0 else math.inf
     return float(min(share, body.l_f / body.h) * pressed + body.g * slope.sine)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.plant import brake_disc, tyre
+from bywire.plant import adhesion, brake_disc
 from bywire.plant.road import SURFACES
 
 BENCH = "benches/wet_stop_mixed.toml"
@@ -21,8 +21,9 @@ def growth(par, road, v, slip):
     """
     vehicle, gains, mix = par.vehicle, par.ecu.front_slip, par.ecu.mix
     body, wheel, circuit = vehicle.body, vehicle.front_wheel, par.front.circuit
-    c1, c2, c3 = SURFACES[road]
-    mu, slope = tyre.adhesion(slip, c1, c2, c3), c1 * c2 * np.exp(-c2 * slip) - c3
+    ground = SURFACES[road]
+    c1, c2, c3 = ground[:3]
+    mu, slope = adhesion.burckhardt(slip, ground), c1 * c2 * np.exp(-c2 * slip) - c3
     load = body.m * body.g * min(1.0 - body.l_f / body.L + mu * body.h / body.L, 1.0)
     k, r, w = brake_disc.torque_per_pressure(par.front.disc), wheel.r, 2 * np.pi * circuit.f_n
     speed = gains.v_fixed if gains.schedule == "fixed" else v

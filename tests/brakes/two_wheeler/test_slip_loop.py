@@ -17,15 +17,27 @@ def spread(schedule):
     return max(each) / min(each)
 
 
-def test_the_plant_has_the_gain_and_the_pole_of_a_single_corner():
-    par = bywire.parameters("front600")
+def slope_of(ground, slip, curve):
+    """Return the slope of the adhesion over slip."""
+    if curve == "burckhardt":
+        return ground.c1 * ground.c2 * np.exp(-ground.c2 * slip) - ground.c3
+    z = ground.B * slip
+    inner = z - ground.E * (z - np.arctan(z))
+    rise = ground.B * (1.0 - ground.E * z * z / (1.0 + z * z))
+    angle = ground.C * np.arctan(inner)
+    return ground.D * np.cos(angle) * ground.C * rise / (1.0 + inner * inner)
+
+
+@pytest.mark.parametrize("curve", ["burckhardt", "magic-formula"])
+def test_the_plant_has_the_gain_and_the_pole_of_a_single_corner(curve):
+    par = bywire.parameters("front600").replace({"tyre.curve": curve})
     for v in (10.0, 30.0):
         at = point(par, v)
         model = linearize(
             at.model, at.par, at.state, at.memory, inputs=("p_ref",), outputs=("slip",)
         )
         ground, slip = par.drum.surface, par.slip.slip_set
-        slope = ground.c1 * ground.c2 * np.exp(-ground.c2 * slip) - ground.c3
+        slope = slope_of(ground, slip, curve)
         k, wheel = brake_disc.torque_per_pressure(par.brake.disc), par.wheel
         # Gain r k/(J v a) with a = mu' N r^2/(J v), at every speed.
         gain = k / (slope * par.drum.N * wheel.r)

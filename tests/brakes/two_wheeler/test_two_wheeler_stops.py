@@ -7,6 +7,7 @@ import pytest
 
 import bywire
 from bywire.bench.energy_ledger import actuator_ledger
+from bywire.plant.road import SURFACES as SETS
 from bywire.report.bench_figures import bench_figures
 
 KMH_100 = "100 km/h"
@@ -180,6 +181,28 @@ def test_a_step_of_half_the_length_changes_a_stop_by_less_than_a_centimeter():
             for step in ("40 us", "20 us")
         ]
         assert abs(at[0] - at[1]) < 0.01
+
+
+def test_a_stop_on_tyres_that_follow_the_magic_formula():
+    steep = {f"vehicle.{end}_tyre.curve": "magic-formula" for end in ("front", "rear")}
+    given = {**OFF, **WET, **steep, "vehicle.body.CdA": "0", "vehicle.body.load": "rigid"}
+    at = [
+        stopped({**given, "simulation.step": step}, v_0="30 m/s", p_rear="80 bar")
+        for step in ("40 us", "20 us")
+    ]
+    far = [result.kpi("stopping_distance").value for result in at]
+    assert abs(far[0] - far[1]) < 1e-4
+    run = at[1].recording
+    taken = sum(run[name] for name in run if name.startswith("E_"))
+    left = (taken - run["W_slope"] - run["W_pitch"]).values
+    assert np.abs(left - left[0]).max() < 1e-11 * float(run["E_vehicle"][0])
+    # Both wheels stand: the vehicle slides with mu(1) g, without drag.
+    B, C, D, E = SETS["wet-asphalt"][3:]
+    mu = D * math.sin(C * math.atan(B - E * (B - math.atan(B))))
+    slides = run.sel(time=slice(2.0, 4.0))
+    assert not slides["omega_f"].values.any()
+    assert not slides["omega_r"].values.any()
+    assert slides["a"].values == pytest.approx(mu * 9.81, rel=1e-9)
 
 
 @pytest.mark.parametrize("gradient", ["-0.1", "0", "0.1"])

@@ -16,9 +16,10 @@ from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import ParameterError
 from bywire.core.quantities import Unit
 from bywire.core.typing import Array
-from bywire.plant import road, tyre
-from bywire.plant.road import SURFACES, SurfaceName
+from bywire.plant import adhesion, road
+from bywire.plant.road import SurfaceName
 from bywire.vehicle import ideal_stop, stop_figures
+from bywire.vehicle.surfaces import laid
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 RidingSpeed = ideal_stop.RidingSpeed
@@ -60,12 +61,7 @@ def rolling_case(
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:
     """Return the parameters of a road of some surface, and of a further one; own ones stay."""
-    changes: dict[str, float] = {}
-    for stretch, name in (("first", first), ("further", first if further is None else further)):
-        if name != "own":
-            numbers = SURFACES[name]._asdict()
-            changes |= {f"vehicle.road.{stretch}.{key}": v for key, v in numbers.items()}
-    return changes
+    return laid("vehicle.road", first, further)
 
 
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
@@ -77,7 +73,7 @@ def judged_stop(run: xr.Dataset, v_0: float) -> tuple[Kpi, ...]:
     """Return the key figures of a stop from a speed [m/s]."""
     par = vehicle_of(run)
     ideal = ideal_stop.ideal_distance(v_0, par)
-    peak = tyre.peak_slip(*road.surface(0.0, par.road))
+    peak = adhesion.peak_slip(road.surface(0.0, par.road), par.front_tyre)
     return stop_figures.stop_figures(run, stop_figures.Setting(ideal, float(peak)))
 
 
@@ -85,7 +81,8 @@ def locked_stop(v_0: float, par: TwoWheelerParameters) -> float:
     """Return a time [s] in which locked wheels stop a vehicle, a single one on most roads."""
     road_ahead, body = par.vehicle.road, par.vehicle.body
     slope = road.slope(0.0, road_ahead)
-    held = tyre.adhesion(1.0, *road.surface(0.0, road_ahead)) * slope.cosine + slope.sine
+    locked = adhesion.adhesion(1.0, road.surface(0.0, road_ahead), par.vehicle.front_tyre)
+    held = locked * slope.cosine + slope.sine
     if not held > 0.0:
         raise ParameterError(
             "locked wheels do not stop on this slope: give options.duration, the time to record"

@@ -20,7 +20,7 @@ from bywire.brakes.two_wheeler.case import (
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
-from bywire.plant import road, tyre
+from bywire.plant import adhesion, road
 from bywire.plant.road import Distance, SurfaceName
 from bywire.vehicle import stop_figures
 
@@ -81,7 +81,8 @@ def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[floa
     begin = float(np.interp(options.x_change, x[: k + 1], t[: k + 1]))
     ground = road.surface(options.x_change + 1.0, vehicle_of(run).road)
     beyond = (t > begin) & (v > stop_figures.SLOW)
-    beyond &= run["slip_f"].values > _CALM * tyre.peak_slip(*ground)
+    peak = adhesion.peak_slip(ground, vehicle_of(run).front_tyre)
+    beyond &= run["slip_f"].values > _CALM * peak
     last = float(t[np.flatnonzero(beyond)[-1]]) if beyond.any() else begin
     return {"recovery_time": last - begin, "jump_speed": float(np.interp(begin, t, v))}
 

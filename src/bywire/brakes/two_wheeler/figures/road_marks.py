@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from bywire.bench.result import Result
 from bywire.brakes.two_wheeler.case import vehicle_of
 from bywire.core.typing import Array
-from bywire.plant import road
+from bywire.plant import adhesion, road
 from bywire.plant.road import SURFACES
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
@@ -102,8 +102,8 @@ def _surface_name(place: float, par: VehicleParameters) -> str:
     """Return what the surface at a place is called, the factor on its adhesion apart."""
     far = road.share(place, par.road) > 0.5
     own = par.road.further if far else par.road.first
-    numbers = (own.c1, own.c2, own.c3)
-    return next((name for name, known in SURFACES.items() if tuple(known) == numbers), "own")
+    numbers = adhesion.surface_of(own)
+    return next((name for name, known in SURFACES.items() if known == numbers), "own")
 
 
 def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int) -> None:

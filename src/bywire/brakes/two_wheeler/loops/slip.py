@@ -14,7 +14,7 @@ from bywire.brakes.two_wheeler.rigs.wheel_on_drum import (
 from bywire.control import slip_pi
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-from bywire.plant import brake_disc, pressure_loop, road_wheel, tyre
+from bywire.plant import adhesion, brake_disc, pressure_loop, road_wheel, tyre
 
 
 def point(par: ParameterSet, value: float) -> Point:
@@ -30,14 +30,15 @@ def point(par: ParameterSet, value: float) -> Point:
         raise ParameterError(f"speed = {value:g} m/s is no operating point: it must be > 0 m/s")
     at = cast(WheelOnDrumParameters, par.replace({"drum.v": value}))
     slip = slip_pi.set_point(value, at.slip)
-    surface = tuple(at.drum.surface.flat().values())
-    if not slip < tyre.peak_slip(*surface):
+    surface = adhesion.surface_of(at.drum.surface)
+    peak = adhesion.peak_slip(surface, at.tyre)
+    if not slip < peak:
         raise ParameterError(
             f"slip.slip_set = {slip:g} is no operating point: the adhesion has its peak at "
-            f"{tyre.peak_slip(*surface):.3g}, ask for less"
+            f"{peak:.3g}, ask for less"
         )
     v_wheel = value * (1.0 - slip)
-    force = at.drum.N * tyre.adhesion(slip, *surface)
+    force = at.drum.N * adhesion.adhesion(slip, surface, at.tyre)
     held = at.wheel.r * force - road_wheel.rolling_resistance(at.drum.N, at.wheel)
     p = held / brake_disc.torque_per_pressure(at.brake.disc)
     state = WheelOnDrum.state(

@@ -14,7 +14,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.parts import Integral, Part, Shown, Wire
 from bywire.core.quantities import Duration, Unit
 from bywire.core.signals import Role, Signal, zeros
-from bywire.plant import brake_disc, pressure_loop, road, road_wheel, tyre
+from bywire.plant import adhesion, brake_disc, pressure_loop, road_wheel, tyre
 
 DrumSpeed = Annotated[float, Unit("m/s", 20.0), Field(gt=0, allow_inf_nan=False)]
 Load = Annotated[float, Unit("N", 2e3), Field(gt=0, allow_inf_nan=False)]
@@ -27,7 +27,7 @@ class DrumParameters(ParameterSet):
     """speed of its surface"""
     N: Load
     """force that presses the wheel on it"""
-    surface: road.SurfaceParameters
+    surface: adhesion.SurfaceParameters
 
 
 class WheelOnDrumParameters(ParameterSet):
@@ -85,8 +85,7 @@ class WheelOnDrum(Assembly[WheelOnDrumParameters, Memory]):
 
     def wire(self, w: Self) -> None:
         """Say what wheel, tyre and brake feel."""
-        drum, ground = w.par.drum, w.par.drum.surface
-        surface = (ground.c1, ground.c2, ground.c3)
+        drum, surface = w.par.drum, adhesion.surface_of(w.par.drum.surface)
         limits = tyre.limits(
             tyre.Contact(drum.v, road_wheel.tread_speed(w.wheel.xe, w.wheel.par), *surface),
             w.tyre.par,

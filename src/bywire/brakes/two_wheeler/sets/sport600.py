@@ -17,6 +17,7 @@ SOURCE = (
 )
 _CLASS = "class of 600 to 1000 cm^3 sport motorcycles with rider"
 _TYRE = {
+    "curve": chosen("burckhardt", "its numbers circulate for seven surfaces"),
     "sigma": chosen(0.10, "tyre transients of the order of 0.1 s at walking pace"),
     "c_t": chosen(1.1, "a tenth of critical damping of the vehicle on its stuck tyres"),
     "v_low": chosen(2.0, "above, the relaxation length damps"),

@@ -18,9 +18,10 @@ from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
-from bywire.plant.road import SURFACES, SurfaceName
+from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.stop_figures import standstill
+from bywire.vehicle.surfaces import laid
 
 _CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
 
@@ -57,12 +58,8 @@ class Options(ParameterSet):
 
 def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
-    changes = {"command.mode": "moment", "flywheel.law": "coasting"}
-    if options.surface != "own":
-        numbers = SURFACES[options.surface]._asdict()
-        for stretch in ("first", "further"):
-            changes |= {f"corner.road.{stretch}.{k}": v for k, v in numbers.items()}
-    changed = par.replace(changes)
+    given = {"command.mode": "moment", "flywheel.law": "coasting"}
+    changed = par.replace(given | laid("corner.road", options.surface))
     state, memory = at_speed(options.v_0, changed)
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return (

@@ -27,6 +27,7 @@ CORNER = CitedSet(
         "corner.body.m": chosen(450.0, "front corner of a mid-size car"),
         "corner.body.g": chosen(9.81, "gravity"),
         "corner.r": chosen(0.30, "rolling radius of a mid-size car's wheel"),
+        "corner.tyre.curve": chosen("burckhardt", "its numbers circulate for seven surfaces"),
         "corner.tyre.sigma": chosen(0.20, "a car tyre's, of the order of its contact's length"),
         "corner.tyre.c_t": chosen(1.1, "a tenth of critical damping of a vehicle on stuck tyres"),
         "corner.tyre.v_low": chosen(2.0, "above, the relaxation length damps"),
