@@ -42,7 +42,7 @@ def case_from_rest(
     driven = par.replace({"drive": drive})
     return Case(
         label, EmbCaliper(), driven, state_at(F, driven), memory_at(F, driven), stimulus, duration,
-        **timing,
+        start=lambda par: (state_at(F, par), memory_at(F, par)), **timing,
     )  # fmt: skip
 
 

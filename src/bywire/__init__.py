@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from bywire.api.describe import describe
     from bywire.api.design import design
     from bywire.api.export_controller import ControllerExport, export_controller
+    from bywire.api.export_fmu import ExportedFmu, export_fmu
     from bywire.api.frequency_response import frequency_response
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
@@ -100,6 +101,8 @@ _HOMES = {
     "LifeResult": "api.life",
     "linearize": "api.linearize",
     "design": "api.design",
+    "ExportedFmu": "api.export_fmu",
+    "export_fmu": "api.export_fmu",
     "study": "api.study",
     "reproduce": "api.reproduce",
     "describe": "api.describe",
@@ -129,6 +132,7 @@ __all__ = [
     "ControllerExport",
     "Conversion",
     "Ensemble",
+    "ExportedFmu",
     "Identification",
     "LifeResult",
     "NewBrake",
@@ -146,6 +150,7 @@ __all__ = [
     "describe",
     "design",
     "export_controller",
+    "export_fmu",
     "frequency_response",
     "identify",
     "linearize",

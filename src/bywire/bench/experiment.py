@@ -46,6 +46,10 @@ class Case:
         How much of the settling time the recording keeps [s].
     record
         Recording interval [s].
+    start
+        ``start(par) -> (state, memory)``: the same initial values for other parameters of this
+        structure, written with ``core.ops`` alone, so that what is exported begins at rest with
+        changed parameters too; None where these are not known.
     """
 
     label: str
@@ -58,6 +62,7 @@ class Case:
     settle: float = 0.0
     keep: float = 0.0
     record: float = 1e-3
+    start: Callable[[Any], tuple[Any, Any]] | None = None
 
     def aligned(self, step: float, interval: float | None = None) -> Case:
         """Return the case with a settling time after which all ticks and a row fall on zero.

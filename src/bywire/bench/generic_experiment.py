@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from types import MappingProxyType
 from typing import Annotated, Any
 
@@ -118,6 +118,7 @@ class Subject:
             case = Case(
                 "run", self.model, par, *at_rest(self.model, par), stimulus, duration(options),
                 settle=options.settle, record=options.record,
+                start=partial(at_rest, self.model),
             )  # fmt: skip
             return (case,)
 

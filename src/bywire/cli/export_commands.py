@@ -48,3 +48,31 @@ def export_controller_command(
         ),
         None, json,
     )  # fmt: skip
+
+
+@export_app.command("fmu")
+def export_fmu_command(
+    bench: BenchFile,
+    out: ExportFolder,
+    part: Annotated[str, typer.Option(help="brake, plant or ecu.")] = "brake",
+    fmi: Annotated[int, typer.Option(help="Version of the interface: 2 or 3.")] = 2,
+    case: Annotated[
+        str, typer.Option(help="Run of the experiment; needed where there are several.")
+    ] = "",
+    target: Annotated[
+        list[str] | None,
+        typer.Option(help="System, e.g. linux64 or win64; may be given several times."),
+    ] = None,
+    set_: BenchChanges = None,
+    json: JsonFlag = False,
+) -> None:
+    """Write a functional mock-up unit for co-simulation."""
+    from bywire.api.export_fmu import export_fmu
+
+    show(
+        lambda progress: export_fmu(
+            bench, out, changes(set_), part=part, fmi=fmi, case=case, targets=target or (),
+            progress=progress,
+        ),
+        None, json,
+    )  # fmt: skip

@@ -19,13 +19,15 @@ from bywire.core.errors import CompilerError
 from bywire.core.scratch import scratch_folder
 from bywire.simulation.kernel_cache import digest_of, is_intact, load, sha256, usable_folder
 
-# Kernels compare and select all the time: without these, maxima become branches.
-_MATH = ("-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only")
+# Kernels compare and select all the time: without these, maxima become branches. A compiler that
+# fuses a product and a sum where it sees fit rounds a case in lanes otherwise than alone, and on
+# another processor otherwise again: 1 % of the time in lanes is not worth that.
+KERNEL_MATH = (
+    "-fno-math-errno", "-fno-trapping-math", "-fno-signed-zeros", "-ffinite-math-only",
+    "-ffp-contract=off",
+)  # fmt: skip
 _STRICT = ("-Werror=implicit-function-declaration",)
-# A compiler that fuses a product and a sum where it sees fit rounds a case in lanes otherwise than
-# alone, and on another processor otherwise again: 1 % of the time in lanes is not worth that.
-_ROUNDED = ("-ffp-contract=off",)
-_COMMON = ("-shared", "-fPIC", "-std=c11", *_MATH, *_ROUNDED, *_STRICT)
+_COMMON = ("-shared", "-fPIC", "-std=c11", *KERNEL_MATH, *_STRICT)
 # Packing a few scalars costs more than it saves. So does computing both sides of a choice that goes
 # the same way for thousands of substeps: with branches a run is a seventh quicker.
 _BRANCHES = ("-fno-if-conversion", "-fno-if-conversion2", "-mtune=native")

@@ -129,7 +129,7 @@ def injected(
     if not (taps or tasks):
         return FaultyCase(**plain, changes=changes)
     model = Tapped(case.model, taps, tasks)
-    plain |= {"model": model, "memory": model.started(case.state, case.memory)}
+    plain |= {"model": model, "memory": model.started(case.state, case.memory), "start": None}
     falsified = _falsified(faults, case, {tap.name: tap for tap in taps})
     return FaultyCase(**plain, changes=changes, falsified=falsified)
 

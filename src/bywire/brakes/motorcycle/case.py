@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from bywire.bench.experiment import Case
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import DriveMode, MotorcycleParameters
-from bywire.brakes.motorcycle.trim import memory_at, state_at
+from bywire.brakes.motorcycle.trim import memory_at, resting_at, state_at
 
 Signals = Mapping[str, NDArray[np.float64]]
 
@@ -41,6 +41,7 @@ def case_from_rest(
         memory=memory_at(p_start, changed),
         stimulus=stimulus,
         duration=duration,
+        start=lambda par: (resting_at(p_start, par), memory_at(p_start, par)),
         **timing,
     )
 

@@ -10,6 +10,7 @@ from bywire.brakes.motorcycle.ecu import Memory
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.control import low_pass_2, pressure_pid
+from bywire.core import ops
 from bywire.core.errors import ParameterError
 from bywire.core.signals import zeros
 from bywire.plant import (
@@ -57,12 +58,12 @@ def travel_at(p: float, par: Par) -> float:
     start = cylinder.x_rest + reservoir_port.closed_at(par.port)
     empty = cylinder.A_mc * (cylinder.s_mc - start) - brake_fluid.gas_volume(0.0, fluid)
     taken = 0.0
-    for low, high in pairwise((0.0, *(node for node in par.caliper.p_table if 0 < node < p), p)):
+    for low, high in pairwise((0.0, *(ops.clip(node, 0.0, p) for node in par.caliper.p_table), p)):
         for share, weight in _GAUSS:
             at = 0.5 * (low + high) + 0.5 * (high - low) * share
             slope = caliper.mass(caliper.State(at), par.caliper, fluid)
-            taken += 0.5 * (high - low) * weight * slope * math.exp((at - p) / fluid.beta)
-    left = empty * math.exp(-p / fluid.beta) - taken
+            taken += 0.5 * (high - low) * weight * slope * ops.exp((at - p) / fluid.beta)
+    left = empty * ops.exp(-p / fluid.beta) - taken
     return cylinder.s_mc - (left + brake_fluid.gas_volume(p, fluid)) / cylinder.A_mc
 
 
@@ -85,9 +86,7 @@ def holding_current(p: float, par: Par) -> float:
 
 
 def state_at(p: float, par: Par, current: float | None = None) -> Any:
-    """Return the state at rest at a pressure [Pa]; the friction holds what is left over.
-
-    Without pressure the piston rests at its retracted end.
+    """Return the state at rest at a pressure [Pa]; see `resting_at`.
 
     Parameters
     ----------
@@ -107,6 +106,20 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
             f"<= {limit:g} bar, where the piston meets its end stop: start lower, or move the "
             "stop (master_cylinder.x_end)"
         )
+    return resting_at(p, par, current)
+
+
+def resting_at(p: float, par: Par, current: float | None = None) -> Any:
+    """Return the state at rest at a pressure [Pa]; the friction holds what is left over.
+
+    Without pressure the piston rests at its retracted end. Parameters may be symbols.
+
+    Parameters
+    ----------
+    current
+        Through the motor [A]; what balances the pressure without friction by default.
+    """
+    x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
     held = holding_current(p, par) if current is None else current
     p_seen = pressure_sensor.reading(p + par.fluid.p_atm, par.pressure_sensor)
     i_seen = current_sensor.reading(held, par.current_sensor)
@@ -151,4 +164,4 @@ def memory_at(p: float, par: Par, current: float | None = None) -> Memory:
 def _duty_for(i: float, par: Par) -> float:
     """Return the duty cycle at which v = D (V_bat - R_bat D i) drives i at standstill."""
     v, V, drop = par.motor.R_m * i, par.supply.V_bat, par.supply.R_bat * i
-    return 2.0 * v / (V + math.sqrt(max(V * V - 4.0 * drop * v, 0.0)))
+    return 2.0 * v / (V + ops.sqrt(ops.fmax(V * V - 4.0 * drop * v, 0.0)))

@@ -56,7 +56,10 @@ def rolling_case(
             for name, p in demands.items()
         }
 
-    return Case(label, TwoWheelerByWire(), changed, state, memory, stimulus, duration)
+    return Case(
+        label, TwoWheelerByWire(), changed, state, memory, stimulus, duration,
+        start=lambda par: at_speed(v_0, par, heat),
+    )  # fmt: skip
 
 
 def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[str, float]:

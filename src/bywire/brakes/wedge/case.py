@@ -68,6 +68,7 @@ def case_from_parked(
         memory=memory_at(0.0, changed),
         stimulus=stimulus,
         duration=duration,
+        start=lambda par: (state_at(0.0, par), memory_at(0.0, par)),
         **timing,
     )
 

@@ -6,6 +6,7 @@ from bywire.brakes.wedge.control import Memory
 from bywire.brakes.wedge.elements import wedge, wedge_caliper
 from bywire.brakes.wedge.laws import screw_offset
 from bywire.brakes.wedge.parameters import WedgeParameters
+from bywire.core import ops
 from bywire.core.signals import zeros
 from bywire.plant import roller_screw
 
@@ -34,7 +35,7 @@ def memory_at(x: float, par: Par) -> Memory:
     both = screw_offset.output(x / k, delta, par.control.offset)
     return zeros(Memory)._replace(
         on=1.0,
-        direction=-1.0 if par.flywheel.Omega_0 < 0 else 1.0,
+        direction=ops.where(par.flywheel.Omega_0 < 0, -1.0, 1.0),
         theta_c=contact_angle(par),
         theta_ref=x / k,
         delta=delta,

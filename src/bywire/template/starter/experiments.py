@@ -46,6 +46,7 @@ def cases(par: Parameters, options: Options, _: Any) -> tuple[Case, ...]:
         Case(
             "run", model, par, zeros(model.State), zeros(Memory), stimulus,
             duration=options.duration + options.release,
+            start=lambda _: (zeros(model.State), zeros(Memory)),
         ),
     )  # fmt: skip
 

@@ -65,7 +65,7 @@ def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tup
     return (
         Case(
             "run", WedgeCorner(), changed, state, memory, lambda t: {"M_set": steps(t, levels)},
-            options.t_hold + options.t_end,
+            options.t_hold + options.t_end, start=lambda par: at_speed(options.v_0, par),
         ),
     )  # fmt: skip
 

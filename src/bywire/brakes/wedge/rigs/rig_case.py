@@ -58,7 +58,10 @@ def _case(
     timing: Mapping[str, float],
 ) -> Case:
     state, memory = zeros(model.State), zeros(model.Memory)
-    return Case(label, model, par, state, memory, stimulus, duration, **timing)
+    return Case(
+        label, model, par, state, memory, stimulus, duration, start=lambda _: (state, memory),
+        **timing,
+    )  # fmt: skip
 
 
 def heart_case(par: WedgeParameters, stimulus: Stimuli, duration: float, mode: str) -> Case:

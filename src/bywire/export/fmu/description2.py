@@ -1,0 +1,90 @@
+"""The model description of version 2.0."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from xml.etree.ElementTree import Element, SubElement
+
+from bywire.export.exported import Exported
+from bywire.export.fmu.units import unit_definitions
+from bywire.export.interface import Interface, Variable, finite_range
+
+
+def description_2(
+    made: Exported, faces: Interface, identifier: str, token: str, head: dict[str, str],
+    sources: Sequence[str],
+) -> Element:  # fmt: skip
+    """Return the model description.
+
+    Parameters
+    ----------
+    identifier
+        Name of the binaries, a name of C.
+    token
+        The GUID.
+    head
+        Attributes that both versions share.
+    sources
+        Files to compile.
+    """
+    frame = repr(made.schedule.frame)
+    root = Element("fmiModelDescription", {
+        "fmiVersion": "2.0", "guid": token, "variableNamingConvention": "structured",
+        "numberOfEventIndicators": "0", **head,
+    })  # fmt: skip
+    slave = SubElement(
+        root, "CoSimulation", modelIdentifier=identifier,
+        canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
+        canGetAndSetFMUstate="true", canSerializeFMUstate="true",
+    )  # fmt: skip
+    files = SubElement(slave, "SourceFiles")
+    for name in sources:
+        SubElement(files, "File", name=name)
+    root.append(unit_definitions(each.unit for each in faces.variables))
+    categories = SubElement(root, "LogCategories")
+    for name in ("logStatusWarning", "logStatusError"):
+        SubElement(categories, "Category", name=name)
+    SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(made.run.duration),
+               stepSize=frame)  # fmt: skip
+    variables = SubElement(root, "ModelVariables")
+    for reference, each in enumerate(faces.variables):
+        variables.append(_scalar(reference, each))
+    structure = SubElement(root, "ModelStructure")
+    results = [k for k, each in enumerate(faces.variables, 1) if each.causality == "output"]
+    for section in ("Outputs", "InitialUnknowns"):
+        unknown = SubElement(structure, section)
+        for k in results:
+            SubElement(unknown, "Unknown", index=str(k))
+    return root
+
+
+def _scalar(reference: int, each: Variable) -> Element:
+    scalar = Element("ScalarVariable", {
+        "name": each.name, "valueReference": str(reference), "causality": each.causality,
+        "variability": variability(each), **({"description": each.label} if each.label else {}),
+    })  # fmt: skip
+    if each.causality == "parameter":
+        scalar.set("initial", "exact")
+    elif each.causality != "input":
+        scalar.set("initial", "calculated")
+    real = SubElement(scalar, "Real")
+    for name, value in real_attributes(each).items():
+        real.set(name, value)
+    return scalar
+
+
+def variability(each: Variable) -> str:
+    """Return when a variable may change."""
+    if each.causality == "parameter":
+        return "tunable" if each.is_tunable else "fixed"
+    return "discrete" if each.is_held else "continuous"
+
+
+def real_attributes(each: Variable) -> dict[str, str]:
+    """Return unit, range and start of a variable, as both versions write them."""
+    made = {} if each.unit == "1" else {"unit": each.unit}
+    if each.leaf is not None:
+        low, high = finite_range(each.leaf)
+        made |= {} if low is None else {"min": repr(low)}
+        made |= {} if high is None else {"max": repr(high)}
+    return made if each.start is None else made | {"start": repr(each.start)}

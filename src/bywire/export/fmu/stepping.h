@@ -1,0 +1,164 @@
+/* A run that a client advances frame by frame: values, ranges, and calls of the kernel.
+ *
+ * What the model gives stands in model.h: counts, tables of variables, initial values. A frame is
+ * the longest interval that divides the tasks' sample times and the recording interval.
+ */
+#include <math.h>
+#include <stdarg.h>
+#include <stdint.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "model.h"
+
+void bw_run(const double *p, double h, const double *u, double *state, const int64_t *plan,
+    const int32_t *selection, double *rec);
+
+#define NEVER INT64_MAX
+#define MESSAGE 600
+
+typedef struct {
+  double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1], sampled[ROWS + 1];
+  int64_t frame;     /* frames since the start */
+  int32_t is_set;    /* a value was set since the rows were computed */
+  int32_t is_begun;  /* the initial values are there */
+} run;
+
+/* Frames between the ticks of every task, and what makes none or all of them tick. */
+static const int64_t task_frames[] = TASK_FRAMES;
+
+/* Advance from one frame to another. With rows, those frames' recorded signals are written, the
+ * last one's too where it is asked for. Tasks tick in frames that their entries divide. */
+static void kernel(const run *r, double *state, int64_t begin, int64_t end, int rows, int last,
+    const int64_t *ticks, double *rec) {
+  int32_t selection[ROWS + 1];
+  int64_t plan[8 + TASKS + 1];
+  for (int k = 0; k < ROWS; ++k) selection[k] = k;
+  plan[0] = begin;
+  plan[1] = end;
+  plan[2] = last;
+  plan[3] = IS_ECU ? 0 : SUBSTEPS;
+  plan[4] = NEVER; /* one row of the stimulus for all frames */
+  plan[5] = rows ? 1 : NEVER;
+  plan[6] = rows ? begin : 0;
+  plan[7] = IS_ECU ? 0 : ROWS;
+  for (int k = 0; k < TASKS; ++k) plan[8 + k] = ticks ? ticks[k] : NEVER;
+  bw_run(r->p, STEP, r->u, state, plan, selection, rec);
+}
+
+/* The recorded signals as they stand, before any tick that is due now. Frame 1: zero divides by
+ * everything, and would tick. */
+static void refresh(run *r) {
+  double state[STATE];
+  if (!r->is_set) return;
+  memcpy(state, r->state, sizeof state);
+  if (!IS_ECU) kernel(r, state, 1, 1, 1, 1, NULL, r->row);
+  r->is_set = 0;
+}
+
+/* Take the initial values of the parameters; 0 where they are no numbers. */
+static int begin(run *r) {
+  double kept[STATE];
+  memcpy(kept, r->state, sizeof kept);
+  if (memcmp(r->p, p_start, sizeof p_start)) bw_start(r->p, r->state);
+  for (int k = 0; k < STATE; ++k) /* what was set stays: a part's inputs lie in the state */
+    if (memcmp(&kept[k], &state_start[k], sizeof(double))) r->state[k] = kept[k];
+  for (int k = 0; k < STATE; ++k)
+    if (!isfinite(r->state[k])) return 0;
+  r->frame = 0;
+  r->is_set = 1;
+  refresh(r);
+  memcpy(r->sampled, r->row, sizeof r->row);
+  r->is_begun = 1;
+  return 1;
+}
+
+static void reset(run *r) {
+  memset(r, 0, sizeof *r);
+  memcpy(r->p, p_start, sizeof p_start);
+  memcpy(r->state, state_start, sizeof state_start);
+  r->is_set = 1;
+}
+
+/* What is to be said of a run that has left the numbers; NULL where it has not. */
+static const char *lost(const run *r) {
+  for (int k = 0; k < STATES; ++k)
+    if (!isfinite(r->state[k])) return state_names[k];
+  return NULL;
+}
+
+/* Advance some frames, with the ticks that are due in them or without any. */
+static void advance(run *r, int64_t frames, int has_ticks) {
+  const int64_t *ticks = has_ticks ? task_frames : NULL;
+  int64_t first = has_ticks ? r->frame : 1; /* without ticks, no frame differs from another */
+  kernel(r, r->state, first, first + 1, 1, 0, ticks, r->sampled);
+  if (frames > 1) {
+    double rest[ROWS + 1];
+    kernel(r, r->state, first + 1, first + frames, 0, 0, ticks, rest);
+  }
+  r->frame += frames;
+  r->is_set = 1;
+  refresh(r);
+}
+
+/* Do ticks of some tasks now; every frame is a multiple of 1. */
+static inline void tick(run *r, const int *is_active) {
+  int64_t ticks[TASKS + 1];
+  for (int k = 0; k < TASKS; ++k) ticks[k] = is_active[k] ? 1 : NEVER;
+  kernel(r, r->state, 1, 1, 1, 1, ticks, r->row);
+  memcpy(r->sampled, r->row, sizeof r->row);
+  r->is_set = 0;
+}
+
+static double unsettled(const run *r) { return r->state[STATE - 2]; }
+
+static double *place_of(run *r, unsigned k) {
+  const int at = variables[k].index;
+  switch (variables[k].place) {
+    case PARAMETER: return &r->p[at];
+    case STIMULUS: return &r->u[at];
+    case IN_STATE: return &r->state[at];
+    case IN_ROW: return &r->row[at];
+    default: return &r->sampled[at];
+  }
+}
+
+/* Set a variable; what is wrong with the value is written to said, else it stays empty. */
+static void set_value(run *r, unsigned k, double value, int is_running, char *said) {
+  const variable *v;
+  said[0] = 0;
+  if (k >= VARIABLES) {
+    snprintf(said, MESSAGE, "there is no variable with the value reference %u", k);
+    return;
+  }
+  v = &variables[k];
+  if (v->kind == RESULT) {
+    snprintf(said, MESSAGE, "%s is computed and cannot be set", v->name);
+  } else if (v->kind == FIXED && is_running) {
+    snprintf(said, MESSAGE, "%s is fixed: set it before or during initialization", v->name);
+  } else if (!isfinite(value) || value < v->low || value > v->high) {
+    snprintf(said, MESSAGE, "%s = %.6g%s is not admissible: it must be %s", v->name, value,
+        v->unit, v->range);
+  } else {
+    *place_of(r, k) = value;
+    r->is_set = 1;
+  }
+}
+
+/* How many frames a step from a time makes; 0 with a message where it makes none. */
+static int64_t frames_of(const run *r, double time, double step, char *said) {
+  const double frame = STEP * SUBSTEPS, here = frame * (double)r->frame;
+  const double frames = step / frame;
+  said[0] = 0;
+  if (!(isfinite(time) && fabs(time - here) <= 1e-6 * frame)) {
+    snprintf(said, MESSAGE, "the step begins at %.9g s, but the run is at %.9g s", time, here);
+    return 0;
+  }
+  if (!(frames > 0.5 && frames < 1e15 && fabs(frames - round(frames)) <= 1e-6)) {
+    snprintf(said, MESSAGE, "a communication step of %.9g s is not admissible: it must be a whole "
+        "multiple of %.9g s, which divides the sample times of the ECU", step, frame);
+    return 0;
+  }
+  return (int64_t)round(frames);
+}

@@ -1,0 +1,237 @@
+"""What an exported part takes and gives: inputs, outputs and parameters, with their meaning."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+from bywire.core.field_notes import field_notes
+from bywire.core.leaf import Leaf
+from bywire.core.parameters import leaf_fields
+from bywire.core.signals import signals_of
+from bywire.export.exported import Exported
+from bywire.simulation.operation import Node
+from bywire.simulation.stages import Stages
+
+Part = Literal["brake", "plant", "ecu"]
+PARTS: tuple[Part, ...] = get_args(Part)
+Place = Literal["parameter", "stimulus", "state", "row", "sampled"]
+Causality = Literal["parameter", "input", "output", "local"]
+
+
+@dataclass(frozen=True)
+class Variable:
+    """A number that a client sets or gets.
+
+    Parameters
+    ----------
+    name
+        Structured: ``motor.R_m``, ``caliper.p_table[1]``.
+    causality
+        What it is for a client.
+    place, index
+        Where the C code keeps it.
+    unit, label
+        SI unit in the syntax of pint, and what it means.
+    start
+        Value before anything is set; None of what is computed.
+    leaf
+        Range of a parameter.
+    is_tunable
+        Whether a parameter may change during the run: those that the ECU alone reads.
+    is_held
+        Whether it changes at ticks alone.
+    """
+
+    name: str
+    causality: Causality
+    place: Place
+    index: int
+    unit: str
+    label: str
+    start: float | None = None
+    leaf: Leaf | None = None
+    is_tunable: bool = False
+    is_held: bool = False
+
+
+@dataclass(frozen=True)
+class Interface:
+    """All variables of a part of an exported run.
+
+    Parameters
+    ----------
+    part
+        The whole brake, the plant (what the ECU holds are inputs), or the ECU (its readings of the
+        plant are inputs).
+    variables
+        In the order of their value references.
+    """
+
+    part: Part
+    variables: tuple[Variable, ...]
+
+    def of(self, causality: Causality) -> tuple[Variable, ...]:
+        """Return the variables of a causality."""
+        return tuple(each for each in self.variables if each.causality == causality)
+
+
+def interface(made: Exported, part: Part, start_reads: frozenset[int] = frozenset()) -> Interface:
+    """Return the variables of a part.
+
+    Parameters
+    ----------
+    start_reads
+        Parameters that the initial values depend on, by index.
+    """
+    reads = _Reads.of(made.stages)
+    readings = _readings(made, reads)
+    signals: list[Variable] = []
+    if part != "plant":
+        signals += _stimuli(made, reads)
+    if part == "plant":
+        signals += (_memory(made, k, "input") for k in sorted(reads.plant["m"]))
+    if part == "ecu":
+        signals += (_state(made, k, name, "input") for k, name in readings.items())
+        signals += (_memory(made, k, "output") for k in range(made.program.sizes.memory))
+    taken = {each.name for each in signals}
+    rows = [_row(made, k, "row") for k in reads.shown(part)]
+    signals += (each for each in rows if each.name not in taken)
+    if part == "plant":
+        named = {each.name for each in rows}
+        signals += (_state(made, k, name, "output") for k, name in readings.items()
+                    if name not in named)  # fmt: skip
+    if part == "brake":
+        signals += (_row(made, k, "sampled") for k in reads.shown(part))
+    parameters = reads.parameters(part) | start_reads
+    return Interface(part, (*signals, *_parameters(made, parameters, reads.tunable)))
+
+
+@dataclass(frozen=True)
+class _Reads:
+    """Indices of the leaves, by kind, that the passes read, the ticks, and each recorded signal."""
+
+    plant: dict[str, frozenset[int]]
+    ecu: dict[str, frozenset[int]]
+    outputs: tuple[dict[str, frozenset[int]], ...]
+
+    @classmethod
+    def of(cls, stages: Stages) -> _Reads:
+        passes = [node for each in (stages.fast, stages.exact) for nodes in each.values()
+                  for node in nodes]  # fmt: skip
+        passes += stages.quadrature.products
+        passes += [c for pairs in stages.quadrature.combinations for c, _ in pairs]
+        ticks = [node for roots in stages.ticks for node in _changed(stages, roots)]
+        return cls(
+            _leaves(stages, passes),
+            _leaves(stages, ticks),
+            tuple(_leaves(stages, [node]) for node in stages.output),
+        )
+
+    def shown(self, part: Part) -> list[int]:
+        """Return the recorded signals of a part: a plant's depend on what it is given alone."""
+        held = self.plant["m"]
+        if part == "plant":
+            return [k for k, each in enumerate(self.outputs) if each["m"] <= held]
+        return list(range(len(self.outputs))) if part == "brake" else []
+
+    def parameters(self, part: Part) -> frozenset[int]:
+        """Return the parameters that a part depends on."""
+        shown = frozenset[int]().union(*(self.outputs[k]["p"] for k in self.shown(part)))
+        own = {"brake": self.plant["p"] | self.ecu["p"], "plant": self.plant["p"],
+               "ecu": self.ecu["p"]}[part]  # fmt: skip
+        return own | shown
+
+    @property
+    def tunable(self) -> frozenset[int]:
+        """Parameters of the ECU alone."""
+        return self.ecu["p"] - self.plant["p"]
+
+
+def _changed(stages: Stages, roots: list[Node]) -> list[Node]:
+    """Return what a task computes: not what it leaves in the memory as it is."""
+    return [node for k, node in enumerate(roots) if node != stages.graph.leaf("m", k)]
+
+
+def _leaves(stages: Stages, roots: Iterable[Node]) -> dict[str, frozenset[int]]:
+    found: dict[str, set[int]] = {kind: set() for kind in ("x", "m", "u", "p")}
+    for node in stages.graph.read_by(roots):
+        operation = stages.graph.nodes[node]
+        if operation.op == "leaf" and operation.args[0] in found:
+            found[operation.args[0]].add(operation.args[1])
+    return {kind: frozenset(each) for kind, each in found.items()}
+
+
+def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
+    known = signals_of(made.run.model.Stimulus)
+    for k, (name, signal) in enumerate(known.items()):
+        if k in reads.ecu["u"]:
+            label = signal.label + ", a standard normal number" * name.startswith("noise_")
+            yield Variable(name, "input", "stimulus", k, signal.unit, label, 0.0, is_held=True)
+
+
+def _row(made: Exported, k: int, place: Literal["row", "sampled"]) -> Variable:
+    """Return a recorded signal as it is now, or as the last tick left it."""
+    name, signal = list(made.program.outputs.items())[k]
+    if place == "row":
+        return Variable(name, "output", place, k, signal.unit, signal.label)
+    label = f"{signal.label}, after the tick at the beginning of the last step"
+    return Variable(f"sampled.{name}", "local", place, k, signal.unit, label, is_held=True)
+
+
+def _readings(made: Exported, reads: _Reads) -> dict[int, str]:
+    """Return the names of the states that ticks read; as recorded where that is the same."""
+    outputs = list(made.program.outputs)
+    memory = set(made.run.model.Memory._fields)
+    names = {}
+    for k in sorted(reads.ecu["x"]):
+        name = made.run.model.State._fields[k]
+        leaf = made.stages.graph.leaf("x", k)
+        is_other = name in outputs and made.stages.output[outputs.index(name)] != leaf
+        names[k] = f"state.{name}" if is_other or name in memory else name
+    return names
+
+
+def _state(made: Exported, k: int, name: str, causality: Causality) -> Variable:
+    signal = list(signals_of(made.run.model.State).values())[k]
+    at = made.layout.start["x"] + k
+    start = made.vector[at] if causality == "input" else None
+    return Variable(name, causality, "state", at, signal.unit, signal.label, start)
+
+
+def _memory(made: Exported, k: int, causality: Causality) -> Variable:
+    name, signal = list(signals_of(made.run.model.Memory).items())[k]
+    at = made.layout.start["m"] + k
+    start = made.vector[at] if causality == "input" else None
+    return Variable(name, causality, "state", at, signal.unit, signal.label, start, is_held=True)
+
+
+def _parameters(
+    made: Exported, read: frozenset[int], tunable: frozenset[int]
+) -> Iterator[Variable]:
+    fields = leaf_fields(type(made.run.par))
+    notes = field_notes(type(made.run.par))
+    for k, (name, value) in enumerate(made.run.par.leaves().items()):
+        if k not in read:
+            continue
+        group, _, node = name.rpartition(".")
+        leaf = fields.get(name) or fields[group]
+        is_node = name not in fields
+        shown = f"{group}[{int(node) + 1}]" if is_node else name
+        label = notes[group if is_node else name]
+        yield Variable(
+            shown, "parameter", "parameter", k, leaf.unit.symbol, label, value, leaf,
+            is_tunable=k in tunable,
+        )  # fmt: skip
+
+
+def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:
+    """Return the admissible ends of a parameter's range; None where it has no end.
+
+    An end that does not belong to it becomes the next number within.
+    """
+    low = math.nextafter(leaf.low, math.inf) if leaf.low_open else leaf.low
+    high = math.nextafter(leaf.high, -math.inf) if leaf.high_open else leaf.high
+    return (None if math.isinf(leaf.low) else low, None if math.isinf(leaf.high) else high)
