@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from bywire.bench.kpis import hysteresis, sine_sweep, step_response, tracking
 from bywire.bench.kpis.kpi import Kpi
+from bywire.core.errors import StepError
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import Kind, instances
@@ -21,6 +22,7 @@ from bywire.simulation.run import Run
 from bywire.simulation.schedule import plan
 
 Recordings = Mapping[str, xr.Dataset]
+_LENGTHENED = 100.0  # times a run, that settling may take until all sample times come out even
 
 
 @dataclass(frozen=True)
@@ -80,13 +82,21 @@ class Case:
         Raises
         ------
         StepError
-            When the step does not divide a sample time or the recording interval.
+            When the step does not divide a sample time or the recording interval, or the common
+            multiple is out of all proportion to the run.
         """
         record = self.record if interval is None else interval
         periods = {task.name: task.period for task in self.model.tasks(self.par)}
         schedule = plan(self.settle + self.duration, step, periods, record)
         common = math.lcm(schedule.record_frames, *schedule.task_frames) * schedule.frame
         settle = float(f"{math.ceil(self.settle / common - 1e-9) * common:.12g}")
+        if settle > _LENGTHENED * (self.settle + self.duration):
+            raise StepError(
+                f"a run of {self.settle + self.duration:g} s would settle for {settle:g} s, in which "
+                "all sample times and recording intervals come out even: choose sample times that "
+                "are shorter and multiples of each other "
+                f"({', '.join(f'{name} {T:g} s' for name, T in periods.items())})"
+            )
         is_aligned = settle == self.settle and record == self.record
         return self if is_aligned else replace(self, settle=settle, record=record)
 

@@ -108,4 +108,4 @@ def exported(bench: Bench, label: str = "") -> Exported:
             "parameters of this bench change during the run, which cannot be exported: leave out "
             "its [[faults]], or export it with the changed parameters"
         )
-    return Exported(bench, number, cases[number].aligned(bench.step, bench.record), run)
+    return Exported(bench, number, cases[number], run)

@@ -34,7 +34,9 @@ class Client:
         self.description = read_model_description(str(folder))
         self.references = {v.name: v.valueReference for v in self.description.modelVariables}
         clocks = ElementTree.parse(folder / "modelDescription.xml").iter("Clock")
-        self.clocks = {int(c.get("valueReference")): float(c.get("intervalDecimal")) for c in clocks}
+        self.clocks = {
+            int(c.get("valueReference")): float(c.get("intervalDecimal")) for c in clocks
+        }
         self.fmu = FMU3Slave(
             guid=self.description.guid, unzipDirectory=str(folder), instanceName="test",
             modelIdentifier=self.description.coSimulation.modelIdentifier,

@@ -48,7 +48,7 @@ def model_header(made: Exported, faces: Interface, start: str, token: str) -> st
     defines = "\n".join(f"#define {name} {value}" for name, value in counts.items())
     values, name = made.run.par.leaves().values(), made.bench.name or made.bench.experiment
     states = made.run.model.State._fields
-    tasks = made.run.model.tasks(made.run.par)
+    names = [text(task.name) for task in made.run.model.tasks(made.run.par)]
     rows = ",\n  ".join(map(_row, faces.variables))
     begins = start or f"{HEADING} {{\n  (void)p, (void)state;\n}}\n"
     return f"""/* Made by bywire of the bench {comment(name)}. */
@@ -70,7 +70,7 @@ static const variable variables[] = {{
 }};
 /* How many numbers a variable of version 3.0 holds: a table stands where its first node does. */
 static const int sizes[] __attribute__((unused)) = {braced(_sizes(faces))};
-static const char *const task_names[] __attribute__((unused)) = {braced(text(task.name) for task in tasks)};
+static const char *const task_names[] __attribute__((unused)) = {braced(names)};
 static const char *const state_names[] = {braced(map(text, states))};
 static const double p_start[] = {braced(map(number, values))};
 static const double state_start[] = {braced(map(number, made.vector))};
