@@ -92,9 +92,9 @@ class Case:
         settle = float(f"{math.ceil(self.settle / common - 1e-9) * common:.12g}")
         if settle > _LENGTHENED * (self.settle + self.duration):
             raise StepError(
-                f"a run of {self.settle + self.duration:g} s would settle for {settle:g} s, in which "
-                "all sample times and recording intervals come out even: choose sample times that "
-                "are shorter and multiples of each other "
+                f"a run of {self.settle + self.duration:g} s would settle for {settle:g} s, in "
+                "which all sample times and recording intervals come out even: choose sample times "
+                "that are shorter and multiples of each other "
                 f"({', '.join(f'{name} {T:g} s' for name, T in periods.items())})"
             )
         is_aligned = settle == self.settle and record == self.record
