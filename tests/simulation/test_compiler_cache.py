@@ -219,7 +219,7 @@ def test_choosing_a_compiler(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
         monkeypatch.setenv("BYWIRE_CC_QUICK", "1")
         quick = find_compiler()
         assert quick == Compiler((str(named),), "my compiler 7, quick", quick=True)
-        assert "-O1" in quick.flags(VECTOR)
+        assert "-Og" in quick.flags(VECTOR)
         assert "-O2" not in quick.flags(VECTOR)
         find_compiler.cache_clear()
         monkeypatch.setenv("BYWIRE_CC_QUICK", "very")
