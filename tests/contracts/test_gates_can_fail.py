@@ -39,7 +39,7 @@ check_rate_units = whole(energy.has_rates_of_its_states)
 check_units, check_SI = equations.has_annotated_units, equations.is_in_SI
 check_back_ends, check_jacobian = equations.has_agreeing_back_ends, equations.has_its_slopes
 round_trip = parameters(values.survives_json)
-codes_range = parameters(values.keeps_the_range_of("codes"))
+ranges = parameters(values.keeps_its_ranges)
 
 
 class Mistake(NamedTuple):
@@ -138,7 +138,7 @@ MISTAKES = {
         "ops.floor(reading * par.codes * 1e6) / (par.codes * 1e6)",
         on(check_jacobian, "sample"),
     ),
-    "infinity taken": Mistake("plant/adc", CODES, "Field(ge=2)", codes_range),
+    "infinity taken": Mistake("plant/adc", CODES, "Field(ge=2)", ranges),
     "number without unit": Mistake(
         "plant/dc_motor", "R_m: Resistance", "R_m: float", round_trip, "TypeError"
     ),

@@ -29,13 +29,13 @@ pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 @pytest.mark.trust
 @pytest.mark.parametrize(("name", "contract"), LONG)
 def test_model_keeps_its_long_contracts(name: str, contract: str) -> None:
-    findings = [d.settle() for d in demands_on(name, ()) if d.contract == contract]
+    findings = [d.settle() for d in demands_on(name, ()) if d.name == contract]
     assert [f.outcome for f in findings] == ["holds"], [str(f) for f in findings]
 
 
 @pytest.mark.parametrize("name", sorted(ASSEMBLIES.all()))
 def test_model_keeps_its_contracts(name: str) -> None:
-    findings = [d.settle() for d in demands_on(name, ()) if (name, d.contract) not in LONG]
+    findings = [d.settle() for d in demands_on(name, ()) if (name, d.name) not in LONG]
     assert [str(f) for f in findings if f.outcome == "broken"] == []
     unchecked = {f.contract for f in findings if f.outcome == "not checked"}
     known = NOT_CHECKED.get(name, set())

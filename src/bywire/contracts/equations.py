@@ -96,12 +96,13 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
             yield Evidence(False, f"the Jacobian is not finite; {choices}")
             return
         largest = np.abs(evaluate(function, structure, matrix)).max(axis=1)[:, None]
-        for j, name in enumerate(flattened(structure)):
-            nominal = abs(sampler.known(name).nominal)
-            wide, narrow = (
-                _slope(function, structure, matrix, j, h * nominal)
-                for h in (DIFFERENCE, DIFFERENCE / 2)
-            )
+        names = list(flattened(structure))
+        nominals = np.array([abs(sampler.known(name).nominal) for name in names])
+        both = [
+            _slopes(function, structure, matrix, h * nominals)
+            for h in (DIFFERENCE, DIFFERENCE / 2)
+        ]
+        for j, (name, nominal, wide, narrow) in enumerate(zip(names, nominals, *both, strict=True)):
             scale = largest / nominal + np.abs(exact[:, j])
             # Where the two differences disagree there is a kink or a jump between their ends.
             smooth = np.abs(wide - narrow) <= 1e-3 * scale
@@ -113,12 +114,15 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
             yield measured(share, SLOPE, f"slope along {name} is off by {share:.1e}; {choices}")
 
 
-def _slope(function: Function, structure: Arguments, matrix: Array, j: int, step: float) -> Array:
-    ahead, behind = matrix.copy(), matrix.copy()
-    ahead[j] += step
-    behind[j] -= step
-    difference = evaluate(function, structure, ahead) - evaluate(function, structure, behind)
-    return np.asarray(difference / (2.0 * step))
+def _slopes(function: Function, structure: Arguments, matrix: Array, steps: Array) -> Array:
+    """Return central differences along every row of the samples, shape (rows, results, samples)."""
+    moves = np.kron(np.diag(steps), np.ones(matrix.shape[1]))
+    many = np.tile(matrix, len(steps))
+    difference = evaluate(function, structure, many + moves) - evaluate(
+        function, structure, many - moves
+    )
+    along = difference.reshape(len(difference), len(steps), matrix.shape[1])
+    return np.asarray(along.transpose(1, 0, 2) / (2.0 * steps[:, None, None]))
 
 
 def _relative(off: Array, scale: Array) -> float:

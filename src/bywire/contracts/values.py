@@ -39,29 +39,9 @@ def set_survives_json(par: ParameterSet) -> Evidence:
 
 def keeps_its_ranges(cls: Class) -> Iterator[Evidence]:
     """Find whether samples of a class refuse what lies outside the range of any number."""
-    for name in leaf_fields(cls):
-        yield from keeps_the_range_of(name)(cls)
-        yield from says_the_range_of(name)(cls)
-
-
-def keeps_the_range_of(name: str) -> Callable[[Class], Iterator[Evidence]]:
-    """Return the contract that a number outside its range is refused, and named."""
-
-    def contract(cls: Class) -> Iterator[Evidence]:
-        for par in samples(cls):
-            yield from refuses_outside(par, name, _says_which)
-
-    return contract
-
-
-def says_the_range_of(name: str) -> Callable[[Class], Iterator[Evidence]]:
-    """Return the contract that a refusal says what would be taken."""
-
-    def contract(cls: Class) -> Iterator[Evidence]:
-        for par in samples(cls):
-            yield from refuses_outside(par, name, _says_range)
-
-    return contract
+    for par in samples(cls):
+        for name in leaf_fields(cls):
+            yield from refuses_outside(par, name, _says_both)
 
 
 def set_keeps_its_ranges(par: ParameterSet) -> Iterator[Evidence]:
@@ -78,6 +58,10 @@ def _says_which(leaf: Leaf, value: float) -> tuple[str, ...]:
 def _says_range(leaf: Leaf, value: float) -> tuple[str, ...]:
     unit = "" if leaf.unit.symbol == "1" else f" {leaf.unit.symbol}"
     return f"{value}{unit}", leaf.range_text
+
+
+def _says_both(leaf: Leaf, value: float) -> tuple[str, ...]:
+    return *_says_which(leaf, value), *_says_range(leaf, value)
 
 
 def refuses_outside(
