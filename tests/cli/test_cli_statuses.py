@@ -107,8 +107,7 @@ def test_list_is_complete(bywire):
         assert all(kpi in text for kpi in kpis)
 
 
-@pytest.mark.parametrize("buffered", ["", "1"], ids=["buffered", "unbuffered"])
-@pytest.mark.parametrize("reader", ["true", "head -1"])
+@pytest.mark.parametrize(("buffered", "reader"), [("", "true"), ("1", "head -1")])
 def test_reader_that_leaves_is_no_error(buffered, reader):
     done = shell(f"(sleep 0.3; bywire list) | {reader}", PYTHONUNBUFFERED=buffered)
     assert (done.returncode, done.stderr) == (0, "")

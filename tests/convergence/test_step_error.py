@@ -1,8 +1,9 @@
-"""The error from the step that a run states: the true one, against 1 us, lies within it."""
+"""The error from the step that a run states: the true one, against a fine step, lies within it."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -21,9 +22,10 @@ from bywire.bench.step_error import OTHER_STEPS, with_step_errors
 from bywire.core.errors import BywireError, RunError
 from bywire.simulation.run import simulate
 
-FINE = 1e-6
 STATIC = ("stribeck", "open-loop")
 """one is computed without a run, the other needs a stimulus"""
+SERIES = ("repeated-stops",)
+"""twenty stops, each time"""
 
 
 def kpi(value: float, error: float = math.nan) -> Kpi:
@@ -167,9 +169,9 @@ def test_standing_wedge_brake_says_how_far_rows_leave_its_times_open():
     assert abs(fine.value - rest.value) <= rest.error
 
 
-def random_bench(rng: np.random.Generator) -> Bench:
+def random_bench(rng: np.random.Generator, left_out: Collection[str]) -> Bench:
     """Return an experiment of one of our brakes with three parameters changed and some step."""
-    names = [name for name in EXPERIMENTS.all() if name not in STATIC]
+    names = [name for name in EXPERIMENTS.all() if name not in (*STATIC, *left_out)]
     while True:
         bench = read(str(rng.choice(names)), {})
         values = {
@@ -185,15 +187,21 @@ def random_bench(rng: np.random.Generator) -> Bench:
             continue
 
 
-@pytest.mark.parametrize("count", [4, pytest.param(200, marks=pytest.mark.trust)])
-def test_true_error_lies_within_three_times_the_estimate(count):
-    """Of all figures of random benches, not significantly less than 95 %."""
+@pytest.mark.parametrize(
+    ("count", "fine", "left_out"),
+    [(4, 2.5e-6, SERIES), pytest.param(200, 1e-6, (), marks=pytest.mark.trust)],
+)
+def test_true_error_lies_within_three_times_the_estimate(count, fine, left_out):
+    """Of all figures of random benches, not significantly less than 95 %.
+
+    A fine step of a quarter of the smallest leaves a sixteenth of an error of second order.
+    """
     rng = np.random.default_rng(20)
     within = total = 0
     for _ in range(count):
-        bench = random_bench(rng)
+        bench = random_bench(rng, left_out)
         estimated = run(bench, estimate_error=True)
-        true = {each.name: each.value for each in run(replace(bench, step=FINE)).kpis}
+        true = {each.name: each.value for each in run(replace(bench, step=fine)).kpis}
         for each in estimated.kpis:
             if math.isnan(each.error) and math.isnan(true[each.name]):
                 continue
