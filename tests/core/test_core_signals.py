@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from bywire.core import errors, quantities, signals, units
 from bywire.core.errors import BywireError, ModelError, UnknownNameError, quoted, unknown_name
-from bywire.core.signals import Signal, signals_of, zeros
+from bywire.core.signals import Signal, joined, signals_of, zeros
 
 QUANTITIES = {
     name: value
@@ -153,3 +153,24 @@ def test_quoting_endless_nesting():
     assert quoted(value) == "a list"
     while value:  # taken apart by hand: the interpreter would recurse
         value = value.pop()
+
+
+class Speeds(NamedTuple):
+    """Some signals."""
+
+    v: Annotated[float, Signal("m/s", "speed")]
+
+
+class Forces(NamedTuple):
+    """Others."""
+
+    F: Annotated[float, Signal("N", "force")]
+
+
+def test_joined_tuples_have_all_fields_and_refuse_a_name_that_both_have():
+    both = joined(__name__, "Both", Speeds, Forces)
+    assert both(F=2.0, v=1.0)._asdict() == {"v": 1.0, "F": 2.0}
+    assert signals_of(both) == {**signals_of(Speeds), **signals_of(Forces)}
+    assert both.__module__ == __name__
+    with pytest.raises(ModelError, match=r"Speeds.v: another tuple .* rename one"):
+        joined(__name__, "Both", Speeds, Forces, Speeds)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import typing
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 from typing import Annotated, Any, Literal, NamedTuple, TypeVar
@@ -131,6 +131,32 @@ def merged_signals(
             if place not in where:
                 where.append(place)
     return [(name, signal, tuple(where)) for (name, signal), where in places.items()]
+
+
+def joined(module: str, name: str, *tuples: type[Any]) -> Any:
+    """Return a signal tuple with the fields of several, which that module keeps under the name.
+
+    For one memory of several controllers.
+
+    Raises
+    ------
+    ModelError
+        When two of them have a field of one name.
+    """
+    fields: list[tuple[str, Any]] = []
+    for each in tuples:
+        hints = typing.get_type_hints(each, include_extras=True)
+        for field in each._fields:
+            if field in dict(fields):
+                raise ModelError(
+                    f"{place_of(each)}: {each.__qualname__}.{field}: another tuple that is joined "
+                    "to this one has such a field too; rename one"
+                )
+            fields.append((field, hints[field]))
+    make: Callable[..., Any] = NamedTuple
+    merged = make(name, fields)
+    merged.__module__ = module
+    return merged
 
 
 def zeros(tuple_type: type[T]) -> T:

@@ -52,3 +52,47 @@ def test_too_little_grip_locks_the_wheel():
     # Locked, the road gives mu(1) and no more, whatever the brake presses.
     locked = run["a"].sel(time=slice(1.2, 1.4))
     assert float(locked.mean()) == pytest.approx(0.130 * 9.81, rel=5e-3)
+
+
+@pytest.fixture(scope="module")
+def panic():
+    return bywire.run("benches/corner_wet_stop.toml", estimate_error=False)
+
+
+def test_slip_control_stands_over_the_moment_control(panic):
+    # By speeds that the ECU estimates from pulses and an accelerometer.
+    assert len(panic.verdicts) == 3
+    assert all(verdict.met for verdict in panic.verdicts)
+    run = panic.recording
+    braked = run.sel(time=slice(0.0, panic.kpi("stopping_time").value))
+    assert (braked["M_set"] <= braked["M_most"] + 1e-9).all()
+    assert float(braked["M_most"].max()) == 1500.0
+    assert float(braked["abs"].mean()) > 0.9
+    # Nothing is built up while the gap is crossed, and the pads stay on the disc from then on.
+    bite = panic.kpi("first_bite").value
+    assert float(run["M_most"].sel(time=slice(0.01, bite - 2e-3)).max()) == 20.0
+    assert float(run["F_N"].sel(time=slice(bite + 2e-3, None)).min()) > 0.0
+    left = run["E_body"] + run["E_wheel"] + run["E_tyre"] + run["E_brake"] - run["W_slope"]
+    assert np.abs(left - left[0]).max() < 1e-6 * float(run["E_body"][0])
+
+
+def test_without_it_the_wheel_locks_and_slides_as_far_as_the_trial_says():
+    given = {"ecu.abs": "off", "options.duration": "8 s"}
+    result = bywire.run("corner-panic", given, estimate_error=False)
+    # 76.5 m with the wheel locked at once; before, the car rolls while the gap is crossed.
+    rolled = 100.0 / 3.6 * result.kpi("first_bite").value
+    assert result.kpi("stopping_distance").value == pytest.approx(76.5 + rolled, abs=0.5)
+    assert result.kpi("locked_time").value > 4.0
+
+
+def test_rules_and_a_step_of_half_the_length_on_the_corner():
+    rules = bywire.run("corner-panic", {"ecu.abs": "rules"}, estimate_error=False)
+    assert rules.kpi("braking_efficiency").value >= 85.0
+    assert rules.kpi("locked_time").value == 0.0
+    assert set(np.unique(rules.recording["phase_x"])) == {0.0, 1.0, 2.0, 3.0}
+    at = [
+        bywire.run("corner-panic", {"simulation.step": step}, estimate_error=False)
+        .kpi("stopping_distance").value
+        for step in ("40 us", "20 us")
+    ]  # fmt: skip
+    assert abs(at[0] - at[1]) < 0.01

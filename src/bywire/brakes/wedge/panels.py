@@ -37,7 +37,10 @@ CORNER = Panels(
     ("wedge-corner",),
     (
         Panel("speed", (Trace("v_x"), Trace("v_tread", Role.SECOND)), height=1.8),
-        Panel("slip", (Trace("slip"),)),
+        Panel(
+            "slip", (Trace("slip"), Trace("slip_hat", Role.SECOND)),
+            saturation="abs", saturated="slip control",
+        ),
         *BRAKING.panels[:2],
         Panel("normal force", (Trace("F_N"),)),
         BRAKING.panels[-1],

@@ -58,7 +58,7 @@ class Options(ParameterSet):
 
 def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tuple[Case, ...]:
     """Return the one run."""
-    given = {"command.mode": "moment", "flywheel.law": "coasting"}
+    given = {"command.mode": "moment", "flywheel.law": "coasting", "ecu.abs": "off"}
     changed = par.replace(given | laid("corner.road", options.surface))
     state, memory = at_speed(options.v_0, changed)
     levels = {0.0: options.M_brake, options.t_hold: 0.0}

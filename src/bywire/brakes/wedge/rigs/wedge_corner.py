@@ -9,12 +9,16 @@ from __future__ import annotations
 from typing import Any, ClassVar, Self
 
 from bywire.brakes.wedge import control
+from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import memory_at
+from bywire.core import ops
+from bywire.core.model import Task
 from bywire.core.parts import Shown
-from bywire.core.signals import Role
-from bywire.plant import flywheel
+from bywire.core.signals import Role, joined
+from bywire.plant import flywheel, road, wheel_encoder
+from bywire.vehicle import corner_slip
 from bywire.vehicle.corner import Corner, CornerParameters, WheelSpeed, rolling_states
 from bywire.vehicle.two_wheeler import BOOK
 
@@ -23,13 +27,21 @@ class WedgeCornerParameters(WedgeParameters):
     """The wedge brake, its flywheel for a wheel, and a quarter of a car."""
 
     corner: CornerParameters
+    ecu: corner_slip.Parameters
 
 
-class WedgeCorner(Corner[WedgeCornerParameters, control.Memory], WedgeBrake):
-    """The brake with all its controllers; the flywheel is the wheel, the road turns it."""
+Memory: Any = joined(__name__, "Memory", control.Memory, corner_slip.Memory)
+"""what moment, position and slip control hold"""
+
+
+class WedgeCorner(Corner[WedgeCornerParameters, Any], WedgeBrake):
+    """The brake with all its controllers; the flywheel is the wheel, the road turns it.
+
+    Slip control stands over the moment control: it lowers the moment that is demanded of it.
+    """
 
     name: ClassVar[str] = "wedge-corner"
-    Memory: ClassVar = control.Memory
+    Memory: ClassVar = Memory
     Stimulus: ClassVar = control.Stimulus
 
     E_wheel = Shown("J", "energy of the wheel", role=Role("sink", "wheel", book=BOOK))
@@ -39,7 +51,8 @@ class WedgeCorner(Corner[WedgeCornerParameters, control.Memory], WedgeBrake):
 
     records: ClassVar[tuple[str, ...]] = (
         "s", "v_x", "v_tread", "a", "slip", "sliding", "u", "F_x", "N_x", "t_locked", "E_body",
-        "E_wheel", "E_tyre", "E_brake", "W_slope", *WedgeBrake.records,
+        "E_wheel", "E_tyre", "E_brake", "W_slope", "M_most", "v_hat", "slip_hat", "abs", "phase_x",
+        *WedgeBrake.records,
     )  # fmt: skip
 
     def wheel(self, w: Self) -> WheelSpeed:
@@ -58,13 +71,38 @@ class WedgeCorner(Corner[WedgeCornerParameters, control.Memory], WedgeBrake):
             "E_brake": w.flow.W_brake,
         }
 
-    def rest(self, par: Any) -> tuple[Any, control.Memory]:
+    def tasks(self, par: Any) -> tuple[Task, ...]:
+        """Return slip control above the brake's own controllers, where it may lower a moment."""
+        brake = super().tasks(par)
+        if par.ecu.abs == "off" or par.command.mode != "moment":
+            return brake
+        return (Task("slip", par.ecu.T_s, _slip), *brake)
+
+    def _moment(self, x: Any, m: Any, u: control.Stimulus, par: Any) -> Any:
+        left = u if par.ecu.abs == "off" else u._replace(M_set=m.M_left)
+        return super()._moment(x, m, left, par)
+
+    def rest(self, par: Any) -> tuple[Any, Any]:
         """Return the vehicle standing, the brake parked."""
         return at_speed(0.0, par)
 
 
-def at_speed(v: float, par: WedgeCornerParameters) -> tuple[Any, control.Memory]:
+def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> Any:
+    """Run slip control once."""
+    edge = wheel_encoder.reading(
+        wheel_encoder.State(x.phi), wheel_encoder.Input(x.Omega), par.ecu.encoder
+    )
+    sine = road.slope(x.s, par.corner.road).sine
+    seen = corner_slip.Readings(
+        x.v_x, x.Omega * par.corner.r, edge.angle, edge.age, par.corner.body.g * sine,
+        ops.where((m.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
+    )  # fmt: skip
+    return corner_slip.tick(seen, m, u.M_set, par.ecu)
+
+
+def at_speed(v: float, par: WedgeCornerParameters) -> tuple[Any, Any]:
     """Return the corner rolling at a speed [m/s], its brake parked."""
     brake = state_at(0.0, par)._asdict() | {"Omega": v / par.corner.r}
     rolling = WedgeCorner.state(**rolling_states(v))._asdict()
-    return WedgeCorner.State(**(rolling | brake)), memory_at(0.0, par)
+    held = memory_at(0.0, par)._asdict() | corner_slip.awake(v, par.ecu)
+    return WedgeCorner.State(**(rolling | brake)), Memory(**held)

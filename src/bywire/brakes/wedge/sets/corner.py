@@ -13,6 +13,13 @@ _ADHESION = {
     for name, value in SURFACES["dry-asphalt"]._asdict().items()
 }
 
+_RULES_FROM = "as tuned for pressure loops of 10 Hz on a motorcycle, none for this brake"
+_RULES = {
+    "slip_keep": 0.35, "slip_dump": 0.46, "slip_back": 0.2, "t_lead": 0.13, "a_hold": 14.0,
+    "t_hold": 0.035, "t_most": 0.24, "dump": 90.0, "depth": 0.92, "back": 1.02, "t_step": 0.025,
+    "step": 0.05, "growth": 1.12, "tau_a": 0.005, "tau_p": 0.025, "v_off": 2.0, "v_fall": 5.0,
+}  # fmt: skip
+
 CORNER = CitedSet(
     name="roberts2003-corner",
     assembly="wedge-corner",
@@ -24,6 +31,34 @@ CORNER = CitedSet(
     values={
         **roberts2003.ENTRIES[0].values,
         "flywheel.J_F": chosen(1.2, "wheel, tyre and disc of a mid-size car"),
+        "ecu.T_s": chosen(1e-3, "as the moment control's"),
+        "ecu.abs": chosen("pi", "an experiment's choice"),
+        "ecu.sees": chosen("estimated", "as on the road"),
+        "ecu.M_rate": chosen(18e3, "what the software rate limit of 60 rad/s gives, 300 N m/rad"),
+        "ecu.M_least": chosen(20.0, "above the threshold of contact: no gap to be crossed again"),
+        "ecu.encoder.law": chosen("pulses", "as wheel sensors are"),
+        "ecu.encoder.pulses": chosen(48.0, "usual; 100 on some"),
+        "ecu.encoder.omega_min": chosen(0.1, "far below walking pace"),
+        "ecu.tau_a": chosen(0.01, "short beside the moment loop"),
+        "ecu.wheel_speed.law": chosen("period", "differences of 48 pulses are too coarse"),
+        "ecu.wheel_speed.pulses": chosen(48.0, "as the sensor has"),
+        "ecu.vehicle_speed.law": chosen("accelerometer", "there is one wheel, and it slips"),
+        "ecu.vehicle_speed.a_max": chosen(12.26, "1.25 g"),
+        "ecu.vehicle_speed.slip_small": chosen(0.005, "a rolling wheel's"),
+        "ecu.vehicle_speed.tau": chosen(0.2, "long beside the first bite, which slips less"),
+        "ecu.vehicle_speed.v_still": chosen(1.0, "an edge then comes every 40 ms"),
+        "ecu.slip.schedule": chosen("speed", "gain and pole of a wheel fall with its speed"),
+        "ecu.slip.slip_set": chosen(0.105, "0.8 of the peak's on wet asphalt"),
+        "ecu.slip.omega_c": chosen(16.0, "a third of the moment loop's 8 Hz"),
+        "ecu.slip.T_i": chosen(0.25, "four times the crossover's"),
+        "ecu.slip.T_t": chosen(0.0625, "the crossover's"),
+        "ecu.slip.v_off": chosen(2.0, "48 pulses then come every 20 ms"),
+        "ecu.slip.v_fall": chosen(6.0, "an edge of 48 pulses comes every 7 ms"),
+        "ecu.slip.v_fixed": chosen(15.0, "the middle of a stop"),
+        "ecu.slip.J_hat": chosen(1.2, "that of the wheel"),
+        "ecu.slip.r_hat": chosen(0.30, "that of the wheel"),
+        "ecu.slip.k_hat": chosen(1e-4, "1000 N m stand for 100 bar: no number depends on it"),
+        **{f"ecu.rules.{name}": chosen(value, _RULES_FROM) for name, value in _RULES.items()},
         "corner.body.m": chosen(450.0, "front corner of a mid-size car"),
         "corner.body.g": chosen(9.81, "gravity"),
         "corner.r": chosen(0.30, "rolling radius of a mid-size car's wheel"),

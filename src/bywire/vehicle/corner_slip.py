@@ -1,0 +1,146 @@
+"""Slip control of a car's corner: it lowers the moment that is demanded of any brake.
+
+The laws speak of pressure. A brake that follows a moment has none: its demand is handed to them as
+the pressure of a brake with ``slip.k_hat``, and what they leave of it is a moment again.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import Field
+
+from bywire.control import abs_rules, slip_pi, vehicle_speed, wheel_speed
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Duration, TimeConstant, Unit
+from bywire.core.signals import Signal, zeros
+from bywire.plant import wheel_encoder
+
+SomeMoment = Annotated[float, Unit("N*m", 10.0), Field(ge=0, allow_inf_nan=False)]
+MomentRate = Annotated[float, Unit("N*m/s", 1e4), Field(gt=0, allow_inf_nan=False)]
+
+
+class Parameters(ParameterSet):
+    """Sensors and laws of one wheel.
+
+    ``abs``: ``"pi"`` holds a slip, ``"rules"`` build, dump and hold by thresholds, ``"off"`` leaves
+    the demand as it is. ``sees``: speed and slip are ``"estimated"`` from pulses and an
+    accelerometer, or ``"known"``, for comparison.
+    """
+
+    T_s: Duration
+    """sample time"""
+    abs: Literal["off", "pi", "rules"]
+    """control of the wheel's slip"""
+    sees: Literal["estimated", "known"]
+    """whether speed and slip are estimated"""
+    M_rate: MomentRate
+    """fastest build-up of a demand"""
+    M_least: SomeMoment
+    """what slip control leaves at least, so that the pads stay on the disc"""
+    encoder: wheel_encoder.Parameters
+    tau_a: TimeConstant
+    """time constant of the accelerometer's filter"""
+    wheel_speed: wheel_speed.Parameters
+    vehicle_speed: vehicle_speed.Parameters
+    slip: slip_pi.Parameters
+    rules: abs_rules.Parameters
+
+
+class Memory(NamedTuple):
+    """What slip control holds between its ticks."""
+
+    M_left: Annotated[float, Signal("N*m", "moment that slip control left", 300.0)]
+    M_most: Annotated[float, Signal("N*m", "moment demand, build-up limited", 300.0)]
+    v_hat: Annotated[float, Signal("m/s", "reference speed", 20.0, set_point_of="v_x")]
+    slip_hat: Annotated[float, Signal("1", "slip as the ECU sees it", 0.1)]
+    a_hat: Annotated[float, Signal("m/s**2", "measured deceleration", 10.0)]
+    abs: Annotated[float, Signal("1", "slip control acts")]
+    tread_hat: Annotated[float, Signal("m/s", "measured speed of the tread", 20.0)]
+    omega_hat: Annotated[float, Signal("rad/s", "measured wheel speed", 60.0)]
+    edge: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
+    age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
+    v_last: Annotated[float, Signal("m/s", "speed at the last sample, in the sensor", 20.0)]
+    slip_integral: Annotated[float, Signal("Pa", "integral part of the slip PI", 1e6)]
+    phase_x: Annotated[float, Signal("1", "phase of the rules", 3.0)]
+    since_x: Annotated[float, Signal("s", "time since the rules' last phase or step", 0.1)]
+    p_left_x: Annotated[float, Signal("Pa", "demand that rules left", 1e6)]
+    p_hat_x: Annotated[float, Signal("Pa", "pressure as rules believe it", 1e6)]
+    p_held_x: Annotated[float, Signal("Pa", "pressure that the wheel's road held", 1e6)]
+    rise_x: Annotated[float, Signal("Pa", "next step of the pressure", 1e5)]
+    slowing_x: Annotated[float, Signal("m/s**2", "wheel's deceleration, filtered", 10.0)]
+
+
+class Readings(NamedTuple):
+    """What there is to be seen at a tick of vehicle and wheel, of the slope, and of the brake."""
+
+    v: Annotated[float, Signal("m/s", "vehicle speed", 20.0)]
+    v_wheel: Annotated[float, Signal("m/s", "speed of the tread", 20.0)]
+    angle: Annotated[float, Signal("rad", "angle of the last edge", 100.0)]
+    age: Annotated[float, Signal("s", "time since the last edge", 1e-3)]
+    weight: Annotated[float, Signal("m/s**2", "gravity along the road", 0.5)]
+    touches: Annotated[float, Signal("1", "pads are on the disc")]
+
+
+def awake(v: float, par: Parameters) -> dict[str, float]:
+    """Return the memory of slip control that has seen a corner roll at a speed [m/s]."""
+    omega = v / par.slip.r_hat
+    seen = zeros(Memory)._replace(
+        v_hat=v, v_last=v, tread_hat=v, omega_hat=omega, edge=-omega * par.T_s
+    )
+    return seen._asdict()
+
+
+def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
+    """Run slip control once: measure, limit the build-up, then lower it.
+
+    ``m``: a memory with the fields of `Memory`; ``M_set``: the moment demanded [N m].
+    """
+    before, m = m, _measured(r, m, par)
+    k = par.slip.k_hat
+    # While a gap is crossed nothing is built up, and the law's integral waits for the pads, too.
+    risen = ops.where(r.touches > 0.5, m.M_most + par.M_rate * par.T_s, par.M_least)
+    m = m._replace(M_most=ops.fmin(M_set, risen))
+    p_most, p_before = m.M_most / k, ops.where(r.touches > 0.5, before.M_most, 0.0) / k
+    if par.abs == "pi":
+        seen = slip_pi.Input(
+            m.v_hat, slip_pi.set_point(m.v_hat, par.slip), m.slip_hat, M_set / k, p_most, p_before
+        )
+        state, out = slip_pi.output(slip_pi.State(m.slip_integral), seen, par.T_s, par.slip)
+        m = m._replace(slip_integral=state.integral)
+    else:
+        view = abs_rules.Input(
+            m.v_hat, m.a_hat, m.tread_hat, before.tread_hat, m.slip_hat,
+            par.slip.J_hat / (par.slip.r_hat * k), p_most, p_before, before.M_left / k,
+        )  # fmt: skip
+        rules = abs_rules.State(*(getattr(m, f"{name}_x") for name in abs_rules.State._fields))
+        rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
+        m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
+    left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
+    return m._replace(M_left=left, abs=out.lowered)
+
+
+def _measured(r: Readings, m: Any, par: Parameters) -> Any:
+    """Return the memory with speeds, slip and deceleration as the ECU sees them."""
+    T = par.T_s
+    wheel = wheel_speed.output(
+        wheel_speed.State(m.edge, m.age, m.omega_hat), wheel_speed.Input(r.angle, r.age), T,
+        par.wheel_speed,
+    )  # fmt: skip
+    shown = (m.v_last - r.v) / T - r.weight
+    v, tread = r.v, r.v_wheel
+    if par.sees == "estimated":
+        tread = wheel.omega * par.slip.r_hat
+        seen = vehicle_speed.Input(tread, tread, shown)
+        v = vehicle_speed.output(vehicle_speed.State(m.v_hat), seen, T, par.vehicle_speed).v
+    return m._replace(
+        v_hat=v,
+        slip_hat=vehicle_speed.slip(v, tread, par.slip.v_off),
+        a_hat=m.a_hat + T / (par.tau_a + T) * (shown - m.a_hat),
+        tread_hat=tread,
+        omega_hat=wheel.omega,
+        edge=wheel.angle,
+        age=wheel.age,
+        v_last=r.v,
+    )
