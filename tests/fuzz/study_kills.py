@@ -114,7 +114,7 @@ def _killed(rng: Random, path: Path, out: Path, options: list[str], further: int
     with subprocess.Popen(
         line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=_environment()
     ) as process:
-        time.sleep(rng.uniform(0.5, 9.0))
+        _waited(rng, process, out / "chunks")
         below = _children(process.pid)
         workers = [*below, *(_children(further) if further else [])]
         victim = rng.choice(workers) if workers and rng.random() < 0.5 else process.pid
@@ -138,10 +138,24 @@ def _killed(rng: Random, path: Path, out: Path, options: list[str], further: int
     return ""
 
 
+def _waited(rng: Random, process: subprocess.Popen[str], chunks: Path) -> None:
+    """Wait for any time, or until a further chunk is there and a moment more."""
+    if rng.random() < 0.3:
+        time.sleep(rng.uniform(0.5, 9.0))
+        return
+    before, give_up = len([*chunks.glob("*")]), time.monotonic() + _LONGEST
+    while process.poll() is None and time.monotonic() < give_up:
+        if len([*chunks.glob("*")]) > before:
+            time.sleep(rng.expovariate(4.0))
+            return
+        time.sleep(0.005)
+
+
 def _children(pid: int) -> list[int]:
     """Return the workers that a process has started (Linux)."""
     try:
-        below = Path(f"/proc/{pid}/task/{pid}/children").read_text().split()
+        tasks = Path(f"/proc/{pid}/task").glob("*/children")  # of every thread
+        below = [each for task in tasks for each in task.read_text().split()]
         lines = {int(x): Path(f"/proc/{x}/cmdline").read_bytes() for x in below}
     except OSError:  # it has ended
         return []

@@ -9,7 +9,7 @@ of a signal, is made and answers.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import cached_property
 from numbers import Number
 from typing import Any
@@ -220,6 +220,12 @@ class Rows:
         return Rows(
             self._values[TIME], {**every, **signals}, {**self._attributes, **attributes}
         )
+
+    def drop_vars(self, names: str | Collection[str]) -> Rows:
+        """Return the rows without some signals."""
+        left_out = {names} if isinstance(names, str) else set(names)
+        kept = {name: self._values[name] for name in self._signals if name not in left_out}
+        return self._like(kept, self._attributes)
 
     @property
     def data_vars(self) -> Mapping[str, Row]:

@@ -13,6 +13,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import xarray as xr
@@ -142,7 +143,8 @@ def loop_width_mid(loop: Loop) -> float | Undefined:
     branch's, each interpolated between samples. Ripple makes a branch cross several times: the
     mean over the crossings keeps its effect small; `smoothed` removes it.
     """
-    width = _width(loop, 0.5 * float(np.min(loop.response) + np.max(loop.response)))
+    middle = 0.5 * float(np.min(loop.response) + np.max(loop.response))
+    (width,) = _widths(loop, np.array([middle]))
     if math.isnan(width):
         return Undefined("the release ends above mid-height")
     return width
@@ -157,8 +159,7 @@ def loop_width_max(loop: Loop) -> float | Undefined:
     left out. Ripple widens it by up to its peak to peak value.
     """
     levels = np.linspace(np.min(loop.response), np.max(loop.response), _LEVELS + 2)[1:-1]
-    widths = [_width(loop, float(level)) for level in levels]
-    reached = [width for width in widths if not math.isnan(width)]
+    reached = [width for width in _widths(loop, levels) if not math.isnan(width)]
     return max(reached, key=abs) if reached else Undefined("the response never falls again")
 
 
@@ -175,19 +176,28 @@ def loop_area(loop: Loop) -> float | Undefined:
     return float(np.sum(0.5 * (x + np.roll(x, -1)) * (np.roll(y, -1) - y)))
 
 
-def _width(loop: Loop, level: float) -> float:
-    apply, release = (_mean_crossing(x, y, level) for x, y in loop.branches)
-    return apply - release
+def _widths(loop: Loop, levels: Array) -> list[float]:
+    """Return the width of the loop at levels that rise."""
+    apply, release = (_mean_crossings(x, y, levels) for x, y in loop.branches)
+    return [a - b for a, b in zip(apply, release, strict=True)]
 
 
-def _mean_crossing(x: Array, y: Array, level: float) -> float:
-    """Return the mean drive where a branch crosses a level, NaN where it does not."""
-    above = y >= level
-    k = np.flatnonzero(above[1:] != above[:-1])
-    if k.size == 0:
-        return math.nan
-    share = (level - y[k]) / (y[k + 1] - y[k])
-    return float(np.mean(x[k] + share * (x[k + 1] - x[k])))
+def _mean_crossings(x: Array, y: Array, levels: Array) -> list[float]:
+    """Return the mean drive where a branch crosses each level, NaN where it does not."""
+    reached = np.searchsorted(levels, y, side="right")  # how many levels a sample has reached
+    low = np.minimum(reached[1:], reached[:-1])
+    count = np.abs(np.diff(reached))
+    k = np.repeat(np.arange(count.size), count)
+    level = np.arange(k.size) - np.repeat(np.cumsum(count) - count, count) + low[k]
+    order = np.argsort(level, kind="stable")
+    k, level = k[order], level[order]
+    share = (levels[level] - y[k]) / (y[k + 1] - y[k])
+    crossings = x[k] + share * (x[k + 1] - x[k])
+    ends = np.searchsorted(level, np.arange(levels.size + 1))
+    return [
+        float(np.mean(crossings[begin:end])) if end > begin else math.nan
+        for begin, end in pairwise(ends.tolist())
+    ]
 
 
 def _cycles(y: Array) -> int:
