@@ -9,7 +9,7 @@ from functools import cache
 import pytest
 from matplotlib.figure import Figure
 
-from bywire.report import files, inline_figure
+from bywire.report import drawing, files, inline_figure
 
 _drawn = files.figure_bytes
 
@@ -32,7 +32,7 @@ def drawn_once(laid_out: bool = False) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(files, "PNG_DPI", 50)
         if not laid_out:
-            patch.setattr(files, "_settle", lambda figure: figure.set_layout_engine("none"))
+            patch.setattr(drawing, "settle", lambda figure: figure.set_layout_engine("none"))
         patch.setattr(inline_figure, "figure_bytes", lambda figure, kind="png": _empty(kind))
         yield
 

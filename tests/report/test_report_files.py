@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import os
+import struct
+import subprocess
+import sys
 from functools import partial
 from pathlib import Path
+from unittest.mock import Mock
 
 import pytest
 import xarray as xr
 from matplotlib.figure import Figure
+from matplotlib.image import imread as png_pixels
 
 from bywire.core.errors import FileError
 from bywire.report.files import figure_bytes, save_figure, write_bytes
@@ -25,16 +31,33 @@ def test_the_same_figure_gives_the_same_bytes(recording: xr.Dataset, kind: str) 
     assert figure_bytes(step_figure(recording), kind) == first
 
 
-def test_a_figure_is_drawn_once_for_each_format(
+def test_a_figure_is_drawn_once_for_both_formats_and_again_when_it_is_changed(
     recording: xr.Dataset, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    drawn: list[object] = []
-    draw = Figure.draw
-    monkeypatch.setattr(Figure, "draw", lambda *args: (drawn.append(args), draw(*args))[1])
+    draw = Mock(side_effect=Figure.draw)
+    monkeypatch.setattr(Figure, "draw", lambda *args: draw(*args))
     figure = step_figure(recording)
-    figure_bytes(figure, "png")
-    figure_bytes(figure, "svg")
-    assert len(drawn) == 2
+    first = figure_bytes(figure, "png")
+    assert b"changed" not in figure_bytes(figure, "svg")
+    assert draw.call_count == 1
+    figure.axes[0].set_xlabel("changed")
+    assert b">changed</text>" in figure_bytes(figure, "svg")
+    assert figure_bytes(figure, "png") != first
+    assert draw.call_count == 2
+
+
+def test_both_formats_have_the_size_of_the_figure(recording: xr.Dataset) -> None:
+    figure = step_figure(recording)
+    width, height = figure.get_size_inches()
+    resolution = figure.dpi
+    png, svg = (figure_bytes(figure, kind) for kind in ("png", "svg"))
+    assert struct.unpack(">II", png[16:24]) == (int(160 * width), int(160 * height))
+    pixels = png_pixels(io.BytesIO(png))
+    assert pixels.shape == (int(160 * height), int(160 * width), 3)
+    assert pixels.min() < 0.2
+    assert pixels[0, 0].tolist() == [1.0, 1.0, 1.0]
+    assert f'width="{72 * width:g}pt" height="{72 * height:g}pt"'.encode() in svg
+    assert figure.dpi == resolution
 
 
 def test_order_of_formats_does_not_matter(recording: xr.Dataset) -> None:
@@ -84,3 +107,16 @@ def test_a_written_file_has_the_usual_permissions(tmp_path: Path) -> None:
     plain = tmp_path / "plain"
     plain.write_bytes(b"")
     assert write_bytes(tmp_path / "ours", b"").stat().st_mode == plain.stat().st_mode
+
+
+def test_figures_are_drawn_as_well_without_descriptions_of_what_can_be_set() -> None:
+    code = (
+        "from bywire.report.answer import leave_out_descriptions; leave_out_descriptions()\n"
+        "from matplotlib.figure import Figure\n"
+        "from bywire.report.files import figure_bytes\n"
+        "(line,) = (figure := Figure()).subplots().plot([0, 1], label='a')\n"
+        "line.set(color='red'); figure.axes[0].legend()\n"
+        "print('linewidth' in str(line.set.__doc__), b'ff0000' in figure_bytes(figure, 'svg'))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False True"

@@ -43,9 +43,16 @@ def show(
     typer.Exit
         With status 1 where something required does not hold, and 130 after an interrupt.
     """
-    from bywire.report.answer import AnswerWarning, with_files, write_document
+    from bywire.report.answer import (
+        AnswerWarning,
+        leave_out_descriptions,
+        with_files,
+        write_document,
+    )
     from bywire.report.terminal import terminal_text
 
+    if out is not None:
+        leave_out_descriptions()
     files: list[Path] = []
     trouble: BywireError | None = None
     with warnings.catch_warnings(record=True) as caught:

@@ -175,6 +175,19 @@ def with_files(document: Document, files: list[Path]) -> dict[str, Any]:
     return {**shown, "files": [*shown.get("files", []), *map(str, files)]}
 
 
+def leave_out_descriptions() -> None:
+    """Have matplotlib do without descriptions of all that can be set.
+
+    It makes signatures and docstrings of every artist's properties when it is loaded, which takes
+    a third of that time, and no command shows them.
+    """
+    from matplotlib import artist
+
+    of_all: Any = artist.Artist
+    setattr(artist, "kwdoc", lambda _: "")  # noqa: B010 - a function is no variable to mypy
+    of_all._update_set_signature_and_docstring = classmethod(lambda _: None)
+
+
 def finite(value: Any) -> Any:
     """Return plain data with null for what is infinite or not defined: JSON has no such numbers."""
     if isinstance(value, dict):

@@ -40,14 +40,18 @@ def _svg(figure: Figure, text: str, prefix: str) -> str:
     svg = whole[whole.index("<svg") :].strip()
     svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<style.*?</style>", "", svg, flags=re.S)
     head, body = svg.split(">", 1)
-    view = re.search(r'viewBox="([\d. ]+)"', head)
-    box = view[1] if view else "0 0 1 1"
-    body = body.replace("xlink:href=", "href=")
-    body = re.sub(r'\bid="', f'id="{prefix}', body)
-    body = re.sub(r'(href="|url\()#', rf"\1#{prefix}", body)
-    body = re.sub(r'\bd="[^"]*"', lambda m: re.sub(r"(\.\d\d)\d+", r"\1", m[0]), body)
+    kept = " ".join(re.findall(r'(?:viewBox|font-family)="[^"]*"', head))
+    body = re.sub(r"<[^>]*>", lambda tag: _tag(tag[0], prefix), body)
     body = re.sub(r"\s*\n\s*", "\n", body)
-    return f'<svg viewBox="{box}" role="img" aria-label="{_attribute(text)}">{body}'
+    return f'<svg {kept} role="img" aria-label="{_attribute(text)}">{body}'
+
+
+def _tag(tag: str, prefix: str) -> str:
+    """Return a tag with ids of its own, and coordinates that are no finer than the eye."""
+    if "#" in tag or ' id="' in tag:
+        tag = re.sub(r'\bid="', f'id="{prefix}', tag.replace("xlink:href=", "href="))
+        tag = re.sub(r'(href="|url\()#', rf"\1#{prefix}", tag)
+    return re.sub(r'\bd="[^"]*"', lambda m: re.sub(r"(\.\d)\d+", r"\1", m[0]), tag)
 
 
 def _png(figure: Figure, text: str) -> str:
