@@ -14,6 +14,7 @@ import bywire
 from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.key_figures import key_figures_of
+from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.rows import Rows
 from bywire.bench.running import run_of
 from bywire.bench.stimuli.registry import STIMULI
@@ -34,11 +35,14 @@ FIRST = dict(reversed(PAIRS))  # of every experiment, the first parameter set th
 LINES = 'experiment = "{}"\nparameters = "{}"\n'
 FEWER = {  # of experiments of many runs, which tests of their brakes run as they are
     "static-force": 'mu_B = "0.2, 0.6"', "friction-sweep": 'mu_B = "0.2, 0.6"',
-    "position-step": 'amplitudes = "0.5 rad"',
+    "position-step": 'amplitudes = "0.5 rad"', "repeated-stops": "stops = 3",
 }  # fmt: skip
-LARGE = ("disc-stop", "force-cycle", "static-force", "stiffness")
-"""kernels in lanes that no other test needs take half a minute; other experiments have the same
-families of key figures"""
+LARGE = (
+    "bandwidths", "corner-stop", "disc-stop", "force-cycle", "friction-ramp", "friction-sweep",
+    "position-step", "rear-lift", "repeated-stops", "slope-hold", "static-force", "stiffness",
+)  # fmt: skip
+"""kernels in lanes that no other test needs, and long runs; other experiments of the same models
+have their figures computed in the same way, and all that are computed by families are left"""
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 
@@ -108,6 +112,14 @@ def test_plain_rows_give_the_same_figures(results, name):
     kpis = EXPERIMENTS.all()[name].judge(rows, result.bench.chosen_options)
     exact = {kpi.name: kpi.value for kpi in result.kpis}
     assert {kpi.name: kpi.value for kpi in kpis} == pytest.approx(exact, rel=0, abs=0, nan_ok=True)
+
+
+def test_all_experiments_judged_by_families_are_put_to_the_test():
+    judged = {n for n, each in EXPERIMENTS.all().items() if isinstance(each.judge, FamilyJudge)}
+    assert len(judged) >= 3
+    assert not judged & set(LARGE)
+    left = {EXPERIMENTS.all()[name].assembly for name in NAMES if name not in LARGE}
+    assert left == {each.assembly for each in EXPERIMENTS.all().values()} - {"wedge-corner"}
 
 
 def _rows(recording):
