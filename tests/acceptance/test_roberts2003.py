@@ -16,7 +16,7 @@ import pytest
 from bywire.brakes.wedge.paper.roberts2003 import PARTS, reproduce
 from bywire.brakes.wedge.paper.runs import parameters
 from bywire.reproduction.reproduction import Reproduction
-from undrawn import drawn_once
+from undrawn import drawn_once, undrawn
 
 Items = Mapping[str, dict[str, Any]]
 TAN_ALPHA = math.tan(math.radians(20.0))
@@ -261,7 +261,7 @@ def test_report_opens_with_causes_and_shows_every_figure(
     names = {exhibit.name for exhibit in reproduction.figures}
     assert names >= {"fig5", "fig6", "fig7", "fig8", "fig9"}
     assert names >= {"brake-factor", "power-off-hold", "force-fight"}
-    with drawn_once():
+    with undrawn():  # drawn and laid out they are by a trust test
         paths = reproduction.write(tmp_path)
     html = (tmp_path / "report.html").read_text(encoding="utf-8")
     assert html.count("<figcaption>Figure") == len(reproduction.figures)
