@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from bywire.api.design import design
     from bywire.api.export_controller import ControllerExport, export_controller
     from bywire.api.export_fmu import ExportedFmu, export_fmu
+    from bywire.api.export_wasm import ExportedWasm, export_wasm
     from bywire.api.frequency_response import frequency_response
     from bywire.api.identification import Identification
     from bywire.api.identify import identify
@@ -103,6 +104,8 @@ _HOMES = {
     "design": "api.design",
     "ExportedFmu": "api.export_fmu",
     "export_fmu": "api.export_fmu",
+    "ExportedWasm": "api.export_wasm",
+    "export_wasm": "api.export_wasm",
     "study": "api.study",
     "reproduce": "api.reproduce",
     "describe": "api.describe",
@@ -133,6 +136,7 @@ __all__ = [
     "Conversion",
     "Ensemble",
     "ExportedFmu",
+    "ExportedWasm",
     "Identification",
     "LifeResult",
     "NewBrake",
@@ -151,6 +155,7 @@ __all__ = [
     "design",
     "export_controller",
     "export_fmu",
+    "export_wasm",
     "frequency_response",
     "identify",
     "linearize",

@@ -27,6 +27,9 @@ ExportFolder = Annotated[
                  show_default=False),
 ]  # fmt: skip
 Precision = Annotated[str, typer.Option(help="Numbers of the C: double, or single.")]
+RunLabel = Annotated[
+    str, typer.Option("--case", help="Run of the experiment; needed where there are several.")
+]
 
 
 @export_app.command("controller")
@@ -56,9 +59,7 @@ def export_fmu_command(
     out: ExportFolder,
     part: Annotated[str, typer.Option(help="brake, plant or ecu.")] = "brake",
     fmi: Annotated[int, typer.Option(help="Version of the interface: 2 or 3.")] = 2,
-    case: Annotated[
-        str, typer.Option(help="Run of the experiment; needed where there are several.")
-    ] = "",
+    case: RunLabel = "",
     target: Annotated[
         list[str] | None,
         typer.Option(help="System, e.g. linux64 or win64; may be given several times."),
@@ -76,3 +77,17 @@ def export_fmu_command(
         ),
         None, json,
     )  # fmt: skip
+
+
+@export_app.command("wasm")
+def export_wasm_command(
+    bench: BenchFile,
+    out: ExportFolder,
+    case: RunLabel = "",
+    set_: BenchChanges = None,
+    json: JsonFlag = False,
+) -> None:
+    """Write a run as WebAssembly with a loader: parameters in, recording out."""
+    from bywire.api.export_wasm import export_wasm
+
+    show(lambda _: export_wasm(bench, out, changes(set_), case=case), None, json)

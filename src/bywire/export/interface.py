@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -235,3 +236,15 @@ def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:
     low = math.nextafter(leaf.low, math.inf) if leaf.low_open else leaf.low
     high = math.nextafter(leaf.high, -math.inf) if leaf.high_open else leaf.high
     return (None if math.isinf(leaf.low) else low, None if math.isinf(leaf.high) else high)
+
+
+def identifier_of(name: str) -> str:
+    """Return a name of C for a bench.
+
+    Examples
+    --------
+    >>> identifier_of("2nd brake: 37 bar")
+    'b2nd_brake_37_bar'
+    """
+    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "bench"
+    return plain[:60] if plain[0].isalpha() else f"b{plain[:59]}"

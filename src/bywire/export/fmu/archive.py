@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import re
 import zipfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from bywire.export.fmu.description3 import build_description, description_3
 from bywire.export.fmu.documentation import documentation
 from bywire.export.fmu.model_header import model_header
 from bywire.export.initial_values import start_source
-from bywire.export.interface import Interface, Part, interface
+from bywire.export.interface import Interface, Part, identifier_of, interface
 from bywire.simulation.run import sampled_stimulus, simulate
 
 HERE = Path(__file__).parent
@@ -98,20 +97,7 @@ def unit_of(made: Exported, part: Part, version: int) -> Unit:
         "model.h": model_header(made, faces, start, token),
         **functions,
     }
-    return Unit(made, faces, version, identifier_of(name, part), token, bool(start), files)
-
-
-def identifier_of(name: str, part: Part) -> str:
-    """Return a name of C for a bench's part.
-
-    Examples
-    --------
-    >>> identifier_of("2nd brake: 37 bar", "plant")
-    'b2nd_brake_37_bar_plant'
-    """
-    plain = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "bench"
-    plain = plain[:60] if plain[0].isalpha() else f"b{plain[:59]}"
-    return f"{plain}_{part}"
+    return Unit(made, faces, version, f"{identifier_of(name)}_{part}", token, bool(start), files)
 
 
 def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progress) -> list[str]:

@@ -1,0 +1,32 @@
+/** A number that may be set. */
+export interface Parameter {
+  name: string; unit: string; start: number; low: number | null; high: number | null;
+  range: string; meaning: string;
+  /** Whether this structure's equations read it. */
+  used: boolean;
+}
+export interface Signal { name: string; unit: string; label: string }
+/** What drives the run: values that hold from their times on. */
+export interface Stimulus extends Signal { steps: [number, number][] }
+export interface Description {
+  name: string; model: string; duration: number; settle: number; step: number; frame: number;
+  recordFrames: number; stimulusFrames: number; stateLength: number; beginsAtRest: boolean;
+  choices: Record<string, string | number>;
+  parameters: Parameter[]; stimulus: Stimulus[]; signals: Signal[];
+}
+export interface Options {
+  /** By name: rows, one for each interval of the fastest task, or steps [time, value]. */
+  stimulus?: Record<string, Float64Array | [number, number][]>;
+  duration?: number;
+}
+export interface Recording {
+  time: Float64Array;
+  signals: Record<string, Float64Array>;
+  /** Whether contacts and frictions settled in all substeps, and all values are numbers. */
+  settled: boolean;
+}
+export interface Brake {
+  description: Description;
+  run(parameters?: Record<string, number>, options?: Options): Recording;
+}
+export function load(bytes: BufferSource, description: Description): Promise<Brake>;

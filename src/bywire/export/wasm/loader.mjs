@@ -1,0 +1,98 @@
+// Loads a run that was exported as WebAssembly. All values are SI.
+
+/** Return whether all values are numbers; a loop is quicker than a callback for each. */
+function areFinite(values) {
+  for (let k = 0; k < values.length; ++k) if (!Number.isFinite(values[k])) return false;
+  return true;
+}
+
+/** Check values for parameters and return the vector that the kernel takes. */
+function vectorOf(description, values) {
+  const vector = Float64Array.from(description.parameters, (each) => each.start);
+  const places = new Map(description.parameters.map((each, k) => [each.name, k]));
+  for (const [name, value] of Object.entries(values)) {
+    const k = places.get(name);
+    if (k === undefined) throw new RangeError(`there is no parameter '${name}'`);
+    const { low, high, unit, range } = description.parameters[k];
+    const isWithin = typeof value === "number" && Number.isFinite(value)
+      && value >= (low ?? -Infinity) && value <= (high ?? Infinity);
+    if (!isWithin) {
+      const shown = unit === "1" ? `${value}` : `${value} ${unit}`;
+      throw new RangeError(`${name} = ${shown} is not admissible: it must be ${range}`);
+    }
+    vector[k] = value;
+  }
+  return vector;
+}
+
+/** Return rows of the stimulus: of each signal an array of rows, or [time, value] steps. */
+function rowsOf(description, given, count, interval) {
+  const names = description.stimulus.map((each) => each.name);
+  const rows = new Float64Array(count * names.length);
+  for (const name of Object.keys(given))
+    if (!names.includes(name)) throw new RangeError(`there is no stimulus '${name}'`);
+  names.forEach((name, k) => {
+    const course = given[name] ?? description.stimulus[k].steps;
+    if (ArrayBuffer.isView(course)) {
+      if (course.length < count) throw new RangeError(`${name}: ${count} rows are wanted`);
+      for (let row = 0; row < count; ++row) rows[row * names.length + k] = course[row];
+      return;
+    }
+    let at = -1;
+    for (let row = 0; row < count; ++row) {
+      while (at + 1 < course.length && course[at + 1][0] <= (row + 1e-6) * interval) ++at;
+      rows[row * names.length + k] = at < 0 ? 0 : course[at][1];
+    }
+  });
+  if (!areFinite(rows)) throw new RangeError("the stimulus must be finite");
+  return rows;
+}
+
+/**
+ * Compile a module; the result runs it as often as is wanted.
+ *
+ * `run(parameters, { stimulus, duration })` returns `{ time, signals, settled, atRest }`: signals by
+ * name as Float64Array, row by row those of a bench. Parameters and stimuli that are left out are
+ * the bench's; noise is none unless it is given as rows.
+ */
+export async function load(bytes, description) {
+  const { exp, log, sin, cos, tan, atan, tanh, pow } = Math;
+  const math = { exp, log, sin, cos, tan, atan, tanh, pow };
+  const { instance } = await WebAssembly.instantiate(bytes, { math });
+  const { memory, parameters, state, room, begin, advance } = instance.exports;
+  const { frame, recordFrames, stimulusFrames, stateLength } = description;
+  const width = description.signals.length;
+  return {
+    description,
+    run(values = {}, { stimulus = {}, duration = description.duration } = {}) {
+      const vector = vectorOf(description, values);
+      const isChanged = vector.some((value, k) => value !== description.parameters[k].start);
+      if (!(duration > 0 && Number.isFinite(duration))) throw new RangeError("duration must be > 0");
+      const frames = Math.ceil(duration / frame / recordFrames - 1e-9) * recordFrames;
+      if (frames > 2 ** 31 - 1) throw new RangeError("the duration is too long");
+      const rows = rowsOf(description, stimulus, Math.floor(frames / stimulusFrames) + 1,
+        stimulusFrames * frame);
+      const count = frames / recordFrames + 1;
+      const u = (room() + 15) & ~15, rec = u + rows.byteLength;
+      const missing = rec + 8 * count * width - memory.buffer.byteLength;
+      if (missing > 0) memory.grow(Math.ceil(missing / 65536));
+      new Float64Array(memory.buffer, parameters(), vector.length).set(vector);
+      new Float64Array(memory.buffer, u, rows.length).set(rows);
+      begin(isChanged ? 1 : 0);
+      const begun = new Float64Array(memory.buffer, state(), stateLength);
+      if (!areFinite(begun))
+        throw new RangeError("there is no state at rest with these parameters");
+      advance(u, stimulusFrames, 0, frames, 1, recordFrames, rec);
+      const table = new Float64Array(memory.buffer, rec, count * width);
+      const signals = {};
+      description.signals.forEach(({ name }, k) => {
+        const values = (signals[name] = new Float64Array(count));
+        for (let row = 0, at = k; row < count; ++row, at += width) values[row] = table[at];
+      });
+      const time = new Float64Array(count);
+      for (let row = 0; row < count; ++row) time[row] = row * recordFrames * frame;
+      const unsettled = new Float64Array(memory.buffer, state(), stateLength)[stateLength - 2];
+      return { time, signals, settled: unsettled === 0 && areFinite(table) };
+    },
+  };
+}

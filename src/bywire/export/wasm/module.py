@@ -1,0 +1,120 @@
+"""The files of an exported run: module, description, loader, types."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from bywire.core.errors import CompilerError
+from bywire.core.scratch import process_folder, scratch_folder
+from bywire.core.signals import Signal, signals_of
+from bywire.export.exported import Exported
+from bywire.export.fmu.model_header import model_header
+from bywire.export.initial_values import start_source
+from bywire.export.interface import finite_range, interface
+from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT
+from bywire.simulation.run import sampled_stimulus
+
+HERE = Path(__file__).parent
+_FLAGS = (
+    "-target", "wasm32-freestanding", "-mbulk-memory", "-O2", "-std=c11", "-nostdlib",
+    "-fno-builtin", "-fno-slp-vectorize", "-fno-unroll-loops", *KERNEL_MATH,
+    "-Wl,--no-entry", "-s",
+)  # fmt: skip
+
+
+def module_files(made: Exported, name: str) -> dict[str, bytes]:
+    """Return the files of an exported run by their names.
+
+    Raises
+    ------
+    CompilerError
+        Without the extra ``compiler``, or when it fails.
+    """
+    start, reads = start_source(made)
+    faces = interface(made, "brake", reads)
+    description = json.dumps(_description(made, name, bool(start), reads), indent=1)
+    return {
+        f"{name}.wasm": _compiled(made.kernel, model_header(made, faces, start, name)),
+        f"{name}.json": description.encode(),
+        "bywire.mjs": (HERE / "loader.mjs").read_bytes(),
+        "bywire.d.mts": (HERE / "loader.d.ts").read_bytes(),
+    }
+
+
+def _compiled(kernel: str, header: str) -> bytes:
+    """Return the module."""
+    if importlib.util.find_spec("ziglang") is None:
+        raise CompilerError(
+            "WebAssembly is compiled by the extra bywire[compiler], which is not installed: "
+            "pip install 'bywire[compiler]'"
+        )
+    with scratch_folder(process_folder()) as folder:
+        for name in ("math.h", "string.h", "page.c"):
+            (folder / name).write_bytes((HERE / name).read_bytes())
+        (folder / "kernel.c").write_text(kernel, encoding="utf-8")
+        (folder / "model.h").write_text(header, encoding="utf-8")
+        made = folder / "module.wasm"
+        command = [sys.executable, "-m", "ziglang", "cc", *_FLAGS, f"-I{folder}",
+                   str(folder / "kernel.c"), str(folder / "page.c"), "-o", str(made)]  # fmt: skip
+        try:
+            done = subprocess.run(
+                command, capture_output=True, text=True, timeout=TIMEOUT, check=False
+            )
+        except subprocess.TimeoutExpired:
+            raise CompilerError(f"the compiler took longer than {TIMEOUT:g} s") from None
+        if done.returncode != 0:
+            message = "\n".join(done.stderr.splitlines()[:6]) or "without a message"
+            raise CompilerError(f"the compiler refused the kernel for WebAssembly:\n{message}")
+        return made.read_bytes()
+
+
+def _description(
+    made: Exported, name: str, begins_anywhere: bool, reads: frozenset[int]
+) -> dict[str, Any]:
+    """Return what the loader, and who uses it, must know of a run."""
+    schedule, par = made.schedule, made.run.par
+    count = made.program.sizes.parameters  # all: the loader fills the kernel's whole vector
+    faces = interface(made, "brake", frozenset(range(count)))
+    used = {each.name for each in interface(made, "brake", reads).of("parameter")}
+    parameters = []
+    for each in faces.of("parameter"):
+        low, high = (None, None) if each.leaf is None else finite_range(each.leaf)
+        parameters.append({
+            "name": each.name, "unit": each.unit, "start": each.start, "low": low, "high": high,
+            "range": "" if each.leaf is None else each.leaf.range_text, "meaning": each.label,
+            "used": each.name in used,
+        })  # fmt: skip
+    return {
+        "name": name, "model": made.run.model.name, "duration": made.run.duration,
+        "settle": made.case.settle, "step": schedule.step, "frame": schedule.frame,
+        "recordFrames": schedule.record_frames, "stimulusFrames": schedule.stimulus_frames,
+        "stateLength": made.layout.total, "beginsAtRest": begins_anywhere,
+        "choices": {k: v for k, v in par.choices().items() if isinstance(v, (str, int))},
+        "parameters": parameters,
+        "stimulus": _stimuli(made),
+        "signals": [_signal(k, s) for k, s in made.program.outputs.items()],
+    }  # fmt: skip
+
+
+def _stimuli(made: Exported) -> list[dict[str, Any]]:
+    """Return what drives the bench, as steps: values that hold from their times on, no noise."""
+    rows = sampled_stimulus(made.run, made.schedule)
+    times = made.schedule.stimulus_times
+    told = []
+    for k, (name, signal) in enumerate(signals_of(made.run.model.Stimulus).items()):
+        values = np.zeros(len(rows)) if name.startswith("noise_") else rows[:, k]
+        changes = np.flatnonzero(np.diff(values, prepend=0.0))
+        steps = [[float(times[at]), float(values[at])] for at in changes]
+        told.append({**_signal(name, signal), "steps": steps})
+    return told
+
+
+def _signal(name: str, signal: Signal) -> dict[str, str]:
+    return {"name": name, "unit": signal.unit, "label": signal.label}
