@@ -35,7 +35,7 @@ STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
     ),
     "position of two screws": ("position-step", "roberts2003", {}),
     "position of a rig": ("screw-position", "roberts2003", {}),
-    "slip by rules": ("straight-stop", "sport600", {}),
+    "slip by rules": ("straight-stop", "sport600", {"ecu.abs": "rules"}),
     "slip by PI": ("straight-stop", "sport600", {"ecu.abs": "pi"}),
     "mixed slip, fixed gain": (
         "straight-stop", "sport600",

@@ -85,6 +85,8 @@ def kind_of(value: Any) -> Any:
         if isinstance(value.value, float):
             return "number"
         return ("known", type(value.value), _hashable(value.value))
+    if isinstance(value, Record) and value.pointer:
+        return ("pointer", value.cls)
     if isinstance(value, (Record, Built)):
         return ("tuple", value.cls)
     if isinstance(value, Update):
@@ -136,6 +138,9 @@ def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument 
     if isinstance(value, (Expr, Known)):
         is_truth = isinstance(value, Expr) and value.truth
         yield Expr(target, uses=here.uses, truth=is_truth), Argument(target, f"{ctype} {target}")
+    elif stays_there(value, structs):
+        there = Record(value.cls, here, pointer=True)
+        yield there, Argument(target, f"const {ctype} *{target}")
     elif isinstance(value, (Record, Built, Update)):
         cls = value.record.cls if isinstance(value, Update) else value.cls
         yield Record(cls, here), Argument(target, f"{ctype} {target}")
@@ -148,6 +153,12 @@ def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument 
         yield made, Argument(target, f"const {ctype} *{target}")
 
 
+def stays_there(value: Any, structs: Structs) -> bool:
+    """Return whether a NamedTuple is handed on as a pointer: inputs, but no memory."""
+    is_input = isinstance(value, Record) and value.pointer
+    return is_input and not structs.of_tuple(value.cls).is_memory
+
+
 def passed(value: Any, body: Body) -> Iterator[Expr]:
     """Yield the C arguments of a value, in the order of `received`."""
     value = lifted(value)
@@ -157,7 +168,7 @@ def passed(value: Any, body: Body) -> Iterator[Expr]:
         each = value.items.values() if isinstance(value, Table) else value.values
         for entry in each:
             yield from passed(entry, body)
-    elif isinstance(value, Array):
+    elif isinstance(value, Array) or stays_there(value, body.structs):
         yield value.expr
     elif isinstance(value, BuiltGroup) or (isinstance(value, Group) and not value.expr.is_path):
         yield from passed(body.variable("values", value), body)

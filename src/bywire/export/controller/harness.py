@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 
 from bywire.export.controller.c_text import c_name, comment
+from bywire.export.controller.parameter_file import parameter_values
 from bywire.export.controller.program import Program
 from bywire.export.controller.vectors import Vectors
 
@@ -23,6 +25,9 @@ def vector_header(program: Program, every: Sequence[Vectors]) -> str:
     parts = [comment(["What the Python of the laws makes of inputs that reach every limit."]),
              f"#ifndef {guard}\n#define {guard}"]  # fmt: skip
     literal = program.precision.literal
+    if program.parameters() and every:
+        other = parameter_values(program, "other_parameters", every[0].other, None)
+        parts.append(f"static {other}")
     for each in every:
         task = c_name(each.step.task.name)
         parts.append(f"#define VECTORS_{task} {len(each.given)}")
@@ -33,7 +38,15 @@ def vector_header(program: Program, every: Sequence[Vectors]) -> str:
                 f"static const {real} {what}_{task}[VECTORS_{task}][{width}] = {{\n"
                 + "\n".join(lines) + "\n};"
             )  # fmt: skip
+        if _reads_parameters(each):
+            lines = textwrap.wrap(", ".join(map(str, each.which)), 88)
+            body = "\n".join(f"    {line}" for line in lines)
+            parts.append(f"static const int other_{task}[VECTORS_{task}] = {{\n{body}\n}};")
     return "\n\n".join([*parts, "#endif"]) + "\n"
+
+
+def _reads_parameters(vectors: Vectors) -> bool:
+    return any(short == "par" for _, short in vectors.step.arguments)
 
 
 def harness(program: Program, every: Sequence[Vectors]) -> str:
@@ -83,7 +96,10 @@ def _compared(program: Program, vectors: Vectors) -> str:
     for at, (kind, field) in enumerate(vectors.names):
         if kind in wanted:
             lines.append(f"        {kind}.{c_name(field)} = given_{task}[k][{at}];")
-    arguments = ", ".join(f"&{each}" if each != "par" else f"&{name}_parameters" for each in wanted)
+    if "par" in wanted:
+        chosen = f"(other_{task}[k] == 1) ? &other_parameters : &{name}_parameters"
+        lines.append(f"        const {name}_Parameters *par = {chosen};")
+    arguments = ", ".join(each if each == "par" else f"&{each}" for each in wanted)
     lines.append(f"        {vectors.step.name}({arguments});")
     lines += [
         f"        wrong += is_same(memory.{c_name(field)}, after_{task}[k][{at}]) ? 0 : 1;"

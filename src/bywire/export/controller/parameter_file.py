@@ -26,9 +26,7 @@ def parameter_file(program: Program, memory: Any, cited: Mapping[str, Cited]) ->
     parts = [comment([f"Values of {program.model.name}, SI units."]),
              f'#include "{name}_ecu.h"']  # fmt: skip
     if program.parameters():
-        lines = _group(program, program.shape, program.par, "", cited, "    ")
-        body = "\n".join(lines)
-        parts.append(f"const {name}_Parameters {name}_parameters = {{\n{body}\n}};")
+        parts.append(parameter_values(program, f"{name}_parameters", program.par, cited))
     literal = program.precision.literal
     fields = [
         f"    .{c_name(each.name)} = {literal(getattr(memory, each.name))},"
@@ -39,9 +37,17 @@ def parameter_file(program: Program, memory: Any, cited: Mapping[str, Cited]) ->
     return "\n\n".join(parts) + "\n"
 
 
+def parameter_values(
+    program: Program, name: str, par: Any, cited: Mapping[str, Cited] | None
+) -> str:
+    """Return the definition of parameters in C; without provenance there are no comments."""
+    body = "\n".join(_group(program, program.shape, par, "", cited, "    "))
+    return f"const {program.name}_Parameters {name} = {{\n{body}\n}};"
+
+
 def _group(
-    program: Program, shape: Shape, values: Any, prefix: str, cited: Mapping[str, Cited],
-    indent: str,
+    program: Program, shape: Shape, values: Any, prefix: str,
+    cited: Mapping[str, Cited] | None, indent: str,
 ) -> list[str]:  # fmt: skip
     literal = program.precision.literal
     lines: list[str] = []
@@ -55,8 +61,9 @@ def _group(
             continue
         nodes = [literal(each) for each in value] if isinstance(kind, Nodes) else []
         text = f"{{{', '.join(nodes)}}}" if nodes else literal(value)
-        lines += [comment([f"{member.note}; {_source(dotted, value, cited)}"], indent),
-                  f"{place} {text},"]  # fmt: skip
+        if cited is not None:
+            lines.append(comment([f"{member.note}; {_source(dotted, value, cited)}"], indent))
+        lines.append(f"{place} {text},")
     return lines
 
 

@@ -1,0 +1,133 @@
+"""Gates of the generated C: sanitizers, coverage, mutants, the same text every time, a target."""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from exported_ecu import bench_of, build, needs_compiler
+
+from bywire.api.export_controller import export_controller
+from bywire.export.controller.harness import FLAGS
+
+BRAKES = ("pressure, sine dither", "moment and position", "slip by rules")
+MUTANTS = 40
+
+
+@needs_compiler
+@pytest.mark.parametrize("structure", BRAKES)
+def test_sanitizers_find_nothing(structure: str, tmp_path: Path) -> None:
+    export_controller(bench_of(structure), tmp_path)
+    checks = ("-fsanitize=address,undefined", "-fno-sanitize-recover=all", "-g")
+    done = build(tmp_path, *FLAGS, *checks).run()
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+@needs_compiler
+@pytest.mark.skipif(shutil.which("gcov") is None, reason="gcov is not installed")
+@pytest.mark.parametrize("structure", BRAKES)
+def test_vectors_run_every_line(structure: str, tmp_path: Path) -> None:
+    made = export_controller(bench_of(structure), tmp_path)
+    assert build(tmp_path, "-std=c99", "-O0", "--coverage").run().returncode == 0
+    name = made.program.name
+    for part in ("ecu", "io"):
+        said = subprocess.run(
+            ["gcov", f"harness-{name}_{part}.gcda"], cwd=tmp_path, capture_output=True, text=True,
+            check=True,
+        ).stdout  # fmt: skip
+        (share,) = re.findall(rf"File '.*{name}_{part}\.c'\nLines executed:([0-9.]+)%", said)
+        assert float(share) == 100.0
+
+
+@needs_compiler
+@pytest.mark.parametrize("structure", ["gains that differ by region", "slip by PI"])
+def test_vectors_kill_mutants(structure: str, tmp_path: Path) -> None:
+    name = export_controller(bench_of(structure), tmp_path, vectors=2000).program.name
+    source = tmp_path / f"{name}_ecu.c"
+    original = source.read_text()
+    objects = []
+    for part in ("io", "parameters", "harness"):
+        objects.append(str(tmp_path / f"{part}.o"))
+        subprocess.run(
+            ["gcc", "-std=c99", "-c", str(tmp_path / f"{name}_{part}.c"), "-o", objects[-1]],
+            check=True,
+        )
+    alive = []
+    for number, text in enumerate(mutants(original)):
+        source.write_text(text)
+        program = str(tmp_path / f"mutant_{number}")
+        command = ["gcc", "-std=c99", "-ffp-contract=off", str(source), *objects, "-o", program]
+        subprocess.run([*command, "-lm"], check=True)
+        if subprocess.run([program], capture_output=True, check=False).returncode == 0:
+            alive.append(number)
+    assert len(alive) <= 0.05 * MUTANTS, alive
+
+
+def mutants(source: str) -> list[str]:
+    """Return copies of a source with one operator or number of its laws changed in each.
+
+    Ones become zeros and all other numbers grow by one: flags are 0 or 1, and others than these
+    would count alike. For the same reason halves between flags and modes are not tried as limits.
+    """
+    bodies = source.index("\nstatic ", source.rindex("typedef"))
+    changes = {
+        " + ": " - ", " - ": " + ", " * ": " / ", " / ": " * ", " < ": " <= ", " > ": " >= ",
+        " <= ": " < ", " >= ": " > ",
+    }  # fmt: skip
+    text = re.sub(r"/\*.*?\*/", lambda m: " " * len(m.group()), source, flags=re.DOTALL)
+    sign = "|".join(map(re.escape, changes))
+    places = [m for m in re.finditer(rf"{sign}|\b\d+\.\d+", text) if m.start() > bodies]
+    places = [m for m in places if not re.match(r" [<>] \d\.5", text[m.start() :])]
+    made = []
+    for place in random.Random(1).sample(places, min(MUTANTS, len(places))):
+        token = place.group()
+        other = changes.get(token) or repr(0.0 if float(token) == 1.0 else float(token) + 1.0)
+        made.append(source[: place.start()] + other + source[place.end() :])
+    assert len(made) >= 0.9 * MUTANTS
+    return made
+
+
+def test_text_is_the_same_in_every_process(tmp_path: Path) -> None:
+    code = (
+        "import sys, bywire; bywire.export_controller("
+        "'straight-stop', sys.argv[1], vectors=20, precision='single')"
+    )
+    folders = [tmp_path / seed for seed in ("1", "2")]
+    for folder in folders:
+        environment = {**os.environ, "PYTHONHASHSEED": folder.name}
+        subprocess.run([sys.executable, "-c", code, str(folder)], env=environment, check=True)
+    first, second = ({p.name: p.read_bytes() for p in f.iterdir()} for f in folders)
+    assert first == second
+    assert len(first) == 11
+
+
+@pytest.mark.skipif(
+    shutil.which("arm-none-eabi-gcc") is None, reason="arm-none-eabi-gcc is not installed"
+)
+def test_single_fits_a_small_target(tmp_path: Path) -> None:
+    made = export_controller(
+        bench_of("pressure, sine dither"), tmp_path, precision="single", vectors=1
+    )
+    name = made.program.name
+    target = ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16")
+    read_only = 0
+    for part in ("ecu", "io", "parameters"):
+        compiled = str(tmp_path / f"{part}.o")
+        subprocess.run(
+            ["arm-none-eabi-gcc", *FLAGS, "-fno-math-errno", *target, "-c",
+             str(tmp_path / f"{name}_{part}.c"), "-o", compiled], check=True,
+        )  # fmt: skip
+        said = subprocess.run(
+            ["arm-none-eabi-size", compiled], capture_output=True, text=True, check=True
+        ).stdout
+        text, data, bss, *_ = map(int, said.splitlines()[1].split()[:3])
+        read_only += text
+        assert data == bss == 0
+    assert read_only <= 2048
+    assert 4 * len(made.program.members(made.program.model.Memory)) <= 128

@@ -1,0 +1,82 @@
+"""What an export refuses, and in which words; a brake of one's own is exported as ours are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from exported_ecu import bench_of, build, needs_compiler
+
+import bywire
+from bywire.core.errors import FileError, ModelError, ParameterError, UnknownNameError
+from bywire.core.model import Task
+from bywire.export.controller.program import program
+
+EXAMPLE = Path(__file__).parents[3] / "examples" / "emb_caliper"
+
+
+def branching(x: Any, m: Any, u: Any, par: Any) -> Any:
+    """Decide by a value: no symbol could."""
+    if m.p_meas > 0.0:
+        return m
+    return m._replace(duty=0.0)
+
+
+def endless(x: Any, m: Any, u: Any, par: Any) -> Any:
+    """Call itself."""
+    return endless(x, m, u, par)
+
+
+def unknown(x: Any, m: Any, u: Any, par: Any) -> Any:
+    """Call what is no law."""
+    return m._replace(duty=divmod(m.duty, 2.0)[0])
+
+
+@pytest.mark.parametrize(
+    ("tick", "said"),
+    [
+        (branching, "it depends on a value that only the running ECU knows: use ops.where"),
+        (endless, "endless calls itself"),
+        (unknown, "divmod is not translated"),
+    ],
+)
+def test_operation_and_line_are_named(tick: Any, said: str) -> None:
+    case = bench_of("pressure, sine dither").cases()[0]
+
+    class Changed(type(case.model)):  # type: ignore[misc]
+        def tasks(self, par: Any) -> tuple[Task, ...]:
+            return (Task("ecu", 1e-3, tick),)
+
+    with pytest.raises(ModelError, match=said) as error:
+        program(Changed(), case.par)
+    assert f"{Path(__file__).name}, line " in str(error.value)
+
+
+def test_bad_requests_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="did you mean 'single'"):
+        bywire.export_controller("hard-braking", tmp_path, precision="singel")
+    with pytest.raises(ParameterError, match="vectors = 0: a whole number"):
+        bywire.export_controller("hard-braking", tmp_path, vectors=0)
+    (tmp_path / "file").write_text("")
+    with pytest.raises(FileError, match="cannot be written"):
+        bywire.export_controller("hard-braking", tmp_path / "file", vectors=1)
+    assert [path.name for path in tmp_path.iterdir()] == ["file"]
+
+
+@needs_compiler
+def test_a_brake_of_ones_own(tmp_path: Path) -> None:
+    bywire.load_system(EXAMPLE)
+    made = bywire.export_controller(EXAMPLE / "benches" / "step_from_5kN.toml", tmp_path)
+    done = build(tmp_path).run()
+    assert [step.task.name for step in made.program.steps] == ["force", "speed", "current"]
+    assert (done.returncode, done.stdout) == (0, "600 vectors, 0 values differ\n")
+
+
+def test_description_names_what_is_read(tmp_path: Path) -> None:
+    made = bywire.export_controller("moment-pulses", tmp_path, vectors=1)
+    text = (tmp_path / "wedge_brake.a2l").read_text()
+    assert text.count("/begin CHARACTERISTIC") == len(made.program.parameters())
+    assert text.count("/begin") == text.count("/end")
+    assert 'SYMBOL_LINK "wedge_brake_parameters.control.moment.f_c" 0' in text
+    assert 'SYMBOL_LINK "wedge_brake_memory.i_1_ref" 0' in text
