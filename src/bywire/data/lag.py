@@ -117,20 +117,21 @@ def _coefficients(
 
     a, b = a - a.mean(), b - b.mean()
     n = a.size
-    middle = slice(n - 1 - most, n + most)
-    ones = np.ones(n)
+    shifts = np.arange(-most, most + 1)
 
-    def summed(x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Sum of y[i + shift] x[i] over the overlap."""
-        return np.asarray(correlate(y, x, mode="full", method="fft"))[middle]
+    def summed(x: NDArray[np.float64], shift: NDArray[np.intp]) -> NDArray[np.float64]:
+        """Sum of x[i] over the i for which i + shift exists as well."""
+        up_to = np.concatenate([[0.0], np.cumsum(x)])
+        return np.asarray(up_to[np.minimum(n, n - shift)] - up_to[np.maximum(0, -shift)])
 
-    count = n - np.abs(np.arange(-most, most + 1))
-    sum_a, sum_b = summed(a, ones), summed(ones, b)
-    var_a = summed(a**2, ones) - sum_a**2 / count
-    var_b = summed(ones, b**2) - sum_b**2 / count
+    count = n - np.abs(shifts)
+    sum_a, sum_b = summed(a, shifts), summed(b, -shifts)
+    var_a = summed(a**2, shifts) - sum_a**2 / count
+    var_b = summed(b**2, -shifts) - sum_b**2 / count
+    both = correlate(b, a, mode="full", method="fft")[n - 1 - most : n + most]
     floor = 1e-12 * max(float((a**2).sum()), 1e-300) * max(float((b**2).sum()), 1e-300)
     product = np.maximum(var_a * var_b, floor)
-    return np.asarray((summed(a, b) - sum_a * sum_b / count) / np.sqrt(product))
+    return np.asarray((both - sum_a * sum_b / count) / np.sqrt(product))
 
 
 def _refined(
