@@ -80,3 +80,13 @@ def test_description_names_what_is_read(tmp_path: Path) -> None:
     assert text.count("/begin") == text.count("/end")
     assert 'SYMBOL_LINK "wedge_brake_parameters.control.moment.f_c" 0' in text
     assert 'SYMBOL_LINK "wedge_brake_memory.i_1_ref" 0' in text
+
+
+def test_a_parser_reads_the_description(tmp_path: Path) -> None:
+    parser = pytest.importorskip("pya2l.parser", reason="pya2l is not installed")
+    made = bywire.export_controller("straight-stop", tmp_path, vectors=1).program
+    with parser.A2lParser() as reader:
+        tree = reader.tree_from_a2l((tmp_path / f"{made.name}.a2l").read_bytes())
+    (module,) = tree.PROJECT.MODULE
+    assert len(module.CHARACTERISTIC) == len(made.parameters())
+    assert len(module.MEASUREMENT) == len(made.members(made.model.Memory))
