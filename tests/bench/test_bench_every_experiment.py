@@ -38,7 +38,7 @@ FEWER = {  # of experiments of many runs, which tests of their brakes run as the
     "position-step": 'amplitudes = "0.5 rad"', "repeated-stops": "stops = 3",
 }  # fmt: skip
 LARGE = (
-    "bandwidths", "corner-stop", "disc-stop", "force-cycle", "friction-ramp", "friction-sweep",
+    "bandwidths", "corner-panic", "corner-stop", "disc-stop", "force-cycle", "friction-ramp", "friction-sweep",
     "position-step", "rear-lift", "repeated-stops", "slope-hold", "static-force", "stiffness",
 )  # fmt: skip
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models

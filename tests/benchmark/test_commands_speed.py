@@ -13,10 +13,13 @@ def test_a_command_is_timed_after_what_it_needs(tmp_path, monkeypatch):
     # Loading takes longest, and what is loaded is not what is looked at here.
     exec(LIBRARIES, {})
     monkeypatch.setattr("bywire.benchmark.commands._UNIT", [sys.executable, "-c", "import numpy"])
+    kernels = tmp_path / "kernels"  # where no other process compiles
+    kernels.mkdir(mode=0o700)
+    monkeypatch.setenv("BYWIRE_CACHE", str(kernels))
     ride = tmp_path / "ride.csv"
     ride.write_text("t [s],x [m]\n" + "".join(f"{k},{k}\n" for k in range(20)))
     made, first = "{folder}/ride.csv", ("convert", str(ride), "{folder}/ride.csv")
-    again = ("convert", made, "{folder}/again.csv", "--force")  # a second time where one compiles
+    again = ("convert", made, "{folder}/again.csv")  # a second time would be refused
     command = Command("command.convert", again, 9.0, first)
     (result,) = measured([command])
     assert result.value is not None, result.note

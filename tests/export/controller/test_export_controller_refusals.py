@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 from exported_ecu import bench_of, build, needs_compiler
+from systems.loading import loaded
 
 import bywire
 from bywire.core.errors import FileError, ModelError, ParameterError, UnknownNameError
@@ -66,8 +67,8 @@ def test_bad_requests_are_refused(tmp_path: Path) -> None:
 
 @needs_compiler
 def test_a_brake_of_ones_own(tmp_path: Path) -> None:
-    bywire.load_system(EXAMPLE)
-    made = bywire.export_controller(EXAMPLE / "benches" / "step_from_5kN.toml", tmp_path)
+    with loaded(EXAMPLE):
+        made = bywire.export_controller(EXAMPLE / "benches" / "step_from_5kN.toml", tmp_path)
     done = build(tmp_path).run()
     assert [step.task.name for step in made.program.steps] == ["force", "speed", "current"]
     assert (done.returncode, done.stdout) == (0, "600 vectors, 0 values differ\n")
