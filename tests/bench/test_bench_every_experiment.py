@@ -38,8 +38,9 @@ FEWER = {  # of experiments of many runs, which tests of their brakes run as the
     "position-step": 'amplitudes = "0.5 rad"', "repeated-stops": "stops = 3",
 }  # fmt: skip
 LARGE = (
-    "bandwidths", "corner-panic", "corner-stop", "disc-stop", "force-cycle", "friction-ramp", "friction-sweep",
-    "position-step", "rear-lift", "repeated-stops", "slope-hold", "static-force", "stiffness",
+    "bandwidths", "corner-panic", "corner-stop", "disc-stop", "force-cycle", "friction-ramp",
+    "friction-sweep", "position-step", "rear-lift", "repeated-stops", "slope-hold", "static-force",
+    "stiffness",
 )  # fmt: skip
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
