@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import Case
 from bywire.bench.running import run_of
@@ -62,6 +64,14 @@ class Exported:
     def schedule(self) -> Schedule:
         """Its integer plan."""
         return self.run.schedule()
+
+    @property
+    def demanded(self) -> list[float]:
+        """What drives the run at its start, without noise."""
+        names = self.run.model.Stimulus._fields
+        (row,) = self.run.stimulus(np.zeros(1))
+        return [0.0 if name.startswith("noise_") else float(value)
+                for name, value in zip(names, row, strict=True)]  # fmt: skip
 
     @property
     def vector(self) -> list[float]:

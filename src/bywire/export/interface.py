@@ -166,11 +166,13 @@ def _leaves(stages: Stages, roots: Iterable[Node]) -> dict[str, frozenset[int]]:
 
 
 def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
-    known = signals_of(made.run.model.Stimulus)
+    known, starts = signals_of(made.run.model.Stimulus), made.demanded
     for k, (name, signal) in enumerate(known.items()):
         if k in reads.ecu["u"]:
             label = signal.label + ", a standard normal number" * name.startswith("noise_")
-            yield Variable(name, "input", "stimulus", k, signal.unit, label, 0.0, is_held=True)
+            yield Variable(
+                name, "input", "stimulus", k, signal.unit, label, starts[k], is_held=True
+            )
 
 
 def _row(made: Exported, k: int, place: Literal["row", "sampled"]) -> Variable:

@@ -60,6 +60,12 @@ def test_every_row_is_the_benchs_own(
         assert np.array_equal(got[:, k], expected), signal
 
 
+def test_it_is_driven_as_the_bench_is_at_its_start_until_told_otherwise(client: Client) -> None:
+    client.begin()
+    assert client["p_set"] == client.reference()["p_set"][0] == 6e5
+    assert client["noise_p"] == 0.0
+
+
 def test_a_validator_finds_nothing(motorcycle: ExportedFmu, wedge: ExportedFmu) -> None:
     assert validate_fmu(str(motorcycle.path)) == []
     assert validate_fmu(str(wedge.path)) == []

@@ -73,6 +73,7 @@ static const int sizes[] __attribute__((unused)) = {braced(_sizes(faces))};
 static const char *const task_names[] __attribute__((unused)) = {braced(names)};
 static const char *const state_names[] = {braced(map(text, states))};
 static const double p_start[] = {braced(map(number, values))};
+static const double u_start[] __attribute__((unused)) = {braced(map(number, made.demanded))};
 static const double state_start[] = {braced(map(number, made.vector))};
 
 static {begins}

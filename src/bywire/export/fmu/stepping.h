@@ -78,6 +78,7 @@ static void reset(run *r) {
   memset(r, 0, sizeof *r);
   memcpy(r->p, p_start, sizeof p_start);
   memcpy(r->state, state_start, sizeof state_start);
+  for (int k = 0; k < STIMULI; ++k) r->u[k] = u_start[k];
   r->is_set = 1;
 }
 
