@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Literal, get_args
 
 from bywire.core.field_notes import field_notes
@@ -56,6 +57,9 @@ class Variable:
     leaf: Leaf | None = None
     is_tunable: bool = False
     is_held: bool = False
+
+
+Numbered = tuple[int, Variable]
 
 
 @dataclass(frozen=True)
@@ -238,6 +242,17 @@ def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:
     low = math.nextafter(leaf.low, math.inf) if leaf.low_open else leaf.low
     high = math.nextafter(leaf.high, -math.inf) if leaf.high_open else leaf.high
     return (None if math.isinf(leaf.low) else low, None if math.isinf(leaf.high) else high)
+
+
+def tables(faces: Interface) -> Iterator[list[Numbered]]:
+    """Yield the variables, the nodes of a table together, each with its value reference."""
+
+    def owner(numbered: Numbered) -> tuple[str, int]:
+        group, bracket, _ = numbered[1].name.partition("[")
+        return (group, -1) if bracket else (group, numbered[0])
+
+    for _, nodes in groupby(enumerate(faces.variables), owner):
+        yield list(nodes)
 
 
 def identifier_of(name: str) -> str:

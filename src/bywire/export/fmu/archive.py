@@ -20,9 +20,9 @@ from bywire.export.fmu.binaries import PLATFORMS, compiled
 from bywire.export.fmu.description2 import description_2
 from bywire.export.fmu.description3 import build_description, description_3
 from bywire.export.fmu.documentation import documentation
-from bywire.export.fmu.model_header import model_header
 from bywire.export.initial_values import start_source
 from bywire.export.interface import Interface, Part, identifier_of, interface
+from bywire.export.model_header import model_header
 from bywire.simulation.run import sampled_stimulus, simulate
 
 HERE = Path(__file__).parent

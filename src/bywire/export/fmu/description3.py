@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from itertools import groupby
+from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from bywire.export.exported import Exported
 from bywire.export.fmu.description2 import real_attributes, variability
 from bywire.export.fmu.units import unit_definitions
-from bywire.export.interface import Interface, Variable
-
-Numbered = tuple[int, Variable]
+from bywire.export.interface import Interface, Numbered, tables
 
 
 def description_3(
@@ -56,17 +53,6 @@ def description_3(
         for reference in results:
             SubElement(structure, section, valueReference=reference)
     return root
-
-
-def tables(faces: Interface) -> Iterator[list[Numbered]]:
-    """Yield the variables, the nodes of a table together, each with its value reference."""
-
-    def owner(numbered: Numbered) -> tuple[str, int]:
-        group, bracket, _ = numbered[1].name.partition("[")
-        return (group, -1) if bracket else (group, numbered[0])
-
-    for _, nodes in groupby(enumerate(faces.variables), owner):
-        yield list(nodes)
 
 
 def _float(nodes: list[Numbered]) -> Element:

@@ -84,8 +84,8 @@ static void reset(run *r) {
 
 /* What is to be said of a run that has left the numbers; NULL where it has not. */
 static const char *lost(const run *r) {
-  for (int k = 0; k < STATES; ++k)
-    if (!isfinite(r->state[k])) return state_names[k];
+  for (int k = 0; k < STATE; ++k)
+    if (!isfinite(r->state[k])) return k < STATES ? state_names[k] : "an integral or the memory";
   return NULL;
 }
 

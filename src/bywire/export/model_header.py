@@ -1,4 +1,4 @@
-"""C text of what a model gives the FMU's functions: counts, tables of variables, initial values."""
+"""C text of what a model gives the functions around its kernel: counts, tables, initial values."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ import re
 from collections.abc import Iterable, Iterator
 
 from bywire.export.exported import Exported
-from bywire.export.fmu.description3 import tables
 from bywire.export.initial_values import HEADING
-from bywire.export.interface import Interface, Variable, finite_range
+from bywire.export.interface import Interface, Variable, finite_range, tables
 from bywire.simulation.c_runtime import SCALAR
 
 _PLACES = {
