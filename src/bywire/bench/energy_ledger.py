@@ -89,9 +89,10 @@ def actuator_ledger(recording: xr.Dataset) -> Ledger:
 def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
     """Return the books beyond the actuator's own that its signals name, by name.
 
-    In such a book a source stands in the place of one of the actuator's, and what it gives more is
-    taken by a sink: of a disc that is braked, the heat of the pads. Books in which nothing was
-    posted, of what is switched off, are left out.
+    A book in which a source stands in the place of one of the actuator's holds the actuator's
+    postings too, and what that source gives more is taken by a sink: of a disc that is braked, the
+    heat of the pads. Others stand by themselves. Books in which nothing was posted, of what is
+    switched off, are left out.
     """
     main = _main_book(recording)
     names = [name for name in _books(recording) if name not in ("", main)]
@@ -140,7 +141,9 @@ def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str
 def _ledger(recording: xr.Dataset, book: str) -> Ledger:
     changes = _changes(recording)
     roles = _roles(recording, changes)
-    known = {name: role for name, role in roles.items() if role.book in ("", book)}
+    widens = any(role.whole for role in roles.values() if role.book == book)
+    books = ("", book) if widens else (book,)
+    known = {name: role for name, role in roles.items() if role.book in books}
     sources = {name: role for name, role in known.items() if role.side == "source"}
     instead = {role.whole: name for name, role in sources.items() if role.whole in sources}
     given = [

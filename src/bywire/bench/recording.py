@@ -17,7 +17,7 @@ from bywire.bench.rows import Rows
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal, signals_of
 from bywire.core.version import __version__
-from bywire.simulation.changes import PUT_IN, PUT_IN_SIGNAL
+from bywire.simulation.changes import put_in_signals
 from bywire.simulation.run import Run, Trajectory, doubts_of
 from bywire.simulation.run_group import RunGroup
 
@@ -83,7 +83,7 @@ def rows_of(
     """Return what a recording of a run holds, as plain arrays, without warnings; see `record`."""
     time = trajectory.time - settle
     begin = int(np.searchsorted(time, -keep - 1e-9))
-    attributes = {**_attributes_of(run.model.Output), **_FURTHER}
+    attributes = _attributes_of(run.model.Output)
     # A copy: each signal in one piece, and the settling not kept in memory.
     kept = dict(zip(trajectory.names, trajectory.values[begin:].T.copy(), strict=True))
     signals = {name: kept[name] for name in attributes if name in kept}
@@ -96,7 +96,7 @@ def rows_of(
 def rows_of_group(group: RunGroup, settle: float) -> Rows:
     """Return what recordings of several runs hold, of those rows that were computed."""
     signals = dict(zip(group.names, group.values, strict=True))
-    attributes = {**_attributes_of(group.runs[0].model.Output), **_FURTHER}
+    attributes = _attributes_of(group.runs[0].model.Output)
     return Rows(
         np.round(group.time - settle, 12), signals, {name: attributes[name] for name in signals}
     )
@@ -104,16 +104,14 @@ def rows_of_group(group: RunGroup, settle: float) -> Rows:
 
 @cache
 def _attributes_of(output: type) -> Mapping[str, Mapping[str, str]]:
-    return {name: _attributes(signal) for name, signal in signals_of(output).items()}
+    every = {**signals_of(output), **put_in_signals(output)}
+    return {name: _attributes(signal) for name, signal in every.items()}
 
 
 def _attributes(signal: Signal) -> dict[str, str]:
     attributes = {"units": signal.unit, "long_name": signal.label}
     attributes |= {"set_point_of": signal.set_point_of} if signal.set_point_of else {}
     return attributes | role_attributes(signal.role)
-
-
-_FURTHER = {PUT_IN: _attributes(PUT_IN_SIGNAL)}
 
 
 def watch(recording: xr.Dataset, run: Run, trajectory: Trajectory) -> list[str]:

@@ -8,24 +8,21 @@ store by: what a change does there stands in that loss.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
-from bywire.core.signals import Role, Signal
+from bywire.core.signals import Role, Signal, signals_of
 from bywire.core.typing import Array
 from bywire.simulation.engine import Engine
 from bywire.simulation.native import Request
 from bywire.simulation.schedule import Schedule
 
-PUT_IN = "E_change"
-"""sum of what changes made the recorded energies jump by"""
-PUT_IN_SIGNAL = Signal(
-    "J", "energy put in by changed parameters", role=Role("source", "changed parameters")
-)
+_PUT_IN = "E_change"
 _TOLERANCE = 1e-9
 
 
@@ -85,18 +82,48 @@ def require_unchanged(changes: Sequence[Change], what: str) -> None:
         )
 
 
-def energies(names: Sequence[str]) -> list[int]:
-    """Return the places of the energies among some outputs: integrals do not jump, stores do."""
-    return [k for k, name in enumerate(names) if name.startswith("E_")]
+@cache
+def put_in_signals(output: type) -> Mapping[str, Signal]:
+    """Return the signals of what changes put into the energies of an Output: one for each book.
+
+    That of the first book has the plain name: of the actuator's own, which has none, if there is.
+    """
+    books = dict.fromkeys(_books(output).values())
+    first = "" if "" in books else next(iter(books), "")
+    return {
+        _PUT_IN if book == first else f"{_PUT_IN}_{book.replace(' ', '_')}": Signal(
+            "J", "energy put in by changed parameters",
+            role=Role("source", "changed parameters", book=book),
+        )
+        for book in sorted(books, key=lambda book: book != first)
+    }  # fmt: skip
 
 
-def energy_of(engine: Engine, request: Request, vector: Array, places: Sequence[int]) -> float:
-    """Return the sum of some energies at an instant with the parameters of a request [J].
+def energies(output: type, names: Sequence[str]) -> Array:
+    """Return which of some outputs are energies, and of which book's.
 
-    ``places``: their indices among the outputs.
+    Integrals do not jump, stores do. Shape (books, outputs), 1 where an output is one of the
+    book's, in the order of `put_in_signals`.
+    """
+    books = _books(output)
+    signals = put_in_signals(output).values()
+    rows = [[float(books.get(n) == s.role.book) for n in names] for s in signals if s.role]
+    return np.array(rows).reshape(len(rows), len(names))
+
+
+def _books(output: type) -> dict[str, str]:
+    known = signals_of(output).items()
+    return {name: s.role.book if s.role else "" for name, s in known if name.startswith("E_")}
+
+
+def energy_of(engine: Engine, request: Request, vector: Array, books: Array) -> Array:
+    """Return the sum of each book's energies at an instant with a request's parameters [J].
+
+    ``books``: `energies` of all outputs.
     """
     end = request.schedule.frames  # a stretch without frames: the row at its end alone
-    row = np.empty((1, len(places)))
-    asked = replace(request, selection=np.array(places, dtype=np.int32))
+    row = np.empty((1, books.shape[1]))
+    asked = replace(request, selection=np.arange(books.shape[1], dtype=np.int32))
     engine.advance(asked, vector.copy(), end, end, row)
-    return float(row.sum())
+    # Outputs that are no energies need not be finite.
+    return np.array([row[0, book > 0].sum() for book in books])

@@ -15,13 +15,7 @@ from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import Progress, advance_all
-from bywire.simulation.changes import (
-    PUT_IN,
-    Change,
-    energies,
-    energy_of,
-    pieces,
-)
+from bywire.simulation.changes import Change, energies, energy_of, pieces, put_in_signals
 from bywire.simulation.engine import Engine, prepare
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request
@@ -171,7 +165,8 @@ def simulate(
     values = np.empty((schedule.rows, len(wanted)))
     if run.changes:
         finished, put_in = _advanced_in_pieces(run, engine, request, vector, values, progress)
-        values, wanted = np.column_stack((values, put_in)), (*wanted, PUT_IN)
+        wanted = (*wanted, *put_in_signals(run.model.Output))
+        values = np.column_stack((values, put_in))
     else:
         finished = advance_all(chosen, request, vector, values, progress)
     rows = schedule.rows if finished == schedule.frames else -(-finished // schedule.record_frames)
@@ -202,7 +197,8 @@ def _advanced_in_pieces(
     ParameterError
         When a change alters the sample times or what the model's state consists of.
     """
-    schedule, put_in = request.schedule, np.zeros(request.schedule.rows)
+    schedule, books = request.schedule, put_in_signals(run.model.Output)
+    put_in = np.zeros((schedule.rows, len(books)))
     before: tuple[Engine, Request] | None = None
     finished = 0
     for begin, last, par in pieces(run.par, run.changes, schedule):
@@ -215,8 +211,8 @@ def _advanced_in_pieces(
                 f"a change during the run alters {what}: only values and laws may change"
             )
         here = replace(request, parameters=np.array(list(par.leaves().values())))
-        places = energies(tuple(prepared.outputs))
-        if before is not None and places:
+        places = energies(run.model.Output, tuple(prepared.outputs))
+        if before is not None and places.size:
             jump = energy_of(engine, here, vector, places) - energy_of(*before, vector, places)
             put_in[-(-begin // schedule.record_frames) :] += jump
         row = -(-begin // schedule.record_frames)

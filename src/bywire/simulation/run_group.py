@@ -21,7 +21,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.changes import PUT_IN, energies, pieces
+from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare, structure_of
 from bywire.simulation.ensemble import LaneKernel, lane_kernel
@@ -160,9 +160,10 @@ def simulate_group(
     kernel = lane_kernel(prepared, compiler, tuple(selected(names, wanted).tolist()))
     schedule = runs[0].schedule()
     edges = _edges(schedule, first, runs)
-    jumping = energies(wanted) if any(run.changes for run in runs) else []
+    output = runs[0].model.Output
+    jumping = energies(output, wanted) if any(run.changes for run in runs) else np.empty((0, 0))
     watch = _Watch(-(-len(runs) // kernel.lanes) * (len(edges) - 1), progress)
-    recorded = (*wanted, PUT_IN) if jumping else wanted
+    recorded = (*wanted, *put_in_signals(output)) if jumping.any() else wanted
     values = np.zeros((len(recorded), len(runs), schedule.rows - first))
 
     def computed(begin: int) -> Array:
@@ -225,13 +226,14 @@ def _stimuli(group: Sequence[Run], schedule: Schedule, width: int) -> Array:
 class _Carried:
     """Runs that are carried on side by side.
 
-    ``jumping``: places among the signals of the energies that changes make jump.
+    ``jumping``: the energies among the signals that changes make jump, by book; see `energies`.
     """
 
     def __init__(
-        self, kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], jumping: list[int]
+        self, kernel: LaneKernel, schedule: Schedule, group: Sequence[Run], jumping: Array
     ) -> None:
         self._kernel, self._schedule, self._jumping = kernel, schedule, jumping
+        self._books = len(jumping) if jumping.any() else 0
         self._count, width = len(group), kernel.lanes
         filled = [*group, *[group[-1]] * (width - len(group))]  # idle lanes repeat the last
         self._vector = np.array(
@@ -256,7 +258,7 @@ class _Carried:
             first = -(-begin // every) - skipped
             self._change(begin, values[:, :, max(first, 0) :])
             last = (schedule.rows if end == schedule.frames else -(-end // every)) - skipped
-            signals = values.shape[0] - bool(self._jumping)
+            signals = values.shape[0] - self._books
             if first >= 0:
                 rows = values[:signals, :, first : max(last, first + 1)].transpose(1, 2, 0)
                 self._advance(schedule, rows, begin, end)
@@ -275,20 +277,20 @@ class _Carried:
         here = self._changes.get(begin, ())
         if not here:
             return
-        before = self._energies(rows) if self._jumping and begin else None
+        before = self._energies(rows) if self._books and begin else None
         for lane, par in here:
             self._parameters[:, lane] = list(par.leaves().values())
         if before is not None:
-            rows[-1] += (self._energies(rows) - before)[: self._count, None]
+            rows[-self._books :] += (self._energies(rows) - before)[:, : self._count, None]
 
     def _energies(self, rows: Array) -> Array:
-        """Return the sum of the energies of every lane now [J], shape (lanes,)."""
+        """Return the sum of each book's energies of every lane now [J], shape (books, lanes)."""
         end, kept = self._schedule.frames, self._vector
-        row = np.empty((self._kernel.lanes, 1, rows.shape[0] - 1))
+        row = np.empty((self._kernel.lanes, 1, rows.shape[0] - self._books))
         self._vector = kept.copy()
         self._advance(self._schedule, row, end, end)
         self._vector = kept
-        return np.asarray(row[:, 0, self._jumping].sum(axis=-1))
+        return np.array([row[:, 0, book > 0].sum(axis=-1) for book in self._jumping])
 
     def _advance(self, plan: Schedule, rows: Array, begin: int, end: int) -> None:
         self._kernel.advance(

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import bywire
-from bywire.bench.energy_ledger import further_ledgers
+from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.experiment import as_run
 from bywire.brakes.two_wheeler.case import rolling_case
 from bywire.brakes.two_wheeler.experiments import repeated_stops
@@ -76,6 +76,25 @@ def test_books_of_the_heat_close(changes):
              "E_ground")  # fmt: skip
     left = sum(growth(run, each) for each in taken) - given
     assert abs(left) < 1e-11 * float(run["E_vehicle"][0])
+
+
+def test_what_changes_put_in_stands_in_the_book_of_its_store():
+    # A mass that comes on top is the vehicle's, discs that hold more heat are the heat's.
+    changes = {"vehicle.body.m": "+20%", "front.heat.C_d": "+50%"}
+    bench = bywire.Bench(
+        "straight-stop", "sport600", options={"duration": 1.5},
+        overrides={"front.heat.law": "lumped"}, faults=[{"set": changes, "onset": 1.0}],
+    )  # fmt: skip
+    run = bywire.run(bench, estimate_error=False).recording
+    body, heat = actuator_ledger(run), further_ledgers(run)["heat"]
+    T = run["T_disc_f"].sel(time=1.0).item() - SPORT600.front.heat.T_a
+    assert growth(run, "E_change_heat") == pytest.approx(
+        0.5 * SPORT600.front.heat.C_d * T, rel=1e-6
+    )
+    for books, name in ((body, "E_change"), (heat, "E_change_heat")):
+        assert {p.name for p in books.sources} & {"E_change", "E_change_heat"} == {name}
+        assert growth(run, name) > 1e-2 * books.turnover
+        assert abs(books.closing_error) < 1e-6 * books.turnover
 
 
 def test_cold_brakes_are_those_without_heat():
