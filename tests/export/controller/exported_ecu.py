@@ -48,6 +48,8 @@ STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
 }  # fmt: skip
 """structural choices of all brakes: experiment, parameter set, overrides"""
 
+BRAKES = ("pressure, sine dither", "moment and position", "slip by rules")
+
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 
 

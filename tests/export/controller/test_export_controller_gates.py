@@ -11,12 +11,11 @@ import sys
 from pathlib import Path
 
 import pytest
-from exported_ecu import bench_of, build, needs_compiler
+from exported_ecu import BRAKES, bench_of, build, needs_compiler
 
 from bywire.api.export_controller import export_controller
 from bywire.export.controller.harness import FLAGS
 
-BRAKES = ("pressure, sine dither", "moment and position", "slip by rules")
 MUTANTS = 40
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.memories import Memories
+from bywire.export.controller.statements import Statement
 from bywire.export.controller.structs import Structs
 from bywire.export.controller.values import (
     PRIMARY,
@@ -25,21 +27,9 @@ from bywire.export.controller.values import (
     Shape,
     Table,
     Update,
-    Uses,
     lifted,
     shape_of,
 )
-
-
-@dataclass(frozen=True)
-class Statement:
-    """``target = value``, or ``target.member = value``, with comments above."""
-
-    target: str
-    ctype: str
-    value: Expr
-    member: str = ""
-    notes: tuple[str, ...] = ()
 
 
 @dataclass
@@ -50,13 +40,13 @@ class Body:
     ----------
     stores
         How often every Python variable is assigned.
-    arguments
-        C names of the function's arguments.
+    memory
+        Which versions of memory there are, and which places keep theirs.
     """
 
     structs: Structs
     stores: Counter[str]
-    arguments: set[str] = field(default_factory=set)
+    memory: Memories = field(default_factory=Memories)
     statements: list[Statement] = field(default_factory=list)
     names: set[str] = field(default_factory=set)
     types: dict[str, str] = field(default_factory=dict)
@@ -69,15 +59,25 @@ class Body:
         self.names.add(name)
         return name
 
-    def write(self, target: str, ctype: str, value: Expr, member: str = "") -> None:
+    def write(
+        self, target: str, ctype: str, value: Expr, member: str = "",
+        changes: Iterable[str] = (), is_pointer: bool = False,
+    ) -> None:  # fmt: skip
         """Append a statement."""
-        self.statements.append(Statement(target, ctype, value, member, tuple(self.notes)))
+        self.memory.read(value.uses)
+        made = Statement(
+            target, ctype, value, member, tuple(self.notes), tuple(changes), is_pointer
+        )
+        self.statements.append(made)
         self.notes.clear()
+        for place in changes:
+            self.moving.add(place)
+            self.memory.changed(place)
 
     def is_stable(self, expr: Expr) -> bool:
         """Return whether a text means the same further down: it reads nothing that changes."""
         changing = {use[1] for use in expr.uses if use[0] == "local"} & self.moving
-        return expr.is_path and not changing
+        return expr.is_path and not changing and not self.memory.versions_in(expr.uses)
 
     def ctype_of(self, value: Any) -> str:
         """Return the C type of a number, a truth value or a structure."""
@@ -98,7 +98,8 @@ class Body:
         if isinstance(value, Expr):
             return value if self.is_stable(value) else self.variable(hint, value)
         if isinstance(value, Record):
-            return value if self.is_stable(value.expr) else self.variable(hint, value)
+            is_kept = self.structs.is_memory(value) or self.is_stable(value.expr)
+            return value if is_kept else self.variable(hint, value)
         if isinstance(value, (Update, BuiltGroup)):
             return self.variable(hint, value)
         if isinstance(value, Group) and not self.is_stable(value.expr):
@@ -117,9 +118,14 @@ class Body:
 
     def variable(self, hint: str, value: Any, name: str = "") -> Any:
         """Return a value that was put into a variable, a new one unless a name is given."""
+        if isinstance(value, Update) and self.structs.is_memory(value):
+            return self.changed_memory(value)
         target = name or self.fresh(hint)
         ctype = self.ctype_of(value)
         here = Expr(target, uses=frozenset({("local", target)}))
+        if isinstance(value, (Record, Built)) and self.structs.is_memory(value):
+            self.write(target, ctype, self.rvalue(value))
+            return self.memory.at(value.cls, target, pointer=False)
         if isinstance(value, Update):
             self.write(target, ctype, self.rvalue(value.record))
             self.moving.add(target)
@@ -135,6 +141,24 @@ class Body:
             return Group(shape, here, pointer=False)
         return here
 
+    def changed_memory(self, value: Update) -> Record:
+        """Return the memory with some fields replaced: in its place, unless that is read later."""
+        place = self.owned(value.record)
+        self.update(place, value.items)
+        self.memory.changed(place.expr.text)
+        return self.memory.at(place.cls, place.expr.text, place.pointer)
+
+    def address(self, record: Record) -> Expr:
+        """Return a pointer to memory."""
+        return replace(record.expr, text=f"{'' if record.pointer else '&'}{record.expr.text}")
+
+    def owned(self, record: Record) -> Record:
+        """Return where memory can be changed: a copy of it where its values are read later."""
+        if self.memory.stays(record.expr.text):
+            return record
+        copied: Record = self.variable(f"{record.expr.text}_new", record)
+        return copied
+
     def update(self, record: Record, items: Mapping[str, Any]) -> None:
         """Write new values of fields of a variable."""
         struct = self.structs.of_tuple(record.cls)
@@ -145,14 +169,20 @@ class Body:
         target = record.expr.text
         # All are computed before the first one is set.
         values = {name: self.rvalue(lifted(v)) for name, v in kept.items()}
-        for at, (name, value) in enumerate(values.items()):
-            if ("local", target) in value.uses and at > 0:
+        earlier: set[Any] = set()
+        for name, value in values.items():
+            reads = ("local", target) in value.uses
+            if reads and (earlier & value.uses or any(use[0] == "call" for use in value.uses)):
                 values[name] = self.variable(f"{name}_new", value)
+            earlier.add(("field", struct.name, name))
         for name, value in values.items():
             uses = value.uses | {("local", target)}
             if struct.is_memory:
                 uses |= {("field", struct.name, name)}
-            self.write(target, struct.name, replace(value, uses=uses), c_name(name))
+            self.write(
+                target, struct.name, replace(value, uses=uses), c_name(name),
+                is_pointer=record.pointer,
+            )  # fmt: skip
         self.moving.add(target)
 
     def rvalue(self, value: Any) -> Expr:
@@ -200,18 +230,6 @@ class Body:
         one, zero = (self.structs.precision.literal(v) for v in (1.0, 0.0))
         return Expr(f"({expr.at(PRIMARY)} ? {one} : {zero})", uses=expr.uses)
 
-    def live(self, result: Uses) -> list[Statement]:
-        """Return the statements that the result needs."""
-        needed, kept = _locals(result), []
-        for statement in reversed(self.statements):
-            if statement.target not in needed:
-                continue
-            kept.append(statement)
-            if not statement.member:
-                needed.discard(statement.target)
-            needed |= _locals(statement.value.uses)
-        return kept[::-1]
-
 
 def is_number(value: Any) -> bool:
     """Return whether a value is a known number."""
@@ -248,7 +266,3 @@ def built_shape(value: BuiltGroup) -> Shape:
         else:
             fields.append((name, Choice(each.value)))
     return Shape(value.cls, tuple(fields))
-
-
-def _locals(uses: Iterable[Any]) -> set[str]:
-    return {use[1] for use in uses if use[0] == "local"}

@@ -109,7 +109,8 @@ class Executor(Evaluator):
         names = {each.id for each in target.elts if isinstance(each, ast.Name)}
         for at, each in enumerate(values[1:], 1):
             used = {use[1] for use in _uses(each) if use[0] == "local"}
-            if used & names and not isinstance(each, Update):
+            is_memory = self.body.structs.is_memory(each)
+            if used & names and not isinstance(each, Update) and not is_memory:
                 values[at] = self.body.variable("then", each)
         for each, entry in zip(target.elts, values, strict=True):
             self._assign(each, entry)
@@ -120,6 +121,9 @@ class Executor(Evaluator):
         body = self.body
         if isinstance(value, (Known, Closure, Method, Array)):
             return value
+        if body.structs.is_memory(value):
+            is_new = isinstance(value, Built)
+            return body.variable(name, value) if is_new else body.settled(value, name)
         if isinstance(value, Update) and self._is_own(name, value.record):
             body.update(value.record, value.items)
             return value.record

@@ -7,14 +7,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from bywire.export.controller.body import Body, Statement, built_shape
+from bywire.export.controller.arguments import Argument
+from bywire.export.controller.body import Body, built_shape
 from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.statements import Statement, live
 from bywire.export.controller.structs import Structs
 from bywire.export.controller.values import (
     Array,
     Built,
     BuiltGroup,
     Expr,
+    Given,
     Group,
     Items,
     Known,
@@ -26,14 +29,6 @@ from bywire.export.controller.values import (
 )
 
 
-@dataclass(frozen=True)
-class Argument:
-    """An argument in C."""
-
-    name: str
-    declaration: str
-
-
 @dataclass
 class CFunction:
     """A function of C.
@@ -41,7 +36,8 @@ class CFunction:
     Parameters
     ----------
     result
-        C type; empty where all that it gives is known at export, and nothing is called.
+        C type; empty where all that it gives is known at export, and nothing is called; ``void``
+        where it changes memory and gives nothing else.
     value
         What it returns, in its own variables.
     members
@@ -50,6 +46,8 @@ class CFunction:
         What it reads.
     all_arguments
         Names of what a call passes, read or not.
+    changes
+        Arguments that are memory and are changed in their place.
     """
 
     name: str
@@ -64,6 +62,7 @@ class CFunction:
     all_arguments: list[str] = field(default_factory=list)
     statements: list[Statement] = field(default_factory=list)
     returned: Expr | None = None
+    changes: set[str] = field(default_factory=set)
     own: set[str] = field(default_factory=set)
     moving: set[str] = field(default_factory=set)
 
@@ -76,132 +75,72 @@ class CFunction:
         return frozenset().union(*every)
 
 
-def kind_of(value: Any) -> Any:
-    """Return what of an argument decides which C function serves."""
-    value = lifted(value)
-    if isinstance(value, Expr):
-        return "truth" if value.truth else "number"
-    if isinstance(value, Known):
-        if isinstance(value.value, float):
-            return "number"
-        return ("known", type(value.value), _hashable(value.value))
-    if isinstance(value, Record) and value.pointer:
-        return ("pointer", value.cls)
-    if isinstance(value, (Record, Built)):
-        return ("tuple", value.cls)
-    if isinstance(value, Update):
-        return ("tuple", value.record.cls)
-    if isinstance(value, Items):
-        return ("items", *(kind_of(each) for each in value.values))
-    if isinstance(value, Table):
-        return ("table", *((name, kind_of(each)) for name, each in value.items.items()))
-    if isinstance(value, Array):
-        return ("array", value.length)
-    if isinstance(value, Group):
-        return ("group", value.shape)
-    if isinstance(value, BuiltGroup):
-        return ("group", built_shape(value))
-    return ("other", id(value))
-
-
-def _hashable(value: Any) -> Any:
-    try:
-        hash(value)
-    except TypeError:
-        return id(value)
-    return value
-
-
-def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument | None]]:
-    """Yield what an argument is within the function, then its arguments in C."""
-    value, structs = lifted(value), body.structs
-    if isinstance(value, Known) and not isinstance(value.value, float):
-        yield value, None
-        return
-    if isinstance(value, (Items, Table)):
-        inner: dict[Any, Any] = {}
-        arguments: list[Argument] = []
-        each = value.items.items() if isinstance(value, Table) else enumerate(value.values)
-        for key, entry in each:
-            (inner[key], first), *more = received(entry, f"{name}_{key}", body)
-            arguments += [a for _, a in [(None, first), *more] if a is not None]
-        yield (
-            Table(inner) if isinstance(value, Table) else Items(tuple(inner.values())),
-            arguments[0] if arguments else None,
-        )
-        yield from ((None, a) for a in arguments[1:])
-        return
-    target = body.fresh(name)
-    here = Expr(target, uses=frozenset({("local", target)}))
-    ctype = body.ctype_of(value) if not isinstance(value, Array) else structs.precision.real
-    body.types[target] = ctype
-    if isinstance(value, (Expr, Known)):
-        is_truth = isinstance(value, Expr) and value.truth
-        yield Expr(target, uses=here.uses, truth=is_truth), Argument(target, f"{ctype} {target}")
-    elif stays_there(value, structs):
-        there = Record(value.cls, here, pointer=True)
-        yield there, Argument(target, f"const {ctype} *{target}")
-    elif isinstance(value, (Record, Built, Update)):
-        cls = value.record.cls if isinstance(value, Update) else value.cls
-        yield Record(cls, here), Argument(target, f"{ctype} {target}")
-    elif isinstance(value, Array):
-        declared = f"const {ctype} {target}[{value.length}]"
-        yield Array(here, value.length), Argument(target, declared)
-    else:
-        shape = value.shape if isinstance(value, Group) else built_shape(value)
-        made = Group(shape, here, pointer=True, origin=(target,))
-        yield made, Argument(target, f"const {ctype} *{target}")
-
-
-def stays_there(value: Any, structs: Structs) -> bool:
-    """Return whether a NamedTuple is handed on as a pointer: inputs, but no memory."""
-    is_input = isinstance(value, Record) and value.pointer
-    return is_input and not structs.of_tuple(value.cls).is_memory
-
-
-def passed(value: Any, body: Body) -> Iterator[Expr]:
-    """Yield the C arguments of a value, in the order of `received`."""
-    value = lifted(value)
-    if isinstance(value, Known) and not isinstance(value.value, float):
-        return
-    if isinstance(value, (Items, Table)):
-        each = value.items.values() if isinstance(value, Table) else value.values
-        for entry in each:
-            yield from passed(entry, body)
-    elif isinstance(value, Array) or stays_there(value, body.structs):
-        yield value.expr
-    elif isinstance(value, BuiltGroup) or (isinstance(value, Group) and not value.expr.is_path):
-        yield from passed(body.variable("values", value), body)
-    elif isinstance(value, Group):
-        sign = "" if value.pointer else "&"
-        yield Expr(f"{sign}{value.expr.text}", uses=value.expr.uses)
-    else:
-        yield body.rvalue(value)
-
-
 def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
     """Let a function return a value: directly, in a structure, or not at all where it is known."""
     value = lifted(value)
     if isinstance(value, Update):
         value = _changed(value, body)
+    value = _left_there(made, body, value)
     made.own = set(body.names)
-    if isinstance(value, (Known, Array)) or (isinstance(value, Group) and value.origin):
+    is_group = isinstance(value, Group) and value.origin
+    if isinstance(value, (Known, Array, Given)) or is_group:
         made.value = value
     elif isinstance(value, (Items, Table)):
         _several(made, body, value, node)
     else:
         made.result, made.value = body.ctype_of(value), value
         made.returned = body.rvalue(value)
+    changed: frozenset[Use] = frozenset(("local", place) for place in made.changes)
     if made.returned is not None:
-        made.statements = body.live(made.returned.uses)
+        body.memory.read(made.returned.uses)
+        made.statements = live(body.statements, made.returned.uses | changed)
+    elif changed:
+        made.result = "void"
+        made.statements = live(body.statements, changed)
     needed = {use[1] for use in made.uses if use[0] == "local"}
     made.arguments = [each for each in made.arguments if each.name in needed]
     made.moving = body.moving
 
 
+def _left_there(made: CFunction, body: Body, value: Any) -> Any:
+    """Return a function's value with memory that it was given, and gives back, by its argument."""
+    memories = [a.name for a in made.arguments if a.name in body.memory.versions]
+    if not memories:
+        return value
+    kept = set()
+
+    def walked(value: Any) -> Any:
+        value = lifted(value)
+        if isinstance(value, Items):
+            # What reads the memory is computed before that is changed.
+            each = [
+                v if body.structs.is_memory(v) else body.settled(v, "kept") for v in value.values
+            ]
+            return Items(tuple(map(walked, each)))
+        if isinstance(value, Table):
+            return Table({name: walked(each) for name, each in value.items.items()})
+        if body.structs.is_memory(value):
+            value = body.settled(value, "changed")
+            is_given = isinstance(value, Record) and value.expr.text in memories
+            if is_given and body.memory.is_now(value):
+                kept.add(value.expr.text)
+                return Given(value.expr.text)
+        return value
+
+    value = walked(value)
+    for place in memories:
+        if place not in kept:
+            body.memory.keep(place)
+        elif body.memory.versions[place]:
+            made.changes.add(place)
+    return value
+
+
 def _changed(value: Update, body: Body) -> Any:
     """Return a replaced NamedTuple in its own variable where that is the function's."""
     name = value.record.expr.text
+    if body.structs.is_memory(value):
+        return body.changed_memory(value)
     if name in body.types and not value.record.pointer:
         body.update(value.record, value.items)
         return value.record
@@ -246,7 +185,9 @@ def _leaves(value: Any, place: tuple[Any, ...]) -> Iterator[tuple[tuple[Any, ...
     elif isinstance(value, Table):
         for name, each in value.items.items():
             yield from _leaves(each, (*place, name))
-    elif not isinstance(value, Known) and not (isinstance(value, Group) and value.origin):
+    elif not isinstance(value, (Known, Given)) and not (
+        isinstance(value, Group) and value.origin
+    ):
         yield place, value
 
 

@@ -12,11 +12,13 @@ from typing import Any
 from bywire.core.errors import ModelError
 from bywire.core.model import Model, Task
 from bywire.core.parameters import ParameterSet
-from bywire.export.controller.body import Body, Statement
+from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, unique
 from bywire.export.controller.calls import called
 from bywire.export.controller.execution import Executor
 from bywire.export.controller.functions import CFunction
+from bywire.export.controller.memories import Memories, Site
+from bywire.export.controller.statements import Statement, live
 from bywire.export.controller.structs import Member, Structs
 from bywire.export.controller.translation import Translation
 from bywire.export.controller.values import (
@@ -27,7 +29,6 @@ from bywire.export.controller.values import (
     Shape,
     Update,
     Use,
-    lifted,
     shape_of,
 )
 
@@ -38,19 +39,19 @@ _MOST = 30
 
 @dataclass(frozen=True)
 class Step:
-    """One task: the arguments that it reads, its statements, what it writes."""
+    """One task: the arguments that it reads, its statements, and the memory where that is new."""
 
     task: Task
     name: str
     arguments: tuple[tuple[str, str], ...]
     statements: tuple[Statement, ...]
-    result: Expr
+    result: Expr | None
 
     @property
     def uses(self) -> frozenset[Use]:
         """All that it needs."""
-        every = [self.result.uses, *(each.value.uses for each in self.statements)]
-        return frozenset().union(*every)
+        every = [each.value.uses for each in self.statements]
+        return frozenset().union(*every, *([self.result.uses] if self.result else []))
 
 
 @dataclass(frozen=True)
@@ -115,17 +116,19 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     """
     short = c_name(name or model.name).lower()
     used: frozenset[Use] | None = None
+    copied: set[Site] = set()
     for _ in range(_MOST):
-        made = _translated(model, par, PRECISIONS[precision], short, used)
+        before = len(copied)
+        made = _translated(model, par, PRECISIONS[precision], short, used, copied)
         fields = frozenset(use for use in made.uses if use[0] == "field")
-        if fields == used:
+        if fields == used and len(copied) == before:
             return made
         used = fields
     raise ModelError(f"{model.name}: what its ECU reads does not settle")  # pragma: no cover
 
 
 def _translated(
-    model: Model, par: ParameterSet, precision: Precision, name: str, used: Any
+    model: Model, par: ParameterSet, precision: Precision, name: str, used: Any, copied: set[Site]
 ) -> Program:
     public = {model.Stimulus: f"{name}_Stimulus", model.State: f"{name}_Plant",
               model.Memory: f"{name}_Memory", type(par): f"{name}_Parameters"}  # fmt: skip
@@ -138,7 +141,7 @@ def _translated(
         classes = {_class_of(each) for each in arguments.values()}
         return function.__module__ == home and model.Memory not in classes
 
-    made = Translation(structs, is_plant, names=set(public.values()))
+    made = Translation(structs, is_plant, names=set(public.values()), copied=copied)
     steps: list[Step] = []
     for task in model.tasks(par):
         steps.append(_step(made, model, par, task, name, {each.name for each in steps}))
@@ -168,7 +171,8 @@ def _step(
 ) -> Step:
     """Return the step of a task: its tick, called on what stands behind pointers."""
     structs = made.structs
-    body = Body(structs, Counter())
+    step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
+    body = Body(structs, Counter(), Memories(step, made.copied))
     held = {"memory": model.Memory, "x": model.State, "u": model.Stimulus}
     given: dict[str, Any] = {}
     for short, cls in held.items():
@@ -177,15 +181,21 @@ def _step(
     body.fresh("par")
     here = Expr("par", uses=frozenset({("local", "par")}))
     structs.of_tuple(model.Memory)
+    given["memory"] = body.memory.at(model.Memory, "memory", pointer=True)
     given["par"] = Group(shape_of(par), here, pointer=True)
     at = Executor(made, body, f"task {task.name!r} of {model.name}", {}, {})
     node = ast.parse(f"{c_name(task.name)}(x, m, u, par)", mode="eval").body
     assert isinstance(node, ast.Call)
     order = [given["x"], given["memory"], given["u"], given["par"]]
-    value = lifted(called(at, node, Known(task.tick), order, {}))
-    result = body.rvalue(value)
-    statements = body.live(result.uses)
-    needed = {use[1] for each in (result, *(s.value for s in statements)) for use in each.uses
+    value = body.settled(called(at, node, Known(task.tick), order, {}), "memory")
+    is_there = isinstance(value, Record) and value.expr.text == "memory"
+    result: Expr | None = None
+    if not (is_there and body.memory.is_now(value)):
+        result = body.rvalue(value)
+    after = frozenset({("local", "memory")}) if result is None else result.uses
+    body.memory.read(after)
+    statements = live(body.statements, after)
+    needed = {use[1] for each in (after, *(s.value.uses for s in statements)) for use in each
               if use[0] == "local"}  # fmt: skip
     arguments = [(f"{structs.of_tuple(model.Memory).name} *memory", "memory")]
     for short in ("x", "u"):
@@ -193,5 +203,4 @@ def _step(
             arguments.append((f"const {structs.of_tuple(held[short]).name} *{short}", short))
     if "par" in needed:
         arguments.append((f"const {structs.of_group(shape_of(par)).name} *par", "par"))
-    step = unique(f"{name}_ecu_step_{c_name(task.name)}", taken)
     return Step(task, step, tuple(arguments), tuple(statements), result)

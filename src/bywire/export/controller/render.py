@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from bywire.export.controller.body import Statement
 from bywire.export.controller.c_text import comment, wrapped
 from bywire.export.controller.functions import CFunction
 from bywire.export.controller.program import Program, Step
+from bywire.export.controller.statements import Statement
 from bywire.export.controller.structs import Struct
 
 _OPS = "bywire.core.ops"
@@ -170,25 +170,29 @@ def signature(function: CFunction) -> str:
 
 
 def _function(program: Program, function: CFunction, before: str = "") -> str:
-    assert function.returned is not None
     lines = [comment(function.description), wrapped(before + signature(function)), "{"]
     own = {each.name for each in function.arguments}
     lines += _statements(function.statements, own)
-    lines += [wrapped(f"return {function.returned.text};", "    "), "}"]
-    return "\n".join(lines)
+    if function.returned is not None:
+        lines.append(wrapped(f"return {function.returned.text};", "    "))
+    return "\n".join([*lines, "}"])
 
 
 def _statements(statements: Iterable[Statement], declared: set[str]) -> list[str]:
     every = list(statements)
     times: dict[str, int] = {}
     for each in every:
-        times[each.target] = times.get(each.target, 0) + 1
+        for target in (each.target, *each.changes):
+            times[target] = times.get(target, 0) + 1
     known, lines = set(declared), []
     for each in every:
         if each.notes:
             lines.append(comment(list(each.notes), "    "))
         if each.member:
-            text = f"{each.target}.{each.member} = {each.value.text};"
+            place = f"{each.target}{'->' if each.is_pointer else '.'}{each.member}"
+            text = f"{place} = {each.value.text};"
+        elif not each.target:
+            text = f"{'' if each.ctype == 'void' else '(void)'}{each.value.text};"
         elif each.target in known:
             text = f"{each.target} = {each.value.text};"
         else:
@@ -209,4 +213,6 @@ def _signature_of(step: Step) -> str:
 
 def _step(step: Step) -> str:
     lines = [wrapped(_signature_of(step)), "{", *_statements(step.statements, set())]
-    return "\n".join([*lines, wrapped(f"*memory = {step.result.text};", "    "), "}"])
+    if step.result is not None:
+        lines.append(wrapped(f"*memory = {step.result.text};", "    "))
+    return "\n".join([*lines, "}"])

@@ -76,6 +76,12 @@ class Structs:
                                      cls is self.memory)
         return self.known[cls]
 
+    def is_memory(self, value: Any) -> bool:
+        """Return whether a value is the memory, which stays in its place and is changed there."""
+        if hasattr(value, "record"):
+            value = value.record
+        return getattr(value, "cls", None) is self.memory
+
     def known_tuple(self, ctype: str) -> type[Any] | None:
         """Return the NamedTuple class behind a C type; None where it is a number's."""
         for cls, struct in self.known.items():

@@ -10,29 +10,25 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bywire.core.errors import ModelError
+from bywire.export.controller.arguments import kind_of, passed, received
 from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name, unique
 from bywire.export.controller.context import Context
 from bywire.export.controller.execution import Executor, Returned
-from bywire.export.controller.functions import (
-    CFunction,
-    as_value,
-    finish,
-    given_back,
-    kind_of,
-    passed,
-    received,
-)
+from bywire.export.controller.functions import CFunction, as_value, finish, given_back
 from bywire.export.controller.members import attribute
+from bywire.export.controller.memories import Memories, Site
 from bywire.export.controller.source import closure_of, description, node_of, stores
 from bywire.export.controller.structs import Structs
 from bywire.export.controller.values import (
     Array,
     Closure,
     Expr,
+    Given,
     Group,
     Items,
     Known,
+    Record,
     Table,
     Uses,
     lifted,
@@ -57,6 +53,7 @@ class Translation:
     functions: dict[Any, CFunction] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
     constants: dict[str, float] = field(default_factory=dict)
+    copied: set[Site] = field(default_factory=set)
     alive: list[Any] = field(default_factory=list)
     depth: int = 0
 
@@ -81,14 +78,18 @@ class Translation:
             raise at.refuse(node, f"{function.__qualname__}: {error}") from None
         arguments = self._arguments(function, bound)
         made = self.function(function, arguments)
+        expr, memories = self._called(at, made, arguments)
         if not made.result:
-            return _rooted(at, node, made.value, arguments)
-        expr = self._called(at, made, arguments)
+            return _rooted(at, node, made.value, arguments, memories)
+        changes = [memories[name].expr.text for name in memories if name in made.changes]
+        value, result = made.value, ""
         if made.struct:
             result = at.body.fresh("result")
-            at.body.write(result, made.result, expr)
             here = Expr(result, uses=frozenset({("local", result)}))
-            return _rooted(at, node, given_back(made, self.structs, here), arguments)
+            value = given_back(made, self.structs, here)
+        if made.struct or changes:
+            at.body.write(result, made.result, expr, changes=changes)
+            return _rooted(at, node, value, arguments, memories)
         value = as_value(made.value, expr)
         return at.body.variable("values", value) if isinstance(value, Group) else value
 
@@ -111,20 +112,33 @@ class Translation:
             arguments[name] = value
         return arguments
 
-    def _called(self, at: Context, made: CFunction, arguments: Mapping[str, Any]) -> Expr:
+    def _called(
+        self, at: Context, made: CFunction, arguments: Mapping[str, Any]
+    ) -> tuple[Expr, dict[str, Record]]:
+        """Return the call, and the memory that it is given by the names of its arguments."""
         wanted = {each.name for each in made.arguments}
-        names = [a for a in made.all_arguments]
-        exprs = [e for value in arguments.values() for e in passed(value, at.body)]
-        kept = [e for name, e in zip(names, exprs, strict=True) if name in wanted]
-        uses: Uses = frozenset().union({("call", made.name)}, *(each.uses for each in kept))
-        return Expr(f"{made.name}({', '.join(each.text for each in kept)})", uses=uses)
+        every = [e for value in arguments.values() for e in passed(value, at.body)]
+        memories: dict[str, Record] = {}
+        kept: list[Expr] = []
+        for name, value in zip(made.all_arguments, every, strict=True):
+            if isinstance(value, Record):
+                is_twice = value.expr.text in (each.expr.text for each in memories.values())
+                if is_twice and made.changes:
+                    value = at.body.variable("memory", value)
+                memories[name] = at.body.owned(value) if name in made.changes else value
+                value = at.body.address(memories[name])
+            if name in wanted:
+                kept.append(value)
+        uses: Uses = frozenset({("call", made.name)}).union(*(each.uses for each in kept))
+        return Expr(f"{made.name}({', '.join(each.text for each in kept)})", uses=uses), memories
 
     def function(self, function: types.FunctionType, arguments: Mapping[str, Any]) -> CFunction:
         """Return the C function of a Python function for arguments of a kind."""
         closure = closure_of(function)
         self.alive += [*closure.values(), *(v for v in arguments.values())]
-        held = tuple((name, kind_of(Known(value))) for name, value in closure.items())
-        key = (function.__code__, held, tuple(kind_of(each) for each in arguments.values()))
+        kinds = tuple(kind_of(each, self.structs) for each in arguments.values())
+        held = tuple((n, kind_of(Known(v), self.structs)) for n, v in closure.items())
+        key = (function.__code__, held, kinds)
         if key not in self.functions:
             self.depth += 1
             if self.depth > DEEP:
@@ -147,12 +161,13 @@ class Translation:
         self.names.add(name)
         is_plant = self.is_plant(function, arguments)
         made = CFunction(name, module, description(function), is_plant)
-        body = Body(self.structs, stores(node))
+        body = Body(self.structs, stores(node), Memories(name, self.copied))
         scope: dict[str, Any] = {n: Known(v) for n, v in closure.items()}
         for python_name, value in arguments.items():
             (scope[python_name], first), *more = received(value, python_name, body)
             made.arguments += [a for _, a in [(None, first), *more] if a is not None]
-            if body.stores[python_name] > 1 and first is not None:
+            is_changed = body.stores[python_name] > 1 and not self.structs.is_memory(value)
+            if is_changed and first is not None:
                 body.moving.add(first.name)
         made.all_arguments = [each.name for each in made.arguments]
         at = Executor(self, body, function.__code__.co_filename, function.__globals__, scope)
@@ -186,9 +201,15 @@ class Translation:
         return returned.value
 
 
-def _rooted(at: Context, node: ast.AST, value: Any, arguments: Mapping[str, Any]) -> Any:
-    """Return a function's result in its caller's words: groups are those that it was given."""
+def _rooted(
+    at: Context, node: ast.AST, value: Any, arguments: Mapping[str, Any],
+    memories: Mapping[str, Record],
+) -> Any:  # fmt: skip
+    """Return a function's result in its caller's words: what it was given is the caller's."""
     value = lifted(value)
+    if isinstance(value, Given):
+        given = memories[value.argument]
+        return at.body.memory.at(given.cls, given.expr.text, given.pointer)
     if isinstance(value, Group) and value.origin:
         root, *path = value.origin
         group = next(v for n, v in arguments.items() if c_name(n) == root)
@@ -196,9 +217,11 @@ def _rooted(at: Context, node: ast.AST, value: Any, arguments: Mapping[str, Any]
             group = attribute(at, node, group, name)
         return group
     if isinstance(value, Items):
-        return Items(tuple(_rooted(at, node, each, arguments) for each in value.values))
+        each = (_rooted(at, node, v, arguments, memories) for v in value.values)
+        return Items(tuple(each))
     if isinstance(value, Table):
-        return Table({n: _rooted(at, node, v, arguments) for n, v in value.items.items()})
+        entries = value.items.items()
+        return Table({n: _rooted(at, node, v, arguments, memories) for n, v in entries})
     if isinstance(value, Array):
         raise at.refuse(node, "a law returns numbers, not a table of parameters")
     return value

@@ -81,6 +81,13 @@ class Update:
 
 
 @dataclass(frozen=True)
+class Given:
+    """The memory that a function was given, as it leaves it: by the name of its argument in C."""
+
+    argument: str
+
+
+@dataclass(frozen=True)
 class Items:
     """A tuple or list of values."""
 
