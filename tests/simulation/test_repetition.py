@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.analysis.loop import LOOPS
@@ -102,3 +103,12 @@ def test_interrupt_ends_a_long_sweep_within_a_moment():
     finally:
         timer.cancel()
     assert time.monotonic() - sent[0] < 2.0
+
+
+def test_a_case_ends_by_itself_and_gives_its_lane_to_the_next():
+    """More cases than lanes, ended after other numbers of windows: bit for bit as each alone."""
+    run, sweep = position(50.0)
+    sweep = replace(sweep, amplitudes=[0.02 * 1.4**k for k in range(19)], tolerance=3e-3)
+    together = frequency_response(run, sweep)
+    assert len(set(together["windows"].values.ravel())) > 1
+    xr.testing.assert_identical(together, frequency_response(run, sweep, lanes=False))

@@ -20,7 +20,8 @@ from bywire.bench.bench import Bench
 from bywire.bench.bench_file import from_mapping
 from bywire.bench.running import run
 from bywire.core.catalog import main_set, parameters
-from bywire.synthesis.bench_figures import BenchFigures, Small, bench_figures, loop_gain
+from bywire.synthesis.bench_figures import BenchFigures, bench_figures
+from bywire.synthesis.bench_sines import Small, loop_gain
 from bywire.synthesis.bench_tuning import Tuning
 from bywire.synthesis.candidate import Candidate, bench_slacks, linear_slacks
 from bywire.synthesis.linear_case import cases_of

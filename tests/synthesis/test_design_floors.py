@@ -17,7 +17,8 @@ from bywire.analysis.loop_figures import LoopFigures
 from bywire.analysis.margins import margins
 from bywire.core.catalog import main_set, parameters
 from bywire.core.errors import UnitError
-from bywire.synthesis.bench_figures import BenchFigures, Small
+from bywire.synthesis.bench_figures import BenchFigures
+from bywire.synthesis.bench_sines import Small
 from bywire.synthesis.candidate import Candidate, judged
 from bywire.synthesis.designer import design
 from bywire.synthesis.floors import DISK, bench_floors, linear_floors

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -18,6 +19,7 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare
 from bywire.simulation.ensemble import lane_kernel
+from bywire.simulation.lane_queue import Lanes
 from bywire.simulation.layout import Layout
 from bywire.simulation.run import Run, initial_vector, selected
 from bywire.simulation.schedule import Schedule
@@ -70,7 +72,9 @@ def repeat(
     lanes: bool = True,
     stop: threading.Event | None = None,
 ) -> Repeated:
-    """Run every case window after window until all cases of its group of lanes repeat.
+    """Run every case window after window until it repeats.
+
+    A case ends by itself, and the next takes its lane: what becomes of it depends on no other.
 
     Parameters
     ----------
@@ -129,46 +133,46 @@ def repeat(
             kernel.advance(open_end, p, u, vector, values, frames)
 
     layout = prepared.engine("auto").layout
-    start = _start_vectors(layout, starts or [(run.state, run.memory)] * count)
-    stopped = threading.Event() if stop is None else stop
+    begins = _start_vectors(layout, starts or [(run.state, run.memory)] * count)
+    stopped, queue = threading.Event() if stop is None else stop, deque(range(count))
+    rows, counters = schedule.frames // schedule.record_frames, layout.start["counters"]
+    done: dict[int, tuple[Array, list[Complex], bool, float]] = {}
 
-    def group(first: int) -> tuple[Array, Complex, int, NDArray[np.bool_], Array]:
-        lane = np.minimum(np.arange(first, first + width), count - 1)
-        columns = np.ascontiguousarray(matrix[:, lane])
-        vector = np.ascontiguousarray(start[:, lane])
+    def turns(_: int) -> None:
+        taken, now = Lanes(queue, width, matrix, begins), np.empty((width, rows, len(signals)))
 
-        def u(begin: int, end: int) -> Array:
-            return np.ascontiguousarray(np.moveaxis(given(lane, begin, end), 0, 2))
+        def u(first: int, last: int) -> Array:
+            return np.ascontiguousarray(np.moveaxis(given(taken.case, first, last), 0, 2))
 
-        shape = (width, schedule.frames // schedule.record_frames, len(signals))
-        now, seen = np.empty(shape), list[Complex]()
-        same = np.zeros(width, dtype=bool)
-        windows = 0
-        while windows < most and not same.all():
-            advance_window(advance, schedule, stopped, columns, u, vector, now)
-            require_finite(layout, vector, f"one of cases {first} to {lane[-1]} left the numbers")
-            windows += 1
-            seen = [*seen[1 - KEPT :], figures(now)]
-            if windows > 1:
-                same = _same(seen[-2], seen[-1], tolerance)
-        return now, _padded(seen), windows, same, vector[layout.start["counters"]]
+        while taken.seen:
+            advance_window(advance, schedule, stopped, taken.columns, u, taken.vector, now)
+            counted = sorted(taken.seen)
+            which = ", ".join(str(taken.case[lane]) for lane in counted)
+            ends = taken.vector[:, counted]
+            require_finite(layout, ends, f"one of cases {which} left the numbers")
+            for lane, repeats in taken.passed(figures(now), tolerance, most).items():
+                left = taken.vector[counters, lane]
+                done[int(taken.case[lane])] = now[lane].copy(), taken.seen[lane], repeats, left
+                taken.release(lane)
 
-    pool = ThreadPoolExecutor((os.cpu_count() or 1) if lanes else 1)
+    workers = min((os.cpu_count() or 1) if lanes else 1, -(-count // width))
+    pool = ThreadPoolExecutor(workers)
     try:
-        done = list(pool.map(group, range(0, count, width)))
+        list(pool.map(turns, range(workers)))
     except KeyboardInterrupt:
         stopped.set()
         raise
     finally:
-        pool.shutdown(cancel_futures=True)
-    times = np.arange(schedule.frames // schedule.record_frames) * schedule.record_frames
+        queue.clear()  # where one failed, what waits is not begun
+        pool.shutdown()
+    values, seen, repeats, unsettled = zip(*(done[k] for k in range(count)), strict=True)
     return Repeated(
-        time=np.asarray(times * schedule.frame, dtype=np.float64),
-        values=np.concatenate([values for values, *_ in done])[:count],
-        figures=np.concatenate([seen for _, seen, *_ in done])[:count],
-        windows=np.repeat([windows for _, _, windows, *_ in done], width)[:count],
-        repeats=np.concatenate([same for *_, same, _ in done])[:count],
-        unsettled=np.concatenate([counters for *_, counters in done])[:count].astype(np.int64),
+        time=np.asarray(np.arange(rows) * schedule.record_frames * schedule.frame, np.float64),
+        values=np.stack(values),
+        figures=np.stack([_padded(each) for each in seen]),
+        windows=np.array([len(each) for each in seen]),
+        repeats=np.array(repeats),
+        unsettled=np.array(unsettled).astype(np.int64),
     )
 
 
@@ -179,16 +183,11 @@ def _start_vectors(
     return np.stack([initial_vector(layout, *one) for one in starts], axis=1)
 
 
-def _same(before: Complex, now: Complex, tolerance: float) -> NDArray[np.bool_]:
-    """Return which lanes repeat; what does not move at all repeats."""
-    apart, size = (np.linalg.norm(one, axis=1) for one in (now - before, now))
-    return np.asarray(apart <= tolerance * size)
-
-
 def _padded(seen: list[Complex]) -> Complex:
-    """Return the figures of the last windows, shape (lanes, KEPT, n)."""
-    missing = np.full((KEPT - len(seen), *seen[0].shape), np.nan, dtype=np.complex128)
-    return np.moveaxis(np.concatenate([missing, np.array(seen)]), 0, 1)
+    """Return the figures of the last windows of a case, shape (KEPT, n)."""
+    last = seen[-KEPT:]
+    missing = np.full((KEPT - len(last), *last[0].shape), np.nan, dtype=np.complex128)
+    return np.concatenate([missing, np.array(last)])
 
 
 def window_schedule(run: Run) -> Schedule:

@@ -1,83 +1,33 @@
-r"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
+"""What gains are worth on the nonlinear bench: sines by amplitude, and the brake's step.
 
-Many sets of gains run side by side, in the lanes of one ensemble.
-
-Controller and sensor are linear between their limits. What the closed loop G, measured with a sine
-of one amplitude, leaves for the rest P (actuator, friction, dither) follows from the loop's laws
-C_r (set point) and C_y (output, sensor included):
-
-.. math:: G = \frac{C_r P}{1 + C_y P}, \quad L = C_y P = \frac{C_y G}{C_r - C_y G}
-
-P is the describing function at that amplitude of the set point, so the margin is one of small and
-middle-sized motion, not a proof of stability in the large. Scheduled gains count as those at the
-operating point: within a blend that is exact for small sines only.
+Many sets of gains run side by side, in the lanes of one ensemble. A set is measured in stages, and
+left where what is known of it already says that it is not wanted.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
 
-from bywire.analysis.crossings import Margin, fall, measured_margin
 from bywire.analysis.loop import Loop
-from bywire.analysis.response.dataset import Sweep, complex_values
-from bywire.analysis.response.frequency_response import frequency_response
-from bywire.analysis.response.window import common_interval, nyquist
 from bywire.bench.bench import Bench
 from bywire.bench.experiment import as_run
 from bywire.bench.kpis.registry import evaluate
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
-from bywire.core.typing import Array, Complex
 from bywire.simulation.ensemble import simulate_ensemble
-from bywire.simulation.run import Run
+from bywire.synthesis.bench_sines import Sines, Small
 
-_POINTS = 12
-_BELOW, _ABOVE = 4.0, 3.0  # of the target: the range of frequencies
-_LEAST = 3  # periods in a window
-_WINDOWS = 12  # granted to a response: friction and converter may keep it from repeating exactly
-_ROUGH_WINDOWS, _ROUGH = 8, 5e-3
 STEP_FIGURES = ("overshoot", "settling_time", "steady_state_error")
 
 
 @dataclass(frozen=True)
-class Small:
-    """Figures of the loop's answer to sines of one amplitude.
-
-    Parameters
-    ----------
-    amplitude
-        Of the sine, in the input's SI unit.
-    bandwidth
-        Frequency at which it has fallen to -3 dB [Hz]; the highest measured one where it stays
-        above; 0 where it is below, or sticks, from the lowest on.
-    least
-        Smallest gain up to the target; 0 where it sticks.
-    phase_margin, crossover
-        Of the describing function [degree, Hz], see `crossings.measured_margin`; NaN where laws
-        are not known.
-    peak
-        Largest gain.
-    settled
-        Whether every response repeated itself.
-    """
-
-    amplitude: float
-    bandwidth: float
-    least: float
-    phase_margin: float
-    crossover: float
-    peak: float
-    settled: bool
-
-
-@dataclass(frozen=True)
 class BenchFigures:
-    """One set of gains on the nonlinear bench.
+    """One set of gains on the nonlinear bench, or what is known of it so far.
 
     Parameters
     ----------
@@ -95,6 +45,10 @@ class BenchFigures:
     reasons: Mapping[str, str] = field(default_factory=dict)
 
 
+Worth = Callable[[int, BenchFigures], bool]
+"""``worth(k, figures) -> bool``: whether set k, with what is known of it so far, is measured on"""
+
+
 def bench_figures(
     loop: Loop,
     par: ParameterSet,
@@ -103,8 +57,6 @@ def bench_figures(
     gains: Mapping[str, Sequence[float]],
     bench: Bench | None,
     target: float,
-    *,
-    rough: bool = False,
 ) -> tuple[BenchFigures, ...]:
     """Return the figures of several sets of gains.
 
@@ -121,111 +73,62 @@ def bench_figures(
         The experiment whose step is judged; None for none.
     target
         Frequency around which is measured [Hz], from a quarter to three times of it.
+    """
+    everything = wanted_figures(
+        loop, par, value, amplitudes, gains, bench, target, lambda k, known: True
+    )
+    return tuple(figures for figures in everything if figures is not None)
+
+
+def wanted_figures(
+    loop: Loop,
+    par: ParameterSet,
+    value: float,
+    amplitudes: Sequence[float],
+    gains: Mapping[str, Sequence[float]],
+    bench: Bench | None,
+    target: float,
+    worth: Worth,
+    *,
+    rough: bool = False,
+) -> tuple[BenchFigures | None, ...]:
+    """Return the figures of those of several sets of gains that are worth to be measured.
+
+    The step is cheap and comes first; then the sines next to the target, of which only the
+    smallest gain is known so far; then all others.
+
+    Parameters
+    ----------
+    loop, par, value, amplitudes, gains, bench, target
+        As of `bench_figures`.
+    worth
+        Asked before every stage but the first. Unknown figures are NaN, or not there.
     rough
         Whether settling to 0.5 % is enough, as in a search.
+
+    Returns
+    -------
+    tuple
+        None for the sets that were left.
     """
-    point = loop.point(par.replace(loop.sustained), value)
-    run, whole = point.run(), loop.whole(point.par)
-    sweep = Sweep(
-        loop.inputs, loop.output, _frequencies(run, whole, target), amplitudes, dict(gains),
-        flags=(), whole=whole, least=_LEAST, tolerance=_ROUGH if rough else 1e-3,
-        most=_ROUGH_WINDOWS if rough else _WINDOWS,
-    )  # fmt: skip
-    responses = frequency_response(run, sweep)
     steps = _steps(bench, gains) if bench is not None else None
-    sets = responses.sizes["variant"]
-    rows = []
-    for k in range(sets):
-        tuned = par.replace({name: float(values[k]) for name, values in gains.items()})
-        laws = _laws(loop, tuned, value, responses["frequency"].values)
-        small = tuple(
-            _small(laws, responses.isel(variant=k, amplitude=j), target)
-            for j in range(responses.sizes["amplitude"])
-        )  # fmt: skip
-        rows.append(BenchFigures(small, *(({},) if steps is None else steps[k])))
-    return tuple(rows)
+    sines = Sines(loop, par, value, amplitudes, gains, target, rough=rough)
 
+    def known(k: int, small: tuple[Small, ...] = ()) -> BenchFigures:
+        return BenchFigures(small, *(({},) if steps is None else steps[k]))
 
-def _frequencies(run: Run, whole: Sequence[float], target: float) -> list[float]:
-    """Return ascending frequencies of which few periods are whole sample times and dithers.
-
-    Several periods, at another phase of the dither each: friction would lock one period of 10 Hz
-    to five of 50 Hz, and what is measured would depend on how both began.
-    """
-    common = common_interval(run, whole)
-    limit = nyquist(run)
-    wanted = np.geomspace(target / _BELOW, min(_ABOVE * target, 0.9 * limit), _POINTS)
-    frequencies = set()
-    for f in wanted:
-        choices = [(n, max(round(n / f / common), 1)) for n in range(_LEAST, _LEAST + 3)]
-        n, m = min(
-            ((n, m) for n, m in choices if math.gcd(n, m) == 1),
-            key=lambda candidate: abs(candidate[0] / (candidate[1] * common * f) - 1.0),
-            default=choices[0],
-        )
-        frequencies.add(n / (m * common))
-    return sorted(candidate for candidate in frequencies if candidate < limit)
+    sets = len(next(iter(gains.values())))
+    wanted = [k for k in range(sets) if worth(k, known(k))]
+    sines.measure(wanted, sines.near)
+    wanted = [k for k in wanted if worth(k, known(k, sines.first_look(k)))]
+    sines.measure(wanted, sines.others)
+    figures = {k: known(k, sines.figures(k)) for k in wanted}
+    return tuple(figures.get(k) for k in range(sets))
 
 
 def has_step(bench: Bench) -> bool:
     """Return whether an experiment has one run and a step that it is judged by."""
     return bench.definition.step is not None and len(bench.cases()) == 1
-
-
-def _small(
-    laws: tuple[Complex, Complex] | None, response: xr.Dataset, target: float
-) -> Small:
-    """Return the figures of the response to one amplitude."""
-    closed, f = complex_values(response), response["frequency"].values
-    moves = np.isfinite(closed)
-    margin = Margin(math.nan, math.nan)
-    if laws is not None and moves.any():
-        demand, feedback = laws
-        gain = _behind(closed[moves], demand[moves], feedback[moves])
-        margin = measured_margin(f[moves], gain)
-    size = np.nan_to_num(response["gain"].values)  # what sticks answers with nothing
-    before = np.append(size[f < target], np.interp(target, f, size))
-    return Small(
-        amplitude=float(response["amplitude"]),
-        bandwidth=min(fall(size, f), float(f[-1])),
-        least=float(before.min()),
-        phase_margin=margin.phase,
-        crossover=margin.crossover,
-        peak=float(size.max()),
-        settled=bool(np.all(response["settled"].values > 0)),
-    )
-
-
-def loop_gain(
-    loop: Loop, par: ParameterSet, value: float, closed: Complex, frequencies: Array
-) -> Complex | None:
-    """Return the loop gain behind a measured closed response.
-
-    Parameters
-    ----------
-    loop, par, value
-        Loop, and the parameters and operating point it was measured with.
-    closed, frequencies
-        Response and frequencies [Hz], shape (n,).
-
-    Returns
-    -------
-    numpy.ndarray or None
-        Shape (n,); None for a loop whose laws are not known.
-    """
-    laws = _laws(loop, par, value, frequencies)
-    return None if laws is None else _behind(closed, *laws)
-
-
-def _laws(
-    loop: Loop, par: ParameterSet, value: float, frequencies: Array
-) -> tuple[Complex, Complex] | None:
-    """Return what a loop's laws make of set point and measured value; None where not known."""
-    return None if loop.laws is None else loop.laws(par, value, frequencies)
-
-
-def _behind(closed: Complex, demand: Complex, feedback: Complex) -> Complex:
-    return np.asarray(feedback * closed / (demand - feedback * closed))
 
 
 def _steps(

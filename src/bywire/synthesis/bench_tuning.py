@@ -1,7 +1,11 @@
 """Gains tuned on the nonlinear bench itself, where friction and dither change the loop.
 
 Differential evolution of a library, every generation one ensemble: what the linear model cannot
-know (friction under dither, converter, limits) is measured for every candidate.
+know (friction under dither, converter, limits) is measured. The search takes up a candidate only
+where its worst slack is not below that of the member whose place it would take. A worst slack is a
+minimum, so whatever is measured first bounds it, the linear models' figures before all: candidates
+whose bound is too low are measured no further, which changes no step of the search. Those that may
+come near the best so far are measured in any case, for they make the edge that is shown.
 """
 
 from __future__ import annotations
@@ -17,13 +21,19 @@ from scipy.stats import qmc
 from bywire.core.interrupts import interrupt_heard
 from bywire.core.typing import Array, Progress
 from bywire.synthesis.bench_figures import BenchFigures
-from bywire.synthesis.candidate import Candidate, judged, linear_slacks
+from bywire.synthesis.candidate import Candidate, ceiling, judged, linear_slacks
 from bywire.synthesis.linear_case import NOMINAL
 from bywire.synthesis.optimizer import Problem
 
-Measure = Callable[[Mapping[str, Sequence[float]]], Sequence[Mapping[str, BenchFigures]]]
+Worth = Callable[[int, Sequence[BenchFigures]], bool]
+Measure = Callable[
+    [Mapping[str, Sequence[float]], Worth], Sequence[Mapping[str, BenchFigures] | None]
+]
+"""``measure(gains, worth)``: figures by label of several sets, None of those that were left where
+``worth(k, known figures)`` was false"""
 
 _ENOUGH = 0.02  # worst slack at which the search ends
+_NEAR = 0.03  # of the best worst slack: what is measured in full wherever the search stands
 _MEMBERS = 36
 GENERATIONS = 60
 """of a search, at most"""
@@ -41,11 +51,11 @@ class Tuning:
         the largest worst bandwidth, and where requirements are missed, the one whose figures
         are nearest.
     tried
-        All candidates, in the order in which they ran.
+        All candidates that were measured in full, in the order in which they ran.
     interrupted
         Whether the user ended it.
     untold
-        Candidates that ran besides, judged by a part of the trials only.
+        Candidates besides, judged by a part of the trials only.
     """
 
     best: Candidate
@@ -55,7 +65,7 @@ class Tuning:
 
     @property
     def count(self) -> int:
-        """Candidates that ran."""
+        """Candidates that were judged."""
         return len(self.tried) + self.untold
 
     def curve(self, first: str, second: str) -> list[tuple[float, float]]:
@@ -101,7 +111,7 @@ def tune(
     start
         The linear design's gains, one of the first generation.
     measure
-        ``measure(gains) -> figures`` by label, for several sets at once.
+        See `Measure`.
     seed
         Of the search.
     generations
@@ -116,18 +126,22 @@ def tune(
     )
     first[0] = center  # the linear design itself: the search cannot end worse than it
     tried: list[Candidate] = []
-    count = [0]
+    count, left = [0], [0]
+    to_beat = np.full(_MEMBERS, -np.inf)
 
     def cost(points: Array) -> Array:
         rows = [problem.gains(z) for z in np.atleast_2d(points.T)]
-        new = _candidates(problem, rows, measure)
-        tried.extend(new)
-        return -np.array([candidate.slack for candidate in new])
+        new = _candidates(problem, rows, measure, to_beat)
+        tried.extend(each for each in new if isinstance(each, Candidate))
+        left[0] += sum(isinstance(each, float) for each in new)
+        return -np.array([each if isinstance(each, float) else each.slack for each in new])
 
     def passed(intermediate_result: OptimizeResult) -> bool:
         count[0] += 1
         if progress is not None:
             progress("tuning on the bench", count[0] / generations)
+        members = -intermediate_result.population_energies
+        to_beat[:] = np.minimum(members, members.max() - _NEAR)
         return bool(intermediate_result.fun <= -_ENOUGH)
 
     interrupted = False
@@ -143,7 +157,7 @@ def tune(
         interrupted = True
         if not tried:
             raise
-    return Tuning(max(tried, key=standing), tuple(tried), interrupted)
+    return Tuning(max(tried, key=standing), tuple(tried), interrupted, left[0])
 
 
 def standing(candidate: Candidate) -> tuple[float, float]:
@@ -152,17 +166,46 @@ def standing(candidate: Candidate) -> tuple[float, float]:
 
 
 def _candidates(
-    problem: Problem, rows: Sequence[Mapping[str, float]], measure: Measure
-) -> list[Candidate]:
-    """Return candidates; those that a linear model says are unstable are not run."""
+    problem: Problem,
+    rows: Sequence[Mapping[str, float]],
+    measure: Measure,
+    to_beat: Array,
+) -> list[Candidate | float]:
+    """Return candidates, or what the slack of those that were left cannot exceed.
+
+    Those that a linear model says are unstable are not run.
+
+    Parameters
+    ----------
+    problem, measure
+        As in `tune`.
+    rows
+        Gains of each candidate.
+    to_beat
+        Worst slack of each below which it is left.
+    """
     linear = [linear_slacks(problem, row) for row in rows]
-    alive = [k for k, slacks in enumerate(linear) if min(slacks.values()) > -10.0]
+    bounds = [ceiling(problem.requirements, (), slacks) for slacks in linear]
+    stable = [min(slacks.values()) > -10.0 for slacks in linear]
+    tried = [k for k in range(len(rows)) if stable[k] and bounds[k] >= to_beat[k]]
+
+    def worth(j: int, known: Sequence[BenchFigures]) -> bool:
+        k = tried[j]
+        bounds[k] = ceiling(problem.requirements, known, linear[k])
+        return bool(bounds[k] >= to_beat[k])
+
     nothing: Mapping[str, BenchFigures] = {NOMINAL: BenchFigures((), {})}
-    figures = dict.fromkeys(range(len(rows)), nothing)
-    if alive:
-        names = rows[0].keys()
-        measured = measure({name: [rows[k][name] for k in alive] for name in names})
-        figures |= dict(zip(alive, measured, strict=True))
-    return [
-        judged(problem.requirements, row, figures[k], linear[k]) for k, row in enumerate(rows)
-    ]
+    figures: dict[int, Mapping[str, BenchFigures] | None] = {
+        k: nothing for k in range(len(rows)) if not stable[k]
+    }
+    if tried:
+        sets = {name: [rows[k][name] for k in tried] for name in rows[0]}
+        figures |= dict(zip(tried, measure(sets, worth), strict=True))
+    candidates: list[Candidate | float] = []
+    for k, row in enumerate(rows):
+        known = figures.get(k)
+        left = float(bounds[k])
+        candidates.append(
+            left if known is None else judged(problem.requirements, row, known, linear[k])
+        )
+    return candidates

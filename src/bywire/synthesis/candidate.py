@@ -12,6 +12,8 @@ from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.requirement import Requirement
 
 _LEAST = -3.0
+MEASURED = frozenset({"bandwidth", "crossover", *STEP_FIGURES})
+"""figures that the bench alone decides on, where it shows them"""
 
 
 @dataclass(frozen=True)
@@ -85,6 +87,28 @@ def bench_slacks(
             slack = min(slack, linear[wanted.text])
         slacks[wanted.text] = max(slack, _LEAST)
     return slacks
+
+
+def ceiling(
+    requirements: Sequence[Requirement],
+    known: Sequence[BenchFigures],
+    linear: Mapping[str, float],
+) -> float:
+    """Return what the worst slack cannot exceed, whatever is still to be measured.
+
+    Parameters
+    ----------
+    requirements, linear
+        As in `bench_slacks`.
+    known
+        What is known of some trials; figures that are still unknown are NaN, or not there.
+    """
+    highest = math.inf
+    for wanted in requirements:
+        highest = min([highest, *(_on_bench(wanted, figures) for figures in known)])
+        if wanted.figure not in MEASURED:
+            highest = min(highest, linear[wanted.text])
+    return max(highest, _LEAST)
 
 
 def judged(

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from bywire.analysis.loop import Loop
 from bywire.bench.bench import Bench
 from bywire.core.parameters import ParameterSet
-from bywire.synthesis.bench_figures import BenchFigures, bench_figures, has_step
+from bywire.synthesis.bench_figures import BenchFigures, Worth, has_step, wanted_figures
 from bywire.synthesis.candidate import judged
 from bywire.synthesis.linear_case import NOMINAL, LinearCase
 from bywire.synthesis.optimizer import Problem
@@ -54,12 +54,18 @@ class Trial:
         return Trial(self.loop, par, value, self.amplitudes, bench, case.label)
 
     def measure(
-        self, gains: Mapping[str, Sequence[float]], target: float, *, rough: bool = False
-    ) -> tuple[BenchFigures, ...]:
-        """Return the figures of sets of gains, see `bench_figures`."""
+        self,
+        gains: Mapping[str, Sequence[float]],
+        target: float,
+        worth: Worth = lambda k, known: True,
+        *,
+        rough: bool = False,
+    ) -> tuple[BenchFigures | None, ...]:
+        """Return the figures of the sets of gains that are worth it, see `wanted_figures`."""
         bench = self.bench if self.bench is not None and has_step(self.bench) else None
-        return bench_figures(
-            self.loop, self.par, self.value, self.amplitudes, gains, bench, target, rough=rough
+        return wanted_figures(
+            self.loop, self.par, self.value, self.amplitudes, gains, bench, target, worth,
+            rough=rough,
         )  # fmt: skip
 
 
@@ -68,18 +74,57 @@ def measured(
     gains: Mapping[str, Sequence[float]],
     target: float,
     *,
-    rough: bool = False,
     report: Report = lambda share: None,
 ) -> list[dict[str, BenchFigures]]:
     """Return the figures of every set of gains, by the label of each trial."""
-    figures = []
-    for k, trial in enumerate(trials):
-        figures.append(trial.measure(gains, target, rough=rough))
-        report((k + 1) / len(trials))
-    return [
-        dict(zip((trial.label for trial in trials), row, strict=True))
-        for row in zip(*figures, strict=True)
-    ]  # fmt: skip
+    rows = wanted(trials, gains, target, lambda k, known: True, report=report)
+    return [row for row in rows if row is not None]
+
+
+def wanted(
+    trials: Sequence[Trial],
+    gains: Mapping[str, Sequence[float]],
+    target: float,
+    worth: Callable[[int, Sequence[BenchFigures]], bool],
+    *,
+    rough: bool = False,
+    report: Report = lambda share: None,
+) -> list[dict[str, BenchFigures] | None]:
+    """Return the figures of the sets of gains that stay worth it through all trials.
+
+    Parameters
+    ----------
+    trials, gains, target, rough
+        As in `bench_figures.wanted_figures`.
+    worth
+        ``worth(k, figures)``: whether set k is measured on, with what is known of it so far.
+    report
+        Called with the share that is done.
+
+    Returns
+    -------
+    list
+        By the label of each trial; None for the sets that were left.
+    """
+    rows: dict[int, dict[str, BenchFigures]] = {
+        k: {} for k in range(len(next(iter(gains.values()))))
+    }
+    count = len(rows)
+    for n, trial in enumerate(trials):
+        sets = list(rows)
+
+        def still(j: int, known: BenchFigures, sets: Sequence[int] = sets) -> bool:
+            return worth(sets[j], [*rows[sets[j]].values(), known])
+
+        chosen = {name: [values[k] for k in sets] for name, values in gains.items()}
+        figures = trial.measure(chosen, target, still, rough=rough) if sets else ()
+        for k, each in zip(sets, figures, strict=True):
+            if each is None:
+                del rows[k]
+            else:
+                rows[k][trial.label] = each
+        report((n + 1) / len(trials))
+    return [rows.get(k) for k in range(count)]
 
 
 def corners_of(problem: Problem, gains: Mapping[str, float]) -> list[LinearCase]:

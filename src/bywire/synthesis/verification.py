@@ -18,7 +18,7 @@ from bywire.synthesis.linear_case import LinearCase, values_of
 from bywire.synthesis.optimizer import Problem
 from bywire.synthesis.requirement import Requirement
 from bywire.synthesis.stages import stage
-from bywire.synthesis.trial import Trial, corners_of, measured, worst_of
+from bywire.synthesis.trial import Trial, corners_of, measured, wanted, worst_of
 
 
 @dataclass(frozen=True)
@@ -144,8 +144,8 @@ def verify(
     tuning = None
     if first.slack < 0.0 and generations > 0:
         tuning = tune(
-            problem, gains, lambda sets: measured(trials, sets, target, rough=True), seed=seed,
-            generations=generations, progress=progress,
+            problem, gains, lambda sets, worth: wanted(trials, sets, target, worth, rough=True),
+            seed=seed, generations=generations, progress=progress,
         )  # fmt: skip
         best = tuning.best.gains
         again = judged(
