@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from bywire.api.controller_check import ControllerCheck, check_controller
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import read
 from bywire.core.catalog import PARAMETER_SETS
@@ -16,7 +17,7 @@ from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
 from bywire.report.answer import Answer, use_case
-from bywire.report.document import Document, Listing, Paragraph, Section
+from bywire.report.document import Document, Flat, Listing, Paragraph, Section
 
 if TYPE_CHECKING:
     from bywire.export.controller.program import Program
@@ -38,12 +39,25 @@ class ControllerExport(Answer):
         What was translated.
     vectors
         Test vectors of each task.
+    check
+        How it did on processors; None where that was not asked for.
     """
 
     folder: Path
     files: tuple[str, ...]
     program: Program
     vectors: int
+    check: ControllerCheck | None = None
+
+    @property
+    def holds(self) -> bool:
+        """Whether all processors gave what Python gives; so, too, where none was asked."""
+        return self.check is None or self.check.holds
+
+    @property
+    def notes(self) -> list[str]:
+        """What was skipped of a check, and how to install what it wants."""
+        return [] if self.check is None else list(self.check.skipped)
 
     def document(self) -> Document:
         """Return what was written, and how it is tried."""
@@ -54,11 +68,16 @@ class ControllerExport(Answer):
             f"{self.program.precision.name} precision"
         )
         following = Listing([f"make -C {self.folder} check"], "Next, with a C compiler:")
+        written = Paragraph(f"written: {self.folder}")
+        checked: list[Flat] = [] if self.check is None else [self.check.table()]
         return Document(
             f"The ECU of {self.program.model.name} in C",
             f"written to {self.folder}",
-            sections=[Section("Files", [what, Listing(list(self.files)), following])],
-            brief=[what, Paragraph(f"written: {self.folder}"), following],
+            sections=[
+                Section("Files", [what, Listing(list(self.files)), following]),
+                *([Section("Check", checked)] if checked else []),
+            ],
+            brief=[what, written, *(checked or [following])],
             data=self._data(),
             is_paged=False,
         )
@@ -75,6 +94,7 @@ class ControllerExport(Answer):
             "memory": [each.name for each in made.members(made.model.Memory)],
             "library": list(made.libraries),
             "vectors": self.vectors,
+            **({} if self.check is None else {"check": self.check.as_object()}),
         }
 
 
@@ -85,6 +105,7 @@ def export_controller(
     *,
     precision: str = "double",
     vectors: int = VECTORS,
+    check: bool = False,
 ) -> ControllerExport:
     """Write the ECU of a bench's model as readable C99, with all that is needed to try it.
 
@@ -99,6 +120,10 @@ def export_controller(
         ``"double"``, equal to Python in every bit, or ``"single"``.
     vectors
         Test vectors of each task.
+    check
+        Whether the C is compiled in both precisions, for this machine and, where
+        arm-none-eabi-gcc and qemu-system-arm are installed, for Cortex-M3, M4F and M7; run there
+        on the vectors, compared bit by bit, and measured.
 
     Returns
     -------
@@ -111,6 +136,8 @@ def export_controller(
         With file, line and operation of what cannot be translated.
     FileError
         When the folder cannot be written.
+    CompilerError
+        When a check finds no compiler, or one fails.
     """
     if precision not in PRECISIONS:
         raise unknown_name("precision", precision, PRECISIONS)
@@ -134,4 +161,5 @@ def export_controller(
         raise FileError(
             f"{folder} cannot be written: {reason}; name another folder"
         ) from None
-    return ControllerExport(folder, tuple(texts), made, vectors)
+    checked = check_controller(case, cited, vectors) if check else None
+    return ControllerExport(folder, tuple(texts), made, vectors, checked)

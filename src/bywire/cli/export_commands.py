@@ -38,6 +38,11 @@ def export_controller_command(
     out: ExportFolder,
     precision: Precision = "double",
     vectors: Annotated[int, typer.Option(help="Test vectors of each task.")] = 200,
+    check: Annotated[
+        bool,
+        typer.Option("--check", help="Run it here and on emulated Cortex-M3, M4F and M7, in both "
+                     "precisions; exit status 1 where a bit differs."),
+    ] = False,
     set_: BenchChanges = None,
     json: JsonFlag = False,
 ) -> None:
@@ -47,7 +52,7 @@ def export_controller_command(
 
     show(
         lambda _: export_controller(
-            read(bench, changes(set_)), out, precision=precision, vectors=vectors
+            read(bench, changes(set_)), out, precision=precision, vectors=vectors, check=check
         ),
         None, json,
     )  # fmt: skip

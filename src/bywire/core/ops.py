@@ -3,6 +3,8 @@
 The equations of plant and control call these and nothing else, so that the same function runs
 on floats, NumPy arrays, CasADi symbols and any object that brings its own operations (a method
 ``_bywire_op``, as the unit-carrying numbers of the dimension tests do). Floats need no CasADi.
+Exponential, logarithm, power, sine and cosine of a float are those of kernels and exported ECUs,
+in every bit; of an array they are NumPy's.
 """
 
 from __future__ import annotations
@@ -13,18 +15,25 @@ from typing import Any
 
 import numpy as np
 
+from bywire.core import elementary, elementary_single
+
 _FLOATS: dict[str, Callable[..., Any]] = {
-    "exp": math.exp,
-    "log": math.log,
+    "exp": elementary.exp,
+    "log": elementary.log,
     "sqrt": math.sqrt,
-    "sin": math.sin,
-    "cos": math.cos,
+    "sin": elementary.sin,
+    "cos": elementary.cos,
     "arctan": math.atan,
     "fabs": abs,
     "floor": math.floor,
     "fmax": max,
     "fmin": min,
-    "power": math.pow,
+    "power": elementary.power,
+}
+_SINGLES: dict[str, Callable[..., Any]] = {
+    "exp": elementary_single.exp,
+    "sin": elementary_single.sin,
+    "cos": elementary_single.cos,
 }
 _CASADI = {"where": "if_else"}
 _PLAIN = (float, int)  # bool is an int
@@ -41,6 +50,8 @@ def _apply(name: str, *args: Any) -> Any:
         import casadi
 
         return getattr(casadi, _CASADI.get(name, name))(*args)
+    if name in _SINGLES and isinstance(special, np.float32):
+        return _SINGLES[name](*args)
     return getattr(np, name)(*args)
 
 

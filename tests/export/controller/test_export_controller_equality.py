@@ -19,7 +19,8 @@ def test_double_equals_python_in_every_bit(structure: str, tmp_path: Path) -> No
     assert built.said == ""
     done = built.run()
     expected = 2000 * len(made.program.steps)
-    assert (done.returncode, done.stdout) == (0, f"{expected} vectors, 0 values differ\n")
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"{expected} vectors, 0 values differ, bits ")
 
 
 @needs_compiler

@@ -71,7 +71,8 @@ def test_old_memory_is_read_behind_changes(tmp_path: Path) -> None:
     for name, text in files(made, Memory(1.0, 2.0), {}, 50).items():
         (tmp_path / name).write_text(text)
     done = build(tmp_path).run()
-    assert (done.returncode, done.stdout) == (0, "50 vectors, 0 values differ\n")
+    assert done.returncode == 0
+    assert done.stdout.startswith("50 vectors, 0 values differ, bits ")
 
 
 @pytest.mark.parametrize("structure", BRAKES[:2])

@@ -75,7 +75,8 @@ def test_a_brake_of_ones_own(tmp_path: Path) -> None:
     done = build(tmp_path).run()
     header = next(tmp_path.glob("*_ecu.h")).read_text()
     assert re.findall(r"_ecu_step_(\w+)\(", header) == ["force", "speed", "current"]
-    assert (done.returncode, done.stdout) == (0, "600 vectors, 0 values differ\n")
+    assert done.returncode == 0
+    assert done.stdout.startswith("600 vectors, 0 values differ, bits ")
 
 
 def test_description_names_what_is_read(tmp_path: Path) -> None:

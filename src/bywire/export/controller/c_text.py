@@ -15,6 +15,7 @@ WIDTH = 96
 _WORDS = """auto bool break case char const continue default do double else enum extern false float
 for goto if inline int long register restrict return short signed sizeof static struct switch true
 typedef union unsigned void volatile while main NULL INFINITY NAN larger smaller
+whole sine cosine exponential logarithm power_of turned near_angle log_parts upper_part bits memcpy
 exp log sqrt sin cos tan fabs floor ceil fmax fmin pow round trunc hypot gamma signgam
 expf logf sqrtf sinf cosf fabsf floorf powf"""
 _RESERVED = frozenset(_WORDS.split())

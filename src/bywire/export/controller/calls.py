@@ -12,6 +12,7 @@ from typing import Any
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
 from bywire.export.controller.context import Context
+from bywire.export.controller.elementary import MAGNITUDE
 from bywire.export.controller.members import attribute
 from bywire.export.controller.values import (
     PRIMARY,
@@ -33,8 +34,11 @@ from bywire.export.controller.values import (
     lifted,
 )
 
-_LIBRARY = {ops.fabs: "fabs", ops.floor: "floor", ops.exp: "exp", ops.log: "log",
-            ops.sqrt: "sqrt", ops.sin: "sin", ops.cos: "cos", ops.power: "pow"}  # fmt: skip
+_LIBRARY = {ops.fabs: "fabs", ops.sqrt: "sqrt", ops.log: "log", ops.power: "pow"}
+_OURS: dict[Any, str] = {
+    ops.floor: "whole", ops.sin: "sine", ops.cos: "cosine", ops.exp: "exponential",
+}  # fmt: skip
+_OURS_IN_DOUBLE: dict[Any, str] = {**_OURS, ops.log: "logarithm", ops.power: "power_of"}
 EXTREMES = {ops.fmin: "smaller", ops.fmax: "larger"}
 """functions of core.ops that stand at the top of the C"""
 
@@ -51,7 +55,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
     if isinstance(target, partial):
         held = {**{n: Known(v) for n, v in target.keywords.items()}, **named}
         return called(at, node, Known(target.func), [*map(Known, target.args), *given], held)
-    if target in _LIBRARY or target in EXTREMES:
+    if target in _LIBRARY or target in _OURS or target in EXTREMES:
         return _elementary(at, node, target, given)
     if target is ops.where:
         return at.chosen(node, *given, *named.values())
@@ -83,11 +87,21 @@ def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> 
     uses: frozenset[Any] = frozenset().union(*(each.uses for each in arguments))
     if function in EXTREMES:
         name = EXTREMES[function]
-        uses |= {("extreme", name)}
+        uses |= {("own", name)}
+    elif function in (ours := _ours(at)):
+        name = ours[function]
+        uses |= {("own", name)}
+        if name in MAGNITUDE:
+            uses |= {("library", "fabs" + at.body.structs.precision.suffix)}
     else:
         name = _LIBRARY[function] + at.body.structs.precision.suffix
         uses |= {("library", name)}
     return Expr(f"{name}({', '.join(each.text for each in arguments)})", PRIMARY, uses)
+
+
+def _ours(at: Context) -> dict[Any, str]:
+    """Return the functions that exports bring themselves."""
+    return _OURS_IN_DOUBLE if at.body.structs.precision.name == "double" else _OURS
 
 
 def _made(at: Context, node: ast.AST, cls: Any, given: list[Any], named: Named) -> Built:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
+import numpy as np
+
 from bywire.export.controller.c_text import c_name, comment
 from bywire.export.controller.parameter_file import parameter_values
 from bywire.export.controller.program import Program
@@ -14,6 +16,8 @@ WARNINGS = ("-Wall", "-Wextra", "-Wconversion", "-Wdouble-promotion", "-Wfloat-e
             "-Wpedantic")  # fmt: skip
 FLAGS = ("-std=c99", "-O2", "-ffp-contract=off")
 """without -ffast-math and its like, and without fused products: else the last digits differ"""
+SMALL_FLAGS = ("-std=c99", "-Os", "-ffp-contract=off", "-fno-math-errno")
+"""for targets whose memory is small; square roots are instructions, without the library's errno"""
 TOLERANCE = 1e-5
 """of single precision where functions of the C library are called, whose last digit is free"""
 
@@ -52,27 +56,47 @@ def _reads_parameters(vectors: Vectors) -> bool:
 def harness(program: Program, every: Sequence[Vectors]) -> str:
     """Return ``NAME_harness.c``: exit status 1 where a vector differs."""
     name = program.name
-    parts = [
-        comment([f"Compares the compiled ECU of {program.model.name} with its test vectors."]),
-        f'#include <stdio.h>\n#include "{name}_ecu.h"\n#include "{name}_test_vectors.h"',
-        _same(program),
-        *(_compared(program, each) for each in every),
-    ]
+    what = f"Compares the compiled ECU of {program.model.name} with its test vectors."
     calls = " + ".join(f"differing_{c_name(e.step.task.name)}()" for e in every)
     count = " + ".join(f"VECTORS_{c_name(e.step.task.name)}" for e in every)
-    parts.append(
+    parts = [
+        *comparison(program, every, what, "#include <stdio.h>"),
         f"int main(void)\n{{\n    {name}_Memory memory;\n    int wrong;\n\n"
         f"    {name}_ecu_init(&memory);\n    wrong = {calls};\n"
-        f'    printf("%d vectors, %d values differ\\n", {count}, wrong);\n'
-        "    return (wrong == 0) ? 0 : 1;\n}"
-    )
+        f'    printf("%d vectors, %d values differ, bits %08lx\\n", {count}, wrong,\n'
+        "            (unsigned long)bits);\n"
+        "    return (wrong == 0) ? 0 : 1;\n}",
+    ]
     return "\n\n".join(parts) + "\n"
+
+
+def comparison(
+    program: Program, every: Sequence[Vectors], what: str, include: str
+) -> list[str]:
+    """Return what a harness begins with: a function per task that compares it with its vectors.
+
+    Parameters
+    ----------
+    what
+        Comment at the top.
+    include
+        What it says its results with.
+    """
+    name = program.name
+    return [
+        comment([what]),
+        f"#include <stdint.h>\n{include}\n#include <string.h>\n"
+        f'#include "{name}_ecu.h"\n#include "{name}_test_vectors.h"',
+        _same(program),
+        _mixed(program),
+        *(_compared(program, each) for each in every),
+    ]
 
 
 def _same(program: Program) -> str:
     real, literal = program.precision.real, program.precision.literal
     head = f"static int is_same({real} a, {real} b)\n{{\n"
-    if program.precision.name == "single" and program.libraries:
+    if program.inexact:
         width = literal(TOLERANCE)
         zero = literal(0.0)
         return (
@@ -83,28 +107,66 @@ def _same(program: Program) -> str:
     return f"{head}    return (a <= b) && (a >= b);\n}}"
 
 
-def _compared(program: Program, vectors: Vectors) -> str:
+def _mixed(program: Program) -> str:
+    real = program.precision.real
+    return f"""/* A number for all results (FNV-1a): equal where they are equal in every bit. */
+static uint32_t bits = 2166136261u;
+
+static void mix({real} value)
+{{
+    unsigned char bytes[sizeof value];
+
+    memcpy(bytes, &value, sizeof value);
+    for (unsigned int n = 0; n < sizeof value; ++n) {{
+        bits = (bits ^ bytes[n]) * 16777619u;
+    }}
+}}"""
+
+
+def bits_of(program: Program, every: Sequence[Vectors]) -> int:
+    """Return the number that a harness makes of all results, where they are those of Python."""
+    kind = np.float32 if program.precision.name == "single" else np.float64
+    bits = 2166136261
+    for each in every:
+        for byte in np.ascontiguousarray(each.after, dtype=f"<{np.dtype(kind).str[1:]}").tobytes():
+            bits = (bits ^ byte) * 16777619 & 0xFFFFFFFF
+    return bits
+
+
+def prepared(program: Program, vectors: Vectors) -> list[str]:
+    """Return the statements that set up vector ``k`` of a task."""
     name, task = program.name, c_name(vectors.step.task.name)
     types = {"x": f"{name}_Plant", "u": f"{name}_Stimulus", "memory": f"{name}_Memory"}
     wanted = [short for _, short in vectors.step.arguments]
-    lines = [f"static int differing_{task}(void)", "{", "    int wrong = 0;", "",
-             f"    for (int k = 0; k < VECTORS_{task}; ++k) {{"]  # fmt: skip
-    for kind in ("x", "u", "memory"):
-        if kind in wanted:
-            # A structure of which a task reads nothing is given its zeros.
-            lines.append(f"        {types[kind]} {kind} = {{0}};")
+    # A structure of which a task reads nothing is given its zeros.
+    lines = [
+        f"{types[kind]} {kind} = {{0}};" for kind in ("x", "u", "memory") if kind in wanted
+    ]
     for at, (kind, field) in enumerate(vectors.names):
         if kind in wanted:
-            lines.append(f"        {kind}.{c_name(field)} = given_{task}[k][{at}];")
+            lines.append(f"{kind}.{c_name(field)} = given_{task}[k][{at}];")
     if "par" in wanted:
         chosen = f"(other_{task}[k] == 1) ? &other_parameters : &{name}_parameters"
-        lines.append(f"        const {name}_Parameters *par = {chosen};")
+        lines.append(f"const {name}_Parameters *par = {chosen};")
+    return [f"        {line}" for line in lines]
+
+
+def stepped(vectors: Vectors) -> str:
+    """Return the call of a task on what ``prepared`` set up."""
+    wanted = [short for _, short in vectors.step.arguments]
     arguments = ", ".join(each if each == "par" else f"&{each}" for each in wanted)
-    lines.append(f"        {vectors.step.name}({arguments});")
-    lines += [
-        f"        wrong += is_same(memory.{c_name(field)}, after_{task}[k][{at}]) ? 0 : 1;"
-        for at, field in enumerate(vectors.kept)
-    ]
+    return f"{vectors.step.name}({arguments});"
+
+
+def _compared(program: Program, vectors: Vectors) -> str:
+    task = c_name(vectors.step.task.name)
+    lines = [f"static int differing_{task}(void)", "{", "    int wrong = 0;", "",
+             f"    for (int k = 0; k < VECTORS_{task}; ++k) {{"]  # fmt: skip
+    lines += [*prepared(program, vectors), f"        {stepped(vectors)}"]
+    for at, field in enumerate(vectors.kept):
+        place = f"memory.{c_name(field)}"
+        lines.append(f"        wrong += is_same({place}, after_{task}[k][{at}]) ? 0 : 1;")
+        lines.append(f"        mix({place});")
     return "\n".join([*lines, "    }", "    return wrong;", "}"])
 
 

@@ -81,6 +81,12 @@ class Program:
         """Functions of the C library that are called."""
         return tuple(sorted({use[1] for use in self.uses if use[0] == "library"}))
 
+    @property
+    def inexact(self) -> tuple[str, ...]:
+        """Functions of the C library among these whose last digit is the library's."""
+        exact = {"fabs", "sqrt", "fabsf", "sqrtf"}
+        return tuple(each for each in self.libraries if each not in exact)
+
     def members(self, cls: type[Any]) -> list[Member]:
         """Return the fields of memory, plant or stimulus that C has."""
         if cls not in self.structs.known:

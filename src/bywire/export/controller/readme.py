@@ -54,8 +54,7 @@ def _plant(program: Program) -> str:
 
 
 def _exactness(program: Program, real: str) -> str:
-    exact = sorted({"floor", "fabs", "sqrt", "floorf", "fabsf", "sqrtf"} & set(program.libraries))
-    free = sorted(set(program.libraries) - set(exact))
+    free = program.inexact
     said = "Of the C library it calls " + (", ".join(program.libraries) or "nothing") + ". "
     if free:
         return said + (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from bywire.export.controller.c_text import comment, wrapped
+from bywire.export.controller.elementary import elementary, headers
 from bywire.export.controller.functions import CFunction
 from bywire.export.controller.program import Program, Step
 from bywire.export.controller.statements import Statement
@@ -50,19 +51,24 @@ def operations(program: Program) -> str:
     parts = [comment(["Elementary functions, with the meaning that they have in Python."]),
              f"#ifndef {name.upper()}_OPS_H\n#define {name.upper()}_OPS_H",
              "#include <stdbool.h>"]  # fmt: skip
-    if program.libraries:
-        parts[-1] += "\n#include <math.h>"
+    ours = {use[1] for use in program.uses if use[0] == "own"}
+    named = [*headers(ours), *(["math"] if program.libraries else [])]
+    parts[-1] += "".join(f"\n#include <{each}.h>" for each in named)
     if program.constants:
         literal = program.precision.literal
         parts.append("\n".join(f"#define {n} ({literal(v)})" for n, v in program.constants.items()))
-    extremes = {use[1] for use in program.uses if use[0] == "extreme"}
     for each, sign, said in (("larger", ">", "larger"), ("smaller", "<", "smaller")):
-        if each in extremes:
+        if each in ours:
             parts.append(
                 f"{comment([f'Return the {said} of two; the first of equal ones.'])}\n"
                 f"static inline {real} {each}({real} x, {real} y)\n{{\n"
                 f"    return (y {sign} x) ? y : x;\n}}"
             )
+    parts += [
+        "\n".join(wrapped(line[len(lead):], lead) for line in text.splitlines() for lead in
+                  [line[: len(line) - len(line.lstrip())]])
+        for text in elementary(ours, program.precision)
+    ]
     parts += [_function(program, each, "static inline ") for each in _of_ops(program)]
     return "\n\n".join([*parts, "#endif"]) + "\n"
 

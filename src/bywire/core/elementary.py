@@ -1,0 +1,153 @@
+"""Exponential, logarithm, power, sine and cosine of floats, in operations that all machines share.
+
+The C library of a system decides the last digit of these functions. Here they are sums and
+products in a fixed order, those of the kernels (``simulation/c_runtime.py``) and of exported
+ECUs, so that Python, kernel and target agree in every bit.
+
+References
+----------
+W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980: reduction of
+arguments in parts. The series are Taylor's.
+"""
+
+from __future__ import annotations
+
+import math
+import struct
+
+from bywire.core.elementary_series import (
+    COSINE,
+    EXPONENTIAL,
+    FAR,
+    FAR_PARTS,
+    FAR_PERIOD,
+    LEAST,
+    LN_2,
+    LOGARITHM,
+    LONGEST,
+    MAGIC,
+    QUARTER,
+    SINE,
+    SMALL,
+)
+
+_HALF_ROOT = 0.70710678118654757
+_UPPER = 0xFFFFFFFFF8000000
+
+
+def exp(x: float) -> float:
+    """Return e to the power of x, which counts as at least -708 and at most 709."""
+    x = float(x)
+    if x != x:
+        return x
+    x = min(max(x, -708.0), 709.0)
+    t = x * 1.4426950408889634 + MAGIC
+    k = t - MAGIC
+    r = (x - k * LN_2[0]) - k * LN_2[1]
+    r2 = r * r
+    r4 = r2 * r2
+    r8 = r4 * r4
+    e3, e4, e5, e6, e7, e8, e9, e10, e11, e12, e13 = EXPONENTIAL
+    a = (1.0 + r) + r2 * (0.5 + r * e3)
+    b = (e4 + r * e5) + r2 * (e6 + r * e7)
+    c = (e8 + r * e9) + r2 * (e10 + r * e11)
+    d = e12 + r * e13
+    y = a + r4 * b + r8 * (c + r4 * d)
+    return y * math.ldexp(1.0, int(k))
+
+
+def sin(x: float) -> float:
+    """Return the sine of x [rad]; beyond 1e11 the angle counts as 0."""
+    return _turned(float(x), 0)
+
+
+def cos(x: float) -> float:
+    """Return the cosine of x [rad]; beyond 1e11 the angle counts as 0."""
+    return _turned(float(x), 1)
+
+
+def _turned(x: float, quarter: int) -> float:
+    """Return the sine of x plus quarter turns."""
+    r, n = x, quarter
+    if abs(x) > SMALL:  # below, k is 0
+        x = _near(x) if abs(x) > FAR else x
+        k = (x * QUARTER[0] + MAGIC) - MAGIC
+        r = ((x - k * QUARTER[1]) - k * QUARTER[2]) - k * QUARTER[3]
+        n += int(k)
+    z = r * r
+    if n & 1:
+        c2, c4, c6, c8, c10, c12, c14, c16 = COSINE
+        y = 1.0 + z * (c2 + z * (c4 + z * (c6 + z * (c8 + z * (
+            c10 + z * (c12 + z * (c14 + z * c16)))))))  # fmt: skip
+    else:
+        s3, s5, s7, s9, s11, s13, s15 = SINE
+        y = r + r * z * (s3 + z * (s5 + z * (s7 + z * (s9 + z * (
+            s11 + z * (s13 + z * s15))))))  # fmt: skip
+    return -y if n & 2 else y
+
+
+def _near(x: float) -> float:
+    """Return a large angle without most of its turns."""
+    if abs(x) > LONGEST:
+        return 0.0 * math.sin(x)  # which refuses what is infinite
+    k = (x * FAR_PERIOD + MAGIC) - MAGIC
+    return ((x - k * FAR_PARTS[0]) - k * FAR_PARTS[1]) - k * FAR_PARTS[2]
+
+
+def _log_parts(a: float) -> tuple[float, float]:
+    """Return log a, a > 0, as a sum: with a = m 2^k, m from sqrt(1/2) to sqrt(2)."""
+    m, e = math.frexp(a)
+    if m < _HALF_ROOT:
+        m, e = 2.0 * m, e - 1
+    f = m - 1.0
+    k = float(e)
+    s = f * (1.0 / (2.0 + f))
+    z = s * s
+    z2 = z * z
+    half = 0.5 * f * f
+    l3, l5, l7, l9, l11, l13, l15, l17, l19, l21 = LOGARITHM
+    p = (l3 + z * l5) + z2 * ((l7 + z * l9)
+        + z2 * ((l11 + z * l13) + z2 * ((l15 + z * l17)
+        + z2 * (l19 + z * l21))))  # fmt: skip
+    whole = k * LN_2[0]
+    high = whole + f
+    low = (f - (high - whole)) + (s * (half + z * p) + k * LN_2[1] - half)
+    return high, low
+
+
+def log(a: float) -> float:
+    """Return the natural logarithm of a.
+
+    Raises
+    ------
+    ValueError
+        Where a is not above 0.
+    """
+    a = float(a)
+    if not a >= LEAST or math.isinf(a):
+        return math.log(a)
+    high, low = _log_parts(a)
+    return high + low
+
+
+def power(a: float, b: float) -> float:
+    """Return a to the power of b, with the product b log a to twice the digits."""
+    a, b = float(a), float(b)
+    if not a >= LEAST or math.isinf(a) or math.isinf(b):
+        return math.pow(a, b)
+    log_a, low = _log_parts(a)
+    product = b * log_a
+    b_h, log_h = _upper(b), _upper(log_a)
+    b_l, log_l = b - b_h, log_a - log_h
+    lost = ((b_h * log_h - product) + (b_h * log_l + b_l * log_h)) + b_l * log_l
+    rest = lost + b * low
+    y = product + rest
+    found = exp(y)
+    return found + found * (rest - (y - product))
+
+
+def _upper(a: float) -> float:
+    """Return a without the lower half of its digits."""
+    (bits,) = struct.unpack("<Q", struct.pack("<d", a))
+    (upper,) = struct.unpack("<d", struct.pack("<Q", bits & _UPPER))
+    return float(upper)

@@ -1,0 +1,243 @@
+"""Elementary functions of an exported ECU as C: the operations of ``core.elementary``, one by one.
+
+No function of the C library is called, so that every target has Python's bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from typing import Any
+
+from bywire.core import elementary_series as double
+from bywire.core import elementary_single as single
+from bywire.export.controller.c_text import Precision
+
+MAGNITUDE = frozenset({"whole", "sine", "cosine"})
+"""functions that take a magnitude"""
+_MAGNITUDE = {"double": "fabs", "float": "fabsf"}
+_WHOLE = {"double": (2.0**52, "int64_t"), "single": (2.0**23, "int32_t")}
+Literal = Callable[[float], str]
+
+
+def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
+    """Return the C of functions by their names in C, those first that others call."""
+    number = double if precision.name == "double" else single
+    real, lit = precision.real, precision.literal
+    parts: list[str] = []
+    if "whole" in wanted:
+        parts.append(_whole(real, lit, *_WHOLE[precision.name]))
+    if {"sine", "cosine"} & set(wanted):
+        parts.append(_turned(real, lit, number))
+    for name, quarter in (("sine", "0u"), ("cosine", "1u")):
+        if name in wanted:
+            parts.append(
+                f"static inline {real} {name}({real} x)\n{{\n    return turned(x, {quarter});\n}}"
+            )
+    if {"logarithm", "power_of"} & set(wanted):
+        parts.append(_LOG_PARTS.format(**_log_words(lit)))
+    if "logarithm" in wanted:
+        parts.append(_LOGARITHM)
+    if {"exponential", "power_of"} & set(wanted):
+        parts.append(_exponential(precision, lit))
+    if "power_of" in wanted:
+        parts.append(_POWER)
+    return parts
+
+
+def headers(wanted: Collection[str]) -> list[str]:
+    """Return the headers of C that the functions need."""
+    named = []
+    if set(wanted) - {"larger", "smaller"}:
+        named.append("stdint")
+    if {"exponential", "power_of", "logarithm"} & set(wanted):
+        named.append("string")
+    return named
+
+
+def _nested(names: Sequence[float], variable: str, lit: Literal) -> str:
+    """Return a polynomial as Horner has it, c0 + x * (c1 + x * ...)."""
+    *first, last = map(lit, names)
+    text = "".join(f"{each} + {variable} * (" for each in first[:-1])
+    return f"{text}{first[-1]} + {variable} * {last}{')' * (len(first) - 1)}"
+
+
+def _whole(real: str, lit: Literal, most: float, integer: str) -> str:
+    fabs = _MAGNITUDE[real]
+    return f"""/* Return the largest whole number that is not above x. */
+static inline {real} whole({real} x)
+{{
+    {real} result = x;
+
+    if ({fabs}(x) < {lit(most)}) {{
+        const {real} toward_zero = ({real})({integer})x;
+        result = (toward_zero > x) ? (toward_zero - {lit(1.0)}) : toward_zero;
+    }}
+    return result;
+}}"""
+
+
+def _turned(real: str, lit: Literal, number: Any) -> str:
+    fabs = _MAGNITUDE[real]
+    quarter, far = number.QUARTER, number.FAR_PARTS
+    magic, limit = lit(number.MAGIC), lit(number.FAR)
+    longest = lit(number.LONGEST)
+    period = lit(number.FAR_PERIOD)
+    sine = _nested(number.SINE, "z", lit)
+    cosine = _nested(number.COSINE, "z", lit)
+    return f"""/* Return a large angle without most of its turns; beyond all digits it is 0. */
+static {real} near_angle({real} x)
+{{
+    const {real} k = (x * {period} + {magic}) - {magic};
+    const {real} near = ((x - k * {lit(far[0])}) - k * {lit(far[1])})
+            - k * {lit(far[2])};
+
+    return ({fabs}(x) < {longest}) ? near : {lit(0.0)};
+}}
+
+/*
+ * Return the sine of x [rad] plus quarter turns: quarters are taken off in parts, by Cody and
+ * Waite, and the rest goes into Taylor's series.
+ */
+static {real} turned({real} x, uint32_t quarter)
+{{
+    const {real} size = {fabs}(x);
+    {real} r = x;
+    uint32_t n = quarter;
+    {real} y;
+
+    if (size > {lit(number.SMALL)}) {{
+        const {real} angle = (size > {limit}) ? near_angle(x) : x;
+        const {real} k = (angle * {lit(quarter[0])} + {magic}) - {magic};
+        r = ((angle - k * {lit(quarter[1])}) - k * {lit(quarter[2])})
+                - k * {lit(quarter[3])};
+        n += (uint32_t)(int32_t)k;
+    }}
+    const {real} z = r * r;
+    if ((n & 1u) == 1u) {{
+        y = {lit(1.0)} + z * ({cosine});
+    }} else {{
+        y = r + r * z * ({sine});
+    }}
+    return ((n & 2u) == 2u) ? -y : y;
+}}"""
+
+
+def _exponential(precision: Precision, lit: Literal) -> str:
+    real = precision.real
+    if precision.name == "single":
+        low, high = map(lit, single.LIMITS)
+        magic, factor, ln_2 = lit(single.MAGIC), lit(single.LOG_2_E), single.LN_2
+        e2 = single.EXPONENTIAL
+        body = f"{lit(1.0)} + (r + r * r * ({_nested(e2, 'r', lit)}))"
+        scale = ("uint32_t", "127", "23")
+        series = f"    const {real} y = {body};\n"
+    else:
+        low, high = lit(-708.0), lit(709.0)
+        magic, factor, ln_2 = lit(double.MAGIC), lit(1.4426950408889634), double.LN_2
+        e = dict(zip(range(3, 14), map(lit, double.EXPONENTIAL), strict=True))
+        scale = ("uint64_t", "1023", "52")
+        series = f"""    const double r2 = r * r;
+    const double r4 = r2 * r2;
+    const double r8 = r4 * r4;
+    const double a = (1.0 + r) + r2 * (0.5 + r * {e[3]});
+    const double b = ({e[4]} + r * {e[5]}) + r2 * ({e[6]} + r * {e[7]});
+    const double c = ({e[8]} + r * {e[9]}) + r2 * ({e[10]} + r * {e[11]});
+    const double d = {e[12]} + r * {e[13]};
+    const double y = a + r4 * b + r8 * (c + r4 * d);
+"""
+    integer, bias, shift = scale
+    return f"""/* Return e to the power of x, which counts as within {low} and {high}. */
+static {real} exponential({real} x)
+{{
+    const {real} least = (x > {low}) ? x : {low};
+    const {real} inside = (least < {high}) ? least : {high};
+    const {real} k = (inside * {factor} + {magic}) - {magic};
+    const {real} r = (inside - k * {lit(ln_2[0])}) - k * {lit(ln_2[1])};
+{series}    const {integer} exponent = ({integer})((int32_t)k + {bias}) << {shift};
+    {real} scale;
+
+    (void)memcpy(&scale, &exponent, sizeof scale);
+    return y * scale;
+}}"""
+
+
+def _log_words(lit: Literal) -> dict[str, str]:
+    names = [f"l{n}" for n in range(3, 22, 2)]
+    return {**dict(zip(names, map(lit, double.LOGARITHM), strict=True)),
+            "ln_2_high": lit(double.LN_2[0]), "ln_2_low": lit(double.LN_2[1])}  # fmt: skip
+
+
+_LOG_PARTS = """/*
+ * Return log a, a > 0, as *low + the result: a = m 2^k, m from sqrt(1/2) to sqrt(2).
+ */
+static double log_parts(double a, double *low)
+{{
+    uint64_t bits;
+    double m;
+
+    (void)memcpy(&bits, &a, sizeof bits);
+    const uint64_t lifted = bits + (0x4000000000000000u - 0x3FE6A09E667F3BCDu);
+    const int32_t e = (int32_t)(lifted >> 52) - 1024;
+    const uint64_t scaled = (lifted & 0x000FFFFFFFFFFFFFu) + 0x3FE6A09E667F3BCDu;
+    (void)memcpy(&m, &scaled, sizeof m);
+
+    const double f = m - 1.0;
+    const double k = (double)e;
+    const double s = f * (1.0 / (2.0 + f));
+    const double z = s * s;
+    const double z2 = z * z;
+    const double half = 0.5 * f * f;
+    const double p = ({l3} + z * {l5}) + z2 * (({l7} + z * {l9})
+            + z2 * (({l11} + z * {l13}) + z2 * (({l15} + z * {l17})
+            + z2 * ({l19} + z * {l21}))));
+    const double whole_part = k * {ln_2_high};
+    const double high = whole_part + f;
+
+    *low = (f - (high - whole_part)) + (s * (half + z * p) + k * {ln_2_low} - half);
+    return high;
+}}"""
+
+_LOGARITHM = """/* Return the natural logarithm of a; what is below 1e-300 counts as that. */
+static double logarithm(double a)
+{
+    double low;
+    const double high = log_parts((a > 1e-300) ? a : 1e-300, &low);
+
+    return high + low;
+}"""
+
+_POWER = """/* Return the upper half of the digits. */
+static double upper_part(double a)
+{
+    uint64_t bits;
+    double upper;
+
+    (void)memcpy(&bits, &a, sizeof bits);
+    bits &= 0xFFFFFFFFF8000000u;
+    (void)memcpy(&upper, &bits, sizeof upper);
+    return upper;
+}
+
+/* Return a to the power of b, a >= 0, with the product b log a to twice the digits. */
+static double power_of(double a, double b)
+{
+    double result = (b > 0.0) ? 0.0 : 1.0;
+
+    if (a >= 1e-300) {
+        double low;
+        const double log_a = log_parts(a, &low);
+        const double product = b * log_a;
+        const double b_high = upper_part(b);
+        const double log_high = upper_part(log_a);
+        const double b_low = b - b_high;
+        const double log_low = log_a - log_high;
+        const double lost = ((b_high * log_high - product) + (b_high * log_low + b_low * log_high))
+                + b_low * log_low;
+        const double rest = lost + b * low;
+        const double y = product + rest;
+        const double power = exponential(y);
+
+        result = power + power * (rest - (y - product));
+    }
+    return result;
+}"""

@@ -1,0 +1,163 @@
+"""Trials of an exported ECU: compiled, run on its vectors, and measured."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from bywire.core.errors import CompilerError
+from bywire.export.controller.harness import FLAGS, SMALL_FLAGS
+from bywire.export.controller.program import Program
+from bywire.export.controller.target.target_harness import target_harness
+from bywire.export.controller.target.targets import CROSS, EMULATOR, HERE, RUNTIME, Target
+from bywire.export.controller.vectors import Vectors
+from bywire.simulation.compiler import Compiler
+
+_TIMEOUT = 300.0
+
+
+@dataclass(frozen=True)
+class TaskFigures:
+    """What a task takes: instructions at most and on average, stack in bytes."""
+
+    instructions: int
+    average: int
+    stack: int
+
+
+@dataclass(frozen=True)
+class Trial:
+    """An ECU that was run on all its vectors.
+
+    Parameters
+    ----------
+    target
+        Name of the processor; ``host`` for this machine.
+    differing
+        Values that are not those of Python.
+    bits
+        A number made of all results, equal where they are equal in every bit.
+    rom, ram
+        Bytes: code, constants and parameters with what the compiler's library brings; memory of
+        the ECU. None on the host.
+    """
+
+    target: str
+    precision: str
+    differing: int
+    bits: int
+    rom: int | None = None
+    ram: int | None = None
+    tasks: Mapping[str, TaskFigures] | None = None
+
+
+def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path) -> Trial:
+    """Return how the exported ECU does on this machine.
+
+    Raises
+    ------
+    CompilerError
+        When it cannot be compiled or run.
+    """
+    made = scratch / "host"
+    _call(
+        [*compiler.command, *FLAGS, *map(str, _sources(program, folder)),
+         str(folder / f"{program.name}_harness.c"), "-o", str(made), "-lm"],
+    )  # fmt: skip
+    said = _call([str(made)], may_fail=True)
+    found = re.search(r"(\d+) values differ, bits ([0-9a-f]+)", said)
+    if found is None:
+        raise CompilerError(f"the compiled ECU of {program.name} said {said[:200]!r}")
+    return Trial("host", program.precision.name, int(found[1]), int(found[2], 16))
+
+
+def target_trial(
+    program: Program, every: Sequence[Vectors], folder: Path, target: Target, scratch: Path
+) -> Trial:
+    """Return how the exported ECU does on another processor, as the emulator runs it.
+
+    Raises
+    ------
+    CompilerError
+        When it cannot be compiled or run.
+    """
+    objects = []
+    for source in _sources(program, folder):
+        objects.append(str(scratch / f"{source.stem}.o"))
+        _call([CROSS, *SMALL_FLAGS, *target.flags, "-c", str(source), "-o", objects[-1]])
+    rom, ram = _sizes(program, objects, target, scratch)
+    image = _image(program, every, objects, target, folder, scratch)
+    said = _call([
+        EMULATOR, "-machine", target.machine, "-nographic", "-monitor", "none", "-serial", "none",
+        "-semihosting-config", "enable=on,target=native", "-icount", "shift=0",
+        "-kernel", str(image),
+    ])  # fmt: skip
+    found = re.search(r"differ (\d+)\nbits (\d+)\n", said)
+    if found is None:
+        raise CompilerError(f"the ECU of {program.name} on {target.name} said {said[:200]!r}")
+    tasks = {
+        name: TaskFigures(int(most), int(mean), int(depth))
+        for name, most, mean, depth in re.findall(r"task (\w+) (\d+) (\d+) (\d+)", said)
+    }
+    differing, bits = map(int, found.groups())
+    return Trial(target.name, program.precision.name, differing, bits, rom, ram, tasks)
+
+
+def _sizes(
+    program: Program, objects: Sequence[str], target: Target, scratch: Path
+) -> tuple[int, int]:
+    """Return read-only and other memory of the ECU, with what its compiler's library brings."""
+    parts = scratch / "parts.elf"
+    steps = [f"-Wl,-u,{step.name}" for step in program.steps]
+    _call([
+        CROSS, *target.flags, *objects, "-nostartfiles", "-Wl,--gc-sections", *steps,
+        f"-Wl,-e,{program.name}_ecu_init", "-o", str(parts), "-lm",
+    ])  # fmt: skip
+    said = _call(["arm-none-eabi-size", str(parts)])
+    text, data, bss = map(int, said.splitlines()[1].split()[:3])
+    width = 4 if program.precision.name == "single" else 8
+    memory = width * len(program.members(program.model.Memory))
+    return text + data, data + bss + memory
+
+
+def _image(
+    program: Program, every: Sequence[Vectors], objects: Sequence[str], target: Target,
+    folder: Path, scratch: Path,
+) -> Path:  # fmt: skip
+    """Return a program for the emulator: the ECU, its vectors, and our start of the processor."""
+    for name in RUNTIME:
+        shutil.copyfile(HERE / name, scratch / name)
+    harness, image = scratch / "target_harness.c", scratch / "target.elf"
+    harness.write_text(target_harness(program, every), encoding="utf-8")
+    _call([
+        CROSS, *SMALL_FLAGS, *target.flags, f"-I{folder}", f"-I{scratch}", str(harness),
+        str(scratch / "startup.c"), *objects, "-nostartfiles", f"-T{scratch / 'target.ld'}",
+        "-o", str(image), "-lm",
+    ])  # fmt: skip
+    return image
+
+
+def _sources(program: Program, folder: Path) -> list[Path]:
+    every = sorted(folder.glob(f"{program.name}_*.c"))
+    return [each for each in every if not each.name.endswith("_harness.c")]
+
+
+def _call(command: list[str], may_fail: bool = False) -> str:
+    name = Path(command[0]).name
+    try:
+        done = subprocess.run(
+            command, capture_output=True, text=True, timeout=_TIMEOUT, check=False,
+            stdin=subprocess.DEVNULL,
+        )  # fmt: skip
+    except subprocess.TimeoutExpired:
+        raise CompilerError(f"{name} took longer than {_TIMEOUT:g} s for an exported ECU") from None
+    except OSError as error:
+        raise CompilerError(f"{name} did not run: {error.strerror or error}") from None
+    if done.returncode != 0 and not may_fail:
+        said = "\n".join((done.stderr or done.stdout).splitlines()[:6]) or "nothing"
+        raise CompilerError(f"{name} failed on an exported ECU and said:\n{said}")
+    return done.stdout + done.stderr
