@@ -22,7 +22,7 @@ from bywire.data import limited_source
 from bywire.data.measurement import read_measurement
 from bywire.data.trace import read_trace, trace_names
 
-SECONDS = 0.5
+SECONDS = 0.25
 PEDAL = """
 experiment = "pedal-tracking"
 parameters = "dardanelli2010"
@@ -63,7 +63,7 @@ def test_every_reader_ends(
 ) -> None:
     monkeypatch.setattr(limited_source, "SECONDS", SECONDS)
     started = time.monotonic()
-    said = r"longer than 0\.5 s without getting further: it is damaged"
+    said = r"longer than 0\.25 s without getting further: it is damaged"
     with pytest.raises(FileError, match=said):
         read(endless)
     assert time.monotonic() - started < 10.0

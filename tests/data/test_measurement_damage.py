@@ -237,8 +237,8 @@ def mdf_with(tmp_path, block, offset, layout, value):
 @pytest.mark.parametrize(
     ("block", "offset", "layout", "value", "text"),
     [
-        (b"##DG", 24, "<Q", "itself", "longer than 1 s without getting further|of memory"),
-        (b"##CN", 24, "<Q", "itself", "longer than 1 s without getting further|of memory"),
+        (b"##DG", 24, "<Q", "itself", "longer than 0.5 s without getting further|of memory"),
+        (b"##CN", 24, "<Q", "itself", "longer than 0.5 s without getting further|of memory"),
         (b"##DG", 32, "<Q", 2**40, "is damaged, as an MDF file"),
         (b"##CG", 24 + 48 + 8, "<Q", HUGE, "and 8 GiB are read at most"),
         (b"##CG", 24 + 48 + 8, "<Q", 401, "401 records .* and 400 could be read"),
@@ -249,7 +249,7 @@ def mdf_with(tmp_path, block, offset, layout, value):
 )
 def test_mdf_blocks_that_lie(tmp_path, monkeypatch, block, offset, layout, value, text):
     pytest.importorskip("asammdf")
-    monkeypatch.setattr(limited_source, "SECONDS", 1.0 if value == "itself" else 20.0)
+    monkeypatch.setattr(limited_source, "SECONDS", 0.5 if value == "itself" else 20.0)
     with pytest.raises(FileError, match=text):
         read_measurement(mdf_with(tmp_path, block, offset, layout, value), largest=8 * 2**30)
 

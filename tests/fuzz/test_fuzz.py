@@ -19,7 +19,7 @@ KILLED = 1261
 """seed of a case in which a braking that replaces a characteristic is interrupted after 1.3 s"""
 KILLED_STUDY = 38
 """seed of a case in which the client of two workers is killed after 3 s"""
-SECONDS = 1.0
+SECONDS = 0.5
 """of a processor, for each kind"""
 
 
@@ -62,6 +62,7 @@ def test_a_command_that_is_ended_midway_leaves_one_result_or_a_word(tmp_path: Pa
     assert kills.case(Random(KILLED), tmp_path) == ""
 
 
+@pytest.mark.trust
 @pytest.mark.skipif(sys.platform != "linux", reason="signals, and the list of a process's children")
 def test_a_study_whose_client_is_killed_leaves_no_worker_and_goes_on(tmp_path: Path) -> None:
     """Its workers would wait for jobs forever."""

@@ -39,8 +39,8 @@ _X86 = platform.machine().lower() in ("x86_64", "amd64")
 _WIDE = ("-march=native", *(("-mprefer-vector-width=512",) if _X86 else ()))
 _SCHEDULED = ("-fschedule-insns", "-fsched-pressure")  # a tenth quicker
 VECTOR = ("-O2", "-fopenmp-simd", *_WIDE, *_SCHEDULED)
-_QUICK = ("-Og",)  # half the time of -O2, and kernels as quick as by -O1
-_GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED})
+_QUICK = ("-Og", "-fira-region=one")  # half the time of -O2, and kernels as quick as by -O1
+_GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED, "-fira-region=one"})
 TIMEOUT = 300.0
 _OTHERWISE = (
     "set BYWIRE_CC to another C compiler, or to none, with which runs are about 200 times slower"

@@ -116,9 +116,8 @@ class Graph:
 
     def apply(self, op: str, *args: Node) -> Node:
         """Return the node of an operation, simplified."""
-        values = [self.value(a) for a in args]
-        if op in _FOLD and all(v is not None for v in values):
-            folded = self._folded(op, values)
+        if op in _FOLD and all(self.nodes[a].op == "const" for a in args):
+            folded = self._folded(op, [self.value(a) for a in args])
             if folded is not None:
                 return folded
         rule = RULES.get(op)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 Node = int
 BOOLEAN = frozenset({"lt", "le", "eq", "ne", "not", "and", "or"})
 COMMUTATIVE = frozenset({"add", "mul", "eq", "ne", "and", "or", "fmin", "fmax"})
 
 
-@dataclass(frozen=True)
-class Operation:
+class Operation(NamedTuple):
     """One node: a leaf (``args`` = kind and index), a constant, or an operation on nodes."""
 
     op: str

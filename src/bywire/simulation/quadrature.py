@@ -11,7 +11,6 @@ from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
-from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.operation import Node
 
@@ -79,26 +78,36 @@ def collapsed(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
     """Return the same values, each as a sum of coefficient times value where that is shorter."""
     new = list(roots)
     needs = [_moving(graph, [root], level) for root in roots]
-    users = Counter(node for listed in needs for node in listed)
+    users = Counter(node for each in needs for node in each)
     for k, root in enumerate(roots):
-        users.subtract(needs[k])  # of the other roots
-        computed = frozenset(node for node, count in users.items() if count)
-        if root not in computed:
-            own = [n for n in needs[k] if n not in computed]
-            terms = _Expansion(graph, computed, level).terms(root)
+        users.subtract(needs[k])
+        for node in needs[k]:
+            if not users[node]:
+                del users[node]  # what is left, the other roots compute
+        if root not in users:
+            alone = len(needs[k] - users.keys())
+            terms = _Expansion(graph, users, level).terms(root)
             inner = [p for p in terms if p is not None]
-            fresh = [n for n in _moving(graph, inner, level) if n not in computed]
+            fresh = len(_moving(graph, inner, level) - users.keys())
             factors = sum(1 for p, c in terms.items() if p is not None and c != graph.constant(1.0))
-            if len(fresh) + factors + len(terms) - 1 < len(own):
+            if fresh + factors + len(terms) - 1 < alone:
                 new[k] = _summed(graph, terms)
                 needs[k] = _moving(graph, [new[k]], level)
         users.update(needs[k])
     return new
 
 
-def _moving(graph: Graph, roots: Sequence[Node], level: Levels) -> list[Node]:
-    """Return what the roots need that changes in every substep."""
-    return needed(graph, roots, level.rare())
+def _moving(graph: Graph, roots: Sequence[Node], level: Levels) -> set[Node]:
+    """Return the operations that the roots need and that change in every substep."""
+    is_rare, operands = level.rare(), graph.operands
+    moving: set[Node] = set()
+    stack = list(roots)
+    while stack:
+        node = stack.pop()
+        if node not in moving and operands[node] and not is_rare(node):
+            moving.add(node)
+            stack.extend(operands[node])
+    return moving
 
 
 def _summed(graph: Graph, terms: Terms) -> Node:
