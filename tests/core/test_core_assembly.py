@@ -290,3 +290,28 @@ def test_a_state_needs_a_mass() -> None:
     element: Any = Massless()
     with pytest.raises(ModelError, match=r"massless has states and a balance, but no mass"):
         declared(second=Part(element, suffix="_2"))
+
+
+class VariedOnce(Screw):
+    def wire(self, w):
+        w.motor.vary(R_m=2.0 * w.motor.par.R_m, K_e=0.5 * w.motor.par.K_e)
+        super().wire(w)
+
+
+class VariedNothing(Screw):
+    def wire(self, w):
+        w.motor.vary(R=1.0)
+
+
+def test_parameters_that_follow_the_state_are_the_elements_everywhere() -> None:
+    plain, varied = (
+        each().at(Screw.state(motor=dc_motor.State(3.0)), Held(1.0), PAR)
+        for each in (Screw, VariedOnce)
+    )
+    assert varied.motor.par.R_m == 2.0 * plain.motor.par.R_m
+    assert varied.torque == 0.5 * plain.torque
+    rows = varied.balance(varied.x, varied.x, Held(1.0), PAR, (0.0, 0.0))
+    assert rows.i == pytest.approx(1.0 - 2.0 * PAR.motor.R_m * 3.0)
+    assert PAR.motor.R_m == plain.motor.par.R_m
+    with pytest.raises(ModelError, match=r"varies an unknown parameter 'R'"):
+        VariedNothing().at(Screw.state(), Held(0.0), PAR)

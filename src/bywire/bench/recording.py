@@ -194,12 +194,16 @@ def open_books_of(run: Run, trajectory: Trajectory) -> list[str]:
 
 
 def energy_residual(recording: xr.Dataset) -> xr.DataArray:
-    """Return energy in, less losses, less the change of stored energy [J]; 0 but for the step."""
+    """Return energy in, less losses, less the change of stored energy [J]; 0 but for the step.
+
+    Of the actuator's own book; what stands in further ones is left out.
+    """
     losses = sum(
-        recording[name]
-        for name in recording
+        values
+        for name, values in recording.items()
         if str(name).startswith("E_") and name not in ("E_source", "E_stored")
-    )
+        and "energy_book" not in values.attrs
+    )  # fmt: skip
     balance = recording["E_source"] - losses - recording["E_stored"]
     residual: xr.DataArray = balance - float(balance.values[0])
     residual.attrs = {"units": "J", "long_name": "residual of the energy balance"}

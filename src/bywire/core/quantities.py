@@ -89,6 +89,9 @@ Conductance = Annotated[float, Unit("m**3/(s*Pa)", 1e-11), _NOT_NEGATIVE]
 # Thermal
 Temperature = Annotated[float, Unit("K", 400.0), _POSITIVE]
 """absolute, shown in degrees Celsius; a difference has the unit ``delta_degC``, shown in K"""
+TemperatureCoefficient = Annotated[float, Unit("1/K", 2e-3), _NOT_NEGATIVE]
+HeatCapacity = Annotated[float, Unit("J/K", 1e3), _POSITIVE]
+HeatConductance = Annotated[float, Unit("W/K", 1.0), _NOT_NEGATIVE]
 
 # Tables
 Nodes = tuple[Annotated[float, _NOT_NEGATIVE], ...]

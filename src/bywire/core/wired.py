@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import cache
 from typing import Any, Generic, TypeVar
 
-from bywire.core.errors import ModelError
+from bywire.core.errors import ModelError, unknown_name
 
 X = TypeVar("X")
 U = TypeVar("U")
@@ -31,6 +31,7 @@ class Wired(Generic[X, U, F, P]):
     def __init__(self, part: Any, instant: Instant) -> None:
         self._part, self._instant = part, instant
         self._input: Any = None
+        self._varied: Any = None
 
     @property
     def x(self) -> X:
@@ -45,6 +46,8 @@ class Wired(Generic[X, U, F, P]):
     @property
     def par(self) -> P:
         """Parameters."""
+        if self._varied is not None:
+            return self._varied  # type: ignore[no-any-return]
         value = self._instant.par
         for name in self._part.path.split("."):
             value = getattr(value, name, None)
@@ -54,6 +57,25 @@ class Wired(Generic[X, U, F, P]):
                 f"stand, Part({self._part.kind}, par='...')"
             )
         return value  # type: ignore[no-any-return]
+
+    def vary(self, **values: Any) -> None:
+        """Let some of its parameters follow the state: what they are at this instant, by name.
+
+        In ``wire``, above what reads them. They may follow what is taken value-only (``xe``); what
+        ``mass`` and ``matrix`` read stays what it is.
+
+        Raises
+        ------
+        ModelError
+            When the element has no such parameter.
+        """
+        given: Any = self.par
+        for name in values:
+            if name not in type(given).model_fields:
+                where = f"{self._part.where}: {line()} varies an"
+                raise ModelError(f"{where} {unknown_name('parameter', name, dict(given))}")
+        # Between valid values; symbols could not be validated.
+        self._varied = type(given).model_construct(**{**dict(given), **values})
 
     @property
     def f(self) -> F:

@@ -9,14 +9,19 @@ from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Area, Temperature, Unit, Weight
+from bywire.core.quantities import (
+    Area,
+    HeatCapacity,
+    HeatConductance,
+    Temperature,
+    Unit,
+    Weight,
+)
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown
 from bywire.core.validity import first, row_by_row
 
-HeatCapacity = Annotated[float, Unit("J/K", 1e3), Field(gt=0, allow_inf_nan=False)]
-HeatConductance = Annotated[float, Unit("W/K", 1.0), Field(ge=0, allow_inf_nan=False)]
 Convection = Annotated[float, Unit("W/(m**2*K)", 10.0), Field(ge=0, allow_inf_nan=False)]
 Cooling = Annotated[float, Signal("W", "cooling by air", role=Role("sink", "air", book="heat"))]
 Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]

@@ -14,13 +14,13 @@ from bywire.core.quantities import (
     Inertia,
     Resistance,
     RotaryDamping,
+    TemperatureCoefficient,
     Torque,
     TorqueConstant,
     Unit,
 )
 from bywire.core.signals import Energy, Power, Role, Signal
 
-TemperatureCoefficient = Annotated[float, Unit("1/K", 2e-3), Field(ge=0, allow_inf_nan=False)]
 TemperatureRise = Annotated[
     float, Unit("delta_degC", 20.0), Field(ge=-100, le=200, allow_inf_nan=False)
 ]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.kpis import effort, hysteresis, occupation, registry, release
+from bywire.bench.kpis import effort, hysteresis, occupation, registry, release, warming
 from bywire.bench.kpis.smoothing import smoothed
 
 LAG = 0.3
@@ -113,7 +113,7 @@ def test_every_figure_is_declared_for_listings():
     found = registry.definitions()
     assert set(registry.FAMILIES.all()) == {
         "effort", "extremes", "hysteresis", "occupation", "release", "sine_sweep",
-        "step_response", "tracking",
+        "step_response", "tracking", "warming",
     }  # fmt: skip
     assert {"rise_time", "energy", "share_stuck", "loop_area"} <= set(found)
     for figure in found.values():
@@ -130,3 +130,24 @@ def test_time_to_empty_lies_between_the_rows():
     exact = 0.4 * math.log(10.0)
     assert found["time_to_empty"].value == pytest.approx(exact, abs=1e-2**2 / 8 / 0.4)
     assert abs(np.min(np.abs(t - exact))) > 1e-3
+
+
+def test_of_several_windings_the_hottest_counts():
+    t = np.linspace(0.0, 10.0, 101)
+    rows = {
+        "p": ("time", 2e6 - 1e5 * t, {"units": "Pa"}),
+        "T_winding_1": ("time", 300.0 + 10.0 * t, {"units": "K"}),
+        "T_winding_2": ("time", np.where(t < 4.05, 380.0, 310.0), {"units": "K"}),
+        "derated": ("time", np.where((t > 0.95) & (t < 4.05), 1.0, 0.0), {"units": "1"}),
+    }
+    found = registry.evaluate("warming", xr.Dataset(rows, {"time": t}), warming.Setting("p"))
+    assert found["peak_winding"].value == pytest.approx(400.0)
+    assert found["final_winding"].value == pytest.approx(400.0)
+    assert found["derated_after"].value == pytest.approx(1.0)
+    assert found["time_derated"].value == pytest.approx(3.1)
+    assert found["final_output"].value == pytest.approx(2e6 - 9.5e5, rel=1e-9)
+    assert found["final_output"].unit == "Pa"
+    bare = xr.Dataset({"p": rows["p"]}, {"time": t})
+    none = registry.evaluate("warming", bare, warming.Setting("p"))
+    assert math.isnan(none["peak_winding"].value)
+    assert math.isnan(none["time_derated"].value)

@@ -143,6 +143,13 @@ class LinearModel:
             return bool(np.abs(poles).max() < 1.0 + _ON_BORDER)
         return bool(poles.real.max() < _ON_BORDER * np.abs(poles).max())
 
+    @property
+    def live(self) -> tuple[str, ...]:
+        """States that anything moves, or anything feels: no temperatures while heat is off."""
+        A, B, C = (values != 0.0 for values in (self.A, self.B, self.C))
+        felt = A.any(axis=0) | A.any(axis=1) | B.any(axis=1) | C.any(axis=0) | (self.rate != 0.0)
+        return tuple(name for name, kept in zip(self.states, felt, strict=True) if kept)
+
     def reduced(self, states: Sequence[str], *, held: bool = False) -> LinearModel:
         """Return the model with some of its states only.
 

@@ -188,7 +188,7 @@ def analog_gain(
     if cut not in model.State._fields:
         raise unknown_name("state", cut, model.State._fields)
     whole = linearize(model, par, state, memory, inputs=(), outputs=(cut,))
-    kept = [name for name in whole.states if name not in locked]
+    kept = [name for name in whole.live if name not in locked]
     plant = whole.reduced(kept, held=bool(locked))
     k = plant.states.index(cut)
     A, B = plant.A.copy(), plant.A[:, k : k + 1].copy()

@@ -103,7 +103,7 @@ def sampled_system(
             raise unknown_name("signal of the stimulus", name, model.Stimulus._fields)
     state, memory, stimulus = point
     plant = linearize(model, par, state, memory, inputs=model.Memory._fields, outputs=outputs)
-    kept = [name for name in plant.states if name not in locked]
+    kept = [name for name in plant.live if name not in locked]
     frame, every = _frames([task.period for task in tasks])
     at = zeros(cast(Any, model.Stimulus)) if stimulus is None else stimulus
     moving = plant.reduced(kept, held=bool(locked))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Annotated, NamedTuple
 
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
-from bywire.control import current_pi, dither, low_pass_2, pedal_map, pressure_pid
+from bywire.control import current_pi, derating, dither, low_pass_2, pedal_map, pressure_pid
 from bywire.core import ops
 from bywire.core.signals import Signal
 from bywire.plant import adc, current_sensor, h_bridge, pedal, pressure_sensor
@@ -44,6 +44,10 @@ class Memory(NamedTuple):
     lp_s1: Annotated[float, Signal("A", "low-pass state 1", 1.0)]
     lp_s2: Annotated[float, Signal("A", "low-pass state 2", 5.0)]
     dit_phase: Annotated[float, Signal("1", "dither phase", 0.5)]
+    rise_winding: derating.Rise
+    rise_housing: derating.Rise
+    i_most: Annotated[float, Signal("A", "limit of the current demand", 20.0)]
+    derated: Annotated[float, Signal("1", "motor derated")]
 
 
 class Readings(NamedTuple):
@@ -58,11 +62,13 @@ def tick(readings: Readings, m: Memory, u: Stimulus, par: MotorcycleParameters) 
     p_share = adc.sample(readings.p, u.noise_p, par.adc)
     i_share = adc.sample(readings.i, u.noise_i, par.adc)
     p_before = m.p_meas
-    m = m._replace(**_values(p_share, i_share, par))
+    m = _derated(m._replace(**_values(p_share, i_share, par)), par)
     if par.drive.mode == "current-direct":
         m = m._replace(i_star=u.i_set, i_dit=0.0, i_ref=u.i_set)
     else:
         m = _shaped(_demand(m, p_before, u, par), par)
+    if par.ecu.derating.law != "off":
+        m = m._replace(i_ref=ops.clip(m.i_ref, -m.i_most, m.i_most))
     limit = h_bridge.limited(par.ecu.current.D_max, par.bridge)
     pi, out = current_pi.output(
         current_pi.State(m.pi_integral),
@@ -105,6 +111,21 @@ def _values(p: float, i: float, par: MotorcycleParameters) -> dict[str, float]:
     }
 
 
+def _derated(m: Memory, par: MotorcycleParameters) -> Memory:
+    """Return the memory with the limit that the motor's temperature leaves of its current."""
+    if par.ecu.derating.law == "off":
+        return m
+    x, out = derating.output(
+        derating.State(m.rise_winding, m.rise_housing),
+        derating.Input(m.i_meas, par.ecu.pressure.i_max),
+        par.ecu.T_s,
+        par.ecu.derating,
+    )
+    return m._replace(
+        rise_winding=x.winding, rise_housing=x.housing, i_most=out.i_max, derated=out.derated
+    )
+
+
 def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) -> Memory:
     """Return the memory with the unfiltered current demand renewed.
 
@@ -120,11 +141,14 @@ def _demand(m: Memory, p_before: float, u: Stimulus, par: MotorcycleParameters) 
     state = pressure_pid.State(m.pid_integral, m.pid_slope, m.pid_last)
     signals = pressure_pid.Input(p_ref=p_ref, p_meas=m.p_meas)
     scheduled = par.ecu.pressure_at(m.p_meas)
+    if par.ecu.derating.law != "off":  # a smaller limit; symbols could not be validated
+        limited = {**dict(scheduled), "i_max": m.i_most}
+        scheduled = pressure_pid.Parameters.model_construct(**limited)
     if par.ecu.schedule.law != "off":
         last = par.ecu.pressure_at(p_before)
         state = pressure_pid.transferred(state, signals, last.k_p, scheduled)
     pid, out = pressure_pid.output(state, signals, par.ecu.T_s, scheduled)
-    saturated = ops.where(ops.fabs(out.i) >= par.ecu.pressure.i_max, 1.0, 0.0)
+    saturated = ops.where(ops.fabs(out.i) >= scheduled.i_max, 1.0, 0.0)
     return m._replace(
         p_ref=p_ref,
         i_star=out.i,

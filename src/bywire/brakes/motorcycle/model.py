@@ -28,6 +28,7 @@ from bywire.plant import (
     end_stop,
     h_bridge,
     master_cylinder,
+    motor_heat,
     pipeline,
     pressure_sensor,
     reservoir_port,
@@ -84,6 +85,10 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         state={"y": "y_i"},
         labels={"y": "filtered current reading"},
     )
+    heat = Part(
+        motor_heat, par="motor_heat", fixed=motor_heat.State._fields, outside=True,
+        loss="E_motor_air",
+    )  # fmt: skip
 
     current = Wire("A", "motor current", 5.0)
     voltage = Wire("V", "motor voltage", 5.0)
@@ -97,21 +102,30 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     at_stop = Shown("1", "piston at an end stop")
     P_gear = Shown("W", "gear loss power, signed")
     P_el = Shown("W", "electrical power from battery or source", 10.0)
+    E_warming = Shown("J", "copper loss of the motor that warms up", role=motor_heat.COPPER)
+    E_winding = Shown("J", "heat in the motor's winding", role=motor_heat.WINDING)
+    E_housing = Shown("J", "heat in the motor's housing", role=motor_heat.HOUSING)
 
     records: ClassVar[tuple[str, ...]] = (
         "i", "i_ref", "i_star", "i_dit", "i_meas", "duty", "voltage", "theta", "omega", "x_mc",
         "p_mc", "p_pd", "p_ref", "p_meas", "V_pedal", "q", "Re", "torque", "T_fr", "F_stop",
         "q_makeup", "stuck", "at_stop", "sat_current", "sat_duty", "P_gear", "P_el", "E_source",
         "E_supply", "E_copper", "E_gear", "E_seal", "E_damping", "E_pipeline", "E_stop", "E_port",
-        "E_stored", "W_shaft", "t_stuck",
+        "E_stored", "W_shaft", "t_stuck", "T_winding", "T_housing", "derated", "E_warming",
+        "E_winding", "E_housing", "E_motor_air",
     )  # fmt: skip
 
     def wire(self, w: Self) -> None:
         """Say what every part feels: electrics, piston, fluid, load, sensors."""
+        warm = motor_heat.warmth(w.heat.xe, w.heat.par)
+        w.motor.vary(R_m=w.motor.par.R_m * warm.R, K_e=w.motor.par.K_e * warm.K)
         w.current, w.voltage, w.i_dc = _electrics(w)
         w.supply.u = battery_supply.Input(w.i_dc)
         w.motor.u = dc_motor.Input(w.voltage, w.gear.x.omega)
         w.torque = dc_motor.output(dc_motor.State(w.current), w.motor.par).torque
+        w.heat.u = motor_heat.Input(
+            dc_motor.power_loss(dc_motor.State(w.current), w.motor.par)
+        )
         piston = ball_screw_gear.output(w.gear.x, w.gear.par)
         cylinder = w.chamber.par
         w.stop.u = end_stop.Input(piston.x, piston.v, cylinder.x_rest, cylinder.x_end)
@@ -158,7 +172,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         port = port + caliper.power_loss(w.pads.x, w.pads.par, w.par.fluid)
         return {
             "E_source": w.voltage * w.current if ideal else battery,
-            "E_copper": dc_motor.power_loss(dc_motor.State(w.current), w.motor.par),
+            "E_copper": w.heat.u.P,
             "E_gear": gear + loss,
             "E_seal": seal,
             "E_port": port - brake_fluid.convected_power(makeup, w.chamber.x.p, w.par.fluid),
@@ -171,6 +185,8 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         friction, makeup = w.reaction
         F_stop = end_stop.load(w.stop.f)
         ideal = w.par.drive.mode in IDEAL
+        # A motor that stays cold keeps what it gives to the air, nothing: a zero without operation.
+        heat, cold = motor_heat.stored(w.heat.x, w.heat.par), w.heat.par.law == "off"
         return {
             **ecu.shown(w.m, w.par),
             "i": w.current,
@@ -181,6 +197,9 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
             "at_stop": ops.where(F_stop == 0, 0.0, 1.0),
             "P_gear": _gear_power(w, friction),
             "P_el": w.voltage * w.current if ideal else w.supply.par.V_bat * w.i_dc,
+            "E_warming": w.flow.E_motor_air if cold else w.flow.E_copper,
+            "E_winding": w.flow.E_motor_air if cold else heat.winding,
+            "E_housing": w.flow.E_motor_air if cold else heat.housing,
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
@@ -197,6 +216,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
                 pressure_sensor.reading(par.fluid.p_atm, par.pressure_sensor)
             ),
             filter_i=anti_alias_filter.State(current_sensor.reading(0.0, par.current_sensor)),
+            heat=motor_heat.cold(par.motor_heat),
         )
         return state, zeros(ecu.Memory)
 

@@ -18,5 +18,6 @@ PANELS = Panels(
         Panel("speed", (Trace("omega"),)),
         Panel("duty cycle", (Trace("duty"),), saturation="sat_duty"),
         Panel("power", (Trace("P_el"),)),
+        Panel("winding", (Trace("T_winding"),), saturation="derated", saturated="derated"),
     ),
 )

@@ -6,7 +6,15 @@ from typing import Literal
 
 from pydantic import model_validator
 
-from bywire.control import current_pi, dither, gain_schedule, low_pass_2, pedal_map, pressure_pid
+from bywire.control import (
+    current_pi,
+    derating,
+    dither,
+    gain_schedule,
+    low_pass_2,
+    pedal_map,
+    pressure_pid,
+)
 from bywire.control.dither import Believed
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Pressure
@@ -22,6 +30,7 @@ from bywire.plant import (
     end_stop,
     h_bridge,
     master_cylinder,
+    motor_heat,
     pedal,
     pipeline,
     pressure_sensor,
@@ -56,6 +65,7 @@ class EcuParameters(ParameterSet):
     pressure: pressure_pid.Parameters
     schedule: gain_schedule.Parameters
     current: current_pi.Parameters
+    derating: derating.Parameters
     filter: low_pass_2.Parameters
     dither: dither.Parameters
     est_par: Believed
@@ -93,6 +103,7 @@ class MotorcycleParameters(ParameterSet):
     supply: battery_supply.Parameters
     bridge: h_bridge.Parameters
     motor: dc_motor.Parameters
+    motor_heat: motor_heat.Parameters
     gear: ball_screw_gear.Parameters
     seal: seal_friction.Parameters
     master_cylinder: master_cylinder.Parameters

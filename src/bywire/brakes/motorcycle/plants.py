@@ -50,10 +50,11 @@ def linear(
         raise ParameterError(
             f"current = {at.value:g} A is no operating point: {error}"
         ) from None
-    return linearize(
+    whole = linearize(
         MotorcycleBrake(), driven, state, memory_at(p, driven),
         inputs=inputs, outputs=outputs, friction=at.friction,
     )  # fmt: skip
+    return whole.reduced(whole.live)
 
 
 def by_current(par: ParameterSet, at: PlantPoint) -> LinearModel:

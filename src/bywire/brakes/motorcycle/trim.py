@@ -21,6 +21,7 @@ from bywire.plant import (
     current_sensor,
     dc_motor,
     master_cylinder,
+    motor_heat,
     pressure_sensor,
     reservoir_port,
 )
@@ -130,6 +131,7 @@ def resting_at(p: float, par: Par, current: float | None = None) -> Any:
         pads=caliper.State(p),
         filter_p=anti_alias_filter.State(p_seen),
         filter_i=anti_alias_filter.State(i_seen),
+        heat=motor_heat.cold(par.motor_heat),
     )
 
 

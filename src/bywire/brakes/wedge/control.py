@@ -6,7 +6,7 @@ from typing import Annotated, NamedTuple
 
 from bywire.brakes.wedge.laws import moment_control, screw_offset
 from bywire.brakes.wedge.parameters import WedgeParameters
-from bywire.control import position_pd
+from bywire.control import derating, position_pd
 from bywire.core import ops
 from bywire.core.signals import Signal
 
@@ -43,6 +43,12 @@ class Memory(NamedTuple):
     speed_2: Annotated[float, Signal("rad/s", "measured speed 2", 50.0)]
     i_1_ref: Annotated[float, Signal("A", "current demand 1", 5.0)]
     i_2_ref: Annotated[float, Signal("A", "current demand 2", 5.0)]
+    rise_winding_1: derating.Rise
+    rise_housing_1: derating.Rise
+    rise_winding_2: derating.Rise
+    rise_housing_2: derating.Rise
+    i_most: Annotated[float, Signal("A", "limit of both current demands", 20.0)]
+    derated: Annotated[float, Signal("1", "motors derated")]
 
 
 class Readings(NamedTuple):
@@ -88,9 +94,9 @@ def moment_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Me
 def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
     """Run the position control of both motors once."""
     on = 1.0 - u.power_off
-    m = _references(m._replace(on=on), r, u, par)
+    m = _references(_derated(m._replace(on=on), par), r, u, par)
     rate = m.direction * m.rate if par.command.mode == "moment" else 0.0 * m.rate
-    control, T = par.control.position, par.control.T_fast
+    control, T = _position(m, par), par.control.T_fast
     x_1, out_1 = position_pd.output(
         position_pd.State(m.last_1, m.speed_1),
         position_pd.Input(m.theta_1_ref, rate, r.theta_1),
@@ -113,10 +119,50 @@ def position_tick(r: Readings, m: Memory, u: Stimulus, par: WedgeParameters) -> 
     )
 
 
-def current_tick(m: Memory, u: Stimulus) -> Memory:
+def current_tick(m: Memory, u: Stimulus, par: WedgeParameters) -> Memory:
     """Hand the demanded currents to the drives."""
     on = 1.0 - u.power_off
-    return m._replace(on=on, i_1_ref=on * u.i_1_set, i_2_ref=on * u.i_2_set)
+    if par.control.derating.law == "off":
+        return m._replace(on=on, i_1_ref=on * u.i_1_set, i_2_ref=on * u.i_2_set)
+    m = _derated(m, par)
+    i_1, i_2 = (ops.clip(i, -m.i_most, m.i_most) for i in (u.i_1_set, u.i_2_set))
+    return m._replace(on=on, i_1_ref=on * i_1, i_2_ref=on * i_2)
+
+
+def _derated(m: Memory, par: WedgeParameters) -> Memory:
+    """Return the memory with the limit that the hotter motor leaves of both currents.
+
+    The drives follow their demands; these stand for the currents, which nobody measures.
+    """
+    control, T = par.control.derating, par.control.T_fast
+    if control.law == "off":
+        return m
+    most = par.control.position.i_max
+    x_1, out_1 = derating.output(
+        derating.State(m.rise_winding_1, m.rise_housing_1), derating.Input(m.i_1_ref, most), T,
+        control,
+    )  # fmt: skip
+    x_2, out_2 = derating.output(
+        derating.State(m.rise_winding_2, m.rise_housing_2), derating.Input(m.i_2_ref, most), T,
+        control,
+    )  # fmt: skip
+    return m._replace(
+        rise_winding_1=x_1.winding,
+        rise_housing_1=x_1.housing,
+        rise_winding_2=x_2.winding,
+        rise_housing_2=x_2.housing,
+        i_most=ops.fmin(out_1.i_max, out_2.i_max),
+        derated=ops.fmax(out_1.derated, out_2.derated),
+    )
+
+
+def _position(m: Memory, par: WedgeParameters) -> position_pd.Parameters:
+    """Return the position control with the limit of its demand that derating leaves."""
+    control = par.control.position
+    if par.control.derating.law == "off":
+        return control
+    # A smaller limit; symbols could not be validated.
+    return position_pd.Parameters.model_construct(**{**dict(control), "i_max": m.i_most})
 
 
 def _references(m: Memory, r: Readings, u: Stimulus, par: WedgeParameters) -> Memory:
@@ -141,7 +187,7 @@ def _allowed(m: Memory, par: WedgeParameters) -> float:
 
     Anti-wind-up: a reference that went on would have to come all the way back at a release.
     """
-    limit, speed = par.control.position.i_max, m.direction * m.rate
+    limit, speed = _position(m, par).i_max, m.direction * m.rate
     push = ops.where(speed < 0, -1.0, 1.0)
     least = ops.fmin(push * m.i_1_ref, push * m.i_2_ref)
     return ops.where(least < limit, speed, 0.0 * speed)

@@ -125,10 +125,11 @@ def full(par: Par, F_N: float, friction: Friction = "removed", speed: float = 0.
     kinds: dict[str, Friction] = dict.fromkeys(WedgeBrake.frictions, friction)
     if cast(Any, at.state).Omega != 0.0 and friction == "stuck":
         kinds["Omega"] = "sliding"
-    return linearize(
+    whole = linearize(
         at.model, at.par, at.state, at.memory,
         inputs=INPUTS, outputs=(*OUTPUTS, "y_M"), friction=kinds,
     )  # fmt: skip
+    return whole.reduced(whole.live)
 
 
 def mechanical(whole: LinearModel, *, corrected: bool = False) -> LinearModel:

@@ -23,6 +23,7 @@ from bywire.plant import (
     end_stop,
     flywheel,
     moment_sensor,
+    motor_heat,
     roller_screw,
     servo_motor,
     shaft_encoder,
@@ -31,6 +32,7 @@ from bywire.plant import (
 Par = WedgeParameters
 LOSSES = {"E_copper": "copper_loss", "E_damping": "damping_loss"}
 """energies that the motors lose, both together"""
+_SLOW = motor_heat.State._fields
 _SUPPLY = Role("source", "supply", whole="W_electric", rest="E_standby",
                rest_label="standby of the drives")  # fmt: skip
 _DISC = Role("source", "disc", whole="W_disc", rest="E_pads", rest_label="heat of pads and disc",
@@ -72,6 +74,12 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     disc = Part(flywheel, par="flywheel", outside=True)
     moment_sensor = Part(moment_sensor, state={"M": "y_M"})
     supply = Part(drive_supply, state={"P": "y_P"})
+    heat_1 = Part(
+        motor_heat, par="motor_heat", suffix="_1", fixed=_SLOW, outside=True, loss="E_motor_air"
+    )
+    heat_2 = Part(
+        motor_heat, par="motor_heat", suffix="_2", fixed=_SLOW, outside=True, loss="E_motor_air"
+    )
 
     F_1 = Wire("N", "axial force on screw 1", 400.0)
     F_2 = Wire("N", "axial force on screw 2", 400.0)
@@ -90,6 +98,9 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     P_meas = Shown("W", "power at the drives' input, filtered", 50.0)
     E_source = Shown("J", "energy in: electrical, disc on wedge, run-out")
     U_caliper = Shown("J", "energy of the caliper")
+    E_warming = Shown("J", "copper loss of the motors that warm up", role=motor_heat.COPPER)
+    E_winding = Shown("J", "heat in the motors' windings", role=motor_heat.WINDING)
+    E_housing = Shown("J", "heat in the motors' housings", role=motor_heat.HOUSING)
 
     records: ClassVar[tuple[str, ...]] = (
         "M_set", "M_B", "y_M", "M_meas", "mode", "rate", "sat_rate", "theta_c", "theta_ref",
@@ -98,7 +109,8 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         "F_N", "F_end", "T_fr_1", "T_fr_2", "F_fr", "Omega", "phi", "contacts", "stuck", "P_in",
         "P_meas", "E_source", "E_copper", "E_damping", "E_shaft", "E_wedge", "E_heart",
         "E_caliper", "E_stop", "E_stored", "U_caliper", "W_supply", "W_electric", "W_disc",
-        "W_runout", "W_brake", "t_stuck",
+        "W_runout", "W_brake", "t_stuck", "T_winding_1", "T_winding_2", "T_housing_1",
+        "T_housing_2", "derated", "E_warming", "E_winding", "E_housing", "E_motor_air",
     )  # fmt: skip
 
     def wire(self, w: Self) -> None:
@@ -107,10 +119,14 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         w.F_1, w.F_2, w.squeeze = forces.F_1, forces.F_2, forces.squeeze
         w.turning = flywheel.turning(w.disc.xe, par.flywheel)
         w.M_B = wedge_caliper.moment(w.caliper.f.F_N, par.wedge.mu_B, w.turning, par.caliper)
-        for drive, motor, i_ref, force in (
-            (w.drive_1, w.motor_1, w.m.i_1_ref, w.F_1), (w.drive_2, w.motor_2, w.m.i_2_ref, w.F_2)
-        ):  # fmt: skip
+        for drive, motor, heat, i_ref, force in (
+            (w.drive_1, w.motor_1, w.heat_1, w.m.i_1_ref, w.F_1),
+            (w.drive_2, w.motor_2, w.heat_2, w.m.i_2_ref, w.F_2),
+        ):
+            warm = motor_heat.warmth(heat.xe, heat.par)
+            motor.vary(R_ref=motor.par.R_ref * warm.R, K_ref=motor.par.K_ref * warm.K)
             drive_train.wire(drive, motor, i_ref, w.m.on, force, par)
+            heat.u = motor_heat.Input(servo_motor.copper_loss(motor.x, motor.par))
         side, x, k = wedge.side(w.body.xe), w.body.x, roller_screw.slope(par.screw)
         F_stop = end_stop.load(w.stop.f)
         w.body.u = wedge.Input(forces.F_M, w.caliper.f.F_N, F_stop, 0.0, side, w.turning)
@@ -169,6 +185,10 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
     def record(self, w: Self) -> dict[str, float]:
         """Return what is recorded beside states, wires and losses."""
         motors = drive_train.power(w.motor_1) + drive_train.power(w.motor_2)
+        heat_1 = motor_heat.stored(w.heat_1.x, w.heat_1.par)
+        heat_2 = motor_heat.stored(w.heat_2.x, w.heat_2.par)
+        # Motors that stay cold keep what they give to the air, nothing: it costs no operation.
+        cold, none = w.par.motor_heat.law == "off", w.flow.E_motor_air
         return {
             "voltage_1": w.motor_1.u.v,
             "voltage_2": w.motor_2.u.v,
@@ -182,6 +202,9 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             "P_meas": w.supply.x.P,
             "E_source": w.flow.W_electric + w.flow.W_disc + w.flow.W_runout,
             "U_caliper": wedge_caliper.energy(w.caliper.u, w.caliper.par),
+            "E_warming": none if cold else w.flow.E_copper,
+            "E_winding": none if cold else heat_1.winding + heat_2.winding,
+            "E_housing": none if cold else heat_1.housing + heat_2.housing,
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
@@ -201,7 +224,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         return control.position_tick(_readings(x, par), m, u, par)
 
     def _current(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
-        return control.current_tick(m, u)
+        return control.current_tick(m, u, par)
 
     def rest(self, par: Par) -> tuple[Any, control.Memory]:
         """Return the brake parked: the wedge in its middle, preloaded, without current."""
@@ -222,6 +245,8 @@ def state_at(x: float, par: Par) -> Any:
         body=wedge.State(x=x, v=0.0),
         disc=flywheel.State(Omega=par.flywheel.Omega_0, phi=0.0),
         supply=drive_supply.State(par.supply.P_standby),
+        heat_1=motor_heat.cold(par.motor_heat),
+        heat_2=motor_heat.cold(par.motor_heat),
     )
 
 

@@ -8,6 +8,11 @@ from types import MappingProxyType
 from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Panels, Trace
 
+_WINDINGS = Panel(
+    "windings", (Trace("T_winding_1"), Trace("T_winding_2", Role.SECOND)),
+    saturation="derated", saturated="derated",
+)  # fmt: skip
+
 BRAKING = Panels(
     "wedge",
     ("wedge-brake",),
@@ -28,6 +33,7 @@ BRAKING = Panels(
         Panel("power", (Trace("P_meas"), Trace("P_in", Role.SECOND))),
         Panel("force", (Trace("F_M"),)),
         Panel("mode", (Trace("mode"),), levels=("parked", "gap", "moment", "retracting")),
+        _WINDINGS,
     ),
 )
 """moment, speed, current and power as in Figs. 7 to 9 of Roberts et al. (2003), and more"""

@@ -7,7 +7,7 @@ from typing import Literal
 from bywire.brakes.wedge.elements import brake_heart, wedge, wedge_caliper, wedge_friction
 from bywire.brakes.wedge.laws import moment_control, screw_offset
 from bywire.brakes.wedge.rigs import rig_parameters
-from bywire.control import position_pd
+from bywire.control import derating, position_pd
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import (
@@ -17,6 +17,7 @@ from bywire.plant import (
     end_stop,
     flywheel,
     moment_sensor,
+    motor_heat,
     roller_screw,
     servo_motor,
     shaft_encoder,
@@ -42,6 +43,7 @@ class ControlParameters(ParameterSet):
     T_slow: Duration
     """sample time of moment control"""
     position: position_pd.Parameters
+    derating: derating.Parameters
     offset: screw_offset.Parameters
     moment: moment_control.Parameters
 
@@ -53,6 +55,7 @@ class WedgeParameters(ParameterSet):
     drive: current_drive.Parameters
     motor_1: servo_motor.Parameters
     motor_2: servo_motor.Parameters
+    motor_heat: motor_heat.Parameters
     screw: roller_screw.Parameters
     bearing: axial_bearing.Parameters
     heart: brake_heart.Parameters

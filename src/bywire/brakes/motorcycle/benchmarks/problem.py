@@ -22,7 +22,7 @@ from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core import ops
 from bywire.core.signals import signals_of, zeros
 from bywire.core.typing import Array
-from bywire.plant import current_sensor, pressure_sensor
+from bywire.plant import current_sensor, motor_heat, pressure_sensor
 from bywire.simulation.run import Run, simulate
 
 Demand = Callable[[Array], Array]
@@ -60,6 +60,7 @@ def rest(par: MotorcycleParameters) -> Any:
     """Return the retracted piston at rest without pressure."""
     return zeros(MotorcycleBrake.State)._replace(
         theta=par.master_cylinder.x_rest / par.gear.k_g,
+        **motor_heat.cold(par.motor_heat)._asdict(),
         y_p=pressure_sensor.reading(par.fluid.p_atm, par.pressure_sensor),
         y_i=current_sensor.reading(0.0, par.current_sensor),
     )

@@ -35,6 +35,33 @@ _ELECTRICAL = {
     "motor.K_e": paper(30.4e-3, _T1),
 }
 
+_SIZE = "catalogs of 40 mm motors of this K_e: 1.9 and 4.7 K/W, 41 and 1120 s"
+_THERMAL_HAT = "the ECU knows the motor"
+_THERMAL = {
+    "motor_heat.law": chosen("off", "optional element, off"),
+    "motor_heat.C_w": chosen(22.0, _SIZE),
+    "motor_heat.C_h": chosen(240.0, _SIZE),
+    "motor_heat.G_wh": chosen(0.52, _SIZE),
+    "motor_heat.G_ha": chosen(0.215, _SIZE),
+    "motor_heat.a_R": chosen(3.93e-3, "copper"),
+    "motor_heat.a_K": chosen(1.1e-3, "neodymium magnets"),
+    "motor_heat.T_ref": chosen(293.15, "20 degC"),
+    "motor_heat.T_a": chosen(293.15, "20 degC"),
+    "motor_heat.T_most": chosen(428.15, "155 degC, insulation of class F"),
+    "ecu.derating.law": chosen("off", "optional law, off"),
+    "ecu.derating.R_hat": chosen(0.35, _THERMAL_HAT),
+    "ecu.derating.a_R_hat": chosen(3.93e-3, _THERMAL_HAT),
+    "ecu.derating.C_w_hat": chosen(22.0, _THERMAL_HAT),
+    "ecu.derating.C_h_hat": chosen(240.0, _THERMAL_HAT),
+    "ecu.derating.G_wh_hat": chosen(0.52, _THERMAL_HAT),
+    "ecu.derating.G_ha_hat": chosen(0.215, _THERMAL_HAT),
+    "ecu.derating.T_ref_hat": chosen(293.15, _THERMAL_HAT),
+    "ecu.derating.T_a_hat": chosen(293.15, "20 degC; a thermometer's reading on a vehicle"),
+    "ecu.derating.T_derate": chosen(393.15, "120 degC, 35 K below the insulation's limit"),
+    "ecu.derating.T_limit": chosen(418.15, "145 degC, 10 K below it"),
+    "ecu.derating.i_least": chosen(2.0, "half of what holds 37 bar"),
+}
+
 _FRICTION = {
     "seal.T_pr": chosen(2e-3, "not printed; preload of seals of this size"),
     "seal.f_cfr_p": paper(1.6e-8, _T3),
@@ -135,7 +162,7 @@ _ECU = {
     "drive.T_source": chosen(1e-4, "an ideal source, nearly continuous"),
 }
 
-_COMMON = _ELECTRICAL | _FRICTION | _HYDRAULIC | _GEAR | _SENSORS | _ECU
+_COMMON = _ELECTRICAL | _THERMAL | _FRICTION | _HYDRAULIC | _GEAR | _SENSORS | _ECU
 
 _PRINTED = _COMMON | {
     "gear.J_mot": paper(1e-5, _T1),

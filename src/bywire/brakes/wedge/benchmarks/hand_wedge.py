@@ -29,6 +29,8 @@ SUBJECT = _Wedge(
     model=WedgeBrake,
     flow=WedgeBrake.Flow,
     choices={
+        "motor_heat.law": ("off",),
+        "control.derating.law": ("off",),
         "screw.law": ("load",),
         "wedge_friction.stopped_disc": ("drop",),
         "caliper.law": ("linear",),

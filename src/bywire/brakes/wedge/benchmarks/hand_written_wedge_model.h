@@ -27,7 +27,7 @@ typedef struct {
     double W, s, q[3], g_1, g_2, g_12, tau;          /* heart, see pressed() */
     double tan, M_W, mu_B, k_return, x_stop, mu_int, mu_R, k_stop, tau_stop; /* wedge */
     double K_cal, tau_cal, clear, per_F_N, J_F, Om_still, runout; /* caliper, disc */
-    double w_M, standby, tau_P;                      /* measurements */
+    double w_M, standby, tau_P, T_a;                 /* measurements */
 } Plant;
 
 typedef struct { double demand, sensed, integral, i, th, om; } Motor;
@@ -87,7 +87,7 @@ static Plant plant_of(const double *p, double h)
     k.clear = p[P_caliper_clearance], k.per_F_N = 2.0 * k.mu_B * p[P_caliper_r_B];
     k.J_F = p[P_flywheel_J_F], k.Om_still = p[P_flywheel_Omega_still];
     k.runout = p[P_flywheel_runout], k.w_M = 2.0 * PI * p[P_moment_sensor_f_M];
-    k.standby = p[P_supply_P_standby], k.tau_P = p[P_supply_tau_P];
+    k.standby = p[P_supply_P_standby], k.tau_P = p[P_supply_tau_P], k.T_a = p[P_motor_heat_T_a];
     return k;
 }
 
@@ -267,7 +267,8 @@ static void record_energies(const Plant *k, const Saved *z, double *o)
     o[O_E_caliper] = e[E_W_caliper] - caliper, o[O_E_stop] = e[E_W_stop] - stop;
     o[O_E_stored] = stored, o[O_U_caliper] = caliper, o[O_W_supply] = e[E_W_supply];
     o[O_W_electric] = e[E_W_electric], o[O_W_disc] = e[E_W_disc], o[O_W_runout] = e[E_W_runout];
-    o[O_W_brake] = e[E_W_brake], o[O_t_stuck] = e[E_t_stuck];
+    o[O_W_brake] = e[E_W_brake], o[O_t_stuck] = e[E_t_stuck], o[O_derated] = 0.0;
+    o[O_E_warming] = o[O_E_winding] = o[O_E_housing] = o[O_E_motor_air] = 0.0;
 }
 
 /* What the contacts carry at an instant. */
@@ -311,6 +312,8 @@ static void record(const Plant *k, const Saved *z, double *o)
     o[O_F_M] = t.f.f_2 - t.f.f_1, o[O_F_N] = t.F_N, o[O_F_end] = t.F_end;
     o[O_T_fr_1] = -b->friction[0], o[O_T_fr_2] = -b->friction[1], o[O_F_fr] = -b->friction[2];
     o[O_Omega] = b->Om, o[O_phi] = b->phi;
+    o[O_T_winding_1] = o[O_T_winding_2] = k->T_a; /* motors that stay cold */
+    o[O_T_housing_1] = o[O_T_housing_2] = k->T_a;
     o[O_contacts] = (t.f.f_1 > 0.0) + 2.0 * (t.f.f_2 > 0.0) + 4.0 * (t.f.f_12 > 0.0);
     o[O_stuck] = a->om == 0.0 && c->om == 0.0 && b->v == 0.0;
     o[O_P_in] = k->standby + V_1 * a->i + V_2 * c->i, o[O_P_meas] = b->y_P;

@@ -49,6 +49,33 @@ _MOTOR = {
     "a_K": chosen(1.1e-3, "neodymium magnets"),
 }
 
+_SIZE = "the size: 0.25 kg of copper, 0.9 kg of iron and aluminum, on the caliper"
+_HAT = "the controller knows the motor"
+_THERMAL = {
+    "motor_heat.law": chosen("off", "optional element, off"),
+    "motor_heat.C_w": chosen(95.0, _SIZE),
+    "motor_heat.C_h": chosen(500.0, _SIZE),
+    "motor_heat.G_wh": chosen(1.5, _SIZE),
+    "motor_heat.G_ha": chosen(1.0, _SIZE),
+    "motor_heat.a_R": chosen(3.93e-3, "copper"),
+    "motor_heat.a_K": chosen(1.1e-3, "neodymium magnets"),
+    "motor_heat.T_ref": chosen(293.15, "20 degC"),
+    "motor_heat.T_a": chosen(293.15, "20 degC"),
+    "motor_heat.T_most": chosen(428.15, "155 degC, insulation of class F"),
+    "control.derating.law": chosen("off", "optional law, off"),
+    "control.derating.R_hat": chosen(_R, _HAT),
+    "control.derating.a_R_hat": chosen(3.93e-3, _HAT),
+    "control.derating.C_w_hat": chosen(95.0, _HAT),
+    "control.derating.C_h_hat": chosen(500.0, _HAT),
+    "control.derating.G_wh_hat": chosen(1.5, _HAT),
+    "control.derating.G_ha_hat": chosen(1.0, _HAT),
+    "control.derating.T_ref_hat": chosen(293.15, _HAT),
+    "control.derating.T_a_hat": chosen(293.15, "20 degC; a thermometer's reading on a vehicle"),
+    "control.derating.T_derate": chosen(393.15, "120 degC, 35 K below the insulation's limit"),
+    "control.derating.T_limit": chosen(418.15, "145 degC, 10 K below it"),
+    "control.derating.i_least": chosen(5.0, "more than holds 600 N m at mu_B 0.35"),
+}
+
 _ELECTRICAL = {
     "supply.P_standby": calibrated(20.0, "tuned so that Fig. 9 needs about 60 W at the input"),
     "supply.tau_P": calibrated(0.03, "tuned so that Fig. 9 needs about 60 W at the input"),
@@ -162,6 +189,7 @@ _RIG = {
 _VALUES = {
     **{f"motor_{k}.{name}": value for k in (1, 2) for name, value in _MOTOR.items()},
     **_ELECTRICAL,
+    **_THERMAL,
     **_MECHANICAL,
     **_STAND,
     **_CONTROL,

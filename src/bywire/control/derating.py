@@ -1,0 +1,119 @@
+"""Derating: a motor's current limit falls with the winding's temperature, as the ECU believes it.
+
+No sensor is in the winding: the ECU runs a thermal model of its own on the current.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge, Gt
+from pydantic import Field, model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    HeatCapacity,
+    HeatConductance,
+    Resistance,
+    Temperature,
+    TemperatureCoefficient,
+    Unit,
+)
+from bywire.core.signals import Signal
+from bywire.core.units import shown
+
+LeastCurrent = Annotated[float, Unit("A", 10.0), Field(ge=0, allow_inf_nan=False)]
+SampleTime = Annotated[float, Signal("s", "sample time", 1e-3), Gt(0)]
+Rise = Annotated[float, Signal("delta_degC", "rise above the air as the ECU believes it", 50.0)]
+
+
+class Parameters(ParameterSet):
+    """The ECU's thermal model, and how the limit follows it.
+
+    ``law``: ``"current"`` lowers the limit; ``"off"`` leaves it as it is, and nothing is computed.
+    """
+
+    law: Literal["off", "current"]
+    """whether the limit falls with temperature"""
+    R_hat: Resistance
+    """resistance at T_ref_hat as the ECU believes it"""
+    a_R_hat: TemperatureCoefficient
+    """growth of the resistance with temperature"""
+    C_w_hat: HeatCapacity
+    """heat capacity of the winding as the ECU believes it"""
+    C_h_hat: HeatCapacity
+    """that of the housing"""
+    G_wh_hat: HeatConductance
+    """conductance from winding to housing as the ECU believes it"""
+    G_ha_hat: HeatConductance
+    """that from housing to the air"""
+    T_ref_hat: Temperature
+    """temperature at which R_hat holds"""
+    T_a_hat: Temperature
+    """temperature of the air as the ECU believes it"""
+    T_derate: Temperature
+    """temperature of the winding from which on the limit falls"""
+    T_limit: Temperature
+    """temperature at which it has fallen to i_least"""
+    i_least: LeastCurrent
+    """current that is left at any temperature"""
+
+    @model_validator(mode="after")
+    def _falls(self) -> Parameters:
+        if not self.T_derate < self.T_limit:
+            raise ValueError(
+                f"T_derate = {shown(self.T_derate, 'K')} must be below T_limit = "
+                f"{shown(self.T_limit, 'K')}: between them the limit falls"
+            )
+        return self
+
+
+class State(NamedTuple):
+    """Rises above the air: zero is a motor that has rested."""
+
+    winding: Rise
+    housing: Rise
+
+
+class Input(NamedTuple):
+    """Current as measured or demanded, and its limit while the motor is cold."""
+
+    i: Annotated[float, Signal("A", "motor current", 5.0)]
+    i_max: Annotated[float, Signal("A", "limit of the current's magnitude", 20.0), Ge(0)]
+
+
+class Output(NamedTuple):
+    """The limit now, the winding's temperature as believed, and whether the limit was lowered."""
+
+    i_max: Annotated[float, Signal("A", "limit of the current's magnitude", 20.0)]
+    T: Annotated[float, Signal("K", "temperature of the winding, estimated", 350.0)]
+    derated: Annotated[float, Signal("1", "motor derated")]
+
+
+def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, Output]:
+    r"""Advance the thermal model by one sample, and return the limit that follows.
+
+    .. math::
+        C_w \dot\vartheta_w &= R(\vartheta_w)\, i^2 - G_{wh} (\vartheta_w - \vartheta_h) \\
+        C_h \dot\vartheta_h &= G_{wh} (\vartheta_w - \vartheta_h) - G_{ha} \vartheta_h \\
+        i_{max} &= i_{least} + (i_0 - i_{least})\,
+        \mathrm{clip}\left(\frac{T_{limit} - T_w}{T_{limit} - T_{derate}}, 0, 1\right)
+
+    Notes
+    -----
+    Linear and not a switch: where a demand holds the limit, current and temperature settle where
+    the heat that comes is the heat that goes, without hunting.
+    """
+    if par.law == "off":
+        return x, Output(u.i_max, par.T_a_hat, 0.0)
+    hot = par.T_a_hat + x.winding
+    R = par.R_hat * (1.0 + par.a_R_hat * (hot - par.T_ref_hat))
+    through = par.G_wh_hat * (x.winding - x.housing)
+    winding = x.winding + T / par.C_w_hat * (R * u.i * u.i - through)
+    housing = x.housing + T / par.C_h_hat * (through - par.G_ha_hat * x.housing)
+    now = par.T_a_hat + winding
+    share = ops.clip((par.T_limit - now) / (par.T_limit - par.T_derate), 0.0, 1.0)
+    least = ops.fmin(par.i_least, u.i_max)
+    limit = least + (u.i_max - least) * share
+    return State(winding, housing), Output(limit, now, ops.where(share < 1.0, 1.0, 0.0))

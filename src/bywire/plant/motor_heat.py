@@ -1,0 +1,179 @@
+"""Heat of a motor: copper loss warms its winding, the winding its housing, and that the air.
+
+Copper conducts less when hot, and magnets hold less: what `warmth` gives, a motor's resistance and
+torque constant follow.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge
+from pydantic import model_validator
+
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import (
+    HeatCapacity,
+    HeatConductance,
+    Temperature,
+    TemperatureCoefficient,
+)
+from bywire.core.signals import Energy, Power, Role, Signal
+from bywire.core.typing import Array
+from bywire.core.units import shown
+from bywire.core.validity import first, row_by_row
+
+BOOK = "motor heat"
+COPPER = Role("source", "copper", book=BOOK)
+WINDING, HOUSING = (Role("sink", label, book=BOOK) for label in ("winding", "housing"))
+Conducted = Annotated[
+    float, Signal("W", "heat of motors to the air", role=Role("sink", "air", book=BOOK))
+]
+Kelvin = Annotated[float, Signal("K", "temperature", 400.0), Ge(0)]
+
+
+class Parameters(ParameterSet):
+    """Two bodies of one temperature each.
+
+    ``law``: ``"lumped"``; ``"off"`` keeps the motor as it is at ``T_ref``, and no temperature
+    moves.
+    """
+
+    law: Literal["off", "lumped"]
+    """whether the motor warms up"""
+    C_w: HeatCapacity
+    """heat capacity of the winding"""
+    C_h: HeatCapacity
+    """heat capacity of housing and magnets"""
+    G_wh: HeatConductance
+    """conductance from winding to housing"""
+    G_ha: HeatConductance
+    """conductance from housing to the air"""
+    a_R: TemperatureCoefficient
+    """growth of the resistance with the winding's temperature, copper"""
+    a_K: TemperatureCoefficient
+    """fall of the torque constant with the housing's temperature, magnets"""
+    T_ref: Temperature
+    """temperature at which the motor's resistance and torque constant hold"""
+    T_a: Temperature
+    """temperature of the air, and of the motor at the start"""
+    T_most: Temperature
+    """temperature of the winding that its insulation stands"""
+
+    @model_validator(mode="after")
+    def _magnets_hold(self) -> Parameters:
+        rise = self.T_most - self.T_ref
+        if not self.a_K * rise < 1.0:
+            raise ValueError(
+                f"a_K = {self.a_K:g} 1/K leaves nothing of the torque constant at T_most = "
+                f"{shown(self.T_most, 'K')}: it must be below {1.0 / rise:.3g} 1/K"
+            )
+        return self
+
+
+class State(NamedTuple):
+    """Temperatures."""
+
+    T_winding: Annotated[float, Signal("K", "temperature of the winding", 350.0), Ge(0)]
+    T_housing: Annotated[float, Signal("K", "temperature of the motor's housing", 320.0), Ge(0)]
+
+
+class Factors(NamedTuple):
+    """Factors of the derivatives: heat capacities."""
+
+    T_winding: Annotated[float, Signal("J/K", "heat capacity of the winding", 30.0)]
+    T_housing: Annotated[float, Signal("J/K", "heat capacity of the housing", 300.0)]
+
+
+class Balance(NamedTuple):
+    """What warms them."""
+
+    T_winding: Annotated[float, Signal("W", "heat into the winding", 30.0)]
+    T_housing: Annotated[float, Signal("W", "heat into the housing", 30.0)]
+
+
+class Input(NamedTuple):
+    """What the winding loses."""
+
+    P: Annotated[float, Signal("W", "copper loss", 30.0), Ge(0)]
+
+
+class Stored(NamedTuple):
+    """Heat above the temperature of the air."""
+
+    winding: Annotated[float, Signal("J", "heat in the winding", 1e3)]
+    housing: Annotated[float, Signal("J", "heat in the housing", 1e4)]
+
+
+class Warmth(NamedTuple):
+    """Resistance and torque constant over those at the reference temperature."""
+
+    R: Annotated[float, Signal("1", "resistance over that at the reference temperature", 1.0)]
+    K: Annotated[float, Signal("1", "torque constant over that at the reference temperature", 1.0)]
+
+
+def mass(par: Parameters) -> Factors:
+    """Return the heat capacities."""
+    return Factors(par.C_w, par.C_h)
+
+
+def balance(x: State, u: Input, par: Parameters) -> Balance:
+    r"""Return what warms winding and housing.
+
+    .. math::
+        C_w \dot T_w &= P - G_{wh} (T_w - T_h) \\
+        C_h \dot T_h &= G_{wh} (T_w - T_h) - G_{ha} (T_h - T_a)
+    """
+    if par.law == "off":
+        return Balance(0.0, 0.0)
+    through = par.G_wh * (x.T_winding - x.T_housing)
+    return Balance(u.P - through, through - par.G_ha * (x.T_housing - par.T_a))
+
+
+def warmth(x: State, par: Parameters) -> Warmth:
+    r"""Return what resistance and torque constant are, over those at the reference temperature.
+
+    .. math:: R/R_{ref} = 1 + a_R (T_w - T_{ref}), \quad K/K_{ref} = 1 - a_K (T_h - T_{ref})
+    """
+    if par.law == "off":
+        return Warmth(1.0, 1.0)
+    return Warmth(
+        R=1.0 + par.a_R * (x.T_winding - par.T_ref), K=1.0 - par.a_K * (x.T_housing - par.T_ref)
+    )
+
+
+def stored(x: State, par: Parameters) -> Stored:
+    """Return the heat in each body."""
+    if par.law == "off":
+        return Stored(0.0, 0.0)
+    return Stored(par.C_w * (x.T_winding - par.T_a), par.C_h * (x.T_housing - par.T_a))
+
+
+def energy(x: State, par: Parameters) -> Energy:
+    """Return the heat in both bodies."""
+    each = stored(x, par)
+    return each.winding + each.housing
+
+
+def power_in(u: Input, par: Parameters) -> Power:
+    """Return the copper loss, where it warms anything."""
+    return 0.0 if par.law == "off" else u.P
+
+
+def power_loss(x: State, par: Parameters) -> Conducted:
+    """Return the heat that goes to the air; signed: air warms what is colder."""
+    return 0.0 if par.law == "off" else par.G_ha * (x.T_housing - par.T_a)
+
+
+def cold(par: Parameters) -> State:
+    """Return a motor as warm as the air."""
+    return State(par.T_a, par.T_a)
+
+
+@row_by_row
+def watch(t: Array, x: State, par: Parameters) -> list[str]:
+    """Return whether the winding gets hotter than its insulation stands."""
+    if par.law == "off":
+        return []
+    most = shown(par.T_most, "K")
+    return list(first(t, x.T_winding > par.T_most, f"the winding passes {most}, its limit,"))
