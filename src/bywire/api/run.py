@@ -251,7 +251,8 @@ def run(
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
-        ``auto``, ``compiled`` or ``virtual-machine``.
+        ``compiled``, ``virtual-machine``, or the compiled C of the ECU in the loop, ``sil``
+        (double precision) or ``sil-single``; ``auto`` is what the bench says.
     estimate_error
         Whether all runs are made in half and double steps too, for the error from the step of key
         figures and recorded signals. A requirement that is closer to its limit than this error

@@ -25,6 +25,7 @@ from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unk
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import pick
+from bywire.simulation.engine import KINDS
 from bywire.simulation.run import Run
 
 
@@ -62,6 +63,9 @@ class Bench:
     assembly
         Which model of the parameters' brake is tested, where an experiment of any brake leaves
         the choice; that of the parameter set where empty.
+    engine
+        What computes its runs: ``auto``, ``compiled``, ``virtual-machine``, or the compiled C of
+        the ECU in the loop, ``sil`` (double precision) or ``sil-single``.
 
     Raises
     ------
@@ -82,6 +86,7 @@ class Bench:
     name: str = ""
     assembly: str = ""
     faults: Sequence[Mapping[str, Any]] = ()
+    engine: str = "auto"
 
     def __post_init__(self) -> None:
         for key in ("experiment", "parameters", "name", "assembly"):
@@ -93,6 +98,8 @@ class Bench:
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
+        if self.engine not in KINDS:
+            raise unknown_name("engine", self.engine, KINDS)
         known = PARAMETER_SETS.find(self.parameters)
         object.__setattr__(self, "overrides", settled(known.parameters(), self.overrides))
         if self.assembly == known.assembly:

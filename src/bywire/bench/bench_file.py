@@ -25,7 +25,7 @@ from bywire.data.toml_file import read_toml
 _SECTIONS = ("options", "stimulus", "set", "simulation", "requirements")
 _KEYS = ("experiment", "parameters", "assembly", "name")
 _FAULTS = "faults"
-_SIMULATION = ("step", "record", "seed")
+_SIMULATION = ("step", "record", "seed", "engine")
 _NAME = re.compile(r"[a-z][a-z0-9-]*")
 _TOO_LARGE = "; measured traces go into a file of their own (options.trace)"
 

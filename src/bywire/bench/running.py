@@ -51,7 +51,7 @@ def run(
     progress
         Called with the run's label and its finished share, 0 to 1.
     engine
-        ``auto``, ``compiled`` or ``virtual-machine``.
+        As of `Bench`; ``auto`` is what the bench says.
     estimate_error
         Whether all runs are made again in half steps, and in double ones where these divide the
         sample times: key figures and recorded signals then say how large their error from the
@@ -97,6 +97,7 @@ def _make_runs(
     remark: str = "",
 ) -> None:
     """Make all recordings of a bench, each kept as soon as it is there."""
+    engine = bench.engine if engine == "auto" else engine
     recordings |= static_recordings(bench)
     for number, case in enumerate(bench.cases()):
         computed = run_of(bench, case, number)

@@ -75,17 +75,19 @@ def rounds(
         check_memory(runs[0], len(runs) * len(outputs))
         report = None if progress is None else partial(progress, cases[0].label)
         kept = {(case.settle, case.keep) for case in cases}
-        if engine != "virtual-machine" and len(runs) > 1 and len(kept) == 1 and fit_lanes(runs):
+        kinds = [benches[k].engine if engine == "auto" else engine for k in places]
+        is_free = all(kind in ("auto", "compiled") for kind in kinds)
+        if is_free and len(runs) > 1 and len(kept) == 1 and fit_lanes(runs):
             times = runs[0].schedule().record_times - cases[0].settle
             first = int(np.searchsorted(times, -cases[0].keep - 1e-9))
             yield Round(places, cases, runs, simulate_group(runs, wanted, threads, report, first))
         else:
-            yield Round(places, cases, runs, _one_by_one(runs, report, engine))
+            yield Round(places, cases, runs, _one_by_one(runs, report, kinds))
 
 
-def _one_by_one(runs: Sequence[Run], report: Any, engine: str) -> list[Trajectory]:
+def _one_by_one(runs: Sequence[Run], report: Any, kinds: Sequence[str]) -> list[Trajectory]:
     computed = []
-    for k, run in enumerate(runs):
+    for k, (run, engine) in enumerate(zip(runs, kinds, strict=True)):
         share = None if report is None else partial(_share, report, k, len(runs))
         trajectory = simulate(run, engine=engine, progress=share)
         if trajectory.status == "interrupted":

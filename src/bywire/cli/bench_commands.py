@@ -45,6 +45,9 @@ def run(
         list[str] | None,
         typer.Option(metavar="NAME[=VALUE][@ONSET]", help="What fails, see 'bywire list faults'."),
     ] = None,
+    engine: Annotated[
+        str, typer.Option(help="What computes, e.g. sil: the ECU's compiled C in the loop.")
+    ] = "auto",
     error_estimate: ErrorEstimate = True,
     out: OutFolder = None,
     json: JsonFlag = False,
@@ -54,7 +57,7 @@ def run(
 
     show(
         lambda progress: run_bench(
-            bench, changes(set_), over=over, faults=fault or (), progress=progress,
+            bench, changes(set_), over=over, faults=fault or (), progress=progress, engine=engine,
             estimate_error=error_estimate,
         ),
         out,

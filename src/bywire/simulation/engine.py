@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 import warnings
 from collections.abc import Callable, Mapping
@@ -25,7 +26,13 @@ from bywire.simulation.virtual_machine import VirtualMachine
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
-KINDS = ("auto", "compiled", "virtual-machine")
+_FROM_ABOVE = {
+    "sil": "bywire.export.controller.in_the_loop:double",
+    "sil-single": "bywire.export.controller.in_the_loop:single",
+}
+"""engines of rooms above, which step the plant by the compiled kernel: module and function of each,
+``function(model, par, kernel)``; found when one is asked for"""
+KINDS = ("auto", "compiled", "virtual-machine", *_FROM_ABOVE)
 _LOCK = threading.RLock()
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -117,14 +124,17 @@ class Prepared:
         ----------
         kind
             ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled where there is a
-            compiler, else the virtual machine, with one warning.
+            compiler, else the virtual machine, with one warning; ``"sil"`` and ``"sil-single"``:
+            compiled, with the ticks by the exported C of the ECU in double or single precision.
 
         Raises
         ------
         UnknownNameError
             For any other name.
         CompilerError
-            For ``"compiled"`` without a compiler.
+            For ``"compiled"`` or an ECU in the loop without a compiler.
+        ModelError
+            Where the ECU cannot be exported.
         """
         if kind not in KINDS:
             raise unknown_name("engine", kind, KINDS)
@@ -135,9 +145,14 @@ class Prepared:
 
     def _build(self, kind: str) -> Engine:
         compiler = None if kind == "virtual-machine" else find_compiler()
+        if compiler is not None and kind in _FROM_ABOVE:
+            module, _, function = _FROM_ABOVE[kind].partition(":")
+            make = getattr(importlib.import_module(module), function)
+            made: Engine = make(self.model, self._par, self._kernel(compiler))
+            return made
         if compiler is not None:
             return self._kernel(compiler)
-        if kind == "compiled":
+        if kind == "compiled" or kind in _FROM_ABOVE:
             raise CompilerError(
                 "there is no C compiler: install one, or the extra bywire[compiler], or take "
                 "engine = 'auto'"

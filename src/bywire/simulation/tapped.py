@@ -9,7 +9,7 @@ the one inside, and runs with and without a fault are of one structure.
 from __future__ import annotations
 
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import cache, partial
 from typing import Annotated, Any, Literal, NamedTuple
 
@@ -107,9 +107,13 @@ class Tapped(Wrapping):
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
         """Return the controllers behind their taps."""
+        return self.behind_taps(self.inner.tasks(par))
+
+    def behind_taps(self, tasks: Iterable[Task]) -> tuple[Task, ...]:
+        """Return controllers of the model inside, however they compute, behind their taps."""
         return tuple(
             Task(task.name, task.period, partial(self._tick, task.name, task.tick))
-            for task in self.inner.tasks(par)
+            for task in tasks
         )
 
     def _tick(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
-import subprocess
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,12 +11,13 @@ import numpy as np
 import pytest
 from exported_ecu import bench_of, needs_compiler
 from numpy.testing import assert_array_equal
+from typer.testing import CliRunner
 
-from bywire.api.export_controller import export_controller
+import bywire
+from bywire.bench.bench_file import load
+from bywire.cli.app import app
+from bywire.core.errors import UnknownNameError
 from bywire.core.typing import Array
-from bywire.export.controller.c_text import c_name
-from bywire.export.controller.harness import FLAGS
-from bywire.export.controller.program import Program
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, initial_vector, request_for, simulate
 
@@ -26,8 +25,8 @@ NEVER = 2**40
 Tick = Callable[[Any, Any, Any], Any]
 
 
-def in_the_loop(run: Run, ticks: Sequence[Tick]) -> Array:
-    """Return the states at every frame where the tasks are ticked from outside.
+def in_python(run: Run) -> Array:
+    """Return the state vector at the end of a run whose ticks are computed by Python.
 
     The kernel's own ticks never come due: its frames are counted from one on.
     """
@@ -41,83 +40,79 @@ def in_the_loop(run: Run, ticks: Sequence[Tick]) -> Array:
     vector = initial_vector(layout, run.state, run.memory)
     x = slice(layout.start["x"], layout.start["x"] + layout.length["x"])
     m = slice(layout.start["m"], layout.start["m"] + layout.length["m"])
-    states, rows = [], np.empty((1, len(request.selection)))
-    for frame in range(schedule.frames):
-        states.append(vector[x].copy())
+    rows = np.empty((1, len(request.selection)))
+    tasks: Sequence[Any] = model.tasks(run.par)
+    for frame in range(schedule.frames + 1):
         u = model.Stimulus(*request.stimulus[frame // schedule.stimulus_frames].tolist())
-        for every, tick in zip(schedule.task_frames, ticks, strict=True):
+        for every, task in zip(schedule.task_frames, tasks, strict=True):
             if frame % every == 0:
                 state = model.State(*vector[x].tolist())
-                vector[m] = tick(state, model.Memory(*vector[m].tolist()), u)
-        engine.advance(plant, vector, frame + 1, frame + 2, rows)
-    return np.array([*states, vector[x]])
-
-
-def compiled(program: Program, folder: Path) -> list[Tick]:
-    """Return the ticks of the compiled ECU."""
-    model, name = program.model, program.name
-    sources = [str(f) for f in sorted(folder.glob("*.c")) if not f.name.endswith("_harness.c")]
-    library = str(folder / "ecu.so")
-    subprocess.run(["gcc", *FLAGS, "-shared", "-fPIC", *sources, "-o", library, "-lm"], check=True)
-    loaded = ctypes.CDLL(library)
-    real = ctypes.c_float if program.precision.name == "single" else ctypes.c_double
-    kinds = {"x": model.State, "u": model.Stimulus, "memory": model.Memory}
-    structs = {
-        short: type(short, (ctypes.Structure,), {
-            "_fields_": [(c_name(each.name), real) for each in program.members(cls)]
-        })
-        for short, cls in kinds.items()
-    }  # fmt: skip
-    names = {short: [e.name for e in program.members(cls)] for short, cls in kinds.items()}
-    parameters = ctypes.c_char.in_dll(loaded, f"{name}_parameters")
-
-    def tick_of(step: Any) -> Tick:
-        function = getattr(loaded, step.name)
-        function.restype = None
-
-        def tick(x: Any, m: Any, u: Any) -> Any:
-            given = {"x": x, "u": u, "memory": m}
-            held = {
-                short: structs[short](*(getattr(given[short], n) for n in names[short]))
-                for short in kinds
-            }
-            wanted = [short for _, short in step.arguments]
-            function(*(ctypes.byref(parameters if s == "par" else held[s]) for s in wanted))
-            after = {n: getattr(held["memory"], c_name(n)) for n in names["memory"]}
-            return m._replace(**after)
-
-        return tick
-
-    return [tick_of(step) for step in program.steps]
-
-
-def in_python(run: Run) -> list[Tick]:
-    """Return the ticks as Python computes them."""
-
-    def tick_of(task: Any) -> Tick:
-        return lambda x, m, u: task.tick(x, m, u, run.par)
-
-    return [tick_of(task) for task in run.model.tasks(run.par)]
+                vector[m] = task.tick(state, model.Memory(*vector[m].tolist()), u, run.par)
+        if frame < schedule.frames:
+            engine.advance(plant, vector, frame + 1, frame + 2, rows)
+    return vector
 
 
 @needs_compiler
 @pytest.mark.parametrize("structure", ["pressure, sine dither", "moment and position"])
-def test_double_in_the_loop_equals_python_in_every_bit(structure: str, tmp_path: Path) -> None:
-    bench = bench_of(structure)
-    made = export_controller(bench, tmp_path, vectors=1)
-    run = replace(next(iter(bench.runs().values())), duration=0.5)
-    looped = in_the_loop(run, compiled(made.program, tmp_path))
-    assert_array_equal(looped, in_the_loop(run, in_python(run)))
+def test_double_in_the_loop_equals_python_in_every_bit(structure: str) -> None:
+    run = replace(next(iter(bench_of(structure).runs().values())), duration=0.2)
+    assert_array_equal(simulate(run, engine="sil").vector, in_python(run))
 
 
 @needs_compiler
-@pytest.mark.parametrize(("precision", "most"), [("double", 1e-4), ("single", 1e3)])
-def test_pressure_is_that_of_the_bench(precision: str, most: float, tmp_path: Path) -> None:
-    bench = bench_of("pressure, sine dither")
-    made = export_controller(bench, tmp_path, precision=precision, vectors=1)
-    run = next(iter(bench.runs().values()))
-    looped = in_the_loop(run, compiled(made.program, tmp_path))
-    pressure = looped[:, run.model.State._fields.index("p_mc")]
-    schedule = run.schedule()
-    apart = pressure[:: schedule.record_frames] - simulate(run, ("p_mc",))["p_mc"]
-    assert np.abs(apart).max() < most
+@pytest.mark.parametrize(("engine", "most"), [("sil", 1e-4), ("sil-single", 1e3)])
+def test_pressure_is_that_of_the_bench(engine: str, most: float) -> None:
+    run = next(iter(bench_of("pressure, sine dither").runs().values()))
+    looped, expected = simulate(run, engine=engine), simulate(run)
+    assert np.abs(looped["p_mc"] - expected["p_mc"]).max() < most
+    if engine == "sil":  # no code of a converter is another
+        assert_array_equal(looped["p_meas"], expected["p_meas"])
+        assert_array_equal(looped["i_meas"], expected["i_meas"])
+    else:
+        assert (looped["duty"].astype(np.float32) == looped["duty"]).all()
+
+
+@needs_compiler
+def test_bench_file_asks_for_it(tmp_path: Path) -> None:
+    file = tmp_path / "looped.toml"
+    file.write_text(
+        'experiment = "hard-braking"\nparameters = "dardanelli2010"\n'
+        '[options]\nduration = "0.3 s"\n[simulation]\nengine = "sil-single"\n'
+    )
+    assert load(file).engine == "sil-single"
+    result = bywire.run(file, estimate_error=False)
+    assert result.recording.attrs["engine"].endswith("ECU as C in single precision")
+    done = CliRunner().invoke(app, ["run", str(file), "--engine", "sill", "--no-error-estimate"])
+    assert isinstance(done.exception, UnknownNameError)
+    assert "did you mean 'sil', 'sil-single'?" in str(done.exception)
+
+
+@needs_compiler
+def test_values_of_a_range_are_looped_each() -> None:
+    changes = {"simulation.engine": "sil", "options.duration": "0.05 s"}
+    over = bywire.run(
+        "hard-braking", changes, over="motor.R_m=0.3 ohm, 0.4 ohm", estimate_error=False
+    )
+    for result in over.results:
+        (recording,) = result.recordings.values()
+        assert recording.attrs["engine"].endswith("ECU as C in double precision")
+
+
+@needs_compiler
+def test_faults_pass_through_the_ecu() -> None:
+    changes = {"options.duration": "0.4 s"}
+    looped, plain = (
+        bywire.run(
+            "hard-braking", changes, faults=["pressure.stuck=20 bar@0.2 s"], engine=engine,
+            estimate_error=False,
+        ).recording
+        for engine in ("sil", "auto")
+    )  # fmt: skip
+    assert float(plain["p_meas"][-1]) == pytest.approx(20e5, rel=1e-3)
+    assert_array_equal(looped["p_meas"], plain["p_meas"])
+
+
+def test_another_engine_is_refused() -> None:
+    with pytest.raises(UnknownNameError, match=r"unknown engine 'sill': did you mean 'sil'"):
+        bywire.run("hard-braking", {"simulation.engine": "sill"})
