@@ -106,6 +106,7 @@ def export_controller(
     precision: str = "double",
     vectors: int = VECTORS,
     check: bool = False,
+    dbc: bool = False,
 ) -> ControllerExport:
     """Write the ECU of a bench's model as readable C99, with all that is needed to try it.
 
@@ -124,6 +125,8 @@ def export_controller(
         Whether the C is compiled in both precisions, for this machine and, where
         arm-none-eabi-gcc and qemu-system-arm are installed, for Cortex-M3, M4F and M7; run there
         on the vectors, compared bit by bit, and measured.
+    dbc
+        Whether the memory is described as signals of a CAN bus, with the C that fills messages.
 
     Returns
     -------
@@ -147,7 +150,7 @@ def export_controller(
     case = replace(chosen, faults=()).cases()[0]
     made = program(case.model, case.par, precision)
     cited = PARAMETER_SETS.find(chosen.parameters).values
-    texts = files(made, case.memory, cited, vectors)
+    texts = files(made, case.memory, cited, vectors, bus=dbc)
     folder = Path(out).expanduser()
     try:
         folder.mkdir(parents=True, exist_ok=True)

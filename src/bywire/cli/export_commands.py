@@ -43,6 +43,9 @@ def export_controller_command(
         typer.Option("--check", help="Run it here and on emulated Cortex-M3, M4F and M7, in both "
                      "precisions; exit status 1 where a bit differs."),
     ] = False,
+    dbc: Annotated[
+        bool, typer.Option("--dbc", help="Describe its memory for a CAN bus, too.")
+    ] = False,
     set_: BenchChanges = None,
     json: JsonFlag = False,
 ) -> None:
@@ -52,7 +55,8 @@ def export_controller_command(
 
     show(
         lambda _: export_controller(
-            read(bench, changes(set_)), out, precision=precision, vectors=vectors, check=check
+            read(bench, changes(set_)), out, precision=precision, vectors=vectors, check=check,
+            dbc=dbc,
         ),
         None, json,
     )  # fmt: skip

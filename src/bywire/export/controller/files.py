@@ -8,6 +8,7 @@ from typing import Any
 from bywire.core.provenance import Cited
 from bywire.export.controller import render
 from bywire.export.controller.a2l import a2l
+from bywire.export.controller.can import can_header, can_source, dbc
 from bywire.export.controller.harness import harness, makefile, vector_header
 from bywire.export.controller.parameter_file import parameter_file
 from bywire.export.controller.program import Program
@@ -16,7 +17,7 @@ from bywire.export.controller.vectors import vectors
 
 
 def files(
-    program: Program, memory: Any, cited: Mapping[str, Cited], count: int
+    program: Program, memory: Any, cited: Mapping[str, Cited], count: int, *, bus: bool = False
 ) -> dict[str, str]:
     """Return the text of every file.
 
@@ -28,6 +29,8 @@ def files(
         Values of the parameter set with their provenance.
     count
         Test vectors of each task.
+    bus
+        Whether measurements are described for a CAN bus, too.
     """
     name = program.name
     made = {
@@ -44,5 +47,9 @@ def files(
     made[f"{name}_harness.c"] = harness(program, every)
     made["Makefile"] = makefile(program, render.has_io(program))
     made[f"{name}.a2l"] = a2l(program)
+    if bus:
+        made[f"{name}.dbc"] = dbc(program)
+        made[f"{name}_can.h"] = can_header(program)
+        made[f"{name}_can.c"] = can_source(program)
     made["README.txt"] = readme(program, sorted([*made, "README.txt"]), count)
     return made

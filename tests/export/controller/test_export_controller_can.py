@@ -1,0 +1,58 @@
+"""Messages of an exported ECU: another reader of DBC finds in them what the memory holds."""
+
+from __future__ import annotations
+
+import ctypes
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from exported_ecu import BRAKES, bench_of, needs_compiler
+
+from bywire.api.export_controller import export_controller
+from bywire.core.signals import signals_of
+from bywire.export.controller.can import CYCLE, FIRST, messages
+from bywire.export.controller.harness import FLAGS, WARNINGS
+
+formats = pytest.importorskip("canmatrix.formats", reason="canmatrix is not installed")
+
+
+@needs_compiler
+@pytest.mark.parametrize("precision", ["double", "single"])
+def test_another_reader_decodes_what_the_ecu_sends(precision: str, tmp_path: Path) -> None:
+    bench = bench_of(BRAKES[1])
+    made = export_controller(bench, tmp_path, precision=precision, vectors=1, dbc=True)
+    program, name = made.program, made.program.name
+    assert f"{name}.dbc" in made.files
+    (matrix,) = formats.loadp(str(tmp_path / f"{name}.dbc")).values()
+    fields = [each.name for each in program.members(program.model.Memory)]
+    signals = signals_of(program.model.Memory)
+    library = str(tmp_path / "can.so")
+    said = subprocess.run(
+        ["gcc", *FLAGS, *WARNINGS, "-shared", "-fPIC", str(tmp_path / f"{name}_can.c"), "-o",
+         library], capture_output=True, text=True, check=True,
+    ).stderr  # fmt: skip
+    assert said == ""
+    fill = getattr(ctypes.CDLL(library), f"{name}_can_fill")
+    real = ctypes.c_float if precision == "single" else ctypes.c_double
+    rng = np.random.default_rng(3)
+    nominal = np.array([signals[field].nominal for field in fields])
+    values = nominal * rng.uniform(-3.0, 3.0, len(fields))
+    values[0] = 1e9 * nominal[0]  # stays at full scale
+    memory = (real * len(fields))(*values)
+    data = (ctypes.c_uint8 * 8)()
+    seen = {}
+    for number, sent in enumerate(messages(program)):
+        frame = matrix.frame_by_id(formats.canmatrix.ArbitrationId(FIRST + number))
+        assert (frame.size, frame.cycle_time) == (8, CYCLE)
+        fill(ctypes.c_uint32(number), memory, data)
+        decoded = frame.decode(bytes(data))
+        for each in sent:
+            signal = frame.signal_by_name(each.name)
+            assert (signal.unit, signal.comment) == (each.unit, each.label)
+            seen[each.field] = float(decoded[each.name].phys_value)
+            expected = min(values[fields.index(each.field)], float(signal.max))
+            assert abs(seen[each.field] - expected) <= 0.5001 * each.factor
+            assert float(signal.max) >= 10.0 * signals[each.field].nominal
+    assert list(seen) == fields
