@@ -2,14 +2,18 @@
 
 from bywire.vehicle.corner import Corner, CornerParameters
 from bywire.vehicle.hot_brakes import HotBrakes, cold_start
+from bywire.vehicle.hot_corner import HotCorner, HotCornerParameters, warm_disc
 from bywire.vehicle.two_wheeler import TwoWheeler, VehicleParameters, rolling_start
 
 __all__ = [
     "Corner",
     "CornerParameters",
     "HotBrakes",
+    "HotCorner",
+    "HotCornerParameters",
     "TwoWheeler",
     "VehicleParameters",
     "cold_start",
     "rolling_start",
+    "warm_disc",
 ]

@@ -118,7 +118,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         par, forces = w.par, brake_heart.output(w.heart.f)
         w.F_1, w.F_2, w.squeeze = forces.F_1, forces.F_2, forces.squeeze
         w.turning = flywheel.turning(w.disc.xe, par.flywheel)
-        w.M_B = wedge_caliper.moment(w.caliper.f.F_N, par.wedge.mu_B, w.turning, par.caliper)
+        w.M_B = wedge_caliper.moment(w.caliper.f.F_N, w.body.par.mu_B, w.turning, par.caliper)
         for drive, motor, heat, i_ref, force in (
             (w.drive_1, w.motor_1, w.heat_1, w.m.i_1_ref, w.F_1),
             (w.drive_2, w.motor_2, w.heat_2, w.m.i_2_ref, w.F_2),
@@ -161,7 +161,7 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
             drive_train.bounds(motor.x.omega, drive_train.torque(motor), force, par)
             for motor, force in ((w.motor_1, w.F_1), (w.motor_2, w.F_2))
         )
-        F_N, mu_B = w.caliper.f.F_N, par.wedge.mu_B
+        F_N, mu_B = w.caliper.f.F_N, w.body.par.mu_B
         pressed = wedge_friction.Input(w.squeeze, F_N, wedge.slope(par.wedge), mu_B, w.turning)
         sliding = wedge_friction.friction(pressed, par.wedge_friction)
         moment = wedge_caliper.moment(F_N, mu_B, 1.0, par.caliper)

@@ -49,7 +49,8 @@ CORNER = Panels(
         ),
         *BRAKING.panels[:2],
         Panel("normal force", (Trace("F_N"),)),
-        BRAKING.panels[-1],
+        Panel("heat", (Trace("T_disc"), Trace("T_pads", Role.SECOND))),
+        *BRAKING.panels[-2:],
     ),
 )
 """the vehicle above, its brake below"""

@@ -13,7 +13,7 @@ from bywire.brakes.wedge.case import steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.core.quantities import Duration, Temperature
 from bywire.plant import adhesion, road
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
@@ -31,6 +31,7 @@ FIGURES = Figures(
     peak_moment=("N*m", "Largest moment of the brake."),
     supply_energy=("J", "Energy that the drives take until the stop."),
     disc_energy=("J", "Energy taken from the wheel until the stop."),
+    disc_temperature=("K", "Highest temperature of the disc until the stop."),
 )
 
 
@@ -43,6 +44,8 @@ class Options(ParameterSet):
     """moment demanded from time zero on"""
     surface: SurfaceName
     """what the road is made of"""
+    T_disc: Temperature
+    """temperature of the disc at the start, where heat counts (corner.heat.law)"""
     duration: Duration
     """time recorded"""
 
@@ -51,7 +54,7 @@ def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tup
     """Return the one run."""
     given = {"command.mode": "moment", "flywheel.law": "coasting"}
     changed = par.replace(given | laid("corner.road", options.surface))
-    state, memory = at_speed(options.v_0, changed)
+    state, memory = at_speed(options.v_0, changed, options.T_disc)
     levels = {0.0: options.M_brake}
     return (
         Case(
@@ -77,6 +80,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         "peak_slip": float(np.max(run["slip"].values[fast], initial=0.0)),
         "locked_time": float(np.sum(np.diff(t)[stands[:-1]])),
         "peak_moment": float(np.max(run["M_B"].values[braked])),
+        "disc_temperature": float(np.max(run["T_disc"].values[braked])),
     }
     return FIGURES(**figures, **_at_the_end(run, end, options.v_0))
 
@@ -114,7 +118,9 @@ EXPERIMENT = Experiment(
     assembly="wedge-corner",
     summary="the wedge brake stops a quarter of a car from 100 km/h on wet road, by slip control",
     options=Options,
-    defaults=Options(v_0=100.0 / 3.6, M_brake=1500.0, surface="wet-asphalt", duration=5.0),
+    defaults=Options(
+        v_0=100.0 / 3.6, M_brake=1500.0, surface="wet-asphalt", T_disc=293.15, duration=5.0
+    ),
     cases=cases,
     judge=judge,
     kpis=FIGURES.units,

@@ -17,7 +17,7 @@ from bywire.brakes.wedge.case import mean, steps, swing
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Duration
+from bywire.core.quantities import Duration, Temperature
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
 from bywire.vehicle.stop_figures import standstill
@@ -37,6 +37,7 @@ FIGURES = Figures(
     force_change=("N", "Normal force peak to peak in that time."),
     creep_speed=("m/s", "Largest speed of the vehicle in that time."),
     energy_braked=("J", "Energy taken from the wheel until the stop."),
+    disc_temperature=("K", "Temperature of the disc at the stop."),
     contact_angle=("rad", "Where the moment control believes the pads to touch, from parking."),
 )
 
@@ -50,6 +51,8 @@ class Options(ParameterSet):
     """moment demanded from time zero on"""
     surface: SurfaceName
     """what the road is made of"""
+    T_disc: Temperature
+    """temperature of the disc at the start, where heat counts (corner.heat.law)"""
     t_hold: Duration
     """time until the demand falls to zero"""
     t_end: Duration
@@ -60,12 +63,13 @@ def cases(par: WedgeCornerParameters, options: Options, _: object = None) -> tup
     """Return the one run."""
     given = {"command.mode": "moment", "flywheel.law": "coasting", "ecu.abs": "off"}
     changed = par.replace(given | laid("corner.road", options.surface))
-    state, memory = at_speed(options.v_0, changed)
+    state, memory = at_speed(options.v_0, changed, options.T_disc)
     levels = {0.0: options.M_brake, options.t_hold: 0.0}
     return (
         Case(
             "run", WedgeCorner(), changed, state, memory, lambda t: {"M_set": steps(t, levels)},
-            options.t_hold + options.t_end, start=lambda par: at_speed(options.v_0, par),
+            options.t_hold + options.t_end,
+            start=lambda par: at_speed(options.v_0, par, options.T_disc),
         ),
     )  # fmt: skip
 
@@ -97,6 +101,7 @@ def _stop(held: xr.Dataset, end: float, options: Options) -> dict[str, float | t
         "force_change": swing(held, "F_N", begin, last) if late.any() else short,
         "creep_speed": float(np.max(np.abs(v[late]))) if late.any() else short,
         "energy_braked": float(np.interp(end, t, held["E_brake"].values)),
+        "disc_temperature": float(np.interp(end, t, held["T_disc"].values)),
         "contact_angle": float(np.interp(end, t, held["theta_c"].values)),
     }
 
@@ -107,7 +112,7 @@ EXPERIMENT = Experiment(
     summary="the wedge brake stops a quarter of a car from 50 km/h with 600 N m, and holds it",
     options=Options,
     defaults=Options(
-        v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", t_hold=5.5, t_end=0.5
+        v_0=50.0 / 3.6, M_brake=600.0, surface="dry-asphalt", T_disc=293.15, t_hold=5.5, t_end=0.5
     ),
     cases=cases,
     judge=judge,

@@ -9,6 +9,7 @@ from __future__ import annotations
 from typing import Any, ClassVar, Self
 
 from bywire.brakes.wedge import control
+from bywire.brakes.wedge.elements import wedge_caliper
 from bywire.brakes.wedge.laws import moment_control
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
@@ -19,14 +20,15 @@ from bywire.core.parts import Shown
 from bywire.core.signals import Role, joined
 from bywire.plant import flywheel, road, wheel_encoder
 from bywire.vehicle import corner_slip
-from bywire.vehicle.corner import Corner, CornerParameters, WheelSpeed, rolling_states
+from bywire.vehicle.corner import WheelSpeed, rolling_states
+from bywire.vehicle.hot_corner import HotCorner, HotCornerParameters, warm_disc
 from bywire.vehicle.two_wheeler import BOOK
 
 
 class WedgeCornerParameters(WedgeParameters):
     """The wedge brake, its flywheel for a wheel, and a quarter of a car."""
 
-    corner: CornerParameters
+    corner: HotCornerParameters
     ecu: corner_slip.Parameters
 
 
@@ -34,10 +36,11 @@ Memory: Any = joined(__name__, "Memory", control.Memory, corner_slip.Memory)
 """what moment, position and slip control hold"""
 
 
-class WedgeCorner(Corner[WedgeCornerParameters, Any], WedgeBrake):
+class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
     """The brake with all its controllers; the flywheel is the wheel, the road turns it.
 
-    Slip control stands over the moment control: it lowers the moment that is demanded of it.
+    Slip control stands over the moment control: it lowers the moment that is demanded of it. Pads
+    that fade rub the wedge in less: the motors have to make up for it.
     """
 
     name: ClassVar[str] = "wedge-corner"
@@ -45,13 +48,11 @@ class WedgeCorner(Corner[WedgeCornerParameters, Any], WedgeBrake):
     Stimulus: ClassVar = control.Stimulus
 
     E_wheel = Shown("J", "energy of the wheel", role=Role("sink", "wheel", book=BOOK))
-    E_brake = Shown(
-        "J", "energy that the brake takes from the wheel", role=Role("sink", "brake", book=BOOK)
-    )
 
     records: ClassVar[tuple[str, ...]] = (
         "s", "v_x", "v_tread", "a", "slip", "sliding", "u", "F_x", "N_x", "t_locked", "E_body",
-        "E_wheel", "E_tyre", "E_brake", "W_slope", "M_most", "v_hat", "slip_hat", "abs", "phase_x",
+        "E_wheel", "E_tyre", "E_brake", "W_slope", "T_disc", "T_pads", "T_fluid", "E_friction",
+        "E_discs", "E_pads", "E_fluid", "E_air", "M_most", "v_hat", "slip_hat", "abs", "phase_x",
         *WedgeBrake.records,
     )  # fmt: skip
 
@@ -63,13 +64,23 @@ class WedgeCorner(Corner[WedgeCornerParameters, Any], WedgeBrake):
         """Return the torque of the road."""
         return self.tyre_torque(w)
 
+    def braked(self, w: Self) -> float:
+        """Return what the pads have taken from the disc."""
+        taken: float = w.flow.W_brake
+        return taken
+
+    def brake_torque(self, w: Self) -> float:
+        """Return what the pads can hold."""
+        return wedge_caliper.moment(w.caliper.f.F_N, w.body.par.mu_B, 1.0, w.caliper.par)
+
+    def wire(self, w: Self) -> None:
+        """Say what every part feels; the pads rub as they can at the heat of their disc."""
+        w.body.vary(mu_B=w.body.par.mu_B * self.pads_friction(w))
+        super().wire(w)
+
     def record(self, w: Self) -> dict[str, float]:
         """Return what is recorded beside states, wires and losses."""
-        return {
-            **super().record(w),
-            "E_wheel": flywheel.energy(w.disc.x, w.disc.par),
-            "E_brake": w.flow.W_brake,
-        }
+        return {**super().record(w), "E_wheel": flywheel.energy(w.disc.x, w.disc.par)}
 
     def tasks(self, par: Any) -> tuple[Task, ...]:
         """Return slip control above the brake's own controllers, where it may lower a moment."""
@@ -100,9 +111,16 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
     return corner_slip.tick(seen, m, u.M_set, par.ecu)
 
 
-def at_speed(v: float, par: WedgeCornerParameters) -> tuple[Any, Any]:
-    """Return the corner rolling at a speed [m/s], its brake parked."""
+def at_speed(
+    v: float, par: WedgeCornerParameters, T_disc: float | None = None
+) -> tuple[Any, Any]:
+    """Return the corner rolling at a speed [m/s], its brake parked.
+
+    ``T_disc``: temperature of the disc [K], that of the air by default.
+    """
+    heat = par.corner.heat
+    disc = warm_disc(heat.T_a if T_disc is None else T_disc, heat)
     brake = state_at(0.0, par)._asdict() | {"Omega": v / par.corner.r}
-    rolling = WedgeCorner.state(**rolling_states(v))._asdict()
+    rolling = WedgeCorner.state(**rolling_states(v), disc_heat=disc)._asdict()
     held = memory_at(0.0, par)._asdict() | corner_slip.awake(v, par.ecu)
     return WedgeCorner.State(**(rolling | brake)), Memory(**held)

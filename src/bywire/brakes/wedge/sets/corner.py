@@ -13,6 +13,32 @@ _ADHESION = {
     for name, value in SURFACES["dry-asphalt"]._asdict().items()
 }
 
+_HEAT_FROM = "as for the motorcycle: usual ranges"
+_HEAT = {
+    "law": chosen("off", "optional element, off"),
+    "C_d": derived(8.0 * 480.0, "a vented disc of 8 kg"),
+    "C_p": derived(2 * 0.35 * 1000.0, "two pads of 350 g"),
+    "C_f": chosen(3500.0, "caliper with wedge, screws and motors' mounts, 5 kg"),
+    "psi": chosen(0.93, _HEAT_FROM),
+    "A": chosen(0.25, "both faces and the vents of a disc of 280 mm"),
+    "h_0": chosen(8.0, _HEAT_FROM),
+    "h_1": chosen(7.0, _HEAT_FROM),
+    "v_ref": chosen(1.0, "h in W/(m^2 K) with v in m/s"),
+    "epsilon": chosen(0.55, _HEAT_FROM),
+    "sigma": derived(5.670374419e-8, "constant of Stefan and Boltzmann"),
+    "G_dp": chosen(2.0, "two pads of 50 cm^2 pressed on"),
+    "G_open": chosen(0.3, "a gap of air of some 0.1 mm"),
+    "G_pf": chosen(1.5, "backing plates and rollers"),
+    "G_f": chosen(2.0, "a caliper in the wind"),
+    "T_a": chosen(293.15, "20 degC"),
+    "T_1": chosen(623.15, _HEAT_FROM),
+    "T_2": chosen(873.15, _HEAT_FROM),
+    "f": chosen(0.6, _HEAT_FROM),
+    "T_boil": chosen(2000.0, "no fluid to boil"),
+    "T_wet": chosen(2000.0, "no fluid to boil"),
+    "T_most": chosen(923.15, "650 degC, gray cast iron"),
+}
+
 _RULES_FROM = "as tuned for pressure loops of 10 Hz on a motorcycle, none for this brake"
 _RULES = {
     "slip_keep": 0.35, "slip_dump": 0.46, "slip_back": 0.2, "t_lead": 0.13, "a_hold": 14.0,
@@ -59,6 +85,7 @@ CORNER = CitedSet(
         "ecu.slip.r_hat": chosen(0.30, "that of the wheel"),
         "ecu.slip.k_hat": chosen(1e-4, "1000 N m stand for 100 bar: no number depends on it"),
         **{f"ecu.rules.{name}": chosen(value, _RULES_FROM) for name, value in _RULES.items()},
+        **{f"corner.heat.{name}": value for name, value in _HEAT.items()},
         "corner.body.m": chosen(450.0, "front corner of a mid-size car"),
         "corner.body.g": chosen(9.81, "gravity"),
         "corner.r": chosen(0.30, "rolling radius of a mid-size car's wheel"),
