@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import threading
-from collections.abc import Callable, Iterable, Iterator
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import AbstractContextManager, contextmanager
@@ -20,8 +22,9 @@ from bywire.data.file_format import library
 from bywire.studies.chunk import Columns, PlacedChunk, computed_chunk, number_of
 from bywire.studies.plan import StudyPlan
 
-_AHEAD = 2  # chunks in flight for each worker, so that none waits for us
+_AHEAD = 2  # chunks, or tasks of a cluster, in flight for each worker, so that none waits for us
 _SECONDS = 10.0  # to reach a cluster
+_TASK = 0.5  # s that a task of a cluster is to take
 _WORTH = 8  # chunks from which on processes are worth their start
 _WHAT = ("studies on a cluster", "cluster")
 
@@ -29,6 +32,8 @@ _WHAT = ("studies on a cluster", "cluster")
 Chunks = Iterable[int | PlacedChunk]
 Compute = Callable[[Chunks], Iterator[tuple[int, Columns]]]
 """yields the number and the columns of each chunk as soon as it is there, in any order"""
+_Task = tuple[float, list[tuple[int, Columns]]]
+"""what a task of a cluster gives: time [s], and its chunks"""
 
 
 class Executor(Protocol):
@@ -125,7 +130,7 @@ class Cluster:
             if not workers:
                 raise RunError(f"the cluster at {self.address} has no workers: start some first")
             client.run(_load, loaded_files())
-            yield partial(_of_cluster, client, plan)
+            yield partial(_of_cluster, client, plan, workers)
 
 
 def executor_of(
@@ -229,17 +234,40 @@ def _client(address: str) -> Iterator[Any]:
         client.close()
 
 
+def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
+    """Return chunks one after the other, and the time that they took."""
+    begin = time.perf_counter()
+    given = [_single(chunk, plan) for chunk in chunks]
+    return time.perf_counter() - begin, given
+
+
 def _of_cluster(
-    client: Any, plan: StudyPlan, chunks: Chunks
+    client: Any, plan: StudyPlan, workers: int, chunks: Chunks
 ) -> Iterator[tuple[int, Columns]]:
+    """Yield what a cluster has finished, with few tasks in flight.
+
+    A task goes through scheduler and network, which takes as long as some cases: it is as many
+    chunks as take about `_TASK`, but near the end no more than each worker's share.
+    """
     distributed = library("distributed", *_WHAT)
     # Once to every worker, where it stays: with each task its bench would be made anew.
     kept = client.scatter(plan, broadcast=True, hash=False)
-    futures = client.map(_single, list(chunks), plan=kept, pure=False)
+    left, size = deque(chunks), 1
+    with client.as_current():
+        tasks = distributed.as_completed(with_results=True)
+
+    def submit() -> None:
+        share = -(-len(left) // (_AHEAD * workers))
+        task = [left.popleft() for _ in range(min(size, share))]
+        if task:
+            tasks.add(client.submit(_timed, task, plan=kept, pure=False))
+
     try:
-        with client.as_current():
-            completed = distributed.as_completed(futures)
-        for future in completed:
-            yield future.result()
+        for _ in range(_AHEAD * workers):
+            submit()
+        for _, (seconds, given) in tasks:
+            size = max(1, round(_TASK * len(given) / seconds))
+            submit()
+            yield from given
     except distributed.KilledWorker as error:
         raise RunError(f"the cluster lost its workers ({error}): resume the study") from None

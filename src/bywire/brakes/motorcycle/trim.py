@@ -107,7 +107,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
             f"<= {limit:g} bar, where the piston meets its end stop: start lower, or move the "
             "stop (master_cylinder.x_end)"
         )
-    return resting_at(p, par, current)
+    return _resting_at(p, x, par, current)
 
 
 def resting_at(p: float, par: Par, current: float | None = None) -> Any:
@@ -121,6 +121,10 @@ def resting_at(p: float, par: Par, current: float | None = None) -> Any:
         Through the motor [A]; what balances the pressure without friction by default.
     """
     x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
+    return _resting_at(p, x, par, current)
+
+
+def _resting_at(p: float, x: float, par: Par, current: float | None) -> Any:
     held = holding_current(p, par) if current is None else current
     p_seen = pressure_sensor.reading(p + par.fluid.p_atm, par.pressure_sensor)
     i_seen = current_sensor.reading(held, par.current_sensor)
