@@ -20,8 +20,10 @@ LONG = {
     ("two-wheeler-by-wire", "derivatives of a run"),
     ("wedge-brake", "derivatives of a run"),
     ("wedge-corner", "derivatives of a run"),
+    ("wedge-corner", "order of the step"),
 }
-"""what takes as long as all else of a model; other models put the contract to the test"""
+"""what takes as long as all else of a model; other models, of which the corner is made, put the
+contract to the test"""
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
