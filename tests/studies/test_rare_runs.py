@@ -114,11 +114,11 @@ def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, 
     true, study = failure(limit), axis(kind, limit, more)
     assert 2e-4 < true < 5e-3
     (rare,) = study.findings.rare
-    assert rare.found.estimate.low < true < rare.found.estimate.high
-    assert len(study.cases) <= rare.found.runs <= 1920  # a search may ask for a case twice
+    assert rare.failure.estimate.low < true < rare.failure.estimate.high
+    assert len(study.cases) <= rare.failure.runs <= 1920  # a search may ask for a case twice
     if kind == "importance-sampling":
-        assert rare.found.runs <= 1280
-        assert rare.found.estimate.variation < 0.08
+        assert rare.failure.runs <= 1280
+        assert rare.failure.estimate.variation < 0.08
     assert study.status == {"met": "passed", "missed": "failed", "undecided": "undecided"}[
         study.findings.judgments[0].outcome
     ]
@@ -132,7 +132,7 @@ def test_a_linear_axis_fails_as_seldom_as_its_closed_form(axis, tmp_path, kind, 
     assert {"failing-overshoot.toml", "failing-overshoot.nc", "exceedance.png"} <= names
     assert bywire.run(tmp_path / "out" / "failing-overshoot.toml").kpi("overshoot").value > limit
     (said,) = json.loads((tmp_path / "out" / "report.json").read_text())["requirements"]
-    assert said["failure"]["probability"] == rare.found.estimate.value
+    assert said["failure"]["probability"] == rare.failure.estimate.value
     assert said["importance"]["d"]["factor"] > 0.8
     assert "probability of failure" in str(study)
 
@@ -177,7 +177,7 @@ def test_interrupted_resumed_and_by_workers_it_is_the_same_to_the_bit(spent, tmp
     partial = bywire.study_report(out)
     assert partial.status == "unfinished"
     assert len(partial.cases) == 768
-    assert [x.probability for x in partial.findings.rare[0].found.levels] == [0.1]
+    assert [x.probability for x in partial.findings.rare[0].failure.levels] == [0.1]
     assert any("not all cases" in text for text in partial.warnings)
     StudyStore(out).path(3).unlink()  # as one of several that were computed at once
     written = StudyStore(out).path(2).stat().st_mtime_ns
@@ -213,7 +213,7 @@ def test_each_requirement_in_turn_shares_the_first_level(study, tmp_path):
     text = BRAKE + 'rise_time = "<= 30 ms with 90 %"\n'
     found = bywire.run_study(study(text, bench=BENCH), tmp_path / "out", cases=700)
     first, second = found.findings.rare
-    assert (first.found.runs, second.found.runs) == (640, 640)
+    assert (first.failure.runs, second.failure.runs) == (640, 640)
     assert len(found.cases) == 640
     assert any("not judged" in note and "overshoot" in note for note in found.notes)
 

@@ -252,7 +252,7 @@ def _run_of(plan: StudyPlan, store: StudyStore, nominal: Result) -> StudyRun:
     elif plan.sought is not None:
         rare, cases = rare_failures(plan, store)
         findings = Findings(plan, cases, nominal.kpis, rare)
-        is_whole = all(each.found.state != "unfinished" for each in rare)
+        is_whole = all(each.failure.state != "unfinished" for each in rare)
     else:
         findings = Findings(plan, store.read(plan.chunks), nominal.kpis)
         is_whole = len(findings.cases) == plan.total

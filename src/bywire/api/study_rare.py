@@ -36,11 +36,11 @@ def failure_table(findings: Findings) -> Table:
         assert failure is not None
         assert wanted is not None
         text, verdict = OUTCOMES[each.outcome]
-        found = failure.estimate
+        probable = failure.estimate
         rows.append((
             Cell(clean(f"{each.demand.kpi} {each.demand.limit}")),
-            Cell(_value(found), value=found.value), Cell(_ends(found)),
-            Cell("-" if np.isnan(found.variation) else f"{100.0 * found.variation:.2g} %"),
+            Cell(_value(probable), value=probable.value), Cell(_ends(probable)),
+            Cell("-" if np.isnan(probable.variation) else f"{100.0 * probable.variation:.2g} %"),
             Cell(str(failure.runs), value=failure.runs), Cell(f"{1.0 - wanted:.3g}"),
             Cell(text, verdict),
         ))  # fmt: skip
@@ -59,7 +59,7 @@ def importance_tables(findings: Findings) -> list[TableBlock]:
 
 def rare_figures(findings: Findings) -> list[FigureBlock]:
     """Return the figure of probabilities over the limit; none where nothing was found."""
-    if not any(each.found.span for each in findings.rare):
+    if not any(each.failure.span for each in findings.rare):
         return []
     return [FigureBlock(
         partial(_curves, findings),
@@ -70,12 +70,12 @@ def rare_figures(findings: Findings) -> list[FigureBlock]:
 
 def rare_data(failure: FailureProbability, findings: RareFailure) -> dict[str, Any]:
     """Return a failure for JSON; margins are in the unit of the key figure."""
-    found = failure.estimate
+    probable = failure.estimate
     return {
         "state": failure.state,
         "failure": {
-            "probability": found.value, "variation": found.variation,
-            "low": found.low, "high": found.high,
+            "probability": probable.value, "variation": probable.variation,
+            "low": probable.low, "high": probable.high,
         },
         "cases": failure.runs,
         "levels": [{"margin": x.margin, "probability": x.probability} for x in failure.levels],
@@ -123,28 +123,28 @@ def rare_notes(findings: Findings) -> list[str]:
 
 
 def _state_text(each: RareFailure, plan: StudyPlan, outcome: Outcome) -> str:
-    found = each.found
-    if found.state == "budget spent":
-        so_far = f"it is no more probable than {found.estimate.high:.2g}"
+    failure = each.failure
+    if failure.state == "budget spent":
+        so_far = f"it is no more probable than {failure.estimate.high:.2g}"
         return (f"the budget of {plan.cases} cases is spent before failure was come to ({so_far})"
                 + (": extend the study" if outcome == "undecided" else ""))  # fmt: skip
-    if found.state == "negligible":
+    if failure.state == "negligible":
         return "less than a thousandth of what is admitted: it was followed no further"
-    if found.state == "level":
+    if failure.state == "level":
         return "too many cases have the same figure to tell worse ones: take 'monte-carlo'"
-    if found.state == "no design point":
-        return f"no design point was found, for {found.why}: take 'subset-simulation'"
+    if failure.state == "no design point":
+        return f"no design point was found, for {failure.why}: take 'subset-simulation'"
     return ""
 
 
-def _value(found: Interval) -> str:
-    if np.isnan(found.value):
-        return f"below {found.high:.2g}" if found.high < 1.0 else "not known"
-    return f"{found.value:.3g}"
+def _value(probable: Interval) -> str:
+    if np.isnan(probable.value):
+        return f"below {probable.high:.2g}" if probable.high < 1.0 else "not known"
+    return f"{probable.value:.3g}"
 
 
-def _ends(found: Interval) -> str:
-    return f"{found.low:.2g} to {found.high:.2g}"
+def _ends(probable: Interval) -> str:
+    return f"{probable.low:.2g} to {probable.high:.2g}"
 
 
 def _importance_table(findings: Findings, each: RareFailure) -> Table:
@@ -175,21 +175,22 @@ def _shown(value: float | str | None, unit: str) -> str:
 def _curves(findings: Findings) -> Figure:
     from bywire.report.study.exceedance import Curve, exceedance
 
-    return exceedance([_curve(findings, each, Curve) for each in findings.rare if each.found.span])
+    seen = [each for each in findings.rare if each.failure.span]
+    return exceedance([_curve(findings, each, Curve) for each in seen])
 
 
 def _curve(findings: Findings, each: RareFailure, make: Any) -> Any:
     demand, unit = each.demand, findings.units[each.demand.kpi]
     compare, bound = limit_of(demand.kpi, demand.limit, unit)
-    assert each.found.span is not None
+    assert each.failure.span is not None
     assert demand.probability is not None
-    margins = np.linspace(*each.found.span, _POINTS)
+    margins = np.linspace(*each.failure.span, _POINTS)
     sign = -1.0 if compare.startswith("<") else 1.0
-    found: Sequence[Interval] = [each.found.below(float(m)) for m in margins]
+    intervals: Sequence[Interval] = [each.failure.below(float(m)) for m in margins]
     return make(
         demand.kpi, unit, bound, 1.0 - demand.probability, bound + sign * margins,
-        np.array([f.value for f in found]), np.array([f.low for f in found]),
-        np.array([f.high for f in found]),
+        np.array([f.value for f in intervals]), np.array([f.low for f in intervals]),
+        np.array([f.high for f in intervals]),
     )  # fmt: skip
 
 

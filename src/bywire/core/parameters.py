@@ -90,10 +90,10 @@ class ParameterSet(BaseModel):
 
     def value(self, name: str) -> Any:
         """Return a leaf or choice of a dotted name that there is; ``name.0`` of a table's nodes."""
-        found: Any = self
+        value: Any = self
         for step in name.split("."):
-            found = found[int(step)] if isinstance(found, tuple) else getattr(found, step)
-        return found
+            value = value[int(step)] if isinstance(value, tuple) else getattr(value, step)
+        return value
 
     @cached_property
     def _known(self) -> dict[tuple[str, str], dict[str, Any]]:

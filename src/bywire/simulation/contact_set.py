@@ -24,13 +24,13 @@ def contact_forces(model: Model, par: ParameterSet, x: Any) -> Any:
 
 def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, slice, bool]]:
     """Return compliances, place among all contacts, and whether the pass takes them as open."""
-    matrices, found, at = model.compliance(par), [], 0
+    matrices, groups, at = model.compliance(par), [], 0
     rarely = model.usually_open or (False,) * len(matrices)
     for C, rare in zip(matrices, rarely, strict=True):
         rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
-        found.append((rows, slice(at, at + len(C)), rare and not exact))
+        groups.append((rows, slice(at, at + len(C)), rare and not exact))
         at += len(C)
-    return found
+    return groups
 
 
 def stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
@@ -88,7 +88,7 @@ def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> 
     exact
         As in `stiffness`.
     """
-    found: list[Any] = []
+    violated: list[Any] = []
     for rows, place, is_open in _groups(model, par, exact):
         overlap, force = d[place], ca.densify(F[place])
         closed = rows @ force
@@ -96,5 +96,5 @@ def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> 
             lack = overlap[k] - closed[k]
             # Where a force pushes, the lack is zero but for rounding.
             wrong = ca.if_else(force[k] > 0, 0, ca.fmax(lack, -force[k]))
-            found.append(overlap[k] if is_open else wrong)
-    return found
+            violated.append(overlap[k] if is_open else wrong)
+    return violated

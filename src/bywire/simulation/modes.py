@@ -58,15 +58,15 @@ def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
     order = needed(graph, roots, lambda n: level[n] == 0)
     refused: set[Node] = set()
     while True:
-        found = _classified(graph, order, level, refused)
-        poor = _poor_atoms(graph, order, found)
+        deciding = _classified(graph, order, level, refused)
+        poor = _poor_atoms(graph, order, deciding)
         if not poor:
             break
         refused |= poor
-    atoms = sorted({a for own in found.values() for a in own})
+    atoms = sorted({a for own in deciding.values() for a in own})
     first = needed(graph, atoms, lambda n: level[n] < 2)
     early = frozenset(first)
-    values = [n for n in order if n in found and n not in early and not _is_truth(graph, n)]
+    values = [n for n in order if n in deciding and n not in early and not _is_truth(graph, n)]
     saved = sum(_cost(graph, n) for n in values if level[n] == 2) - 2.0 * len(atoms)
     if saved < _WORTH_MODE * sum(_cost(graph, n) for n in substep):
         return Modes([], [], [], substep)
@@ -86,26 +86,26 @@ def _classified(
     graph: Graph, order: Sequence[Node], level: Levels, refused: Collection[Node]
 ) -> dict[Node, frozenset[Node]]:
     """Return every node that a mode decides, and the truth values that it follows from."""
-    found: dict[Node, frozenset[Node]] = {}
+    deciding: dict[Node, frozenset[Node]] = {}
     late: set[Node] = set()  # follows from such a node, but not from it alone
     for node in order:
         changing = [a for a in graph.arguments(node) if level[a] > 0]
-        if all(a in found for a in changing):
-            found[node] = frozenset().union(*(found[a] for a in changing))
-        elif any(a in found or a in late for a in changing):
+        if all(a in deciding for a in changing):
+            deciding[node] = frozenset().union(*(deciding[a] for a in changing))
+        elif any(a in deciding or a in late for a in changing):
             late.add(node)
         elif graph.nodes[node].op in _COMPARISONS and node not in refused:
-            found[node] = frozenset({node})
-    return found
+            deciding[node] = frozenset({node})
+    return deciding
 
 
 def _poor_atoms(
-    graph: Graph, order: Sequence[Node], found: dict[Node, frozenset[Node]]
+    graph: Graph, order: Sequence[Node], deciding: dict[Node, frozenset[Node]]
 ) -> set[Node]:
     """Return truth values from which too little follows."""
     worth: dict[Node, float] = {}
     for node in order:
         price = 0.0 if graph.nodes[node].op in _FREE else _cost(graph, node)
-        for atom in found.get(node, ()):
+        for atom in deciding.get(node, ()):
             worth[atom] = worth.get(atom, 0.0) + price
     return {atom for atom, value in worth.items() if value < _WORTH_ATOM}

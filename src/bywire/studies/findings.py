@@ -241,9 +241,9 @@ class Findings:
         numbers = np.asarray(self.cases[CASE])
         return replace(
             among,
-            outcome=rare.found.outcome(wanted, self._error(rare.demand.kpi)),
+            outcome=rare.failure.outcome(wanted, self._error(rare.demand.kpi)),
             worst=None if rare.case is None else int(np.flatnonzero(numbers == rare.case)[0]),
-            failure=rare.found,
+            failure=rare.failure,
         )
 
     def _error(self, name: str) -> float:

@@ -174,17 +174,17 @@ def _estimates(said: Mapping[str, Any]) -> Iterator[Measured]:
 
 def _joined(each: Sequence[Measured]) -> Measured:
     """Return several estimates as one: those of different ones are independent."""
-    names = [name for one in each for name in one.values]
+    names = [name for file in each for name in file.values]
     if not names:
         raise ParameterError("nothing is estimated in it")
     if len(names) != len({*names}):
         twice = next(name for name in names if names.count(name) > 1)
         raise ParameterError(f"{twice} is estimated twice in it")
     return Measured(
-        {k: v for one in each for k, v in one.values.items()},
-        {k: v for one in each for k, v in one.deviations.items()},
-        {k: v for one in each for k, v in one.units.items()},
-        {k: v for one in each for k, v in one.correlations.items()},
+        {k: v for file in each for k, v in file.values.items()},
+        {k: v for file in each for k, v in file.deviations.items()},
+        {k: v for file in each for k, v in file.units.items()},
+        {k: v for file in each for k, v in file.correlations.items()},
     )
 
 

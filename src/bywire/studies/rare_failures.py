@@ -51,7 +51,7 @@ class RareFailure:
     ----------
     demand
         The requirement.
-    found
+    failure
         How probable its failure is.
     case
         Number of the most probable failing case that was computed; None where none failed.
@@ -63,7 +63,7 @@ class RareFailure:
     """
 
     demand: Demand
-    found: FailureProbability
+    failure: FailureProbability
     case: int | None
     importance: tuple[Importance, ...]
     point: Mapping[str, Any]
@@ -94,10 +94,10 @@ def rare_failures(
         When interrupted.
     """
     with SoughtCases(plan, store, executor, progress) as cases:
-        found = tuple(
+        failures = tuple(
             _failure(plan, RequirementCases(cases, k)) for k in range(len(plan.judged_demands))
         )
-    return found, cases.frame
+    return failures, cases.frame
 
 
 def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
@@ -105,32 +105,32 @@ def _failure(plan: StudyPlan, cases: RequirementCases) -> RareFailure:
     assert cases.demand.probability is not None
     if design.kind == SUBSET:
         negligible = _NEGLIGIBLE * (1.0 - cases.demand.probability)
-        found = subset_simulation(
+        failure = subset_simulation(
             cases.drawn, count, design.level, plan.seed, plan.confidence, negligible, cases.report
         )
     else:
-        found = importance_sampling(
+        failure = importance_sampling(
             cases.drawn, cases.searched, count, plan.cases, plan.seed, plan.confidence, CHUNK,
             cases.report,
         )  # fmt: skip
-    case = None if found.place is None else cases.numbers[found.place]
-    importance = _importance(plan, found)
+    case = None if failure.place is None else cases.numbers[failure.place]
+    importance = _importance(plan, failure)
     point = {}
-    if importance and found.center is not None:
-        values = plan.values_at(np.asarray(found.center)[None, :])
+    if importance and failure.center is not None:
+        values = plan.values_at(np.asarray(failure.center)[None, :])
         point = {name: column[0].item() for name, column in values.items()}
-    return RareFailure(cases.demand, found, case, importance, point)
+    return RareFailure(cases.demand, failure, case, importance, point)
 
 
-def _importance(plan: StudyPlan, found: FailureProbability) -> tuple[Importance, ...]:
+def _importance(plan: StudyPlan, failure: FailureProbability) -> tuple[Importance, ...]:
     """Return importance factors: those of Hasofer and Lind's design point, or of the mean failure.
 
     Of correlated quantities they are of their own normal scores.
     """
-    is_rare = found.estimate.value < 0.5  # else failures lie everywhere
-    if found.center is None or not np.any(found.center) or not is_rare:
+    is_rare = failure.estimate.value < 0.5  # else failures lie everywhere
+    if failure.center is None or not np.any(failure.center) or not is_rare:
         return ()
-    scores = plan.scored.correlated(found.center)
+    scores = plan.scored.correlated(failure.center)
     shares = scores**2 / (scores @ scores)
     each = [
         Importance(v.name, float(score), float(part))

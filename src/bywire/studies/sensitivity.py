@@ -141,15 +141,15 @@ def sensitivity(
 def _variance_shares(
     design: SensitivityDesign, names: Sequence[str], figure: Array, confidence: float
 ) -> Sensitivity:
-    found = library("SALib.analyze.sobol", *LIBRARY).analyze(
+    indices = library("SALib.analyze.sobol", *LIBRARY).analyze(
         design.problem, figure, calc_second_order=False, num_resamples=_RESAMPLES,
         conf_level=confidence, seed=np.random.default_rng(design.seed),
     )  # fmt: skip
     drivers = [
         VarianceShares(
             name,
-            _estimate(found["S1"][k], found["S1_conf"][k]),
-            _estimate(found["ST"][k], found["ST_conf"][k], least=0.0),
+            _estimate(indices["S1"][k], indices["S1_conf"][k]),
+            _estimate(indices["ST"][k], indices["ST_conf"][k], least=0.0),
         )
         for k, name in enumerate(names)
     ]
@@ -159,15 +159,15 @@ def _variance_shares(
 def _elementary_effects(
     design: SensitivityDesign, names: Sequence[str], figure: Array, confidence: float
 ) -> Sensitivity:
-    found = library("SALib.analyze.morris", *LIBRARY).analyze(
+    indices = library("SALib.analyze.morris", *LIBRARY).analyze(
         design.problem, design.probabilities, figure, num_resamples=_RESAMPLES,
         conf_level=confidence, num_levels=LEVELS, seed=np.random.default_rng(design.seed),
     )  # fmt: skip
     drivers = [
         ElementaryEffects(
             name,
-            _estimate(found["mu_star"][k], found["mu_star_conf"][k], least=0.0),
-            float(found["sigma"][k]),
+            _estimate(indices["mu_star"][k], indices["mu_star_conf"][k], least=0.0),
+            float(indices["sigma"][k]),
         )
         for k, name in enumerate(names)
     ]

@@ -55,17 +55,17 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
     ----------
     R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11, 1997.
     """
-    found: list[Array] = []
+    tried: list[Array] = []
 
     def batch(columns: Array) -> Array:
         # Of all at once, a column each; what lies beyond an end is the end.
         points = np.clip(columns.T, 0.0, 1.0)
-        found.append(np.maximum(margins(points), _WORST))
-        return found[-1]
+        tried.append(np.maximum(margins(points), _WORST))
+        return tried[-1]
 
     def is_over(intermediate_result: optimize.OptimizeResult) -> bool:
         energies: Array = intermediate_result.population_energies
-        return bool(np.ptp(energies) <= _TOGETHER * np.ptp(found[0]))
+        return bool(np.ptp(energies) <= _TOGETHER * np.ptp(tried[0]))
 
     rng = np.random.default_rng(seed)
     half = population(quantities) // 2  # corners; all of them of few quantities
@@ -85,5 +85,5 @@ def worst_case(margins: Margins, quantities: int, seed: int) -> WorstCase:
         state = "budget spent"
     except UnfinishedError:
         state = "unfinished"
-    least = min((float(each.min()) for each in found), default=np.inf)
-    return WorstCase(state, least, sum(map(len, found)))
+    least = min((float(each.min()) for each in tried), default=np.inf)
+    return WorstCase(state, least, sum(map(len, tried)))

@@ -46,11 +46,11 @@ def attribute(at: Context, node: ast.AST, owner: Any, name: str) -> Any:
         return _of_group(at, owner, name)
     if isinstance(owner, (Group, BuiltGroup)):
         cls = owner.shape.cls if isinstance(owner, Group) else owner.cls
-        found = getattr(cls, name, None)
-        if isinstance(found, property):
-            return at.translation.call(at, node, found.fget, [owner], {})
-        if isinstance(found, cached_property):
-            return at.translation.call(at, node, found.func, [owner], {})
+        member = getattr(cls, name, None)
+        if isinstance(member, property):
+            return at.translation.call(at, node, member.fget, [owner], {})
+        if isinstance(member, cached_property):
+            return at.translation.call(at, node, member.func, [owner], {})
         return Method(owner, name)
     if isinstance(owner, (Items, Table)):
         return Method(owner, name)
@@ -60,11 +60,11 @@ def attribute(at: Context, node: ast.AST, owner: Any, name: str) -> Any:
 def _of_known(at: Context, node: ast.AST, owner: Known, name: str) -> Any:
     if not hasattr(owner.value, name):
         raise at.refuse(node, f"it has no {name!r}")
-    found = getattr(owner.value, name)
-    if is_named_tuple(type(owner.value)) and callable(found):
+    member = getattr(owner.value, name)
+    if is_named_tuple(type(owner.value)) and callable(member):
         return Method(lifted(owner), name)
     module = owner.value.__name__ if isinstance(owner.value, type(ast)) else ""
-    return at.translation.constant(module, name, found)
+    return at.translation.constant(module, name, member)
 
 
 def _of_record(at: Context, node: ast.AST, owner: Record, name: str) -> Any:

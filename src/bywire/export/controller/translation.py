@@ -57,13 +57,13 @@ class Translation:
     alive: list[Any] = field(default_factory=list)
     depth: int = 0
 
-    def constant(self, module: str, name: str, found: Any) -> Known:
+    def constant(self, module: str, name: str, value: Any) -> Known:
         """Return a module's object; a number of its own is called by its name in C."""
-        if isinstance(found, float) and module != "math" and name.strip("_").isupper():
+        if isinstance(value, float) and module != "math" and name.strip("_").isupper():
             called = c_name(f"{module.rpartition('.')[2]}_{name.strip('_')}").upper()
-            if self.constants.setdefault(called, found) == found:
-                return Known(found, called)
-        return Known(found)
+            if self.constants.setdefault(called, value) == value:
+                return Known(value, called)
+        return Known(value)
 
     def call(
         self, at: Context, node: ast.AST, function: Any, given: list[Any], named: Any

@@ -34,7 +34,7 @@ overshoot = "<= 15 % with 90 %"
 """
 _CHUNKS = 4
 _ROUNDS = 3
-_WARM, _STEADY = 4, 192  # chunks of each process beforehand, and those over which rates are measured
+_WARM, _STEADY = 4, 192  # chunks of each process beforehand, and those that are timed
 _CASES = 1024  # of the study whose memory is measured
 # The kernel's own mark of this program, its workers apart.
 _MEMORY = """

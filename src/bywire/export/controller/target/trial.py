@@ -69,10 +69,10 @@ def host_trial(program: Program, folder: Path, compiler: Compiler, scratch: Path
          str(folder / f"{program.name}_harness.c"), "-o", str(made), "-lm"],
     )  # fmt: skip
     said = _call([str(made)], may_fail=True)
-    found = re.search(r"(\d+) values differ, bits ([0-9a-f]+)", said)
-    if found is None:
+    match = re.search(r"(\d+) values differ, bits ([0-9a-f]+)", said)
+    if match is None:
         raise CompilerError(f"the compiled ECU of {program.name} said {said[:200]!r}")
-    return Trial("host", program.precision.name, int(found[1]), int(found[2], 16))
+    return Trial("host", program.precision.name, int(match[1]), int(match[2], 16))
 
 
 def target_trial(
@@ -96,14 +96,14 @@ def target_trial(
         "-semihosting-config", "enable=on,target=native", "-icount", "shift=0",
         "-kernel", str(image),
     ])  # fmt: skip
-    found = re.search(r"differ (\d+)\nbits (\d+)\n", said)
-    if found is None:
+    match = re.search(r"differ (\d+)\nbits (\d+)\n", said)
+    if match is None:
         raise CompilerError(f"the ECU of {program.name} on {target.name} said {said[:200]!r}")
     tasks = {
         name: TaskFigures(int(most), int(mean), int(depth))
         for name, most, mean, depth in re.findall(r"task (\w+) (\d+) (\d+) (\d+)", said)
     }
-    differing, bits = map(int, found.groups())
+    differing, bits = map(int, match.groups())
     return Trial(target.name, program.precision.name, differing, bits, rom, ram, tasks)
 
 
