@@ -204,7 +204,7 @@ def test_initial_state_that_depends_on_a_parameter() -> None:
     run = open_loop({"drive.T_source": 1e-3}, options, 1.0, 20.0)
     run = replace(run, state=run.state._replace(omega=20.0))
     start = np.array(run.state)
-    slope = np.array([1.0, 0.5, 3.0, 1e4, 2e4, 0.0, 0.0])
+    slope = np.array([1.0, 0.5, 3.0, 1e4, 2e4, *np.zeros(start.size - 5)])
     name, value, share = "motor.R_m", run.par.motor.R_m, 1e-5
     result = simulate_with_sensitivities(run, [name], ("p_pd", "i"), slope[:, None])
     up, down = (
