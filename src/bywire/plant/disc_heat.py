@@ -9,14 +9,7 @@ from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import (
-    Area,
-    HeatCapacity,
-    HeatConductance,
-    Temperature,
-    Unit,
-    Weight,
-)
+from bywire.core.quantities import Area, HeatCapacity, HeatConductance, Temperature, Unit, Weight
 from bywire.core.signals import Energy, Power, Role, Signal
 from bywire.core.typing import Array
 from bywire.core.units import shown

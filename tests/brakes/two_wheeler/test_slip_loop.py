@@ -6,6 +6,7 @@ import pytest
 import bywire
 from bywire.analysis.linear.linearize import linearize
 from bywire.brakes.two_wheeler.loops.slip import point
+from bywire.control import slip_pi
 from bywire.plant import brake_disc
 
 
@@ -62,3 +63,34 @@ def test_a_gain_that_follows_the_speed_keeps_the_gain_margin():
 def test_points_that_do_not_stay_are_refused(changes, v, said):
     with pytest.raises(bywire.BywireError, match=said):
         point(bywire.parameters("front600").replace(changes), v)
+
+
+def climbed(eager, slip, building_up=False):
+    """Return how long slip control takes from a slip to within 5 % of its set slip, 0.105.
+
+    On a tyre that is a spring, 15 kN m per unit slip at once; or how far it gets in 0.2 s while
+    the demand still builds up.
+    """
+    par = bywire.parameters("sport600").ecu.front_slip.replace({"eager": eager, "T_t": 1e9})
+    T, stiff, t = 1e-3, 15e3 / par.k_hat, 0.0
+    p_rider = 3.0 * stiff * par.slip_set
+    x = slip_pi.State(stiff * slip - slip_pi.gain(20.0, par) * (par.slip_set - slip))
+    while abs(slip - par.slip_set) > 0.05 * par.slip_set and t < (0.2 if building_up else 30.0):
+        p_most = p_rider - 1.0 if building_up else p_rider
+        seen = slip_pi.Input(20.0, par.slip_set, slip, p_rider, p_most, p_most)
+        x, out = slip_pi.output(x, seen, T, par)
+        # the slip follows a moment later, as the tyre does
+        slip, t = slip + 0.2 * (out.p / stiff - slip), t + T
+    return slip if building_up else t
+
+
+def test_an_integral_alone_is_slow_on_a_stiff_tyre_and_hurries_below_its_slip():
+    par = bywire.parameters("sport600").ecu.front_slip
+    # (stiffness + K_p) T_i/K_p: exponential from 0.04 to 5 % of 0.105
+    K_p = slip_pi.gain(20.0, par) * par.k_hat
+    slow = par.T_i * (15e3 + K_p) / K_p * np.log(0.065 / (0.05 * 0.105))
+    assert climbed(0.0, 0.04) == pytest.approx(slow, rel=0.02)
+    assert climbed(10.0, 0.04) < 0.4 * slow
+    # beyond the set slip, and while the demand builds up, it is what it was
+    assert climbed(10.0, 0.14) == climbed(0.0, 0.14)
+    assert climbed(10.0, 0.04, building_up=True) == climbed(0.0, 0.04, building_up=True)

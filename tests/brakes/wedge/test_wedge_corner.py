@@ -96,3 +96,18 @@ def test_rules_and_a_step_of_half_the_length_on_the_corner():
         for step in ("40 us", "20 us")
     ]  # fmt: skip
     assert abs(at[0] - at[1]) < 0.01
+
+
+def test_slip_control_hurries_below_its_slip_on_dry_road():
+    plain, eager = (
+        bywire.run(
+            "corner-panic",
+            {"options.surface": "dry-asphalt", "ecu.slip.eager": str(each),
+             "options.v_0": "60 km/h", "options.duration": "3 s"},
+            estimate_error=False,
+        )
+        for each in (0, 10)
+    )  # fmt: skip
+    assert plain.kpi("braking_efficiency").value < 65.0
+    assert eager.kpi("braking_efficiency").value > 76.0
+    assert eager.kpi("peak_slip").value < 0.105

@@ -28,6 +28,7 @@ _SLIP = {
     "slip_set": chosen(0.105, "0.8 of the peak's on wet asphalt; others are flat there"),
     "omega_c": chosen(20.0, "a third of a 10 Hz pressure loop"),
     "T_i": chosen(0.2, "four times the crossover's"),
+    "eager": chosen(0.0, "a plain integral, as in the trial; 10 gains 2 % on dry asphalt"),
     "T_t": chosen(0.05, "the crossover's"),
     "v_off": chosen(2.0, "48 pulses then come every 20 ms"),
     "v_fall": chosen(6.0, "an edge of 48 pulses comes every 7 ms"),

@@ -77,6 +77,7 @@ CORNER = CitedSet(
         "ecu.slip.slip_set": chosen(0.105, "0.8 of the peak's on wet asphalt"),
         "ecu.slip.omega_c": chosen(16.0, "a third of the moment loop's 8 Hz"),
         "ecu.slip.T_i": chosen(0.25, "four times the crossover's"),
+        "ecu.slip.eager": chosen(10.0, "2 s on the stiff side of dry asphalt become 0.3 s"),
         "ecu.slip.T_t": chosen(0.0625, "the crossover's"),
         "ecu.slip.v_off": chosen(2.0, "48 pulses then come every 20 ms"),
         "ecu.slip.v_fall": chosen(6.0, "an edge of 48 pulses comes every 7 ms"),
