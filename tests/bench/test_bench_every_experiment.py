@@ -15,7 +15,6 @@ from bywire.bench.ensemble import run_benches
 from bywire.bench.experiment import EXPERIMENTS
 from bywire.bench.key_figures import key_figures_of
 from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.rows import Rows
 from bywire.bench.running import run_of
 from bywire.bench.stimuli.registry import STIMULI
 from bywire.core.brake import brakes
@@ -108,10 +107,9 @@ def test_every_signal_has_unit_and_name(results, name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_plain_rows_give_the_same_figures(results, name):
+def test_recordings_give_the_same_figures_as_their_plain_rows(results, name):
     result = results[name]
-    rows = {label: _rows(recording) for label, recording in result.recordings.items()}
-    kpis = EXPERIMENTS.all()[name].judge(rows, result.bench.chosen_options)
+    kpis = EXPERIMENTS.all()[name].judge(result.recordings, result.bench.chosen_options)
     exact = {kpi.name: kpi.value for kpi in result.kpis}
     assert {kpi.name: kpi.value for kpi in kpis} == pytest.approx(exact, rel=0, abs=0, nan_ok=True)
 
@@ -122,14 +120,6 @@ def test_all_experiments_judged_by_families_are_put_to_the_test():
     assert not judged & set(LARGE)
     left = {EXPERIMENTS.all()[name].assembly for name in NAMES if name not in LARGE}
     assert left == {each.assembly for each in EXPERIMENTS.all().values()} - {"wedge-corner"}
-
-
-def _rows(recording):
-    if set(recording.dims) != {"time"}:
-        return recording  # a static characteristic
-    signals = {str(n): v.values for n, v in recording.items()}
-    attributes = {n: recording[n].attrs for n in signals}
-    return Rows(recording["time"].values, signals, attributes, lambda: recording.attrs)
 
 
 @pytest.mark.parametrize(

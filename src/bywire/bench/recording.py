@@ -52,7 +52,7 @@ def record(
     recording["time"].attrs["long_name"] = "time"
     recording.attrs = {
         **run_notes(run, trajectory),
-        "warnings": "; ".join(watch(recording, run, trajectory)),
+        "warnings": "; ".join(watch(cast(xr.Dataset, rows), run, trajectory)),
         **notes,
     }
     return recording

@@ -202,7 +202,8 @@ def judged(
     """
 
     def figures(made: Mapping[str, xr.Dataset]) -> tuple[Kpi, ...]:
-        return bench.definition.judge(made, bench.chosen_options)
+        rows = {label: Rows.of(recording) for label, recording in made.items()}
+        return bench.definition.judge(rows, bench.chosen_options)
 
     kpis = figures(recordings)
     if others:

@@ -18,6 +18,14 @@ _SI = (
     "1", "s", "m", "rad", "m/s", "rad/s", "N", "Pa", "N*m", "A", "V", "W", "ohm", "Hz",
     "m/s**2", "m**2", "m**3", "m**3/s", "kg", "K",
 )  # fmt: skip
+_WHOLE = {**{symbol: symbol for symbol in _SI}, "J": "N*m"}
+"""units that are SI as they stand, and what `si_symbol` calls them"""
+
+
+class Whole(str):
+    """A unit that is SI as it stands: most files hold no other, and pint takes long to load."""
+
+    __slots__ = ()
 
 
 def split_title(title: str) -> tuple[str, str]:
@@ -46,6 +54,8 @@ def unit_of(text: str) -> Any:
     plain = re.sub(r"(?<=N)(?=m\b)", "*", "1" if text == "-" else text)
     if len(text) > _LONGEST or not _UNIT.fullmatch(plain):
         raise ValueError(text)
+    if plain in _WHOLE:
+        return Whole(plain)
     try:
         unit = unit_of_symbol(plain.replace("%", "percent").replace("·", "*").replace(" ", "*"))
         base_of(unit)
@@ -56,30 +66,43 @@ def unit_of(text: str) -> Any:
 
 def unit_of_symbol(symbol: str) -> Any:
     """Return the unit of a symbol that is known to be one; ``"1"`` is a pure number's."""
-    return units.registry().Unit("" if symbol == "1" else symbol)
+    return Whole(symbol) if symbol in _WHOLE else _of_pint(symbol)
+
+
+def _of_pint(unit: Any) -> Any:
+    """Return a unit as pint has it, also of its symbol."""
+    if not isinstance(unit, str):
+        return unit
+    return units.registry().Unit("" if unit == "1" else str(unit))
 
 
 def base_of(unit: Any) -> Any:
     """Return the base units; radians stay, so that rpm is no frequency in Hz."""
-    return units.registry().Quantity(1.0, unit).to_base_units().units
+    return units.registry().Quantity(1.0, _of_pint(unit)).to_base_units().units
 
 
 @cache
 def si_symbol(unit: Any) -> str:
     """Return the SI unit of a unit's quantity."""
+    if isinstance(unit, Whole):
+        return _WHOLE[unit]
     base = base_of(unit)
     return next((s for s in _SI if base_of(unit_of_symbol(s)) == base), f"{base:~C}")
 
 
 def measures(unit: Any, symbol: str) -> bool:
     """Return whether a unit measures the quantity of an SI unit."""
+    if isinstance(unit, Whole) and symbol in _WHOLE:
+        return _WHOLE[unit] == _WHOLE[symbol]
     return bool(base_of(unit) == base_of(unit_of_symbol(symbol)))
 
 
 def converted(values: NDArray[np.float64], unit: Any, symbol: str) -> NDArray[np.float64]:
     """Return values in an SI unit."""
-    quantity = units.registry().Quantity(values, unit)
-    return np.asarray(quantity.to(unit_of_symbol(symbol)).magnitude)
+    if isinstance(unit, Whole) and symbol in _WHOLE and measures(unit, symbol):
+        return np.array(values, dtype=np.float64)
+    quantity = units.registry().Quantity(values, _of_pint(unit))
+    return np.asarray(quantity.to(_of_pint(unit_of_symbol(symbol))).magnitude)
 
 
 def convert_in_place(values: NDArray[np.float64], unit: Any, symbol: str) -> None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bywire.core.typing import Array
+from bywire.data.recursive_filter import filtered
 
 _TOGETHER = (1, 8, 64)  # neighbors summed up
 _BLOCKS = 10  # per unknown, at least
@@ -104,7 +105,7 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
     r
         Shape (n,).
     """
-    from scipy import stats
+    from scipy import special  # of which stats is made, and takes long to load
 
     n, p = influence.shape
     largest, freedom = np.ones(p), sure.freedom
@@ -120,7 +121,8 @@ def _as_scattered(sure: Uncertainty, influence: Array, r: Array) -> Uncertainty:
         ratio = variance / np.maximum(np.diag(sure.covariance), 1e-300)
         for k in np.flatnonzero(known & (independent >= _FEWEST_GROUPS)):
             level = _LEVEL / (p * (1 + len(_GROUPS)))
-            if ratio[k] > max(stats.f.isf(level, independent[k], sure.freedom), largest[k]):
+            limit = float(special.fdtri(independent[k], sure.freedom, 1.0 - level))
+            if ratio[k] > max(limit, largest[k]):
                 largest[k], freedom = ratio[k], min(freedom, float(independent[k]))
     wider = np.sqrt(largest)
     return Uncertainty(sure.covariance * np.outer(wider, wider), freedom, sure.colored)
@@ -194,10 +196,8 @@ def autoregression(residuals: Array) -> Autoregression:
 
 def _filtered(columns: Array, coefficients: Array) -> Array:
     """Return columns through the noise's filter, until it has died away."""
-    from scipy import signal
-
     tail = np.zeros((min(len(columns), 50 * len(coefficients)), columns.shape[1]))
-    return np.asarray(signal.lfilter([1.0], coefficients, np.vstack((columns, tail)), axis=0))
+    return filtered([1.0], coefficients, np.vstack((columns, tail)))
 
 
 def autocorrelation(residuals: Array, lags: int) -> Array:
@@ -212,7 +212,7 @@ def autocorrelation(residuals: Array, lags: int) -> Array:
 
 def is_white(residuals: Array, lags: int = 20) -> bool:
     """Return whether neighbors do not go together (Ljung and Box 1978, level 1 %)."""
-    from scipy import stats
+    from scipy import special  # of which stats is made, and takes long to load
 
     n = residuals.size
     lags = min(lags, n // 4)
@@ -220,4 +220,4 @@ def is_white(residuals: Array, lags: int = 20) -> bool:
         return True
     rho = autocorrelation(residuals, lags)[1:]
     statistic = n * (n + 2) * float(np.sum(rho**2 / (n - np.arange(1, lags + 1))))
-    return bool(stats.chi2.sf(statistic, lags) > _LEVEL)
+    return bool(special.chdtrc(lags, statistic) > _LEVEL)

@@ -101,9 +101,9 @@ class Estimate:
 
     def intervals(self, level: float = 0.95) -> Array:
         """Return the confidence intervals (Student's t), shape (p, 2)."""
-        from scipy import stats
+        from scipy import special  # of which stats is made, and takes long to load
 
-        t = float(stats.t.ppf(0.5 + 0.5 * level, max(self.freedom, 1.0)))
+        t = float(special.stdtrit(max(self.freedom, 1.0), 0.5 + 0.5 * level))
         reach = t * self.deviations
         return np.column_stack((self.values - reach, self.values + reach))
 

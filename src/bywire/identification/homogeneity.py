@@ -162,7 +162,7 @@ def _told_by(J: Array) -> list[int]:
 
 
 def _apart(tables: Mapping[str, Mapping[str, _Told]]) -> tuple[Disagreement, ...]:
-    from scipy import stats
+    from scipy import special
 
     names = list(dict.fromkeys(name for table in tables.values() for name in table))
     compared: list[tuple[Disagreement, float]] = []
@@ -181,7 +181,7 @@ def _apart(tables: Mapping[str, Mapping[str, _Told]]) -> tuple[Disagreement, ...
     level = _LEVEL / max(len(compared), 1)
     apart = [
         each for each, freedom in compared
-        if each.apart > stats.t.isf(0.5 * level, max(freedom, 1.0))
+        if each.apart > special.stdtrit(max(freedom, 1.0), 1.0 - 0.5 * level)
         and abs(each.value - each.others) > _SMALL * abs(each.others)
     ]  # fmt: skip
     return tuple(sorted(apart, key=lambda each: -each.apart))

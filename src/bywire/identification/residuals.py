@@ -44,7 +44,7 @@ def lack_of_fit(
     note
         What the richer model can do that the fitted one cannot.
     """
-    from scipy import stats
+    from scipy import special
 
     e, A = residuals * weights, richer * weights[:, None]
     r = int(np.linalg.matrix_rank(A))
@@ -56,7 +56,7 @@ def lack_of_fit(
     # What a richer model bends is slow: there colored noise is larger than on the average.
     slow = 1.0 if is_white(rest) else autoregression(rest).at_zero_frequency / within
     value = float(e @ e - rest @ rest) / more / (within * max(slow, 1.0))
-    return Check(name, value, limit=float(stats.f.isf(_LEVEL, more, left)), note=note)
+    return Check(name, value, limit=float(special.fdtri(more, left, 1.0 - _LEVEL)), note=note)
 
 
 def by_output(

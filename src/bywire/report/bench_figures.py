@@ -5,9 +5,9 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import xarray as xr
-from matplotlib.figure import Figure
 
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.kpis import sine_sweep
@@ -23,6 +23,9 @@ from bywire.report.step_response import step_response
 from bywire.report.stribeck_curve import stribeck_curve
 from bywire.report.time_traces import time_traces
 from bywire.report.tracking import tracking
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 @dataclass(frozen=True)

@@ -5,17 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import MultipleLocator
 from numpy.typing import NDArray
 
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.wording import clean
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+    from matplotlib.ticker import MultipleLocator
 
 
 @dataclass(frozen=True)
@@ -138,6 +140,8 @@ def _above(response: Response, depth: float) -> Response:
 
 def _phase_ticks(responses: Sequence[Response]) -> MultipleLocator:
     """Return ticks at multiples of 15, 45, 90, ... degrees, at most about six."""
+    from matplotlib.ticker import MultipleLocator
+
     phases = np.concatenate([response.phase_deg for response in responses])
     phases = phases[np.isfinite(phases)]
     span = float(np.ptp(phases)) if len(phases) else 0.0

@@ -7,9 +7,6 @@ from dataclasses import dataclass
 from itertools import cycle
 from typing import TYPE_CHECKING
 
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, ledger
 from bywire.core.errors import ParameterError
 from bywire.report import style
@@ -18,6 +15,8 @@ from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLORS = {
     "E_copper": style.VERMILLION,

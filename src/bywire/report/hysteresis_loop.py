@@ -7,9 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from bywire.bench.kpis.smoothing import smoothed
 from bywire.core.errors import ParameterError
@@ -21,6 +18,8 @@ from bywire.report.wording import duration
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 ARROWS_AT = (0.35, 0.75)
 """where along a branch its arrows sit, as shares of its drawn length"""
@@ -53,6 +52,8 @@ def hysteresis_loop(
     ParameterError
         When there is no recording.
     """
+    from matplotlib.lines import Line2D
+
     if not recordings:
         raise ParameterError("hysteresis_loop: no recording given: give at least one")
     figure, (axes,) = style.new_figure(4.2)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 
 from bywire.core.typing import Array
 from bywire.core.units import difference_unit, display_factor
@@ -16,6 +15,10 @@ from bywire.report.decimation import kept_samples
 from bywire.report.line_role import Role
 from bywire.report.record_marks import mark_records
 from bywire.report.wording import amount, in_display_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _MOST = 6  # curves of a family that have a color each
 _LINE = 1.3  # width of the line in the middle of a band [pt]
@@ -111,6 +114,8 @@ def _draw(axes: Axes, at: Array, values: Array, alone: bool, **look: object) -> 
 
 
 def _bands(axes: Axes, curve: Curve) -> None:
+    from matplotlib.patches import Patch
+
     data, x = curve.data, curve.x
     banded = "low" in data and "high" in data
     family = _family(data["value"], data[x])

@@ -11,10 +11,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
 
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
@@ -31,6 +27,10 @@ from bywire.report.wording import duration
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 FEW = 3
 """recordings up to which the second trace of a panel is drawn as well"""
@@ -259,6 +259,8 @@ def _draw_limits(
 
 
 def _entry(label: str, color: str | Color, dash: Any) -> Line2D:
+    from matplotlib.lines import Line2D
+
     text = style.plain(label, 110)
     return Line2D([], [], color=color, linestyle=dash, linewidth=1.4, label=text)
 

@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError
 from bywire.report import style
@@ -16,6 +14,8 @@ from bywire.report.decimation import decimate
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 _ROOM = "  "  # short labels of wide letters need more than the legend's mean width of a letter
 _DASHES: tuple[style.Dash, ...] = ("-", (0, (4, 2)), (0, (1.5, 1.5)))

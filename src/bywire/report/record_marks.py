@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 
 from bywire.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _NAMED = 8  # records up to which there is room for their names
 _ROOM = 0.06  # of the height of the first panel, for the names

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
-
-from matplotlib.axes import Axes
+from typing import TYPE_CHECKING, Any
 
 from bywire.bench.experiment import Experiment
 from bywire.bench.requirements import Verdict, limit_of
@@ -15,6 +13,9 @@ from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel
 from bywire.report.line_role import Role
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 
 @dataclass(frozen=True)

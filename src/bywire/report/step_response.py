@@ -7,8 +7,6 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeGuard
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bywire.bench.kpis.smoothing import smoothed
 from bywire.core.units import convert
@@ -21,6 +19,8 @@ from bywire.report.wording import duration
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def step_response(

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
@@ -15,6 +14,7 @@ from bywire.report.wording import amount
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 
 def stribeck_curve(

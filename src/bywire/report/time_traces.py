@@ -7,8 +7,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from bywire.core.errors import ParameterError
 from bywire.core.units import convert
@@ -21,6 +19,8 @@ from bywire.report.step_marks import StepLimits, draw_limits
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 NEAR = 0.5

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from matplotlib.figure import Figure
-
 from bywire.core.errors import ParameterError
 from bywire.report import style
 from bywire.report.channel import channel
@@ -14,6 +12,7 @@ from bywire.report.line_role import Role
 
 if TYPE_CHECKING:
     import xarray as xr
+    from matplotlib.figure import Figure
 
 
 def tracking(recording: xr.Dataset, variable: str, set_point: str) -> Figure:

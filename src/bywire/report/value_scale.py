@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import matplotlib as mpl
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
-from matplotlib.figure import Figure
 
 from bywire.report import style
 from bywire.report.wording import in_display_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 Color = tuple[float, float, float, float]
 
@@ -24,6 +24,8 @@ def value_color(values: Sequence[float], k: int) -> Color:
     """Return the color of one of some values."""
     low, high = min(values), max(values)
     share = (values[k] - low) / (high - low) if high > low else 0.0
+    import matplotlib as mpl
+
     return mpl.colormaps[_COLORS](_BRIGHTEST * share)
 
 
@@ -37,6 +39,10 @@ def value_scale(
     name, unit, values
         Quantity, its SI unit and its values.
     """
+    import matplotlib as mpl
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
     low, high = in_display_unit(np.array([min(values), max(values)]), unit)[0]
     colors = mpl.colormaps[_COLORS].resampled(256)
     shown = ListedColormap(colors(np.linspace(0.0, _BRIGHTEST, 256)))

@@ -10,6 +10,7 @@ from bywire.brakes.wedge.elements import wedge
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
+from bywire.data.recursive_filter import filtered
 from bywire.identification.replaying.relation import Relation, Rows
 
 _PRESSED = 0.1  # of the largest force: below it, the relation tells little
@@ -30,8 +31,6 @@ def _steady(data: xr.Dataset, force: str, par: WedgeParameters) -> NDArray[np.bo
 
 
 def _lagged(F: Array, data: xr.Dataset, par: WedgeParameters) -> Array:
-    from scipy import signal
-
     t = data["time"].values
     keep = float(np.exp(-2.0 * np.pi * par.moment_sensor.f_M * (t[1] - t[0])))
     there = np.isfinite(F)
@@ -39,7 +38,7 @@ def _lagged(F: Array, data: xr.Dataset, par: WedgeParameters) -> Array:
     # Of a force that runs straight from sample to sample.
     slope = (1.0 - keep) / -np.log(keep)
     numerator = [1.0 - slope, slope - keep]
-    late, _ = signal.lfilter(numerator, [1.0, -keep], filled, zi=[slope * filled[0]])
+    late = filtered(numerator, [1.0, -keep], filled, settled=True)
     return np.where(there, late, np.nan)
 
 

@@ -16,6 +16,7 @@ from bywire.brakes.motorcycle.case import case_from_rest, smoothing
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Current, CurrentRate, Frequency, TimeConstant
+from bywire.data.recursive_filter import filtered
 
 WITHOUT, WITH = "without-dither", "with-dither"
 
@@ -54,14 +55,12 @@ def cases(par: MotorcycleParameters, options: Options, _: object = None) -> tupl
 
 def finish(recording: xr.Dataset, options: Options) -> xr.Dataset:
     """Add the measured current behind the low-pass filter, as the paper plots it."""
-    from scipy import signal  # slow to load, and only this experiment needs it
-
     interval = float(recording["time"][1] - recording["time"][0])
     decay = float(np.exp(-2.0 * np.pi * options.f_filter * interval))
     raw = recording["i_meas"].values
-    filtered, _ = signal.lfilter([1.0 - decay], [1.0, -decay], raw, zi=[decay * raw[0]])
+    behind = filtered([1.0 - decay], [1.0, -decay], raw, settled=True)
     attrs = {"units": "A", "long_name": "measured current, filtered"}
-    return recording.assign(i_filtered=("time", filtered, attrs))
+    return recording.assign(i_filtered=("time", behind, attrs))
 
 
 def loop(options: Options) -> hysteresis.Setting:

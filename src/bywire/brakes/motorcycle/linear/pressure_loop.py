@@ -123,14 +123,21 @@ def _single(block: Any, output: str) -> LinearModel:
     )  # fmt: skip
 
 
+def _companion(brake: Rational) -> tuple[Array, Array, Array]:
+    """Return A, B, C of a strictly proper transfer function, its first state the fastest."""
+    den = np.asarray(brake.den, dtype=float) / brake.den[0]
+    n = den.size - 1
+    num = np.asarray(brake.num, dtype=float) / brake.den[0]
+    A = np.vstack([-den[1:], np.eye(n - 1, n)])
+    return A, np.eye(n, 1), np.concatenate([np.zeros(n - num.size), num])[None]
+
+
 def _cascade(motor: LinearModel, brake: Rational, f_aa: float) -> LinearModel:
     """Return motor, brake and the pressure channel's filter in a row, continuous.
 
     The motor's first state is the current that drives the brake.
     """
-    from scipy.signal import tf2ss
-
-    G, g, c, _ = tf2ss(brake.num, brake.den)
+    G, g, c = _companion(brake)
     n, w = G.shape[0], 2.0 * np.pi * f_aa
     A = np.zeros((n + 3, n + 3))
     A[:2, :2] = motor.A

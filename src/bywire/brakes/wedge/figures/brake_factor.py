@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from bywire.bench.result import Result
 from bywire.brakes.wedge.series import tag
@@ -15,6 +15,9 @@ from bywire.core.typing import Array
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
 from bywire.report.line_role import Role
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 FARTHEST = 60.0
 """brake factor at which the ordinate ends: at the neutral point it has no bound"""

@@ -24,6 +24,7 @@ from bywire.brakes.motorcycle.paper import facts
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.brakes.motorcycle.trim import holding_current
 from bywire.core.typing import Array, Complex
+from bywire.data.recursive_filter import filtered
 from bywire.identification.least_squares import solve
 from bywire.simulation.run import Run, Trajectory, simulate
 from bywire.simulation.run_group import fit_lanes, simulate_group
@@ -210,11 +211,8 @@ def _runs(cases: Iterable[Case], signals: Sequence[str]) -> Sequence[Trajectory]
 
 def _low_passed(run: Trajectory, f: float) -> Array:
     """Return the measured current behind the first-order low-pass of Fig. 5."""
-    from scipy import signal
-
     decay = math.exp(-2.0 * math.pi * f * float(run.time[1] - run.time[0]))
-    raw = run["i_meas"]
-    return np.asarray(signal.lfilter([1.0 - decay], [1.0, -decay], raw, zi=[decay * raw[0]])[0])
+    return filtered([1.0 - decay], [1.0, -decay], run["i_meas"], settled=True)
 
 
 def _braking(brakes: Sequence[Par]) -> list[dict[str, float]]:
