@@ -45,7 +45,13 @@ def test_vectors_run_every_line(structure: str, tmp_path: Path) -> None:
 
 
 @needs_compiler
-@pytest.mark.parametrize("structure", ["gains that differ by region", "slip by PI"])
+@pytest.mark.parametrize(
+    "structure",
+    ["moment and position", *(
+        pytest.param(each, marks=pytest.mark.trust)
+        for each in ("gains that differ by region", "slip by PI", "slip by rules")
+    )],
+)
 def test_vectors_kill_mutants(structure: str, tmp_path: Path) -> None:
     name = export_controller(bench_of(structure), tmp_path, vectors=2000).program.name
     source = tmp_path / f"{name}_ecu.c"
