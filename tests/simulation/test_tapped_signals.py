@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from bywire.simulation.run import Run, simulate
-from bywire.simulation.tapped import Tap, Tapped, rests
+from bywire.simulation.tapped import DEAD, Tap, Tapped, rests
 from systems.sampled_lag import LAG, Memory, SampledLag, State
 
 TAPS = (
@@ -102,3 +102,12 @@ def test_a_drive_comes_late_and_a_task_misses_its_ticks():
     rested = tapped(**{rests("law"): [0.0, 1.0, 1.0, 1.0]})
     np.testing.assert_allclose(rested["y"], expected(rare), atol=1e-12)
     assert set(np.diff(np.flatnonzero(np.diff(rested["seen"]) != 0))) == {4}
+
+
+def test_a_dead_task_has_no_memory_and_begins_anew():
+    held = tapped(**{rests("law"): [0.0, 1.0, 1.0, 1.0]})
+    dead = tapped(**{rests("law"): [0.0, DEAD, DEAD, DEAD]})
+    # one tick of four runs: it gives what it gives, then nothing in place of the last
+    runs = np.flatnonzero(np.diff(held["seen"]) != 0) + 1
+    assert np.all(dead["seen"][runs] != 0.0)
+    assert np.all(np.delete(dead["seen"], [0, *runs]) == 0.0)

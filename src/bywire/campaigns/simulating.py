@@ -130,4 +130,4 @@ def _computed(runs: Sequence[Run], signals: Sequence[str]) -> Sequence[Trajector
 def _missed(case: Case, task: str, time: Array) -> Array:
     """Return where a task misses its ticks, which a watchdog sees."""
     given = case.falsified(time) if isinstance(case, FaultyCase) else {}
-    return np.asarray(given.get(rests(task), np.zeros(time.size)))
+    return np.minimum(given.get(rests(task), np.zeros(time.size)), 1.0)

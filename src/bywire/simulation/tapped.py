@@ -18,6 +18,9 @@ from bywire.core.model import Model, Task
 from bywire.core.signals import Signal, signals_of
 from bywire.core.wrapping import Wrapping
 
+DEAD = 2.0
+"""of the stimulus by which a task fails: it has lost its memory"""
+
 
 class Tap(NamedTuple):
     """A signal that can be falsified.
@@ -50,7 +53,11 @@ class Tap(NamedTuple):
 
 
 def rests(task: str) -> str:
-    """Return the name of the stimulus that lets a task miss its tick where it is 1."""
+    """Return the name of the stimulus by which a task fails.
+
+    Where it is 1 the task misses its tick, and what it held stays; where it is `DEAD`, all that the
+    task renews is as at rest: it has no memory, and begins anew when it runs again.
+    """
     return f"rest_{task.replace('-', '_')}"
 
 
@@ -87,7 +94,7 @@ class Tapped(Wrapping):
         """That of the model inside, then what falsifies."""
         controls = [(name, Signal("1", name.replace("_", " ")))
                     for tap in self.taps for name in tap.controls().values()]  # fmt: skip
-        tasks = [(rests(task), Signal("1", f"task {task} misses its tick"))
+        tasks = [(rests(task), Signal("1", f"task {task} fails: 1 misses its tick, 2 is dead"))
                  for task in self.resting]  # fmt: skip
         return _extended(self.inner.Stimulus, (*controls, *tasks))
 
@@ -129,9 +136,13 @@ class Tapped(Wrapping):
                 u = u._replace(**{tap.field: _tapped(tap, u, memory, stimulus, last)})
         after = tick(x, before, u, par)
         if name in self.resting:
-            missed = getattr(stimulus, rests(name))
-            pairs = zip(before, after, strict=True)
-            after = type(after)(*(_either(missed, old, new) for old, new in pairs))
+            fails = getattr(stimulus, rests(name))
+            empty = self.inner.rest(par)[1]
+            # What a task hands on as it was is no memory of its own.
+            after = type(after)(*(
+                new if new is old else _failing(fails, old, new, none)
+                for old, new, none in zip(before, after, empty, strict=True)
+            ))  # fmt: skip
         for tap in self.taps:
             if tap.side == "drive" and (name == tap.task or not tap.late):
                 _tapped(tap, after, memory, stimulus, last)
@@ -164,6 +175,11 @@ def _tapped(tap: Tap, source: Any, memory: Any, stimulus: Any, last: dict[str, A
 
 def _either(flag: float, old: float, new: float) -> float:
     return ops.where(flag > 0.5, old, new)
+
+
+def _failing(fails: float, old: float, new: float, none: float) -> float:
+    """Return what a task holds that runs, misses its tick, or is dead."""
+    return ops.where(fails > 0.5 * (1.0 + DEAD), none, _either(fails, old, new))
 
 
 def _fields(tap: Tap) -> tuple[str, ...]:

@@ -159,3 +159,22 @@ def test_pads_that_were_knocked_back_take_the_volume_of_their_gap():
 def test_a_jammed_screw_holds_what_there_is():
     p = bar(failed("gear.jammed"))
     assert np.ptp(p[-1000:]) < 1e-6
+
+
+def test_a_dead_controller_leaves_the_brake_as_a_shorted_bridge_does():
+    dead, shorted = failed("ecu.dead"), failed("battery.shorted")
+    np.testing.assert_allclose(bar(dead), bar(shorted), rtol=0, atol=0.02)
+    later = dead.sel(time=slice(ONSET + 1e-3, None))
+    assert not later["duty"].values.any()
+    assert not later["i_ref"].values.any()
+
+
+def test_a_controller_that_restarts_begins_with_empty_memory():
+    recording = failed("ecu.restarted", "0.5 s", duration="3 s")
+    p, dead = bar(recording), bar(failed("ecu.dead", duration="3 s"))
+    again = int(np.searchsorted(recording["time"].values, ONSET + 0.5 + 1e-6))
+    np.testing.assert_array_equal(p[:again], dead[:again])
+    assert p[again] < 17.0
+    assert p[-100:].mean() == pytest.approx(37.0, abs=0.3)
+    # its integral starts at nothing: the pressure is built up as from a standing start
+    assert p[again:].max() < 45.0

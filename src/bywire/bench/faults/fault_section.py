@@ -17,7 +17,7 @@ from bywire.core.parameters import ParameterSet
 
 _OWN = ("fault", "value", "seed", "set")
 _RANGES = {"dropout": (0.0, 1.0), "missed": (0.0, 1.0), "noise": (0.0, math.inf),
-           "late": (1.0, 1000.0), "dropped": (2.0, 1e6)}  # fmt: skip
+           "late": (1.0, 1000.0), "dropped": (2.0, 1e6), "restarted": (1e-6, math.inf)}  # fmt: skip
 
 
 @dataclass(frozen=True)

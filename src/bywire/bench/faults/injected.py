@@ -153,8 +153,8 @@ def _falsified(
                 each = falsify(mode, fault.value, size, since, case.par, draws)
                 given = {names[kind]: values for kind, values in each.items()}
             elif mode.task:
-                ticks = since / periods[mode.task]
-                given = {rests(mode.task): missed(mode, fault.value, size, ticks, draws)}
+                period = periods[mode.task]
+                given = {rests(mode.task): missed(mode, fault.value, size, since, period, draws)}
             for name, values in given.items():
                 rows[name] = rows.get(name, 0.0) + values
         return rows

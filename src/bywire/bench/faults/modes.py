@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from bywire.bench.stimuli.quantities import TOLERANCE
 from bywire.core.errors import ModelError
 from bywire.core.faults import CHANNELS, FAULTS, Channel, ParameterFault
 from bywire.core.model import ASSEMBLIES, Model
 from bywire.core.parameters import ParameterSet, leaf_fields
 from bywire.core.signals import signals_of
 from bywire.core.typing import Array
-from bywire.simulation.tapped import Tap
+from bywire.simulation.tapped import DEAD, Tap
 
 Changes = Callable[[Any, float], Mapping[str, Any]]
 
@@ -90,6 +91,8 @@ _TASK = {
     "frozen": ("misses every tick, what it gave out stays", "", 0.0),
     "dropped": ("runs only every so many ticks", "ticks", 2.0),
     "missed": ("misses ticks, with a probability", "probability", 0.2),
+    "dead": ("runs no more, all it renews is as at rest; then begins with empty memory", "", 0.0),
+    "restarted": ("begins anew with empty memory, after a time", "duration", 0.05),
 }
 _VALUES = {"factor": 0.5, "probability": 0.2, "ticks": 5.0}
 
@@ -190,7 +193,8 @@ def _of_channel(channel: Channel, tasks: Collection[str]) -> Iterator[Mode]:
 def _unit(kind: str, unit: str) -> str:
     if not kind:
         return ""
-    return {"level": unit, "offset": unit, "rate": f"{unit}/s"}.get(kind, "1")
+    units = {"level": unit, "offset": unit, "rate": f"{unit}/s", "duration": "s"}
+    return units.get(kind, "1")
 
 
 def _identifier(name: str) -> str:
@@ -238,14 +242,18 @@ def falsify(
 
 
 def missed(
-    mode: Mode, value: float, size: Array, ticks: Array, draws: np.random.Generator
+    mode: Mode, value: float, size: Array, since: Array, period: float, draws: np.random.Generator
 ) -> Array:
-    """Return where a task misses its tick, of the stimulus' rows.
+    """Return where a task misses its tick, and where it is dead, of the stimulus' rows.
 
-    ``ticks``: ticks of the task since the onset, at every row.
+    ``since``: time since the onset [s], at every row; ``period``: of the task [s].
     """
     if mode.falsified == "dropped":
-        return np.where(np.mod(np.round(ticks), round(value)) != 0, size > 0, 0.0)
+        return np.where(np.mod(np.round(since / period), round(value)) != 0, size > 0, 0.0)
+    if mode.falsified == "dead":
+        return np.where(size > 0, DEAD, 0.0)
+    if mode.falsified == "restarted":
+        return np.where((size > 0) & (since < value - TOLERANCE), DEAD, 0.0)
     if mode.falsified == "missed":
         return np.where(draws.random(size.size) < value, size > 0, 0.0)
     return np.where(size > 0, 1.0, 0.0)
