@@ -48,6 +48,7 @@ MOTORCYCLE: list[tuple[dict[str, Any], Counts]] = [
     ({"ecu.dither.waveform": "off"}, (283, 645, 136, (116,))),
     ({"ecu.dither.waveform": "square"}, (283, 645, 136, (131,))),
     ({"ecu.dither.waveform": "triangle"}, (283, 645, 136, (136,))),
+    ({"caliper.fluid_heat": "warming"}, (293, 653, 136, (131,))),
     ({"motor_heat.law": "lumped"}, (339, 686, 147, (131,))),
     ({"ecu.derating.law": "current"}, (283, 645, 136, (175,))),
     ({"drive.mode": "pedal"}, (283, 645, 136, (160,))),

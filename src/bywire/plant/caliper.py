@@ -6,14 +6,17 @@ from itertools import pairwise
 from typing import Annotated, Literal, NamedTuple
 
 from annotated_types import Ge
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
 from bywire.core import ops
 from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
-from bywire.core.quantities import Area, Conductance, Nodes, Stiffness, Unit
+from bywire.core.quantities import Area, Conductance, Nodes, Stiffness, Unit, Volume
 from bywire.core.signals import Energy, FluidCompliance, Power, Signal
 from bywire.plant import brake_fluid
+
+Expansion = Annotated[float, Unit("1/K", 7e-4), Field(ge=0, allow_inf_nan=False)]
+WarmingRate = Annotated[float, Unit("delta_degC/s", 1.0), Field(allow_inf_nan=False)]
 
 
 class Parameters(ParameterSet):
@@ -22,8 +25,9 @@ class Parameters(ParameterSet):
     ``law``: ``"linear"`` is eq. (11); ``"compressible"`` is eq. (10), with the compressibility
     of the fluid in the caliper; ``"table"`` interpolates a measured pressure-volume curve, whose
     flat start can hold the volume of a knock-back. ``leak``: whether fluid is lost to the outside
-    in proportion to the pressure. Gas in line and caliper (``fluid.air = "caliper"``) adds to the
-    volume that the caliper takes in.
+    in proportion to the pressure. ``fluid_heat``: whether the fluid in the caliper warms and
+    expands: where no port lets it out, it presses the pads on. Gas in line and caliper
+    (``fluid.air = "caliper"``) adds to the volume that the caliper takes in.
     """
 
     law: Literal["linear", "compressible", "table"]
@@ -41,6 +45,14 @@ class Parameters(ParameterSet):
     """whether fluid is lost to the outside"""
     G_leak: Conductance
     """conductance of the leak; used by leak "leaking" only"""
+    fluid_heat: Literal["off", "warming"]
+    """whether the fluid in the caliper warms"""
+    V_hot: Volume
+    """volume of the fluid that warms; used by fluid_heat "warming" only"""
+    alpha_V: Expansion
+    """its expansion by volume"""
+    T_rate: WarmingRate
+    """by how much it warms in a time"""
 
     @model_validator(mode="after")
     def _table_is_a_curve(self) -> Parameters:
@@ -60,6 +72,8 @@ FAULTS = (
     ParameterFault("soft", "softer pads or a hose that swells", ("K_pd",), 0.5),
     ParameterFault("leaking", "fluid is lost to the outside, by the leak's conductance",
                    replaced="G_leak", value=1e-13, with_it={"leak": "leaking"}),
+    ParameterFault("heated", "fluid in the caliper warms and expands, by the rate",
+                   replaced="T_rate", value=1.0, with_it={"fluid_heat": "warming"}),
 )
 
 
@@ -104,11 +118,17 @@ def _pads(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> float:
     return spring if par.law == "linear" else spring * (1.0 + x.p / fluid.beta)
 
 
+def expansion(par: Parameters) -> Annotated[float, Signal("m**3/s", "flow", 1e-8)]:
+    r"""Return the volume by which warming fluid grows in a time, :math:`\alpha_V V \dot T`."""
+    return 0.0 if par.fluid_heat == "off" else par.alpha_V * par.V_hot * par.T_rate
+
+
 def balance(
     x: State, u: Input, par: Parameters
 ) -> Annotated[float, Signal("m**3/s", "flow", 1e-6)]:
-    """Return the flow that the pads take up: all that comes in, but for what leaks."""
-    return u.q if par.leak == "tight" else u.q - par.G_leak * x.p
+    """Return the flow that the pads take up: what comes in and expands, but for what leaks."""
+    q = u.q if par.fluid_heat == "off" else u.q + expansion(par)
+    return q if par.leak == "tight" else q - par.G_leak * x.p
 
 
 def _slope(p: float, par: Parameters) -> float:
@@ -146,9 +166,15 @@ def _pad_energy(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> flo
     return spring * stored
 
 
-def power_in(x: State, u: Input, fluid: brake_fluid.Parameters) -> Power:
-    """Return what the inflow carries."""
-    return brake_fluid.convected_power(u.q, x.p, fluid)
+def power_in(x: State, u: Input, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+    """Return what the inflow carries, and what fluid that expands gives."""
+    carried = brake_fluid.convected_power(u.q, x.p, fluid)
+    return carried if par.fluid_heat == "off" else carried + expansion_power(x, par, fluid)
+
+
+def expansion_power(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:
+    """Return what fluid that expands gives, signed: where it cools it takes."""
+    return brake_fluid.convected_power(expansion(par), x.p, fluid)
 
 
 def power_loss(x: State, par: Parameters, fluid: brake_fluid.Parameters) -> Power:

@@ -38,6 +38,7 @@ CHOICES: dict[str, dict[str, Any]] = {
     "pressure_sensor.place": {"mid-pipeline": {}},
     "adc.law": {"ideal": {}},
     "ecu.schedule.law": {"regions": {"ecu.schedule.low.k_p": 2e-5, "ecu.schedule.low.k_i": 2e-4}},
+    "caliper.fluid_heat": {"warming": {"caliper.T_rate": 2.0}},
     "ecu.derating.law": {"current": {"ecu.derating.T_a_hat": 417.0}},
     "motor_heat.law": {"lumped": {"motor_heat.C_w": 0.02}},
     "ecu.filter.place": {"before-dither": {}},

@@ -11,7 +11,11 @@ import pytest
 
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import actuator_ledger
+from bywire.bench.experiment import as_run
+from bywire.bench.recording import record
 from bywire.bench.running import run
+from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.simulation.run import simulate
 
 HOLD = {"p_from": "37 bar", "p_to": "37.0001 bar", "duration": "4 s"}
 ONSET = 1.5
@@ -178,3 +182,49 @@ def test_a_controller_that_restarts_begins_with_empty_memory():
     assert p[-100:].mean() == pytest.approx(37.0, abs=0.3)
     # its integral starts at nothing: the pressure is built up as from a standing start
     assert p[again:].max() < 45.0
+
+
+def warmed(**changes):
+    """Return the recording of a brake at rest whose caliper warms by 5 K/s, and its parameters."""
+    par = Bench("hard-braking", "dardanelli2010").par
+    case = case_from_rest(
+        "run", par, "current-source", 0.0, lambda t: {"i_set": 0.0 * t}, 6.0,
+        {"caliper.fluid_heat": "warming", "caliper.T_rate": 5.0, **changes},
+    )  # fmt: skip
+    recording = record(as_run(case, 2e-5), simulate(as_run(case, 2e-5)), 0.0, 0.0, {})
+    books = actuator_ledger(recording)
+    assert abs(books.closing_error) < 1e-9 * books.turnover
+    return recording, case.par
+
+
+def test_fluid_that_warms_behind_a_blocked_port_presses_the_pads_on():
+    blocked = {"port.law": "dead-stroke", "port.G_port": 0.0}
+    (recording, par), (opened, _) = warmed(**blocked), warmed(**{"port.law": "dead-stroke"})
+    p = recording["p_pd"].values[-1]
+    # 30 K of 5 ml go into the pads' spring, the chamber's fluid, and the stop the piston leans on.
+    grown = par.caliper.alpha_V * par.caliper.V_hot * 30.0
+    assert grown == pytest.approx(1.05e-7)
+    pads = par.caliper.A_pd**2 / par.caliper.K_pd
+    assert p == pytest.approx(grown / pads, rel=0.01)
+    cylinder = par.master_cylinder
+    chamber = cylinder.A_mc * (cylinder.s_mc - cylinder.x_rest) / par.fluid.beta
+    leans = -cylinder.A_mc * recording["F_stop"].values[-1] / par.stop.k_stop
+    assert p * (pads + chamber) + leans == pytest.approx(grown, rel=1e-3)
+    # an open port lets it out: flow over conductance
+    flow = par.caliper.alpha_V * par.caliper.V_hot * 5.0
+    assert opened["p_mc"].values[-1] == pytest.approx(flow / 1e-11, rel=1e-3)
+
+
+def test_a_port_that_gets_blocked_keeps_what_a_caliper_expands():
+    heated = {"fault": "caliper.heated", "value": "2 K/s", "onset": 0.6, "lasts": 1.0}
+    bench = Bench(
+        "release", "dardanelli2010", {"port.law": "dead-stroke"},
+        options={"p_from": "5 bar", "duration": "2 s"},
+        faults=[heated, {"fault": "port.blocked", "onset": -9.0}],
+    )  # fmt: skip
+    left = bar(run(bench).recording)[-1]
+    opened = Bench(
+        "release", "dardanelli2010", {"port.law": "dead-stroke"},
+        options={"p_from": "5 bar", "duration": "2 s"}, faults=[heated],
+    )  # fmt: skip
+    assert left > bar(run(opened).recording)[-1] + 0.5

@@ -67,7 +67,8 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
     port = Part(reservoir_port)
     E_port = Integral(
-        "J", "energy out through reservoir port and leak", role=Role("sink", "port and leak")
+        "J", "energy out through port and leak, less that of fluid that warms",
+        role=Role("sink", "port, leak, warming fluid"),
     )
     W_shaft = Integral("J", "work of the motor on the gear")
     t_stuck = Integral("s", "time stuck", role=Role("standstill"))
@@ -170,6 +171,8 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         battery = battery_supply.power_source(w.supply.u, w.supply.par)
         port = reservoir_port.power_loss(w.port.u, w.port.par, w.par.fluid)
         port = port + caliper.power_loss(w.pads.x, w.pads.par, w.par.fluid)
+        if w.pads.par.fluid_heat != "off":
+            port = port - caliper.expansion_power(w.pads.x, w.pads.par, w.par.fluid)
         return {
             "E_source": w.voltage * w.current if ideal else battery,
             "E_copper": w.heat.u.P,

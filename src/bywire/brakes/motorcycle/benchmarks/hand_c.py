@@ -24,6 +24,7 @@ SUBJECT = Subject(
         "port.law": ("makeup",),
         "fluid.air": ("none",),
         "caliper.law": ("linear",),
+        "caliper.fluid_heat": ("off",),
         "pressure_sensor.place": ("master-cylinder",),
         "adc.law": ("quantized",),
         "ecu.derating.law": ("off",),
