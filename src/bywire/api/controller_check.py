@@ -13,7 +13,7 @@ from bywire.core.errors import CompilerError, ModelError
 from bywire.core.provenance import Cited
 from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
-from bywire.export.controller.program import Program, program
+from bywire.export.controller.program import program
 from bywire.export.controller.target.targets import TARGETS, missing_tools
 from bywire.export.controller.target.trial import Trial, host_trial, target_trial
 from bywire.export.controller.vectors import vectors
@@ -155,7 +155,8 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
     for precision in PRECISIONS:
         try:
             made = program(case.model, case.par, precision)
-            texts = files(made, case.memory, cited, count)
+            every = vectors(made, case.memory, count)
+            texts = files(made, case.memory, cited, every)
         except ModelError as error:
             if precision == "double":
                 raise
@@ -172,12 +173,5 @@ def check_controller(case: Case, cited: Mapping[str, Cited], count: int) -> Cont
             if compiler is not None:
                 trials.append(host_trial(made, folder, compiler, scratch))
             if not missing:
-                trials += _on_targets(made, case, folder, scratch, count)
+                trials += [target_trial(made, every, folder, t, scratch) for t in TARGETS]
     return ControllerCheck(tuple(trials), tried, tuple(skipped), tuple(inexact))
-
-
-def _on_targets(
-    made: Program, case: Case, folder: Path, scratch: Path, count: int
-) -> list[Trial]:
-    every = vectors(made, case.memory, count)
-    return [target_trial(made, every, folder, each, scratch) for each in TARGETS]

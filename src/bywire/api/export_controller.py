@@ -16,6 +16,7 @@ from bywire.core.scratch import scratch_folder
 from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
+from bywire.export.controller.vectors import vectors as test_vectors
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Flat, Listing, Paragraph, Section
 
@@ -150,7 +151,8 @@ def export_controller(
     case = replace(chosen, faults=()).cases()[0]
     made = program(case.model, case.par, precision)
     cited = PARAMETER_SETS.find(chosen.parameters).values
-    texts = files(made, case.memory, cited, vectors, bus=dbc)
+    every = test_vectors(made, case.memory, vectors)
+    texts = files(made, case.memory, cited, every, bus=dbc)
     folder = Path(out).expanduser()
     try:
         folder.mkdir(parents=True, exist_ok=True)

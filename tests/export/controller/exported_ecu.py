@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import shutil
 import subprocess
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import bywire
 from bywire.export.controller.harness import FLAGS
+from bywire.export.controller.vectors import Vectors
 
 STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
     "pressure, sine dither": ("hard-braking", "dardanelli2010", {}),
@@ -49,6 +52,16 @@ STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
 """structural choices of all brakes: experiment, parameter set, overrides"""
 
 BRAKES = ("pressure, sine dither", "moment and position", "slip by rules")
+
+
+def bits_of(precision: str, every: Sequence[Vectors]) -> str:
+    """Return the number that a harness makes of all results, where they are those of Python."""
+    bits, kind = 2166136261, "<f4" if precision == "single" else "<f8"
+    for each in every:
+        for byte in np.ascontiguousarray(each.after, dtype=kind).tobytes():
+            bits = (bits ^ byte) * 16777619 & 0xFFFFFFFF
+    return f"{bits:08x}"
+
 
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 

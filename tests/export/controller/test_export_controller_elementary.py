@@ -16,6 +16,7 @@ from bywire.core.signals import Signal
 from bywire.export.controller.files import files
 from bywire.export.controller.harness import FLAGS, WARNINGS
 from bywire.export.controller.program import program
+from bywire.export.controller.vectors import vectors
 
 Number = Annotated[float, Signal("1", "a number", 1.0)]
 
@@ -62,9 +63,9 @@ def test_all_functions_equal_python(precision: str, tmp_path: Path) -> None:
         name="functions", State=Nothing, Stimulus=Nothing, Memory=Memory,
         tasks=lambda par: [Task("only", 0.001, law)],
     )  # fmt: skip
-    made = program(model, Parameters(), precision)
+    made, start = program(model, Parameters(), precision), Memory(*[0.5] * 7)
     assert {each.rstrip("f") for each in made.libraries} == {"fabs"}
-    for name, text in files(made, Memory(*[0.5] * 7), {}, 1000).items():
+    for name, text in files(made, start, {}, vectors(made, start, 1000)).items():
         (tmp_path / name).write_text(text)
     built = build(tmp_path, *FLAGS, *WARNINGS)
     assert built.said == ""

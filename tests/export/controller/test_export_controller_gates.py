@@ -136,3 +136,37 @@ def test_single_fits_a_small_target(tmp_path: Path) -> None:
         assert data == bss == 0
     assert read_only <= 2048
     assert 4 * len(made.program.members(made.program.model.Memory)) <= 128
+
+
+ADDON = next(Path("/usr/lib").glob("*/cppcheck/addons/misra.py"), Path("misra.py"))
+ADVISORY = {"12.1"}
+"""rules whose findings are known: 12.1 wants parentheses where the order is clear to readers"""
+
+
+@pytest.mark.skipif(
+    shutil.which("cppcheck") is None or not ADDON.exists(),
+    reason="cppcheck and its addon misra.py are not installed",
+)
+@pytest.mark.parametrize(
+    ("structure", "precision"),
+    [(BRAKES[0], "single"), (BRAKES[1], "double"), (BRAKES[2], "double")],
+)
+def test_misra_finds_nothing_that_is_required(
+    structure: str, precision: str, tmp_path: Path
+) -> None:
+    made = export_controller(
+        bench_of(structure), tmp_path, precision=precision, vectors=1, dbc=True
+    )
+    found: dict[str, list[str]] = {}
+    for part in ("ecu", "io", "parameters", "can"):
+        source = tmp_path / f"{made.program.name}_{part}.c"
+        subprocess.run(["cppcheck", "--dump", "--std=c99", "-q", str(source)], check=True)
+        said = subprocess.run(
+            [sys.executable, str(ADDON), "--no-summary", f"{source}.dump"],
+            capture_output=True, text=True, check=False,
+        )  # fmt: skip
+        for line in (said.stdout + said.stderr).splitlines():
+            rule = re.search(r"misra-c2012-([0-9.]+)", line)
+            if rule is not None:
+                found.setdefault(rule[1], []).append(line)
+    assert set(found) <= ADVISORY, {r: lines for r, lines in found.items() if r not in ADVISORY}

@@ -15,6 +15,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.signals import Signal
 from bywire.export.controller.files import files
 from bywire.export.controller.program import program
+from bywire.export.controller.vectors import vectors
 
 Number = Annotated[float, Signal("1", "a number", 1.0)]
 
@@ -67,8 +68,8 @@ def test_old_memory_is_read_behind_changes(tmp_path: Path) -> None:
     model: Any = SimpleNamespace(
         name="swaps", State=Nothing, Stimulus=Nothing, Memory=Memory, tasks=lambda par: [task]
     )
-    made = program(model, Parameters())
-    for name, text in files(made, Memory(1.0, 2.0), {}, 50).items():
+    made, start = program(model, Parameters()), Memory(1.0, 2.0)
+    for name, text in files(made, start, {}, vectors(made, start, 50)).items():
         (tmp_path / name).write_text(text)
     done = build(tmp_path).run()
     assert done.returncode == 0

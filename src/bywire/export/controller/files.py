@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from bywire.core.provenance import Cited
@@ -13,12 +13,13 @@ from bywire.export.controller.harness import harness, makefile, vector_header
 from bywire.export.controller.parameter_file import parameter_file
 from bywire.export.controller.program import Program
 from bywire.export.controller.readme import readme
-from bywire.export.controller.vectors import vectors
+from bywire.export.controller.vectors import Vectors
 
 
 def files(
-    program: Program, memory: Any, cited: Mapping[str, Cited], count: int, *, bus: bool = False
-) -> dict[str, str]:
+    program: Program, memory: Any, cited: Mapping[str, Cited], every: Sequence[Vectors], *,
+    bus: bool = False,
+) -> dict[str, str]:  # fmt: skip
     """Return the text of every file.
 
     Parameters
@@ -27,8 +28,8 @@ def files(
         With which the bench begins.
     cited
         Values of the parameter set with their provenance.
-    count
-        Test vectors of each task.
+    every
+        Test vectors of the tasks.
     bus
         Whether measurements are described for a CAN bus, too.
     """
@@ -42,7 +43,6 @@ def files(
     if render.has_io(program):
         made[f"{name}_io.h"] = render.io_header(program)
         made[f"{name}_io.c"] = render.io_source(program)
-    every = vectors(program, memory, count)
     made[f"{name}_test_vectors.h"] = vector_header(program, every)
     made[f"{name}_harness.c"] = harness(program, every)
     made["Makefile"] = makefile(program, render.has_io(program))
@@ -51,5 +51,5 @@ def files(
         made[f"{name}.dbc"] = dbc(program)
         made[f"{name}_can.h"] = can_header(program)
         made[f"{name}_can.c"] = can_source(program)
-    made["README.txt"] = readme(program, sorted([*made, "README.txt"]), count)
+    made["README.txt"] = readme(program, sorted([*made, "README.txt"]), len(every[0].given))
     return made

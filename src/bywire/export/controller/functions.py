@@ -63,7 +63,6 @@ class CFunction:
     statements: list[Statement] = field(default_factory=list)
     returned: Expr | None = None
     changes: set[str] = field(default_factory=set)
-    own: set[str] = field(default_factory=set)
     moving: set[str] = field(default_factory=set)
 
     @property
@@ -81,7 +80,6 @@ def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
     if isinstance(value, Update):
         value = _changed(value, body)
     value = _left_there(made, body, value)
-    made.own = set(body.names)
     is_group = isinstance(value, Group) and value.origin
     if isinstance(value, (Known, Array, Given)) or is_group:
         made.value = value

@@ -5,8 +5,6 @@ from __future__ import annotations
 import textwrap
 from collections.abc import Sequence
 
-import numpy as np
-
 from bywire.export.controller.c_text import c_name, comment
 from bywire.export.controller.parameter_file import parameter_values
 from bywire.export.controller.program import Program
@@ -121,16 +119,6 @@ static void mix({real} value)
         bits = (bits ^ bytes[n]) * 16777619u;
     }}
 }}"""
-
-
-def bits_of(program: Program, every: Sequence[Vectors]) -> int:
-    """Return the number that a harness makes of all results, where they are those of Python."""
-    kind = np.float32 if program.precision.name == "single" else np.float64
-    bits = 2166136261
-    for each in every:
-        for byte in np.ascontiguousarray(each.after, dtype=f"<{np.dtype(kind).str[1:]}").tobytes():
-            bits = (bits ^ byte) * 16777619 & 0xFFFFFFFF
-    return bits
 
 
 def prepared(program: Program, vectors: Vectors) -> list[str]:

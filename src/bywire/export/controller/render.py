@@ -64,13 +64,17 @@ def operations(program: Program) -> str:
                 f"static inline {real} {each}({real} x, {real} y)\n{{\n"
                 f"    return (y {sign} x) ? y : x;\n}}"
             )
-    parts += [
-        "\n".join(wrapped(line[len(lead):], lead) for line in text.splitlines() for lead in
-                  [line[: len(line) - len(line.lstrip())]])
-        for text in elementary(ours, program.precision)
-    ]
+    parts += map(_lines_wrapped, elementary(ours, program.precision))
     parts += [_function(program, each, "static inline ") for each in _of_ops(program)]
     return "\n\n".join([*parts, "#endif"]) + "\n"
+
+
+def _lines_wrapped(text: str) -> str:
+    lines = []
+    for line in text.splitlines():
+        rest = line.lstrip()
+        lines.append(wrapped(rest, line[: len(line) - len(rest)]))
+    return "\n".join(lines)
 
 
 def _of_ops(program: Program) -> list[CFunction]:

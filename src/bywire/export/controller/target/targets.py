@@ -26,14 +26,11 @@ class Target:
         For the compiler.
     machine
         Board of the emulator.
-    has_unit
-        Precisions in which its instructions compute.
     """
 
     name: str
     flags: tuple[str, ...]
     machine: str
-    has_unit: tuple[str, ...] = ()
 
 
 TARGETS = (
@@ -41,12 +38,12 @@ TARGETS = (
     Target(
         "Cortex-M4F",
         ("-mcpu=cortex-m4", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv4-sp-d16"),
-        "mps2-an386", ("single",),
+        "mps2-an386",
     ),
     Target(
         "Cortex-M7",
         ("-mcpu=cortex-m7", "-mthumb", "-mfloat-abi=hard", "-mfpu=fpv5-d16"),
-        "mps2-an500", ("single", "double"),
+        "mps2-an500",
     ),
 )  # fmt: skip
 
