@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from bywire.api.margins import margins
     from bywire.api.new import NewBrake, new
     from bywire.api.overview import overview
+    from bywire.api.page import BenchPage, page
     from bywire.api.replay import Replay, replay
     from bywire.api.reproduce import reproduce
     from bywire.api.run import BenchResult, run
@@ -110,6 +111,8 @@ _HOMES = {
     "reproduce": "api.reproduce",
     "describe": "api.describe",
     "overview": "api.overview",
+    "BenchPage": "api.page",
+    "page": "api.page",
     "margins": "api.margins",
     "new": "api.new",
     "NewBrake": "api.new",
@@ -125,6 +128,7 @@ _HOMES = {
 __all__ = [
     "Bench",
     "BenchEnsemble",
+    "BenchPage",
     "BenchRange",
     "BenchResult",
     "Brake",
@@ -164,6 +168,7 @@ __all__ = [
     "margins",
     "new",
     "overview",
+    "page",
     "parameters",
     "project_life",
     "read_measurement",

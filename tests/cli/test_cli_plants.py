@@ -35,7 +35,7 @@ def test_texts_and_figures(bywire, tmp_path):
     page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
     for text in ("largest error up to", "poles besides these: 1 at 0", "How it was made"):
         assert text in page
-    assert "poles besides these: 2 at 0" in outcome.out
+    assert "poles besides these: 1 at 0" in outcome.out
 
 
 def test_friction_of_a_plant(bywire):

@@ -28,6 +28,7 @@ from bywire.cli.loop_commands import (
     margins_command,
 )
 from bywire.cli.output import result
+from bywire.cli.page_command import page_command
 from bywire.cli.sizing_commands import design_command, study_command
 from bywire.cli.study_commands import study_app
 
@@ -42,6 +43,7 @@ app = typer.Typer(
 app.command("list")(list_command)
 app.command("run")(run)
 app.command("compare")(compare)
+app.command("page")(page_command)
 app.command("reproduce")(reproduce_command)
 app.command("benchmark")(benchmark_command)
 app.command("linearize")(linearize_command)

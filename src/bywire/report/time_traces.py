@@ -65,7 +65,7 @@ def time_traces(
     ParameterError
         When the recording has none of the variables, or a panel mixes units.
     """
-    present = _chosen(recording) if panels is None else drawable(recording, panels)
+    present = shown_panels(recording) if panels is None else drawable(recording, panels)
     if not present:
         wanted = ", ".join(trace.variable for panel in panels or () for trace in panel.traces)
         raise ParameterError(
@@ -94,7 +94,7 @@ def time_traces(
     return figure
 
 
-def _chosen(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
+def shown_panels(recording: xr.Dataset) -> list[tuple[Panel, list[Trace]]]:
     """Return the declared panels of which the recording shows most, or those by unit."""
     known = [drawable(recording, each.panels) for each in declared_panels(recording)]
     most = max(known, key=len, default=[])

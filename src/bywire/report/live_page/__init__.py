@@ -1,0 +1,1 @@
+"""A bench in a page: the run itself as WebAssembly, parameters to move, curves."""

@@ -1,0 +1,159 @@
+/* The page: values of parameters in, curves out, the latest value first. */
+
+const read = (id) => JSON.parse(document.getElementById(id).textContent);
+const bench = read("bench");
+const { description, digest, panels, chosen, judged } = bench;
+const parameters = description.parameters.filter(({ used }) => used);
+const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
+const kept = [];
+const place = (id) => document.getElementById(id);
+let run = null, busy = false, wanted = null, number = 0;
+
+function complain(text) {
+  place("message").textContent = text;
+  place("message").hidden = !text;
+}
+
+const changes = () =>
+  Object.fromEntries(parameters.filter((p) => values[p.name] !== p.start).map((p) => [p.name, values[p.name]]));
+
+function describe() {
+  const made = changes(), count = Object.keys(made).length;
+  place("changes").textContent = count
+    ? `changed: ${Object.entries(made).map(([name, value]) => {
+      const parameter = parameters.find((each) => each.name === name);
+      return `${name} = ${digits(shownOf(value, parameter))} ${parameter.shownUnit}`.replace(/ 1$/, "");
+    }).join(", ")}`
+    : "as in the bench";
+  place("reset").disabled = count === 0;
+  history.replaceState(null, "", count ? `#${linkOf(digest, made)}` : " ".trim() || location.pathname);
+}
+
+/* Key figures beside those of the runs that were kept, and whether they are as required. */
+function judge() {
+  place("figures").hidden = !judged;
+  place("unjudged").hidden = Boolean(judged);
+  if (!judged) return;
+  const given = keyFigures(run.time, run.signals, judged.settings);
+  const followed = judged.followed.filter((name) => name in changes());
+  place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
+    const computed = followed.length && STEP.includes(figure.name)
+      ? undefinedFor(`an option follows ${followed}: save the bench file and run it`) : given[figure.name];
+    const unit = figure.unit === "1" ? "" : ` ${figure.unit}`;
+    const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
+      : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
+    const met = figure.limit && isMet(computed, figure.limit);
+    const verdict = figure.limit
+      ? element("td", { class: met ? "met" : "missed" }, `${met ? "✓" : "✗"} ${figure.text}`)
+      : element("td", {}, computed.reason);
+    return element("tr", {}, element("th", { scope: "row", title: figure.definition }, figure.name), value, verdict);
+  }));
+}
+
+/* One run at a time: what was asked for meanwhile replaces what waited. */
+function ask() {
+  wanted = { ...values };
+  if (busy) return;
+  busy = true;
+  number += 1;
+  place("work").textContent = "running …";
+  worker.postMessage({ number, values: wanted });
+  wanted = null;
+}
+
+function answered({ data: { error, time, signals, settled } }) {
+  busy = false;
+  if (error) {
+    complain(error);
+    place("work").textContent = "not run";
+  } else {
+    run = recordingOf({ time, signals }, description.settle, bench.keep);
+    place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
+    place("keep").disabled = place("csv").disabled = false;
+    judge();
+    plots.draw(run, kept, values);
+  }
+  if (wanted) ask();
+}
+
+function changed(name, value) {
+  values[name] = value;
+  describe();
+  ask();
+}
+
+function save(name, kind, text) {
+  const link = element("a", { href: URL.createObjectURL(new Blob([text], { type: kind })), download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+}
+
+function showKept() {
+  place("kept").replaceChildren(...kept.map((each, k) => {
+    const drop = element("button", { type: "button", "aria-label": `drop ${each.name}` }, "×");
+    drop.addEventListener("click", () => {
+      kept.splice(k, 1);
+      showKept();
+      plots.draw(run, kept, values);
+    });
+    return element("li", { title: each.told }, each.name, drop);
+  }));
+}
+
+place("keep").addEventListener("click", () => {
+  const count = 1 + Math.max(0, ...kept.map(({ name }) => Number(name.split(" ")[1])));
+  kept.push({ ...run, name: `run ${count}`, told: place("changes").textContent });
+  showKept();
+  plots.draw(run, kept, values);
+});
+place("reset").addEventListener("click", () => {
+  for (const { name, start } of parameters) if (values[name] !== start) rows.get(name).show((values[name] = start));
+  complain("");
+  describe();
+  ask();
+});
+place("csv").addEventListener("click", () =>
+  save(`${description.name}.csv`, "text/csv", csvOf(run.time, run.signals, description.signals)));
+place("toml").addEventListener("click", () =>
+  save(`${description.name}.toml`, "application/toml", benchFile(bench.text, changes(), parameters)));
+place("link").addEventListener("click", async () => {
+  await navigator.clipboard?.writeText(location.href).catch(() => undefined);
+  place("work").textContent = "the address of this page holds its values";
+});
+
+function take(link) {
+  try {
+    const asked = changesOf(link, digest, parameters);
+    for (const { name, start } of parameters) rows.get(name).show((values[name] = asked[name] ?? start));
+    complain("");
+  } catch (error) {
+    complain(error.message);
+  }
+  describe();
+}
+
+const rows = parameterPanel(place("parameters"), parameters, chosen, changed, complain);
+const plots = curves(place("curves"), panels);
+const again = () => run && plots.draw(run, kept, values);
+new ResizeObserver(again).observe(place("curves"));
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
+  plots.forget();
+  again();
+});
+let worker;
+if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
+  complain("this browser runs no WebAssembly in workers, by which the bench is computed: take a current one");
+} else {
+  const bytes = Uint8Array.from(atob(read("kernel")), (letter) => letter.charCodeAt(0));
+  const text = `${read("loader")}\n${read("worker")}`;
+  worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
+  worker.addEventListener("message", answered);
+  worker.addEventListener("error", (event) => complain(`the bench does not run: ${event.message}`));
+  worker.postMessage({ bytes, description });
+  take(location.hash.slice(1));
+  ask();
+  addEventListener("hashchange", () => {
+    take(location.hash.slice(1));
+    ask();
+  });
+}

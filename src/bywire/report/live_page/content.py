@@ -1,0 +1,189 @@
+"""The page's text: a file with kernel, scripts and styles inside, and a policy that admits no more.
+
+Whatever a browser runs or styles stands in the page with its digest in the policy; what is data
+stands as JSON in which no tag can begin.
+"""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from html import escape
+from importlib.resources import files
+from string import Template
+from typing import TYPE_CHECKING, Any
+
+from bywire.bench.bench_text import bench_text
+from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.requirements import limit_of
+from bywire.bench.result import Result
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.quantities import display_unit
+from bywire.core.units import convert
+from bywire.core.version import __version__
+from bywire.export.exported import Exported
+from bywire.export.wasm.module import module_files
+from bywire.report.live_page.dependence import dependence
+from bywire.report.panels import Panel, Trace
+from bywire.report.parameter_rows import parameter_rows
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_SCRIPTS = ("values.js", "figures.js", "controls.js", "curves.js", "bench.js")
+FAMILIES = frozenset({"step_response", "effort", "occupation", "extremes"})
+"""key figures that the page computes itself"""
+_NAME = "run"  # of the module, inside the page
+
+
+def page_text(
+    made: Exported, panels: Sequence[tuple[Panel, Sequence[Trace]]], result: Result,
+    chosen: Sequence[str],
+) -> str:  # fmt: skip
+    """Return the page of a run.
+
+    Parameters
+    ----------
+    made
+        The run.
+    panels
+        What is drawn over time, with the traces that the recording has.
+    result
+        What the bench itself gave: labels and units of signals, definitions of key figures.
+    chosen
+        Parameters that stand first.
+
+    Raises
+    ------
+    CompilerError
+        Without the extra ``compiler``.
+    """
+    name = made.bench.name or made.bench.experiment
+    module = module_files(made, _NAME)
+    data = _data(made, json.loads(module[f"{_NAME}.json"]), panels, result, chosen)
+    digest = hashlib.sha256(module[f"{_NAME}.wasm"] + json.dumps(data).encode()).hexdigest()[:16]
+    data["digest"] = digest
+    data["description"]["name"] = "".join(c if c.isalnum() else "_" for c in name)
+    loader = module["bywire.mjs"].decode().replace("export async function", "async function")
+    blocks = {
+        "bench": data, "kernel": base64.b64encode(module[f"{_NAME}.wasm"]).decode(),
+        "loader": loader, "worker": _text("worker.js"),
+    }  # fmt: skip
+    style = _text("uplot/uPlot.min.css") + _text("live.css")
+    library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"
+    script = '"use strict";\n' + "\n".join(map(_text, _SCRIPTS))
+    policy = (
+        f"default-src 'none'; script-src {_hashed(library)} {_hashed(script)} 'wasm-unsafe-eval'; "
+        f"style-src {_hashed(style)}; worker-src blob:; base-uri 'none'; form-action 'none'"
+    )
+    return Template(_text("page.html")).substitute(
+        policy=policy, title=escape(name), summary=escape(_summary(made)),
+        style=style, library=library, script=script, footer=escape(_footer(made)),
+        data="\n".join(_block(key, value) for key, value in blocks.items()),
+    )  # fmt: skip
+
+
+def _data(
+    made: Exported, description: dict[str, Any],
+    panels: Sequence[tuple[Panel, Sequence[Trace]]], result: Result, chosen: Sequence[str],
+) -> dict[str, Any]:  # fmt: skip
+    bench, recording = made.bench, result.recordings[made.case.label]
+    cited = PARAMETER_SETS.find(bench.parameters).values
+    origins = {row.name: row for row in parameter_rows(bench.par, cited)}
+    read = [each["name"] for each in description["parameters"] if each["used"]]
+    follow = dependence(bench, made.number, read)
+    used = set()
+    for each in description["parameters"]:
+        each |= {**_shown(each["unit"]), "kind": "", "where": ""}
+        each["shownUnit"] = display_unit(each["unit"])
+        if each["name"] in origins:
+            row = origins[each["name"]]
+            each |= {"kind": row.kind, "where": row.where}
+        each["used"] &= each["name"] not in follow.driving
+        used |= {each["name"]} if each["used"] else set()
+    return {
+        "description": description,
+        "panels": [_panel(panel, traces, recording, used) for panel, traces in panels],
+        "chosen": [name for name in chosen if name in used],
+        "keep": made.case.keep,
+        "text": bench_text(bench),
+        "judged": _judged(made, result, sorted(follow.judging & used)),
+        "held": sorted(follow.driving),
+    }
+
+
+def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str, Any] | None:
+    """Return how the page judges its run; None where it cannot."""
+    bench, judge = made.bench, made.bench.definition.judge
+    if not isinstance(judge, FamilyJudge) or bench.definition.finish is not None:
+        return None
+    settings = judge.settings(bench.chosen_options)
+    if not settings.keys() <= FAMILIES:
+        return None
+    limits = {
+        kpi.name: limit_of(kpi.name, bench.requirements[kpi.name], kpi.unit)
+        for kpi in result.kpis if kpi.name in bench.requirements
+    }  # fmt: skip
+    figures = [
+        {"name": kpi.name, "unit": display_unit(kpi.unit), **_shown(kpi.unit),
+         "definition": kpi.definition, "text": bench.requirements.get(kpi.name, ""),
+         "limit": dict(zip(("compare", "bound"), limits[kpi.name], strict=True))
+         if kpi.name in limits else None}
+        for kpi in result.kpis
+    ]  # fmt: skip
+    return {"settings": {name: asdict(each) for name, each in settings.items()},
+            "figures": figures, "followed": list(followed)}  # fmt: skip
+
+
+def _panel(
+    panel: Panel, traces: Sequence[Trace], recording: xr.Dataset, used: set[str]
+) -> dict[str, Any]:
+    unit = str(recording[traces[0].variable].attrs.get("units", "1"))
+    return {
+        "quantity": panel.quantity, "unit": display_unit(unit), **_shown(unit),
+        "height": panel.height, "levels": list(panel.levels), "saturation": panel.saturation,
+        "limit": panel.limit if panel.limit in used else None,
+        "traces": [
+            {"name": trace.variable, "role": trace.role.value,
+             "label": str(recording[trace.variable].attrs.get("long_name", trace.variable))}
+            for trace in traces
+        ],
+    }  # fmt: skip
+
+
+def _shown(symbol: str) -> Mapping[str, float]:
+    """Return factor and offset from an SI unit to the one in which the edges show it."""
+    unit = display_unit(symbol)
+    offset = float(convert(0.0, symbol, unit))
+    return {"factor": float(convert(1.0, symbol, unit)) - offset, "offset": offset}
+
+
+def _summary(made: Exported) -> str:
+    label = f", run {made.case.label}" if len(made.bench.cases()) > 1 else ""
+    return f"{made.bench.definition.summary}{label}; parameters {made.bench.parameters}"
+
+
+def _footer(made: Exported) -> str:
+    cited = PARAMETER_SETS.find(made.bench.parameters)
+    noise = any(name.startswith("noise_") for name in made.run.model.Stimulus._fields)
+    return (
+        f"bywire {__version__}. The page computes the bench's own kernel, in steps of "
+        f"{1e6 * made.schedule.step:g} us{', without the noise of its sensors' if noise else ''}. "
+        f"Parameters: {cited.source}. Curves by uPlot (MIT license, in the page)."
+    )
+
+
+def _block(key: str, value: Any) -> str:
+    text = json.dumps(value, allow_nan=False).replace("<", "\\u003c")
+    return f'<script type="application/json" id="{key}">{text}</script>'
+
+
+def _hashed(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+def _text(name: str) -> str:
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,35 @@
+// node drive_page.mjs PAGE SCRIPTS TASK.json: what a page computes and says, without a browser.
+import { readFileSync, writeFileSync } from "node:fs";
+import { runInThisContext } from "node:vm";
+const [page, scripts, task] = process.argv.slice(2);
+const text = readFileSync(page, "utf8");
+const block = (id) => JSON.parse(text.match(new RegExp(`id="${id}">(.*?)</script>`, "s"))[1]);
+for (const name of ["values.js", "figures.js"]) runInThisContext(readFileSync(`${scripts}/${name}`, "utf8"));
+runInThisContext(block("loader"));
+const { description, digest, judged, keep, text: file } = block("bench");
+const parameters = description.parameters.filter(({ used }) => used);
+const brake = await runInThisContext("load")(Buffer.from(block("kernel"), "base64"), description);
+const call = (name, ...given) => runInThisContext(name)(...given);
+const tries = {
+  run({ changes }) {
+    const made = call("recordingOf", brake.run(changes), description.settle, keep);
+    const signals = Object.fromEntries(Object.entries(made.signals).map(([n, c]) => [n, Array.from(c)]));
+    const figures = judged && call("keyFigures", made.time, made.signals, judged.settings);
+    return { time: Array.from(made.time), signals, figures };
+  },
+  link: ({ changes }) => call("changesOf", call("linkOf", digest, changes), digest, parameters),
+  hostile: ({ link }) => call("changesOf", link.replace("DIGEST", digest), digest, parameters),
+  file: ({ changes }) => call("benchFile", file, changes, parameters),
+  slider: ({ name, share }) => {
+    const parameter = parameters.find((each) => each.name === name), way = call("sliderOf", parameter);
+    return { ...way, value: call("valueAt", way, share), share: call("shareOf", way, parameter.start) };
+  },
+};
+const answers = JSON.parse(readFileSync(task)).map(({ kind, ...given }) => {
+  try {
+    return { answer: tries[kind](given) };
+  } catch (error) {
+    return { error: error.message };
+  }
+});
+writeFileSync(`${task}.out`, JSON.stringify(answers, (_, x) => (Number.isNaN(x) ? "NaN" : x)));

@@ -1,0 +1,193 @@
+"""A bench's page: what it computes is what the bench computes, and nothing else gets in."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import math
+import re
+import shutil
+import subprocess
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import bywire
+from bywire.bench.bench_file import read
+from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.report import live_page
+from bywire.report.live_page.dependence import dependence
+
+NODE = shutil.which("node")
+DRIVER = Path(__file__).with_name("drive_page.mjs")
+SCRIPTS = Path(live_page.__file__).parent
+SHORT = {"t_hold": "60 ms", "pulses": 1, "t_low": "20 ms", "t_high": "20 ms", "settle": "20 ms"}
+BENCHES = {
+    "motorcycle": bywire.Bench(
+        "hard-braking", "dardanelli2010", overrides={"adc.noise": 0.0},
+        options={"settle": 0.1, "duration": 0.3}, requirements={"overshoot": "<= 15 %"},
+    ),
+    "wedge": bywire.Bench("moment-pulses", "roberts2003", options=SHORT),
+}  # fmt: skip
+VARIED = {
+    "motorcycle": ("motor.R_m", "seal.T_pr", "caliper.K_pd", "fluid.beta"),
+    "wedge": ("wedge.mu_B", "motor_1.R_ref", "heart.K_W", "caliper.K_cal"),
+}
+needs_node = pytest.mark.skipif(NODE is None, reason="no node runs the scripts of pages")
+
+
+@pytest.fixture(scope="module", params=sorted(BENCHES))
+def name(request: pytest.FixtureRequest) -> str:
+    return str(request.param)
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bywire.BenchPage]:
+    folder = tmp_path_factory.mktemp("pages")
+    return {name: bywire.page(bench, folder / f"{name}.html") for name, bench in BENCHES.items()}
+
+
+def block(page: bywire.BenchPage, key: str) -> Any:
+    match = re.search(rf'id="{key}">(.*?)</script>', page.file.read_text(), re.DOTALL)
+    assert match
+    return json.loads(match[1])
+
+
+def tried(page: bywire.BenchPage, folder: Path, *tasks: dict[str, Any]) -> list[dict[str, Any]]:
+    """Return what the page's scripts answer."""
+    task = folder / "task.json"
+    task.write_text(json.dumps(tasks))
+    call = [str(NODE), str(DRIVER), str(page.file), str(SCRIPTS), str(task)]
+    subprocess.run(call, check=True, timeout=120)
+    answers: list[dict[str, Any]] = json.loads(Path(f"{task}.out").read_text())
+    return answers
+
+
+def used(page: bywire.BenchPage) -> dict[str, dict[str, Any]]:
+    listed = block(page, "bench")["description"]["parameters"]
+    return {each["name"]: each for each in listed if each["used"]}
+
+
+@needs_node
+def test_any_values_give_what_the_bench_gives(pages, name, tmp_path):
+    bench, page, rng = BENCHES[name], pages[name], np.random.default_rng(7)
+    leaves, sliders = bench.par.leaves(), VARIED[name]
+    assert {*sliders} <= used(page).keys()
+    cases: list[dict[str, float]] = [{}]
+    cases += [{n: leaves[n] * rng.uniform(0.8, 1.25) for n in sliders} for _ in range(3)]
+    answers = tried(page, tmp_path, *({"kind": "run", "changes": case} for case in cases))
+    for case, each in zip(cases, answers, strict=True):
+        made, result = each["answer"], bywire.run(bench.with_overrides(case))
+        np.testing.assert_allclose(made["time"], result.recording["time"], atol=1e-12)
+        for signal, values in made["signals"].items():
+            own = result.recording[signal].values
+            scale = max(np.abs(own).max(), 1e-300)
+            assert np.abs(np.array(values) - own).max() <= 1e-9 * scale, signal
+        for kpi in result.kpis if made["figures"] else ():
+            given = made["figures"][kpi.name]
+            assert bool(given["reason"]) == math.isnan(kpi.value), kpi.name
+            if not given["reason"]:
+                assert given["value"] == pytest.approx(kpi.value, rel=1e-9, abs=1e-12), kpi.name
+    assert (answers[0]["answer"]["figures"] is not None) == (name == "motorcycle")
+
+
+@needs_node
+def test_links_and_files_hold_what_was_moved(pages, tmp_path):
+    page, changes = pages["motorcycle"], {"motor.R_m": 0.1 + 0.2, "seal.T_pr": 1.0 / 3e3}
+    link, file = tried(
+        page, tmp_path, {"kind": "link", "changes": changes}, {"kind": "file", "changes": changes}
+    )
+    assert link["answer"] == changes  # to the last bit
+    path = tmp_path / "moved.toml"
+    path.write_text(file["answer"])
+    moved = read(path, {})
+    wanted = BENCHES["motorcycle"].with_overrides(changes).par.leaves()
+    assert moved.par.leaves() == pytest.approx(wanted, rel=1e-12)  # texts are read to 12 digits
+    assert moved.chosen_options == BENCHES["motorcycle"].chosen_options
+    assert tomllib.loads(file["answer"])["requirements"] == {"overshoot": "<= 15 %"}
+
+
+@needs_node
+@pytest.mark.parametrize(
+    ("link", "text"),
+    [
+        ("bench=0123&motor.R_m=0.5", "another version"),
+        ("bench=DIGEST&motor.R_m=-1", "motor.R_m = -1 ohm is not admissible: it must be > 0 ohm"),
+        ("bench=DIGEST&motor.R_m=1e999", "not admissible"),
+        ("bench=DIGEST&motor.R_m=", "not admissible"),
+        ("bench=DIGEST&motor.R_m=alert(1)", "not admissible"),
+        ("bench=DIGEST&__proto__=1", "no parameter here"),
+        ("bench=DIGEST&ecu.T_s=1e-4", "no parameter here"),  # the run's plan follows it
+        ("bench=DIGEST&%3Cscript%3E=1", "no parameter here"),
+    ],
+)
+def test_hostile_links_are_refused_in_words(pages, tmp_path, link, text):
+    (said,) = tried(pages["motorcycle"], tmp_path, {"kind": "hostile", "link": link})
+    assert text in said["error"]
+
+
+@needs_node
+def test_a_slider_stays_within_what_is_admissible(pages, tmp_path):
+    (way,) = tried(
+        pages["motorcycle"], tmp_path, {"kind": "slider", "name": "motor.R_m", "share": 1.0}
+    )
+    start = BENCHES["motorcycle"].par.leaves()["motor.R_m"]
+    assert (way["answer"]["from"], way["answer"]["to"]) == (start / 4, start * 4)
+    assert way["answer"]["value"] == pytest.approx(4 * start)
+    assert way["answer"]["share"] == pytest.approx(0.5)
+
+
+def test_the_policy_admits_the_pages_own_scripts_and_nothing_else(pages, name):
+    text = pages[name].file.read_text()
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', text)
+    assert policy
+    assert "default-src 'none'" in policy[1]
+    assert not {"'unsafe-inline'", "'unsafe-eval'", "http:", "https:", "*"} & set(policy[1].split())
+    scripts = re.findall(r"<script>(.*?)</script>", text, re.DOTALL)
+    styles = re.findall(r"<style>(.*?)</style>", text, re.DOTALL)
+    assert (len(scripts), len(styles)) == (2, 1)
+    for each in (*scripts, *styles):
+        digest = base64.b64encode(hashlib.sha256(each.encode()).digest()).decode()
+        assert f"'sha256-{digest}'" in policy[1]
+    assert not re.findall(r"<(?:link|img|iframe|script src)\b", text)
+    assert pages[name].compressed < 100e3
+
+
+def test_texts_of_a_bench_cannot_leave_their_place(tmp_path):
+    bench = bywire.Bench(
+        "hard-braking", "dardanelli2010", options={"settle": 0.02, "duration": 0.02},
+        name='</script><script>alert("x")</script>',
+    )  # fmt: skip
+    text = bywire.page(bench, tmp_path / "page.html").file.read_text()
+    assert "<script>alert" not in text
+    assert len(re.findall(r"<script>", text)) == 2
+
+
+def test_parameters_that_drive_the_run_are_held(pages):
+    bench = BENCHES["motorcycle"]
+    follow = dependence(bench, 0, ("motor.R_m", "ecu.T_s", "ecu.dither.f_dit"))
+    assert follow.driving == {"ecu.T_s"}
+    assert follow.judging == {"ecu.dither.f_dit"}
+    assert "ecu.T_s" not in used(pages["motorcycle"])
+    assert block(pages["motorcycle"], "bench")["judged"]["followed"] == ["ecu.dither.f_dit"]
+
+
+@pytest.mark.parametrize(
+    ("given", "error", "text"),
+    [
+        ({"out": "page.txt"}, ParameterError, "ends in .html"),
+        ({"vary": ["motor.R"]}, UnknownNameError, "motor.R_m"),
+        ({"vary": ["motor_heat.R_wh"]}, bywire.BywireError, "motor_heat"),
+        ({"bench": "force-cycle"}, ParameterError, "choose it"),
+        ({"bench": "stribeck"}, ParameterError, "without any run"),
+    ],
+)
+def test_what_makes_no_page_is_said(tmp_path, given, error, text):
+    arguments = {"bench": "hard-braking", "out": "page.html"} | given
+    with pytest.raises(error, match=text):
+        bywire.page(arguments["bench"], tmp_path / arguments["out"], vary=given.get("vary", ()))
+    assert not list(tmp_path.iterdir())
