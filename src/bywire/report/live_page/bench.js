@@ -22,11 +22,11 @@ function describe() {
   place("changes").textContent = count
     ? `changed: ${Object.entries(made).map(([name, value]) => {
       const parameter = parameters.find((each) => each.name === name);
-      return `${name} = ${digits(shownOf(value, parameter))} ${parameter.shownUnit}`.replace(/ 1$/, "");
+      return `${name} = ${digits(shownOf(value, parameter))} ${parameter.shownUnit}`.trim();
     }).join(", ")}`
     : "as in the bench";
   place("reset").disabled = count === 0;
-  history.replaceState(null, "", count ? `#${linkOf(digest, made)}` : " ".trim() || location.pathname);
+  history.replaceState(null, "", count ? `#${linkOf(digest, made)}` : location.pathname);
 }
 
 /* Key figures beside those of the runs that were kept, and whether they are as required. */
@@ -39,7 +39,7 @@ function judge() {
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
     const computed = followed.length && STEP.includes(figure.name)
       ? undefinedFor(`an option follows ${followed}: save the bench file and run it`) : given[figure.name];
-    const unit = figure.unit === "1" ? "" : ` ${figure.unit}`;
+    const unit = figure.unit && ` ${figure.unit}`;
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
       : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
     const met = figure.limit && isMet(computed, figure.limit);

@@ -29,6 +29,7 @@ from bywire.export.wasm.module import module_files
 from bywire.report.live_page.dependence import dependence
 from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
+from bywire.report.wording import unit_text
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -98,7 +99,7 @@ def _data(
     used = set()
     for each in description["parameters"]:
         each |= {**_shown(each["unit"]), "kind": "", "where": ""}
-        each["shownUnit"] = display_unit(each["unit"])
+        each["shownUnit"] = unit_text(display_unit(each["unit"]))
         if each["name"] in origins:
             row = origins[each["name"]]
             each |= {"kind": row.kind, "where": row.where}
@@ -128,7 +129,7 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
         for kpi in result.kpis if kpi.name in bench.requirements
     }  # fmt: skip
     figures = [
-        {"name": kpi.name, "unit": display_unit(kpi.unit), **_shown(kpi.unit),
+        {"name": kpi.name, "unit": unit_text(display_unit(kpi.unit)), **_shown(kpi.unit),
          "definition": kpi.definition, "text": bench.requirements.get(kpi.name, ""),
          "limit": dict(zip(("compare", "bound"), limits[kpi.name], strict=True))
          if kpi.name in limits else None}
@@ -143,7 +144,7 @@ def _panel(
 ) -> dict[str, Any]:
     unit = str(recording[traces[0].variable].attrs.get("units", "1"))
     return {
-        "quantity": panel.quantity, "unit": display_unit(unit), **_shown(unit),
+        "quantity": panel.quantity, "unit": unit_text(display_unit(unit)), **_shown(unit),
         "height": panel.height, "levels": list(panel.levels), "saturation": panel.saturation,
         "limit": panel.limit if panel.limit in used else None,
         "traces": [

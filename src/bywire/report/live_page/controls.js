@@ -10,9 +10,8 @@ function element(tag, attributes = {}, ...inside) {
 
 /** Make the row of a parameter; `changed(name, value)` is told of every move. */
 function parameterRow(parameter, changed, complain) {
-  const { name, shownUnit, meaning, range, kind, where } = parameter;
+  const { name, shownUnit: unit, meaning, range, kind, where } = parameter;
   const slider = sliderOf(parameter), id = `p-${name}`;
-  const unit = shownUnit === "1" ? "" : shownUnit;
   const field = element("input", { type: "text", inputmode: "decimal", id, autocomplete: "off",
     "aria-label": `${name}${unit && ` in ${unit}`}`, title: `admissible: ${range}` });
   const back = element("button", { type: "button", title: "as in the bench",

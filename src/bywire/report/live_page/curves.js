@@ -1,6 +1,6 @@
 /* Panels of curves over one time axis, the current run above those that were kept. */
 
-const HEIGHT = 120; // px of a panel of height 1
+const HEIGHT = 150; // px of a panel of height 1
 const NEAR = 0.5; // share of a limit from which its lines are drawn
 const DASHES = { "set point": [6, 4], limit: [2, 4] };
 
@@ -9,7 +9,7 @@ function palette() {
   const style = getComputedStyle(document.documentElement);
   const color = (name) => style.getPropertyValue(`--${name}`).trim();
   return { ink: color("faint"), line: color("line"), bar: color("bar"), limit: color("bad"),
-    main: color("main"), second: color("second"), "set point": color("ink"), kept: color("kept") };
+    main: color("main"), second: color("second"), third: color("third"), "set point": color("ink"), kept: color("kept") };
 }
 
 /** Return a signal as it is shown. */
@@ -18,7 +18,7 @@ const converted = (values, quantity) => Array.from(values, (value) => shownOf(va
 /** Return the lines of a panel: traces of the run, its limit, and first traces of kept runs. */
 function linesOf(panel, kept, colors) {
   const lines = panel.traces.map(({ label, role }) => ({
-    label, stroke: colors[role] ?? colors.main, width: role === "main" ? 2 : 1.5,
+    label, stroke: colors[role] ?? colors.third, width: role === "main" ? 2 : 1.5,
     dash: DASHES[role], points: { show: false },
     paths: panel.levels.length ? uPlot.paths.stepped({ align: 1 }) : undefined,
   }));
@@ -72,9 +72,9 @@ function curves(place, panels) {
     plots.forEach((plot) => plot.destroy());
     place.replaceChildren();
     plots = panels.map((panel, k) => {
-      const last = k === panels.length - 1, unit = panel.unit === "1" ? "" : ` [${panel.unit}]`;
+      const last = k === panels.length - 1, unit = panel.unit && ` [${panel.unit}]`;
       const axis = { stroke: colors.ink, grid: { stroke: colors.line, width: 1 },
-        ticks: { stroke: colors.line } };
+        ticks: { stroke: colors.line }, labelFont: "600 11px system-ui, sans-serif" };
       const figure = element("figure", { "aria-label": `${panel.quantity} over time` });
       place.append(figure);
       const names = panel.levels;
