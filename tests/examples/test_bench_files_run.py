@@ -17,6 +17,10 @@ LONG = {"repeated_stops"}
 """twenty stops, of which those tests make a few"""
 
 
+TRUE = {"corner_wet_stop": "the current limit of 20 A was reached at t = 3.7"}
+"""warnings that are right: there, motors push against a wheel that stands, after the stop"""
+
+
 @pytest.mark.trust
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_requirements_hold_whatever_the_step(file: Path) -> None:
@@ -35,7 +39,8 @@ def test_requirements_hold(file: Path) -> None:
     missed = [f"{v.kpi} = {v.value:g} {v.unit}" for v in result.verdicts if not v.met]
     assert not missed
     assert result.verdicts
-    unexpected = [text for text in result.warnings if "retracted stop" not in text]
+    expected = ("retracted stop", TRUE.get(file.stem, "retracted stop"))
+    unexpected = [text for text in result.warnings if not any(each in text for each in expected)]
     assert not unexpected
 
 

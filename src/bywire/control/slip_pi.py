@@ -99,7 +99,8 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     -----
     On the rising branch the tyre's slip is stiff, and an integral alone closes the loop in
     :math:`T_i\, N r \mu'(\lambda)/(k K_p)`: 2 s on dry asphalt at a slip of 0.04, half a stop.
-    ``eager`` shortens that far below the set slip, and leaves the loop at the set slip as it is.
+    ``eager`` shortens that far below the set slip, above v_fall, and leaves the loop at the set
+    slip as it is.
 
     References
     ----------
@@ -111,8 +112,10 @@ def output(x: State, u: Input, T: SampleTime, par: Parameters) -> tuple[State, O
     wanted = K_p * error + x.integral
     p = ops.clip(wanted, 0.0, ops.fmax(u.p_most, 0.0))
     short = ops.fmax(error, 0.0) / ops.fmax(u.slip_set, _NO_SLIP)
-    # While a demand builds up, what is missing is not slip control's: no haste then.
-    haste = 1.0 + par.eager * ops.where(u.p_most < u.p_rider, 0.0, short)
+    # While a demand builds up, what is missing is not slip control's; below v_fall edges of the
+    # wheel come so late that slip looks missing: no haste then.
+    calm = ops.where(u.p_most < u.p_rider, 1.0, ops.where(u.v < par.v_fall, 1.0, 0.0))
+    haste = 1.0 + par.eager * (1.0 - calm) * short
     growth = K_p / par.T_i * haste * error + (p - wanted) / par.T_t
     # Nothing to be lowered yet: the first demand must not wait for the integral.
     idle = u.p_before <= 0
