@@ -15,7 +15,7 @@ from bywire.data.recursive_filter import filtered
      ([0.5, 0.5], [1.0])],
 )  # fmt: skip
 def test_a_filter_is_scipys(b: list[float], a: list[float]) -> None:
-    x = np.random.default_rng(1).standard_normal((200, 2))
+    x = np.random.default_rng(1).standard_normal((9000, 2))
     np.testing.assert_allclose(filtered(b, a, x), signal.lfilter(b, a, x, axis=0), atol=1e-12)
     begin = signal.lfilter_zi(b, a) * x[0, 0] if len(a) + len(b) > 2 else []
     settled, _ = signal.lfilter(b, a, x[:, 0], zi=begin)

@@ -121,6 +121,9 @@ def test_kernels_in_lanes_are_kept_by_what_they_record(
     for _ in range(2):
         require_equal(kept.run(CONTACT), simulate(CONTACT))
         assert kept.builds == 4
+    monkeypatch.setattr(kept_kernel, "processor", lambda: "a third one")
+    kept.run(CONTACT)
+    assert kept.builds == 5
 
 
 def halved(path: Path) -> None:

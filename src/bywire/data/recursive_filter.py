@@ -11,6 +11,8 @@ import numpy as np
 
 from bywire.core.typing import Array
 
+_BLOCK = 4096  # samples that are solved for at once: a band of many rows takes memory
+
 
 def filtered(
     numerator: Sequence[float] | Array,
@@ -37,20 +39,30 @@ def filtered(
     numpy.ndarray
         Shape of ``x``.
     """
-    from scipy.linalg import solve_banded
-
     b, a = (np.asarray(each, dtype=np.float64) for each in (numerator, denominator))
     x = np.asarray(x, dtype=np.float64)
     count = len(x)
     if not count:
         return x
     before = x[0] if settled else np.zeros_like(x[0])
-    past = before * (b.sum() / a.sum()) if settled else before
-    driven = np.zeros_like(x)
-    for j, factor in enumerate(b):
+    driven = b[0] * x
+    for j, factor in enumerate(b[1:], 1):
         driven[j:] += factor * x[: max(count - j, 0)]
         driven[:j] += factor * before
-    for j, factor in enumerate(a[1:], 1):
-        driven[:j] -= factor * past
-    diagonals = np.repeat(a[:count, None], count, axis=1)  # of a lower triangle
-    return np.asarray(solve_banded((len(diagonals) - 1, 0), diagonals, driven))
+    return _recursive(a, driven, before * (b.sum() / a.sum()) if settled else before)
+
+
+def _recursive(a: Array, driven: Array, before: Array) -> Array:
+    """Return y of sum a_j y_(k-j) = driven_k in place of the latter; ``before``: y until then."""
+    from scipy.linalg import solve_banded
+
+    p = a.size - 1
+    last = np.repeat(before[None], p, axis=0)
+    for begin in range(0, len(driven) if p else 0, _BLOCK):
+        part = driven[begin : begin + _BLOCK]
+        for j in range(1, p + 1):
+            part[:j] -= a[j] * last[p - j : p - j + len(part)]
+        diagonals = np.repeat(a[: len(part), None], len(part), axis=1)  # of a lower triangle
+        part[:] = solve_banded((len(diagonals) - 1, 0), diagonals, part)
+        last = np.concatenate([last, part])[-p:]
+    return driven

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import platform
 import sys
 from dataclasses import dataclass
 from functools import cached_property
@@ -87,7 +86,7 @@ class Place:
 
     def in_lanes(self, selection: tuple[int, ...]) -> Place:
         """Return where the kernel in lanes is kept that records some outputs, by index."""
-        name = _digest(repr((self.file.name, selection, processor())))[:32]
+        name = _digest(repr((self.file.name, selection)))[:32]
         return Place(self.file.with_name(f"lanes-{name}.json"), self.state)
 
     def kept(self) -> KeptKernel | None:
@@ -150,7 +149,7 @@ def place_of(model: Model, structure: tuple[object, ...]) -> Place | None:
         return None
     names = [f"{kind.__module__}.{kind.__qualname__}" for kind in types]
     rest = _without_types(structure)
-    built_by = (ca.CasadiMeta.version(), np.__version__, sys.version, platform.machine())
+    built_by = (ca.CasadiMeta.version(), np.__version__, sys.version, processor())
     home = str(Path(sys.modules[__name__].__file__ or ""))
     name = _digest(repr((names, rest, built_by, home)))[:32]
     return Place(usable_folder() / f"kernel-{name}.json", state)

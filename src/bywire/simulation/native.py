@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.typing import Array
-from bywire.simulation.compiler import PLAIN, Compiler, load_library
+from bywire.simulation.compiler import SINGLE, Compiler, load_library
 from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
 from bywire.simulation.schedule import Schedule
@@ -85,7 +85,7 @@ class SingleKernel:
         from bywire.simulation.stages import build_stages
 
         stages = build_stages(program)
-        _, library = load_library(emit_single(stages), PLAIN, compiler, cls.ENTRY)
+        _, library = load_library(emit_single(stages), SINGLE, compiler, cls.ENTRY)
         return cls(layout_of(stages), library, compiler)
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:

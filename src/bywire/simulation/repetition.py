@@ -136,7 +136,8 @@ def repeat(
     begins = _start_vectors(layout, starts or [(run.state, run.memory)] * count)
     stopped, queue = threading.Event() if stop is None else stop, deque(range(count))
     rows, counters = schedule.frames // schedule.record_frames, layout.start["counters"]
-    done: dict[int, tuple[Array, list[Complex], bool, float]] = {}
+    values = np.empty((count, rows, len(signals)))
+    done: dict[int, tuple[list[Complex], bool, float]] = {}
 
     def turns(_: int) -> None:
         taken, now = Lanes(queue, width, matrix, begins), np.empty((width, rows, len(signals)))
@@ -151,8 +152,8 @@ def repeat(
             ends = taken.vector[:, counted]
             require_finite(layout, ends, f"one of cases {which} left the numbers")
             for lane, repeats in taken.passed(figures(now), tolerance, most).items():
-                left = taken.vector[counters, lane]
-                done[int(taken.case[lane])] = now[lane].copy(), taken.seen[lane], repeats, left
+                case, unsettled = int(taken.case[lane]), float(taken.vector[counters, lane])
+                values[case], done[case] = now[lane], (taken.seen[lane], repeats, unsettled)
                 taken.release(lane)
 
     workers = min((os.cpu_count() or 1) if lanes else 1, -(-count // width))
@@ -165,10 +166,10 @@ def repeat(
     finally:
         queue.clear()  # where one failed, what waits is not begun
         pool.shutdown()
-    values, seen, repeats, unsettled = zip(*(done[k] for k in range(count)), strict=True)
+    seen, repeats, unsettled = zip(*(done[k] for k in range(count)), strict=True)
     return Repeated(
         time=np.asarray(np.arange(rows) * schedule.record_frames * schedule.frame, np.float64),
-        values=np.stack(values),
+        values=values,
         figures=np.stack([_padded(each) for each in seen]),
         windows=np.array([len(each) for each in seen]),
         repeats=np.array(repeats),

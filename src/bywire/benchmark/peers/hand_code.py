@@ -15,7 +15,7 @@ from bywire.benchmark.peers.hand_source import Subject
 from bywire.core.errors import CompilerError
 from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
-from bywire.simulation.compiler import PLAIN, find_compiler, load_library
+from bywire.simulation.compiler import SINGLE, find_compiler, load_library
 from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
 
@@ -77,7 +77,7 @@ class HandCode:
     par
         Any parameter set of the structure that the C covers.
     flags
-        ``PLAIN`` for single runs, ``THREADS`` for ensembles, ``WITHOUT_SUMS`` beside either; on
+        ``SINGLE`` for single runs, ``THREADS`` for ensembles, ``WITHOUT_SUMS`` beside either; on
         top of the flags that all kernels get, so that code is compared and not settings.
 
     Raises
@@ -86,7 +86,9 @@ class HandCode:
         Without a C compiler, or without its OpenMP when ``THREADS`` asks for it.
     """
 
-    def __init__(self, subject: Subject, par: ParameterSet, flags: tuple[str, ...] = PLAIN) -> None:
+    def __init__(
+        self, subject: Subject, par: ParameterSet, flags: tuple[str, ...] = SINGLE
+    ) -> None:
         self._subject = subject
         self.label, library = load(subject.text(par), flags, "hand_run")
         self._run, self._ensemble = library.hand_run, library.hand_ensemble

@@ -8,7 +8,7 @@ from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode
 from bywire.benchmark.peers.hand_source import Subject
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters as Par
-from bywire.simulation.compiler import PLAIN
+from bywire.simulation.compiler import SINGLE
 
 __all__ = ["OUTPUTS", "SUBJECT", "THREADS", "WITHOUT_SUMS", "HandWritten", "indices"]
 
@@ -48,5 +48,5 @@ class HandWritten(HandCode):
     The second counter is the number of substeps near a stop or at the limit of the pressure.
     """
 
-    def __init__(self, par: Par, flags: tuple[str, ...] = PLAIN) -> None:
+    def __init__(self, par: Par, flags: tuple[str, ...] = SINGLE) -> None:
         super().__init__(SUBJECT, par, flags)

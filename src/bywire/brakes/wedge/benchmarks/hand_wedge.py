@@ -9,7 +9,7 @@ from bywire.benchmark.peers.hand_source import Subject
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.compiler import PLAIN
+from bywire.simulation.compiler import SINGLE
 
 
 class _Wedge(Subject):
@@ -48,5 +48,5 @@ class HandWrittenWedge(HandCode):
     The second counter is the number of passes.
     """
 
-    def __init__(self, par: WedgeParameters, flags: tuple[str, ...] = PLAIN) -> None:
+    def __init__(self, par: WedgeParameters, flags: tuple[str, ...] = SINGLE) -> None:
         super().__init__(SUBJECT, par, flags)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from bywire.benchmark.peers.hand_code import arrays, load, plan_arguments
 from bywire.brakes.wedge.benchmarks.hand_wedge import SUBJECT
 from bywire.core.typing import Array
-from bywire.simulation.compiler import PLAIN
+from bywire.simulation.compiler import SINGLE
 from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
 
@@ -40,7 +40,7 @@ def solve(run: Run, width: float, width_v: float, step: float) -> Solution:
         friction; somewhat longer steps chatter within the width and cost little.
     """
     own = replace(run, step=step)
-    _, library = load(SUBJECT.text(own.par, "tanh_rk4_wedge.c"), PLAIN, "tanh_run")
+    _, library = load(SUBJECT.text(own.par, "tanh_rk4_wedge.c"), SINGLE, "tanh_run")
     library.tanh_run.restype = None
     shared, state, values = arrays(own, [own.par], SIGNALS)
     arguments = (
