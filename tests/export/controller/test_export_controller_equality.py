@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from exported_ecu import STRUCTURES, bench_of, bits_of, build, needs_compiler
+from exported_ecu import BRAKES, STRUCTURES, bench_of, bits_of, build, needs_compiler
 
 from bywire.export.controller.files import files
 from bywire.export.controller.harness import FLAGS, WARNINGS
@@ -13,9 +13,19 @@ from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors
 
 
+MANY, FEW = 2000, 300
+LARGE = (*BRAKES, "gains that differ by region")
+CASES = [
+    *((structure, "double", MANY if structure in LARGE else FEW) for structure in STRUCTURES),
+    *((structure, "single", FEW) for structure in LARGE),
+    *(pytest.param(structure, "double", MANY, marks=pytest.mark.trust) for structure in STRUCTURES),
+    *(pytest.param(structure, "single", MANY, marks=pytest.mark.trust) for structure in STRUCTURES),
+]
+"""structures whose laws have most branches by many vectors; all of them by many take a minute"""
+
+
 @needs_compiler
-@pytest.mark.parametrize("structure", STRUCTURES)
-@pytest.mark.parametrize(("precision", "count"), [("double", 2000), ("single", 300)])
+@pytest.mark.parametrize(("structure", "precision", "count"), CASES)
 def test_results_are_those_of_python(
     structure: str, precision: str, count: int, tmp_path: Path
 ) -> None:
