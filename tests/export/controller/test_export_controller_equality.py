@@ -12,14 +12,13 @@ from bywire.export.controller.harness import FLAGS, WARNINGS
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors
 
-
 MANY, FEW = 2000, 300
 LARGE = (*BRAKES, "gains that differ by region")
 CASES = [
     *((structure, "double", MANY if structure in LARGE else FEW) for structure in STRUCTURES),
     *((structure, "single", FEW) for structure in LARGE),
     *(pytest.param(structure, "double", MANY, marks=pytest.mark.trust) for structure in STRUCTURES),
-    *(pytest.param(structure, "single", MANY, marks=pytest.mark.trust) for structure in STRUCTURES),
+    *(pytest.param(structure, "single", FEW, marks=pytest.mark.trust) for structure in STRUCTURES),
 ]
 """structures whose laws have most branches by many vectors; all of them by many take a minute"""
 
