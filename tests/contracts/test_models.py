@@ -20,10 +20,11 @@ LONG = {
     ("two-wheeler-by-wire", "derivatives of a run"),
     ("wedge-brake", "derivatives of a run"),
     ("wedge-corner", "derivatives of a run"),
+    ("two-wheeler-by-wire", "order of the step"),
     ("wedge-corner", "order of the step"),
 }
-"""what takes as long as all else of a model; other models, of which the corner is made, put the
-contract to the test"""
+"""what takes as long as all else of a model; other models put the contract to the test, and tests
+of stops halve the step"""
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
