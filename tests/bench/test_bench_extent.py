@@ -66,6 +66,13 @@ def test_run_that_no_memory_holds(duration):
         bywire.run(bench)
 
 
+def test_settling_that_no_float_counts_in_bytes():
+    options = {"settle": "1e305 s"}
+    bench = bywire.Bench("open-loop", SET, options=options, stimulus=STEP)
+    with pytest.raises(StepError, match=r"needs about .* GB of memory, but this machine has"):
+        bywire.run(bench)
+
+
 def test_recording_less_often_needs_less(monkeypatch):
     monkeypatch.setattr(extent, "_memory", lambda: 2e6)
     with pytest.raises(StepError, match=r"0\.002 GB.*record less often"):

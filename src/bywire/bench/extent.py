@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
 from typing import Any
 
 from bywire.bench.experiment import Case
@@ -83,10 +84,10 @@ def check_memory(run: Run, signals: int) -> None:
     schedule = run.schedule()
     numbers = schedule.rows * signals * _COPIES
     numbers += schedule.stimulus_rows * len(run.model.Stimulus._fields)
-    needed, memory = 8.0 * numbers, _memory()
+    needed, memory = 8 * numbers, _memory()  # a float does not hold all that one may ask for
     if needed > memory:
         raise StepError(
             f"a run of {run.duration:g} s, recorded every {run.record:g} s, needs about "
-            f"{needed / _GIGA:.3g} GB of memory, but this machine has {memory / _GIGA:.3g} GB: "
-            "run shorter, or record less often (simulation.record)"
+            f"{Decimal(needed) / 10**9:.3g} GB of memory, but this machine has "
+            f"{memory / _GIGA:.3g} GB: run shorter, or record less often (simulation.record)"
         )
