@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from bywire.cli.options import BenchChanges, ErrorEstimate, JsonFlag, OutFolder, changes
+from bywire.cli import completion
+from bywire.cli.options import (
+    BenchChanges,
+    BenchFile,
+    ErrorEstimate,
+    JsonFlag,
+    OutFolder,
+    changes,
+)
 from bywire.cli.show import show
 
 
@@ -17,6 +24,7 @@ def list_command(
         typer.Argument(
             metavar="[TOPIC|NAME|WORD]",
             help="A kind of things; or a name: its options, signals, units; or what it is about.",
+            autocompletion=completion.ANYTHING,
         ),
     ] = None,
     json: JsonFlag = False,
@@ -33,10 +41,7 @@ def list_command(
 
 
 def run(
-    bench: Annotated[
-        Path,
-        typer.Argument(help="Bench file (TOML), or an experiment's name.", show_default=False),
-    ],
+    bench: BenchFile,
     set_: BenchChanges = None,
     over: Annotated[
         str, typer.Option(help="Run for each value, e.g. motor.R_m=0.2ohm:0.6ohm:9.")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.options import BenchChanges, ErrorEstimate, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
 
@@ -18,6 +19,7 @@ def compare(
             metavar="RUN RUN...",
             help="Result folders of run --out, bench files, or experiments.",
             show_default=False,
+            autocompletion=completion.BENCHES,
         ),
     ],
     set_: BenchChanges = None,

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import BenchChanges, JsonFlag, changes
+from bywire.cli.options import BenchChanges, BenchFile, JsonFlag, changes
 from bywire.cli.output_folder import folder
 from bywire.cli.show import show
 
@@ -15,12 +15,6 @@ export_app = typer.Typer(
     no_args_is_help=True, help="Write parts of a bench in the form that other tools take."
 )
 
-BenchFile = Annotated[
-    Path,
-    typer.Argument(
-        help="Bench file (TOML), or an experiment.", metavar="BENCH", show_default=False
-    ),
-]
 ExportFolder = Annotated[
     Path,
     typer.Option("--out", help="Folder of the export.", parser=folder, metavar="PATH",

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
 
@@ -15,7 +16,7 @@ def faults_command(
     campaign: Annotated[
         str,
         typer.Argument(help="Campaign file (TOML), or a campaign's name, e.g. motorcycle.",
-                       show_default=False),
+                       show_default=False, autocompletion=completion.CAMPAIGNS),
     ],
     set_: BenchChanges = None,
     out: OutFolder = None,

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.options import (
     BenchChanges,
     CaseName,
@@ -62,7 +63,12 @@ Holdout = Annotated[
 
 
 def identify(
-    method: Annotated[str, typer.Argument(help="Method, see 'bywire list'.", show_default=False)],
+    method: Annotated[
+        str,
+        typer.Argument(
+            help="Method, see 'bywire list'.", show_default=False, autocompletion=completion.METHODS
+        ),
+    ],
     measurements: Annotated[
         list[Path] | None,
         typer.Argument(metavar="[MEASUREMENT]...", help="Measurement files.", show_default=False),

@@ -7,13 +7,16 @@ from typing import Annotated
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.options import BenchChanges, JsonFlag, OutFolder, changes
 from bywire.cli.show import show
 
 
 def life_command(
     life: Annotated[
-        Path, typer.Argument(help="Life file (TOML), or the name of a life.", show_default=False)
+        Path,
+        typer.Argument(help="Life file (TOML), or the name of a life.", show_default=False,
+                       autocompletion=completion.LIVES),
     ],
     set_: BenchChanges = None,
     check: Annotated[

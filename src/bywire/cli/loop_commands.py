@@ -6,6 +6,7 @@ from typing import Annotated
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.options import (
     At,
     Changes,
@@ -20,8 +21,12 @@ from bywire.cli.options import (
 from bywire.cli.show import show
 
 LoopOrPlant = Annotated[
-    str, typer.Argument(help="Loop or plant, see 'bywire list'.", show_default=False)
-]
+    str,
+    typer.Argument(
+        help="Loop or plant, see 'bywire list'.", show_default=False,
+        autocompletion=completion.LOOPS_OR_PLANTS,
+    ),
+]  # fmt: skip
 
 
 def linearize_command(

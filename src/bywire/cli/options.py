@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.output_folder import folder
 from bywire.core.errors import ParameterError
 
@@ -20,16 +21,32 @@ OutFolder = Annotated[
         metavar="PATH",
     ),
 ]
-LoopName = Annotated[str, typer.Argument(help="Loop, see 'bywire list'.", show_default=False)]
-Parameters = Annotated[str, typer.Option(help="Parameter set, e.g. roberts2003.")]
+BenchFile = Annotated[
+    Path,
+    typer.Argument(
+        help="Bench file (TOML), or an experiment.", metavar="BENCH", show_default=False,
+        autocompletion=completion.BENCHES,
+    ),
+]  # fmt: skip
+LoopName = Annotated[
+    str,
+    typer.Argument(
+        help="Loop, see 'bywire list'.", show_default=False, autocompletion=completion.LOOPS
+    ),
+]
+Parameters = Annotated[
+    str, typer.Option(help="Parameter set, e.g. roberts2003.", autocompletion=completion.SETS)
+]
 At = Annotated[str, typer.Option("--at", help="Operating point, e.g. '20 bar'.")]
 Changes = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. motor.R_m=0.4ohm."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change a parameter, e.g. motor.R_m=0.4ohm.",
+                 autocompletion=completion.changeable),
 ]
 BenchChanges = Annotated[
     list[str] | None,
-    typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm."),
+    typer.Option("--set", metavar="KEY=VALUE", help="Change the bench, e.g. motor.R_m=0.4ohm.",
+                 autocompletion=completion.changeable),
 ]
 ErrorEstimate = Annotated[
     bool, typer.Option(help="Run in other steps too, for the error of all figures.")

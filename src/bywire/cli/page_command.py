@@ -7,23 +7,20 @@ from typing import Annotated
 
 import typer
 
-from bywire.cli.options import BenchChanges, JsonFlag, changes
+from bywire.cli.completion import varied
+from bywire.cli.options import BenchChanges, BenchFile, JsonFlag, changes
 from bywire.cli.show import show
 
 
 def page_command(
-    bench: Annotated[
-        Path,
-        typer.Argument(
-            help="Bench file (TOML), or an experiment.", metavar="BENCH", show_default=False
-        ),
-    ],
+    bench: BenchFile,
     out: Annotated[
         Path, typer.Option("--out", help="File of the page (.html).", show_default=False)
     ],
     vary: Annotated[
         list[str] | None,
-        typer.Option(help="Parameter that stands first in the page; may be given several times."),
+        typer.Option(help="Parameter that stands first in the page; may be given several times.",
+                     autocompletion=varied),
     ] = None,
     case: Annotated[
         str, typer.Option("--case", help="Run of the experiment; needed where there are several.")

@@ -7,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from bywire.cli import completion
 from bywire.cli.options import (
     At,
     Changes,
@@ -21,7 +22,9 @@ from bywire.cli.show import show
 
 def study_command(
     name: Annotated[
-        str, typer.Argument(help="Sizing study, see 'bywire list'.", show_default=False)
+        str,
+        typer.Argument(help="Sizing study, see 'bywire list'.", show_default=False,
+                       autocompletion=completion.SIZING),
     ],
     parameters: Parameters = "",
     set_: Annotated[

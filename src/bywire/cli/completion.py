@@ -1,0 +1,96 @@
+"""What the shell completes with the tab key: names from the kept index, and files beside them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from glob import escape, iglob
+from os.path import isdir
+
+Completed = list[tuple[str, str]]
+"""words that a shell may put in, each with what it means"""
+
+
+def names_of(*kinds: str, ending: str = "") -> Callable[[str], Completed]:
+    """Return what completes names of some kinds of things, and files of an ending.
+
+    Parameters
+    ----------
+    kinds
+        Kinds of things, for instance ``"experiments"``; see `bywire.overview`.
+    ending
+        Of files, for instance ``".toml"``; none where empty.
+    """
+
+    def completed(incomplete: str) -> Completed:
+        from bywire.api.overview import overview
+
+        things = overview().things
+        known = {name: str(text) for kind in kinds for name, text in _texts(things[kind]).items()}
+        fitting = [(name, known[name]) for name in sorted(known) if name.startswith(incomplete)]
+        return fitting + (_files(incomplete, ending) if ending else [])
+
+    return completed
+
+
+def _texts(things: dict[str, str] | list[str]) -> dict[str, str]:
+    return things if isinstance(things, dict) else dict.fromkeys(things, "")
+
+
+def _files(incomplete: str, ending: str) -> Completed:
+    """Return folders, and files of an ending, whose paths begin so."""
+    paths = sorted(iglob(f"{escape(incomplete)}*"))
+    return [(f"{path}/" if isdir(path) else path, "") for path in paths
+            if isdir(path) or path.endswith(ending)]  # fmt: skip
+
+
+def changeable(args: list[str], incomplete: str) -> Completed:
+    """Complete ``KEY=VALUE`` to the key: parameters and options of the bench that is named.
+
+    Of what is no bench, a loop for instance, those of all parameter sets.
+    """
+    from bywire.core.errors import BywireError
+
+    if "=" in incomplete:
+        return []  # values are the user's own
+    named = next((word for word in args if not word.startswith("-")), "")
+    try:
+        keys = _keys_of(named)
+    except BywireError:
+        keys = _all_parameters()
+    return [(f"{key}=", text) for key, text in keys.items() if key.startswith(incomplete)]
+
+
+def varied(args: list[str], incomplete: str) -> Completed:
+    """Complete the name of a parameter."""
+    return [(key.removesuffix("="), text) for key, text in changeable(args, incomplete)]
+
+
+def _keys_of(bench: str) -> dict[str, str]:
+    """Return parameters, and options, of a bench with what they are now."""
+    from bywire.bench.bench_file import read
+
+    made = read(bench, {})
+    options = {f"options.{name}": value for name, value in made.chosen_options.flat().items()}
+    known = {**made.par.flat(), **options}
+    return {name: f"{value!r} in SI" for name, value in known.items()}
+
+
+def _all_parameters() -> dict[str, str]:
+    from bywire.core.catalog import PARAMETER_SETS
+
+    sets = PARAMETER_SETS.all().values()
+    return {name: cited.name for cited in sets for name in cited.parameters().flat()}
+
+
+BENCHES = names_of("experiments", "generic_experiments", ending=".toml")
+LOOPS = names_of("loops")
+LOOPS_OR_PLANTS = names_of("loops", "plants")
+METHODS = names_of("methods")
+SETS = names_of("parameter_sets")
+SIZING = names_of("studies")
+LIVES = names_of("lives", ending=".toml")
+CAMPAIGNS = names_of("campaigns", ending=".toml")
+ANYTHING = names_of(
+    "brakes", "assemblies", "parameter_sets", "experiments", "generic_experiments", "loops",
+    "plants", "studies", "lives", "methods", "stimuli", "campaigns", "residuals", "kpis",
+)  # fmt: skip
