@@ -11,6 +11,7 @@ processes are killed up to four times each (``--studies 10``).
 from __future__ import annotations
 
 import argparse
+import contextlib
 import faulthandler
 import math
 import signal
@@ -102,7 +103,8 @@ def tried(kind: str, seed: int, first: int, cases: int, seconds: float) -> tuple
     """Try cases of a kind and return what is wrong, and the share of sound ones with a result."""
     wrong, statuses, through = [], Counter[int](), Counter[bool]()
     give_up = time.process_time() + seconds
-    with tempfile.TemporaryDirectory() as folder:
+    # There, too, lands what a command writes whose --out took the next word for a folder.
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for k, rng in islice(inputs.numbered(seed, kind), first, first + cases):
             if time.process_time() > give_up and statuses.total() >= LEAST:
                 break
