@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -83,8 +84,10 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
         (peak,) = PEAK(f"_{suffix}", p_max=run["p_mc"].max())
         loops[peak.name] = peak
     plain = loops["loop_area_undithered"]
-    ratio = loops["loop_area_dithered"].value / plain.value
-    return (*loops.values(), *RATIO(loop_area_ratio=(ratio, plain.note)))
+    ratio, note = math.nan, plain.note or "the loop without dither has no area"
+    if plain.value:
+        ratio, note = loops["loop_area_dithered"].value / plain.value, plain.note
+    return (*loops.values(), *RATIO(loop_area_ratio=(ratio, note)))
 
 
 _LOOP = units_of("hysteresis", "occupation", resolved={"drive": "A", "drive*response": "A*Pa"})

@@ -1,0 +1,28 @@
+"""Friction ramp: figures of a ramp that shows no loop."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import pytest
+
+import bywire
+from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis.registry import evaluate
+from bywire.brakes.motorcycle.experiments import friction_ramp
+
+
+def test_a_loop_without_area_has_no_ratio(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the current is not seen, the area is zero to the last digit, or a rounding of it."""
+
+    def flat(family: str, *given: object) -> dict[str, Kpi]:
+        kpis = evaluate(family, *given)
+        return {name: replace(kpi, value=0.0, note="") if name == "loop_area" else kpi
+                for name, kpi in kpis.items()}  # fmt: skip
+
+    monkeypatch.setattr(friction_ramp, "evaluate", flat)
+    short = {"options.i_max": "1 A", "options.slope": "20 A/s"}
+    ratio = bywire.run("friction-ramp", short, estimate_error=False).kpi("loop_area_ratio")
+    assert math.isnan(ratio.value)
+    assert ratio.note == "the loop without dither has no area"
