@@ -172,6 +172,9 @@ def test_parameters_that_drive_the_run_are_held(pages):
     follow = dependence(bench, 0, ("motor.R_m", "ecu.T_s", "ecu.dither.f_dit"))
     assert follow.driving == {"ecu.T_s"}
     assert follow.judging == {"ecu.dither.f_dit"}
+    stop = bywire.Bench("straight-stop", "sport600", options={"surface": "wet-asphalt"})
+    road = dependence(stop, 0, ("vehicle.road.first.c1", "vehicle.body.m"))  # by the surface
+    assert road.driving == {"vehicle.road.first.c1"}
     assert "ecu.T_s" not in used(pages["motorcycle"])
     assert block(pages["motorcycle"], "bench")["judged"]["followed"] == ["ecu.dither.f_dit"]
 

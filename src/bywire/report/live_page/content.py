@@ -170,9 +170,11 @@ def _summary(made: Exported) -> str:
 def _footer(made: Exported) -> str:
     cited = PARAMETER_SETS.find(made.bench.parameters)
     noise = any(name.startswith("noise_") for name in made.run.model.Stimulus._fields)
+    begins = made.bench.definition.preview is not None
     return (
         f"bywire {__version__}. The page computes the bench's own kernel, in steps of "
         f"{1e6 * made.schedule.step:g} us{', without the noise of its sensors' if noise else ''}. "
+        f"{'It begins as the bench does with its own values. ' if begins else ''}"
         f"Parameters: {cited.source}. Curves by uPlot (MIT license, in the page)."
     )
 
