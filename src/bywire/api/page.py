@@ -18,6 +18,8 @@ from bywire.report.document import Document, Listing, Section
 if TYPE_CHECKING:
     from bywire.export.exported import Exported
 
+_FIRST = 6  # parameters that stand first where nobody chose any
+
 
 @dataclass(frozen=True)
 class BenchPage(Answer):
@@ -122,5 +124,3 @@ def page(
     file = write_bytes(out, content)
     return BenchPage(file, made, len(content), len(gzip.compress(content, mtime=0)))
 
-
-_FIRST = 6  # parameters that stand first where nobody chose any
