@@ -1,0 +1,1 @@
+"""Speed: a controlled stop by hand."""
