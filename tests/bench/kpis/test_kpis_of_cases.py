@@ -4,16 +4,27 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.bench.kpis import effort, extremes, hysteresis, occupation, release, step_response
+from bywire.bench.kpis import (
+    cases,
+    effort,
+    extremes,
+    hysteresis,
+    occupation,
+    release,
+    step_response,
+)
 from bywire.bench.kpis.cases import FamilyJudge, evaluate_cases
 from bywire.bench.kpis.registry import FAMILIES, evaluate
 from bywire.bench.rows import Rows
+from bywire.simulation.compiler import find_compiler
 
+needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="there is no C compiler")
 CASES = 300
 STEP = step_response.Setting("y", 0.0, 0.0, 1.0)
 SETTINGS = {
@@ -59,6 +70,53 @@ def test_each_case_is_as_if_it_were_alone_for_every_family(rows):
                 assert together[name].case(k) == alone
                 told |= {alone.note.split()[0]} if math.isnan(alone.value) else set()
     assert told >= {"never", "already", "enters", "the", "no", "it"}  # reasons of every kind
+
+
+@needs_compiler
+@pytest.mark.parametrize("family", ["step_response", "effort", "occupation", "extremes"])
+def test_c_gives_the_bits_of_python_on_any_samples(family, monkeypatch):
+    random, compiled = np.random.default_rng(5), 0
+    every: set[str] = set()
+    for _ in range(80):
+        few, setting = _drawn(random, family)
+        settings = [setting] * few["y"].values.shape[0]
+        by_c = evaluate_cases(family, few, settings)
+        with monkeypatch.context() as without:
+            without.setattr(cases, "figures_in_c", lambda *_: None)
+            by_python = evaluate_cases(family, few, settings)
+        compiled += isinstance(by_c[next(iter(by_c))].told, partial)
+        for name, figure in by_python.items():
+            np.testing.assert_array_equal(by_c[name].values, figure.values, name)
+            notes = [figure.told(k) for k in range(len(settings))]
+            assert [by_c[name].told(k) for k in range(len(settings))] == notes
+            every |= {note.split()[0] for note in notes if note}
+    assert compiled > 40  # the others have samples that define nothing
+    assert len(every) >= {"step_response": 6, "extremes": 1}.get(family, 2)
+
+
+def _drawn(random: np.random.Generator, family: str) -> tuple[Rows, object]:
+    """Return few rows, so coarse that they meet levels and each other, and how they are seen."""
+    n = int(random.integers(2, 40))
+    t = np.cumsum(random.choice([0.01, 0.02, 0.05], n)) - 0.1
+    y = np.round(random.choice([0.0, 1.0, 3.0]) * random.standard_normal((5, n)), 1)
+    y[0], y[1, n // 2 :] = 0.5, 1.0
+    if random.random() < 0.1:
+        y[2, -1] = random.choice([math.nan, math.inf])
+    mode = (random.uniform(size=y.shape) < 0.5).astype(float)
+    mode[4, 0] += random.choice([0.0, 0.5])
+    rows = Rows(t, {"y": y, "mode": mode}, {"y": {"units": "m"}, "mode": {"units": "1"}})
+    if family != "step_response":
+        names = {"effort": ("y", "mode", "nothing"), "extremes": ("y",),
+                 "occupation": ("mode", random.choice(["mode", "none"]), "y", "none")}  # fmt: skip
+        names["effort"] = tuple(name if random.random() < 0.7 else "nothing" for name in "yyy")
+        return rows, FAMILIES.find(family).setting_class(*map(str, names[family]))
+    levels = random.choice([None, 0.0, 1.0], 2, p=[0.2, 0.4, 0.4])
+    window = sorted(random.uniform(t[0], t[-1], 2)) if random.random() < 0.3 else None
+    return rows, step_response.Setting(
+        "y", float(random.choice([*t[:-1], random.uniform(t[0], t[-1])])), *levels,
+        window=window and tuple(map(float, window)),
+        smoothing=float(random.choice([0.0, 0.03, 0.5])),
+    )  # fmt: skip
 
 
 def test_levels_may_differ_between_cases(rows):

@@ -14,7 +14,7 @@ const tries = {
   run({ changes }) {
     const made = call("recordingOf", brake.run(changes), description.settle, keep);
     const signals = Object.fromEntries(Object.entries(made.signals).map(([n, c]) => [n, Array.from(c)]));
-    const figures = judged && call("keyFigures", made.time, made.signals, judged.settings);
+    const figures = judged && call("keyFigures", brake.exports, made.time, made.signals, judged.families);
     return { time: Array.from(made.time), signals, figures };
   },
   link: ({ changes }) => call("changesOf", call("linkOf", digest, changes), digest, parameters),

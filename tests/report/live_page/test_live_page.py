@@ -91,7 +91,7 @@ def test_any_values_give_what_the_bench_gives(pages, name, tmp_path):
             given = made["figures"][kpi.name]
             assert bool(given["reason"]) == math.isnan(kpi.value), kpi.name
             if not given["reason"]:
-                assert given["value"] == pytest.approx(kpi.value, rel=1e-9, abs=1e-12), kpi.name
+                assert given["value"] == pytest.approx(kpi.value, rel=1e-12, abs=1e-15), kpi.name
     assert (answers[0]["answer"]["figures"] is not None) == (name == "motorcycle")
 
 

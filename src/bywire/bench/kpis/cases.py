@@ -4,13 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any, cast
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
-from bywire.bench.kpis.kpi import Kpi, KpiOfCases
+from bywire.bench.kpis.in_c import figures_in_c
+from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
 from bywire.bench.kpis.registry import FAMILIES, Family, evaluate
+from bywire.bench.kpis.samples import signal
 from bywire.bench.rows import Rows
 
 
@@ -42,13 +46,15 @@ class FamilyJudge:
 
         ``rows``: signals of shape (cases, time); ``options``: of each case, of one structure.
         """
-        each = [self.settings(chosen) for chosen in options]
+        known = {id(chosen): self.settings(chosen) for chosen in options}  # mostly of one
+        each = [known[id(chosen)] for chosen in options]
         given = [evaluate_cases(name, rows, [s[name] for s in each]) for name in each[0]]
         return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
 
     def signals(self, options: Sequence[Any]) -> set[str]:
         """Return the names of all signals that it may look at, of cases with these options."""
-        each = {setting for chosen in options for setting in self.settings(chosen).values()}
+        distinct = {id(chosen): chosen for chosen in options}.values()
+        each = {setting for chosen in distinct for setting in self.settings(chosen).values()}
         return {name for setting in each for name in signals_of_setting(setting)}
 
     def _wants(self, name: str) -> bool:
@@ -114,9 +120,15 @@ def _together(
     )
     blank = dict.fromkeys(by_case)
     if not is_alike or any(
-        other != first and replace(other, **blank) != replace(first, **blank) for other in settings
+        other is not first
+        and other != first
+        and replace(other, **blank) != replace(first, **blank)
+        for other in settings
     ):
         return None
+    compiled = _in_c(chosen, rows, settings, replace(first, **levels))
+    if compiled is not None:
+        return compiled
     data = chosen.select(cast(xr.Dataset, rows), replace(first, **levels))
     if data.defect:
         return None
@@ -125,3 +137,39 @@ def _together(
         each.name: replace(each, values=np.broadcast_to(each.values, len(settings)))
         for each in figures
     }
+
+
+def _in_c(
+    chosen: Family, rows: Rows, settings: Sequence[Any], joined: Any
+) -> dict[str, KpiOfCases] | None:
+    """Return the figures of cases at once by a family's C; None where that cannot tell them.
+
+    ``joined``: their setting, with the levels of each case.
+    """
+    how, figures = chosen.in_c, list(chosen.measures.values())
+    if how is None:
+        return None
+    names = [getattr(joined, name) for name in how.signals]
+    each = [signal(cast(xr.Dataset, rows), n) if n in rows else None for n in names]
+    if each[0] is None and not all(figure.needs for figure in figures):
+        return None
+    given = figures_in_c(
+        chosen.name, chosen.path, how, joined, rows["time"].values,
+        [None if one is None else one[0] for one in each], len(figures),
+    )  # fmt: skip
+    if given is None:
+        return None
+    level = "1" if each[0] is None else each[0][1]
+
+    def told(figure: Measure[Any], why: NDArray[np.int32], k: Any) -> str:
+        if not why[k]:
+            return how.note(joined)
+        return figure(chosen.select(cast(xr.Dataset, rows.case(k)), settings[k])).note
+
+    return {
+        figure.name: KpiOfCases(
+            figure.name, values, level if figure.unit == "level" else figure.unit,
+            figure.definition, partial(told, figure, why),
+        )
+        for figure, values, why in zip(figures, *given, strict=True)
+    }  # fmt: skip

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import Undefined, measure
 from bywire.bench.kpis.samples import defect, integral, signal
 from bywire.core.typing import Array
@@ -24,6 +25,16 @@ class Setting:
     current: str = "i"
     power: str = "P_el"
     energy: str = "E_source"
+
+
+IN_C = InC(
+    signals=("current", "power", "energy"),
+    reasons=(
+        "no current is recorded",
+        "no electrical power is recorded",
+        "neither energy nor electrical power is recorded",
+    ),
+)
 
 
 @dataclass(frozen=True, eq=False)

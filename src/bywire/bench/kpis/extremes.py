@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import measure
 from bywire.bench.kpis.samples import defect, signal
 from bywire.core.typing import Array
@@ -22,6 +23,9 @@ class Setting:
     BY_CASE: ClassVar[tuple[str, ...]] = ()
 
     signal: str
+
+
+IN_C = InC(("signal",))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 import xarray as xr
 
+from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import Undefined, Values, measure
 from bywire.bench.kpis.samples import defect, integral, signal
 from bywire.core.typing import Array
@@ -25,6 +26,12 @@ class Setting:
     t_stuck: str = "t_stuck"
     sat_current: str = "sat_current"
     sat_duty: str = "sat_duty"
+
+
+IN_C = InC(
+    signals=("stuck", "t_stuck", "sat_current", "sat_duty"),
+    reasons=("the mode is not recorded", "the mode holds other values than 0 and 1"),
+)
 
 
 @dataclass(frozen=True, eq=False)

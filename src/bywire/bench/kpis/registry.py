@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from types import MappingProxyType, ModuleType
 from typing import Any
 
 import xarray as xr
 
+from bywire.bench.kpis.in_c import InC
 from bywire.bench.kpis.kpi import Kpi, Measure
 from bywire.core.registry import Kind
 
@@ -30,6 +32,9 @@ class Family:
     measures
         Its figures by name, in the order of the file; each has ``name``, ``unit`` and
         ``definition``.
+    in_c, path
+        How its C is called, and where that is, with the figures in the same order; None where it
+        has none.
     """
 
     name: str
@@ -37,6 +42,8 @@ class Family:
     setting_class: type
     select: Callable[[xr.Dataset, Any], Any]
     measures: Mapping[str, Measure[Any]]
+    in_c: InC | None = None
+    path: Path = Path()
 
 
 def _declared(module: ModuleType) -> Iterator[Family]:
@@ -45,7 +52,9 @@ def _declared(module: ModuleType) -> Iterator[Family]:
     if figures:
         summary = (module.__doc__ or "").strip().splitlines()[0]
         name = module.__name__.rpartition(".")[2]
-        yield Family(name, summary, module.Setting, module.select, figures)
+        path = Path(module.__file__ or "").with_suffix(".c")
+        in_c = getattr(module, "IN_C", None)
+        yield Family(name, summary, module.Setting, module.select, figures, in_c, path)
 
 
 FAMILIES = Kind("family of key figures", ("kpis",), _declared, "bywire.bench.kpis")

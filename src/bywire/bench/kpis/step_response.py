@@ -17,8 +17,9 @@ from typing import Any, ClassVar
 import numpy as np
 import xarray as xr
 
+from bywire.bench.kpis.in_c import UNSOUND, InC
 from bywire.bench.kpis.kpi import Undefined, Values, Why, measure
-from bywire.bench.kpis.samples import defect, integral, sample, signal
+from bywire.bench.kpis.samples import defect, integral, sample, signal, total
 from bywire.bench.kpis.smoothing import smoothed, treatment
 from bywire.core.typing import Array
 
@@ -59,6 +60,39 @@ class Setting:
     window: tuple[float, float] | None = None
     smoothing: float = 0.0
     set_point: str = ""
+
+
+def _packed(setting: Setting, cases: int) -> Array:
+    """Return the setting as the C takes it: what the step was, then levels of each case."""
+    levels = np.full((cases, 2), math.nan)
+    for column, level in enumerate((setting.start, setting.end)):
+        levels[:, column] = math.nan if level is None else level
+    given = [float(each is not None) for each in (setting.start, setting.end, setting.window)]
+    step = (setting.t_step, setting.smoothing, *given, *(setting.window or (0.0, 0.0)))
+    return np.concatenate((step, levels.ravel()))
+
+
+IN_C = InC(
+    signals=("signal",),
+    reasons=(
+        "the step height is zero",
+        "the response changes by less than its ripple: no step is seen",
+        "never gets as far",
+        "there already at the step",
+        "never settles",
+        "enters the band only shortly before the recording ends",
+        "no set point is given",
+        "the steady state's window holds < 2 samples",
+    ),
+    failures=(
+        UNSOUND,
+        "the step is outside the recording",
+        "the steady state's window holds < 2 samples",
+    ),
+    packed=_packed,
+    note=lambda setting: treatment(setting.smoothing),
+    room=8,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,7 +199,7 @@ def select(recording: xr.Dataset, setting: Setting) -> StepResponse:
     end: Any = _mean(after) if setting.end is None else setting.end
     if start is None:
         before = y[..., : np.searchsorted(t, setting.t_step - 0.5 * setting.smoothing)]
-        start = np.mean(before, axis=-1) if before.size else after.y[..., 0]
+        start = total(before) / before.shape[-1] if before.size else after.y[..., 0]
     if isinstance(end, Undefined):
         return replace(after, problem=end.reason)
     return replace(after, start=start, end=end)

@@ -27,6 +27,8 @@ export interface Recording {
 }
 export interface Brake {
   description: Description;
+  /** Memory and functions of the module, as they are. */
+  exports: WebAssembly.Exports;
   run(parameters?: Record<string, number>, options?: Options): Recording;
 }
 export function load(bytes: BufferSource, description: Description): Promise<Brake>;

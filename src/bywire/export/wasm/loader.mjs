@@ -64,6 +64,7 @@ export async function load(bytes, description) {
   const width = description.signals.length;
   return {
     description,
+    exports: instance.exports,
     run(values = {}, { stimulus = {}, duration = description.duration } = {}) {
       const vector = vectorOf(description, values);
       const isChanged = vector.some((value, k) => value !== description.parameters[k].start);

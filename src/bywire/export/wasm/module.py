@@ -6,7 +6,9 @@ import importlib.util
 import json
 import subprocess
 import sys
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -29,8 +31,12 @@ _FLAGS = (
 )  # fmt: skip
 
 
-def module_files(made: Exported, name: str) -> dict[str, bytes]:
+def module_files(
+    made: Exported, name: str, further: Mapping[str, str] = MappingProxyType({})
+) -> dict[str, bytes]:
     """Return the files of an exported run by their names.
+
+    ``further``: C that goes into the module, by the name of the function that it exports.
 
     Raises
     ------
@@ -41,14 +47,14 @@ def module_files(made: Exported, name: str) -> dict[str, bytes]:
     faces = interface(made, "brake", reads)
     description = json.dumps(_description(made, name, bool(start), reads), indent=1)
     return {
-        f"{name}.wasm": _compiled(made.kernel, model_header(made, faces, start, name)),
+        f"{name}.wasm": _compiled(made.kernel, model_header(made, faces, start, name), further),
         f"{name}.json": description.encode(),
         "bywire.mjs": (HERE / "loader.mjs").read_bytes(),
         "bywire.d.mts": (HERE / "loader.d.ts").read_bytes(),
     }
 
 
-def _compiled(kernel: str, header: str) -> bytes:
+def _compiled(kernel: str, header: str, further: Mapping[str, str]) -> bytes:
     """Return the module."""
     if importlib.util.find_spec("ziglang") is None:
         raise CompilerError(
@@ -60,9 +66,14 @@ def _compiled(kernel: str, header: str) -> bytes:
             (folder / name).write_bytes((HERE / name).read_bytes())
         (folder / "kernel.c").write_text(kernel, encoding="utf-8")
         (folder / "model.h").write_text(header, encoding="utf-8")
+        sources = [folder / "kernel.c", folder / "page.c"]
+        for entry, text in further.items():
+            sources.append(folder / f"{entry}.c")
+            sources[-1].write_text(text, encoding="utf-8")
         made = folder / "module.wasm"
-        command = [sys.executable, "-m", "ziglang", "cc", *_FLAGS, f"-I{folder}",
-                   str(folder / "kernel.c"), str(folder / "page.c"), "-o", str(made)]  # fmt: skip
+        exported = [f"-Wl,--export={entry}" for entry in further]
+        command = [sys.executable, "-m", "ziglang", "cc", *_FLAGS, *exported, f"-I{folder}",
+                   *map(str, sources), "-o", str(made)]  # fmt: skip
         try:
             done = subprocess.run(
                 command, capture_output=True, text=True, timeout=TIMEOUT, check=False

@@ -34,11 +34,12 @@ function judge() {
   place("figures").hidden = !judged;
   place("unjudged").hidden = Boolean(judged);
   if (!judged) return;
-  const given = keyFigures(run.time, run.signals, judged.settings);
+  const following = judged.families.find(({ name }) => name === "step_response")?.figures ?? [];
   const followed = judged.followed.filter((name) => name in changes());
   place("figures").tBodies[0].replaceChildren(...judged.figures.map((figure) => {
-    const computed = followed.length && STEP.includes(figure.name)
-      ? undefinedFor(`an option follows ${followed}: save the bench file and run it`) : given[figure.name];
+    const computed = followed.length && following.includes(figure.name)
+      ? { value: NaN, reason: `an option follows ${followed}: save the bench file and run it` }
+      : run.figures[figure.name];
     const unit = figure.unit && ` ${figure.unit}`;
     const value = computed.reason ? element("td", { class: "number", title: computed.reason }, "–")
       : element("td", { class: "number" }, digits(shownOf(computed.value, figure)) + unit);
@@ -61,13 +62,13 @@ function ask() {
   wanted = null;
 }
 
-function answered({ data: { error, time, signals, settled } }) {
+function answered({ data: { error, time, signals, figures, settled } }) {
   busy = false;
   if (error) {
     complain(error);
     place("work").textContent = "not run";
   } else {
-    run = recordingOf({ time, signals }, description.settle, bench.keep);
+    run = { time, signals, figures };
     place("work").textContent = settled ? "" : "contacts or frictions did not settle in some step";
     place("keep").disabled = place("csv").disabled = false;
     judge();
@@ -149,7 +150,7 @@ if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
   worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
   worker.addEventListener("message", answered);
   worker.addEventListener("error", (event) => complain(`the bench does not run: ${event.message}`));
-  worker.postMessage({ bytes, description });
+  worker.postMessage({ bytes, given: { description, judged, keep: bench.keep } });
   take(location.hash.slice(1));
   ask();
   addEventListener("hashchange", () => {

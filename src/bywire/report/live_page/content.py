@@ -10,14 +10,17 @@ import base64
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from html import escape
 from importlib.resources import files
 from string import Template
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from bywire.bench.bench_text import bench_text
 from bywire.bench.kpis.cases import FamilyJudge
+from bywire.bench.kpis.in_c import entry_of, source_of
+from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
 from bywire.core.catalog import PARAMETER_SETS
@@ -34,9 +37,7 @@ from bywire.report.wording import unit_text
 if TYPE_CHECKING:
     import xarray as xr
 
-_SCRIPTS = ("values.js", "figures.js", "controls.js", "curves.js", "bench.js")
-FAMILIES = frozenset({"step_response", "effort", "occupation", "extremes"})
-"""key figures that the page computes itself"""
+_SCRIPTS = ("values.js", "controls.js", "curves.js", "bench.js")
 _NAME = "run"  # of the module, inside the page
 
 
@@ -63,7 +64,9 @@ def page_text(
         Without the extra ``compiler``.
     """
     name = made.bench.name or made.bench.experiment
-    module = module_files(made, _NAME)
+    families = _settings(made) or ()
+    further = {entry_of(each): source_of(FAMILIES.find(each).path) for each in families}
+    module = module_files(made, _NAME, further)
     data = _data(made, json.loads(module[f"{_NAME}.json"]), panels, result, chosen)
     digest = hashlib.sha256(module[f"{_NAME}.wasm"] + json.dumps(data).encode()).hexdigest()[:16]
     data["digest"] = digest
@@ -71,7 +74,7 @@ def page_text(
     loader = module["bywire.mjs"].decode().replace("export async function", "async function")
     blocks = {
         "bench": data, "kernel": base64.b64encode(module[f"{_NAME}.wasm"]).decode(),
-        "loader": loader, "worker": _text("worker.js"),
+        "loader": loader, "worker": f"{_text('figures.js')}\n{_text('worker.js')}",
     }  # fmt: skip
     style = _text("uplot/uPlot.min.css") + _text("live.css")
     library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"
@@ -116,13 +119,33 @@ def _data(
     }
 
 
+def _settings(made: Exported) -> Mapping[str, Any] | None:
+    """Return the settings of the families that the page judges its run by; None where it cannot."""
+    definition = made.bench.definition
+    if not isinstance(definition.judge, FamilyJudge) or definition.finish is not None:
+        return None
+    settings = definition.judge.settings(made.bench.chosen_options)
+    is_whole = all(FAMILIES.find(name).in_c is not None for name in settings)
+    return settings if is_whole else None
+
+
+def _family(name: str, setting: Any) -> dict[str, Any]:
+    """Return how the page calls the C of a family."""
+    family = FAMILIES.find(name)
+    how = family.in_c
+    assert how is not None
+    return {
+        "name": name, "entry": entry_of(name), "figures": list(family.measures),
+        "signals": [getattr(setting, field) for field in how.signals],
+        "setting": np.nan_to_num(how.packed(setting, 1)).tolist(), "room": how.room,
+        "reasons": ["", *how.reasons], "failures": ["", *how.failures],
+    }  # fmt: skip
+
+
 def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str, Any] | None:
     """Return how the page judges its run; None where it cannot."""
-    bench, judge = made.bench, made.bench.definition.judge
-    if not isinstance(judge, FamilyJudge) or bench.definition.finish is not None:
-        return None
-    settings = judge.settings(bench.chosen_options)
-    if not settings.keys() <= FAMILIES:
+    bench, settings = made.bench, _settings(made)
+    if settings is None:
         return None
     limits = {
         kpi.name: limit_of(kpi.name, bench.requirements[kpi.name], kpi.unit)
@@ -135,7 +158,7 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
          if kpi.name in limits else None}
         for kpi in result.kpis
     ]  # fmt: skip
-    return {"settings": {name: asdict(each) for name, each in settings.items()},
+    return {"families": [_family(name, each) for name, each in settings.items()],
             "figures": figures, "followed": list(followed)}  # fmt: skip
 
 

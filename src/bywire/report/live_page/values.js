@@ -72,12 +72,10 @@ function benchFile(text, changes, parameters) {
   return [...lines.slice(0, at + 1), ...kept, ...set, ...lines.slice(end), ""].join("\n");
 }
 
-/** Return what a bench records of a run: time from the end of settling on, and what is kept before. */
-function recordingOf({ time, signals }, settle, keep) {
-  const begin = time.findIndex((t) => t >= settle - keep - 1e-9);
-  const cut = Object.entries(signals).map(([name, column]) => [name, column.subarray(begin)]);
-  const since = time.subarray(begin).map((t) => Math.round((t - settle) * 1e12) / 1e12);
-  return { time: since, signals: Object.fromEntries(cut) };
+/** Return whether a key figure meets its requirement; a figure that is not defined does not. */
+function isMet({ value }, { compare, bound }) {
+  return compare === "<=" ? value <= bound : compare === ">=" ? value >= bound
+    : compare === "<" ? value < bound : value > bound;
 }
 
 /** Return recorded signals as CSV, units in the heads, all SI. */

@@ -1,10 +1,16 @@
-/* Runs the bench beside the page, which stays alive meanwhile; the loader stands above. */
+/* Runs and judges the bench beside the page, which stays alive meanwhile; loader and figures above. */
 let loaded; // promised with the first message: the next ones may come before it is there
-self.onmessage = async ({ data: { bytes, description, values, number } }) => {
+let bench;
+self.onmessage = async ({ data: { bytes, given, values, number } }) => {
   try {
-    loaded ??= load(bytes, description);
+    bench ??= given;
+    loaded ??= load(bytes, bench.description);
     const brake = await loaded;
-    if (values) self.postMessage({ number, ...brake.run(values) });
+    if (!values) return;
+    const { settled, ...made } = brake.run(values);
+    const { time, signals } = recordingOf(made, bench.description.settle, bench.keep);
+    const figures = bench.judged && keyFigures(brake.exports, time, signals, bench.judged.families);
+    self.postMessage({ number, time, signals, figures, settled });
   } catch (error) {
     self.postMessage({ number, error: error.message });
   }
