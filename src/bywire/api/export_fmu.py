@@ -15,7 +15,8 @@ from bywire.core.typing import silent
 from bywire.core.units import shown
 from bywire.export.fmu.archive import unit_of, write_unit
 from bywire.export.fmu.binaries import PLATFORMS, this_platform
-from bywire.export.interface import PARTS, Causality
+from bywire.export.interface import KINDS, PARTS
+from bywire.export.variables import Causality
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Paragraph, Section, TableBlock
 from bywire.report.tables import Table, text_table
@@ -25,11 +26,15 @@ if TYPE_CHECKING:
     from bywire.export.fmu.archive import Unit
 
 _KINDS: dict[Causality, str] = {
-    "input": "inputs", "output": "outputs", "parameter": "parameters", "local": "sampled signals",
+    "input": "inputs", "output": "outputs", "parameter": "parameters", "local": "others",
 }  # fmt: skip
 _NO_START = (
     "the start at rest of this experiment is not known for other parameters: with changed "
     "parameters the unit begins where the exported ones rest, and settles"
+)
+_EXCHANGED = (
+    "a solver integrates its states and meets its events; between them contacts and frictions keep "
+    "their modes"
 )
 
 
@@ -64,11 +69,11 @@ class ExportedFmu(Answer):
         unit = self.unit
         schedule = unit.made.schedule
         table = TableBlock(self._table())
-        steps = Paragraph(
+        steps = Paragraph(_EXCHANGED if unit.faces.kind == "model-exchange" else (
             f"internal step {shown(schedule.step, 's')}, communication steps are multiples of "
             f"{shown(schedule.frame, 's')}; time 0 is {shown(unit.made.case.settle, 's')} before "
             "time zero of the bench"
-        )
+        ))  # fmt: skip
         written = f"written: {self.path}"
         return Document(
             f"FMU {unit.identifier}",
@@ -94,6 +99,7 @@ class ExportedFmu(Answer):
             "file": str(self.path),
             "fmi": unit.version,
             "part": unit.faces.part,
+            "kind": unit.faces.kind,
             "identifier": unit.identifier,
             "token": unit.token,
             "case": unit.made.case.label,
@@ -115,13 +121,14 @@ def export_fmu(
     out: str | Path,
     overrides: Mapping[str, str] = MappingProxyType({}),
     *,
-    part: str = "brake",
+    part: str = "",
+    kind: str = "co-simulation",
     fmi: int = 2,
     case: str = "",
     targets: Sequence[str] = (),
     progress: Progress | None = None,
 ) -> ExportedFmu:
-    """Write a bench's model as a functional mock-up unit for co-simulation.
+    """Write a bench's model as a functional mock-up unit.
 
     Parameters
     ----------
@@ -133,7 +140,10 @@ def export_fmu(
         Changes of a bench file or experiment, as ``--set`` takes them.
     part
         ``"brake"``: all; ``"plant"``: what the ECU holds are inputs, its readings outputs;
-        ``"ecu"``: the reverse.
+        ``"ecu"``: the reverse. The brake by default; the plant where that is exchanged.
+    kind
+        ``"co-simulation"``: it steps by itself, as the bench does; ``"model-exchange"``: the plant
+        for a client's solver, with derivatives, event indicators and modes.
     fmi
         Version of the interface: 2 for 2.0, 3 for 3.0 (tasks are clocks, tables arrays).
     case
@@ -156,8 +166,16 @@ def export_fmu(
     CompilerError
         When there is no compiler for a system, or it fails.
     """
+    if kind not in KINDS:
+        raise unknown_name("kind", kind, KINDS)
+    part = part or ("plant" if kind == "model-exchange" else "brake")
     if part not in PARTS:
         raise unknown_name("part", part, PARTS)
+    if kind == "model-exchange" and part != "plant":
+        raise ParameterError(
+            f"part = {part!r}: model exchange is for the plant, the ECU works in ticks; export "
+            "that for co-simulation beside it"
+        )
     if fmi not in (2, 3):
         raise ParameterError(f"fmi = {quoted(fmi)}: FMUs of version 2 (2.0) and 3 (3.0) are made")
     systems = tuple(dict.fromkeys(targets)) or (this_platform(),)
@@ -170,7 +188,7 @@ def export_fmu(
         bench = bench.with_overrides(overrides)
     from bywire.export.exported import exported
 
-    unit = unit_of(exported(bench, case), part, fmi)
+    unit = unit_of(exported(bench, case), part, fmi, kind)
     folder = Path(out)
     path = folder / f"{unit.identifier}.fmu"
     try:

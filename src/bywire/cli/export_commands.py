@@ -60,7 +60,12 @@ def export_controller_command(
 def export_fmu_command(
     bench: BenchFile,
     out: ExportFolder,
-    part: Annotated[str, typer.Option(help="brake, plant or ecu.")] = "brake",
+    part: Annotated[
+        str, typer.Option(help="brake, plant or ecu.", show_default="brake; plant for model-exchange")
+    ] = "",
+    kind: Annotated[
+        str, typer.Option(help="co-simulation, or model-exchange of the plant.")
+    ] = "co-simulation",
     fmi: Annotated[int, typer.Option(help="Version of the interface: 2 or 3.")] = 2,
     case: RunLabel = "",
     target: Annotated[
@@ -70,13 +75,13 @@ def export_fmu_command(
     set_: BenchChanges = None,
     json: JsonFlag = False,
 ) -> None:
-    """Write a functional mock-up unit for co-simulation."""
+    """Write a functional mock-up unit for co-simulation, or model exchange."""
     from bywire.api.export_fmu import export_fmu
 
     show(
         lambda progress: export_fmu(
-            bench, out, changes(set_), part=part, fmi=fmi, case=case, targets=target or (),
-            progress=progress,
+            bench, out, changes(set_), part=part, kind=kind, fmi=fmi, case=case,
+            targets=target or (), progress=progress,
         ),
         None, json,
     )  # fmt: skip

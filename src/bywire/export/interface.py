@@ -2,63 +2,32 @@
 
 from __future__ import annotations
 
-import math
 import re
+from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, get_args
 
-from bywire.core.field_notes import field_notes
-from bywire.core.leaf import Leaf
-from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signals_of
 from bywire.export.exported import Exported
+from bywire.export.variables import (
+    Causality,
+    Place,
+    Variable,
+    memory_variable,
+    parameter_variables,
+    row_variable,
+    state_variable,
+)
+from bywire.simulation.graph import Graph
 from bywire.simulation.operation import Node
 from bywire.simulation.stages import Stages
 
 Part = Literal["brake", "plant", "ecu"]
 PARTS: tuple[Part, ...] = get_args(Part)
-Place = Literal["parameter", "stimulus", "state", "row", "sampled"]
-Causality = Literal["parameter", "input", "output", "local"]
-
-
-@dataclass(frozen=True)
-class Variable:
-    """A number that a client sets or gets.
-
-    Parameters
-    ----------
-    name
-        Structured: ``motor.R_m``, ``caliper.p_table[1]``.
-    causality
-        What it is for a client.
-    place, index
-        Where the C code keeps it.
-    unit, label
-        SI unit in the syntax of pint, and what it means.
-    start
-        Value before anything is set; None of what is computed.
-    leaf
-        Range of a parameter.
-    is_tunable
-        Whether a parameter may change during the run: those that the ECU alone reads.
-    is_held
-        Whether it changes at ticks alone.
-    """
-
-    name: str
-    causality: Causality
-    place: Place
-    index: int
-    unit: str
-    label: str
-    start: float | None = None
-    leaf: Leaf | None = None
-    is_tunable: bool = False
-    is_held: bool = False
-
-
+Kind = Literal["co-simulation", "model-exchange"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 Numbered = tuple[int, Variable]
 
 
@@ -73,14 +42,21 @@ class Interface:
         plant are inputs).
     variables
         In the order of their value references.
+    kind
+        Whether it steps by itself, or a client's solver integrates it.
     """
 
     part: Part
     variables: tuple[Variable, ...]
+    kind: Kind = "co-simulation"
 
     def of(self, causality: Causality) -> tuple[Variable, ...]:
         """Return the variables of a causality."""
         return tuple(each for each in self.variables if each.causality == causality)
+
+    def at(self, place: Place) -> dict[int, int]:
+        """Return the value references of what stands in a place, by index there."""
+        return {v.index: k for k, v in enumerate(self.variables) if v.place == place}
 
 
 def interface(made: Exported, part: Part, start_reads: frozenset[int] = frozenset()) -> Interface:
@@ -92,26 +68,26 @@ def interface(made: Exported, part: Part, start_reads: frozenset[int] = frozense
         Parameters that the initial values depend on, by index.
     """
     reads = _Reads.of(made.stages)
-    readings = _readings(made, reads)
+    asked = readings(made)
     signals: list[Variable] = []
     if part != "plant":
         signals += _stimuli(made, reads)
     if part == "plant":
-        signals += (_memory(made, k, "input") for k in sorted(reads.plant["m"]))
+        signals += (memory_variable(made, k, "input") for k in sorted(reads.plant["m"]))
     if part == "ecu":
-        signals += (_state(made, k, name, "input") for k, name in readings.items())
-        signals += (_memory(made, k, "output") for k in range(made.program.sizes.memory))
+        signals += (state_variable(made, k, name, "input") for k, name in asked.items())
+        signals += (memory_variable(made, k, "output") for k in range(made.program.sizes.memory))
     taken = {each.name for each in signals}
-    rows = [_row(made, k, "row") for k in reads.shown(part)]
+    rows = [row_variable(made, k, "row") for k in reads.shown(part)]
     signals += (each for each in rows if each.name not in taken)
     if part == "plant":
         named = {each.name for each in rows}
-        signals += (_state(made, k, name, "output") for k, name in readings.items()
+        signals += (state_variable(made, k, name, "output") for k, name in asked.items()
                     if name not in named)  # fmt: skip
     if part == "brake":
-        signals += (_row(made, k, "sampled") for k in reads.shown(part))
+        signals += (row_variable(made, k, "sampled") for k in reads.shown(part))
     parameters = reads.parameters(part) | start_reads
-    return Interface(part, (*signals, *_parameters(made, parameters, reads.tunable)))
+    return Interface(part, (*signals, *parameter_variables(made, parameters, reads.tunable)))
 
 
 @dataclass(frozen=True)
@@ -130,9 +106,9 @@ class _Reads:
         passes += [c for pairs in stages.quadrature.combinations for c, _ in pairs]
         ticks = [node for roots in stages.ticks for node in _changed(stages, roots)]
         return cls(
-            _leaves(stages, passes),
-            _leaves(stages, ticks),
-            tuple(_leaves(stages, [node]) for node in stages.output),
+            leaves_read(stages.graph, passes),
+            leaves_read(stages.graph, ticks),
+            tuple(leaves_read(stages.graph, [node]) for node in stages.output),
         )
 
     def shown(self, part: Part) -> list[int]:
@@ -160,13 +136,14 @@ def _changed(stages: Stages, roots: list[Node]) -> list[Node]:
     return [node for k, node in enumerate(roots) if node != stages.graph.leaf("m", k)]
 
 
-def _leaves(stages: Stages, roots: Iterable[Node]) -> dict[str, frozenset[int]]:
-    found: dict[str, set[int]] = {kind: set() for kind in ("x", "m", "u", "p")}
-    for node in stages.graph.read_by(roots):
-        operation = stages.graph.nodes[node]
-        if operation.op == "leaf" and operation.args[0] in found:
-            found[operation.args[0]].add(operation.args[1])
-    return {kind: frozenset(each) for kind, each in found.items()}
+def leaves_read(graph: Graph, roots: Iterable[Node]) -> dict[str, frozenset[int]]:
+    """Return the indices of the leaves that values are computed from, by kind."""
+    read: defaultdict[str, set[int]] = defaultdict(set)
+    for node in graph.read_by(roots):
+        operation = graph.nodes[node]
+        if operation.op == "leaf":
+            read[operation.args[0]].add(operation.args[1])
+    return defaultdict(frozenset, {kind: frozenset(each) for kind, each in read.items()})
 
 
 def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
@@ -179,69 +156,17 @@ def _stimuli(made: Exported, reads: _Reads) -> Iterator[Variable]:
             )
 
 
-def _row(made: Exported, k: int, place: Literal["row", "sampled"]) -> Variable:
-    """Return a recorded signal as it is now, or as the last tick left it."""
-    name, signal = list(made.program.outputs.items())[k]
-    if place == "row":
-        return Variable(name, "output", place, k, signal.unit, signal.label)
-    label = f"{signal.label}, after the tick at the beginning of the last step"
-    return Variable(f"sampled.{name}", "local", place, k, signal.unit, label, is_held=True)
-
-
-def _readings(made: Exported, reads: _Reads) -> dict[int, str]:
+def readings(made: Exported) -> dict[int, str]:
     """Return the names of the states that ticks read; as recorded where that is the same."""
     outputs = list(made.program.outputs)
     memory = set(made.run.model.Memory._fields)
     names = {}
-    for k in sorted(reads.ecu["x"]):
+    for k in sorted(_Reads.of(made.stages).ecu["x"]):
         name = made.run.model.State._fields[k]
         leaf = made.stages.graph.leaf("x", k)
         is_other = name in outputs and made.stages.output[outputs.index(name)] != leaf
         names[k] = f"state.{name}" if is_other or name in memory else name
     return names
-
-
-def _state(made: Exported, k: int, name: str, causality: Causality) -> Variable:
-    signal = list(signals_of(made.run.model.State).values())[k]
-    at = made.layout.start["x"] + k
-    start = made.vector[at] if causality == "input" else None
-    return Variable(name, causality, "state", at, signal.unit, signal.label, start)
-
-
-def _memory(made: Exported, k: int, causality: Causality) -> Variable:
-    name, signal = list(signals_of(made.run.model.Memory).items())[k]
-    at = made.layout.start["m"] + k
-    start = made.vector[at] if causality == "input" else None
-    return Variable(name, causality, "state", at, signal.unit, signal.label, start, is_held=True)
-
-
-def _parameters(
-    made: Exported, read: frozenset[int], tunable: frozenset[int]
-) -> Iterator[Variable]:
-    fields = leaf_fields(type(made.run.par))
-    notes = field_notes(type(made.run.par))
-    for k, (name, value) in enumerate(made.run.par.leaves().items()):
-        if k not in read:
-            continue
-        group, _, node = name.rpartition(".")
-        leaf = fields.get(name) or fields[group]
-        is_node = name not in fields
-        shown = f"{group}[{int(node) + 1}]" if is_node else name
-        label = notes[group if is_node else name]
-        yield Variable(
-            shown, "parameter", "parameter", k, leaf.unit.symbol, label, value, leaf,
-            is_tunable=k in tunable,
-        )  # fmt: skip
-
-
-def finite_range(leaf: Leaf) -> tuple[float | None, float | None]:
-    """Return the admissible ends of a parameter's range; None where it has no end.
-
-    An end that does not belong to it becomes the next number within.
-    """
-    low = math.nextafter(leaf.low, math.inf) if leaf.low_open else leaf.low
-    high = math.nextafter(leaf.high, -math.inf) if leaf.high_open else leaf.high
-    return (None if math.isinf(leaf.low) else low, None if math.isinf(leaf.high) else high)
 
 
 def tables(faces: Interface) -> Iterator[list[Numbered]]:

@@ -5,20 +5,25 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 from bywire.export.exported import Exported
 from bywire.export.initial_values import HEADING
-from bywire.export.interface import Interface, Variable, finite_range, tables
+from bywire.export.interface import Interface, tables
+from bywire.export.variables import Variable, finite_range
 from bywire.simulation.c_runtime import SCALAR
 
 _PLACES = {
     "parameter": "PARAMETER", "stimulus": "STIMULUS", "state": "IN_STATE", "row": "IN_ROW",
-    "sampled": "IN_SAMPLED",
+    "sampled": "IN_SAMPLED", "rate": "IN_RATE", "mode": "IN_MODE", "closed": "IN_CLOSED",
+    "indicator": "IN_INDICATOR", "events": "IN_EVENTS",
 }  # fmt: skip
 
 
-def model_header(made: Exported, faces: Interface, start: str, token: str) -> str:
+def model_header(
+    made: Exported, faces: Interface, start: str, token: str,
+    modes: Mapping[str, object] | None = None,
+) -> str:  # fmt: skip
     """Return the C header of an exported part.
 
     Parameters
@@ -27,6 +32,8 @@ def model_header(made: Exported, faces: Interface, start: str, token: str) -> st
         C function of the initial values, empty where there is none.
     token
         What tells this model from others.
+    modes
+        Further counts, of a plant in model exchange.
     """
     schedule, n = made.schedule, made.program.sizes
     counts = {
@@ -43,6 +50,9 @@ def model_header(made: Exported, faces: Interface, start: str, token: str) -> st
         "VARIABLES": len(faces.variables),
         "IS_PLANT": int(faces.part == "plant"),
         "IS_ECU": int(faces.part == "ecu"),
+        "X_AT": made.layout.start["x"],
+        "M_AT": made.layout.start["m"],
+        **(modes or {}),
     }
     defines = "\n".join(f"#define {name} {value}" for name, value in counts.items())
     values, name = made.run.par.leaves().values(), made.bench.name or made.bench.experiment
@@ -56,7 +66,7 @@ def model_header(made: Exported, faces: Interface, start: str, token: str) -> st
 {SCALAR}
 {defines}
 
-enum {{ PARAMETER, STIMULUS, IN_STATE, IN_ROW, IN_SAMPLED }};
+enum {{ {", ".join(_PLACES.values())} }};
 enum {{ FIXED, TUNABLE, GIVEN, RESULT }};
 typedef struct {{
   const char *name, *unit, *range;

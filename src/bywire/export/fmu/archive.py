@@ -20,8 +20,10 @@ from bywire.export.fmu.binaries import PLATFORMS, compiled
 from bywire.export.fmu.description2 import description_2
 from bywire.export.fmu.description3 import build_description, description_3
 from bywire.export.fmu.documentation import documentation
+from bywire.export.fmu.exchange_equations import Equations
+from bywire.export.fmu.exchange_interface import exchange_interface
 from bywire.export.initial_values import start_source
-from bywire.export.interface import Interface, Part, identifier_of, interface
+from bywire.export.interface import Interface, Kind, Part, identifier_of, interface
 from bywire.export.model_header import model_header
 from bywire.simulation.run import sampled_stimulus, simulate
 
@@ -43,6 +45,8 @@ class Unit:
         Its variables.
     version
         Of the interface: 2 or 3.
+    functions
+        File of the interface's functions.
     identifier
         Name of its binaries.
     token
@@ -56,15 +60,11 @@ class Unit:
     made: Exported
     faces: Interface
     version: int
+    functions: str
     identifier: str
     token: str
     begins_anywhere: bool
     files: Mapping[str, str]
-
-    @property
-    def functions(self) -> str:
-        """File of the interface's functions."""
-        return f"fmu{self.version}.c"
 
     def description(self) -> Element:
         """Return the model description."""
@@ -82,22 +82,30 @@ class Unit:
         return description_3(*arguments)
 
 
-def unit_of(made: Exported, part: Part, version: int) -> Unit:
-    """Return the FMU of a part of an exported run."""
+def unit_of(made: Exported, part: Part, version: int, kind: Kind = "co-simulation") -> Unit:
+    """Return the FMU of a part of an exported run; by model exchange that of its plant."""
     start, reads = start_source(made)
-    faces = interface(made, part, reads)
-    functions = {name: _own(name) for name in ("stepping.h", f"fmu{version}.c")}
+    modes: dict[str, object] = {}
+    if kind == "model-exchange":
+        equations = Equations(made)
+        faces, modes = exchange_interface(equations, reads), equations.counts
+        kernel, run, functions = equations.source(), "exchange.h", f"exchange{version}.c"
+    else:
+        faces = interface(made, part, reads)
+        kernel, run, functions = made.kernel, "stepping.h", f"fmu{version}.c"
+    written = {name: _own(name) for name in ("values.h", run, f"fmi{version}.h", functions)}
     digest = hashlib.sha256()
-    for each in (made.kernel, repr(faces), start, repr(made.schedule), *functions.values()):
+    for each in (kernel, repr(faces), start, repr(made.schedule), *written.values()):
         digest.update(each.encode())
     token = f"{{{UUID(bytes=digest.digest()[:16])}}}"
     name = made.bench.name or made.bench.experiment
     files = {
-        KERNEL: made.kernel,
-        "model.h": model_header(made, faces, start, token),
-        **functions,
+        KERNEL: kernel,
+        "model.h": model_header(made, faces, start, token, modes),
+        **written,
     }
-    return Unit(made, faces, version, f"{identifier_of(name)}_{part}", token, bool(start), files)
+    identifier = f"{identifier_of(name)}_{part}" + "_exchange" * (kind == "model-exchange")
+    return Unit(made, faces, version, functions, identifier, token, bool(start), files)
 
 
 def write_unit(unit: Unit, path: Path, targets: Sequence[str], progress: Progress) -> list[str]:

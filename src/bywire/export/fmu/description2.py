@@ -7,7 +7,17 @@ from xml.etree.ElementTree import Element, SubElement
 
 from bywire.export.exported import Exported
 from bywire.export.fmu.units import unit_definitions
-from bywire.export.interface import Interface, Variable, finite_range
+from bywire.export.interface import Interface, Kind
+from bywire.export.variables import Variable, finite_range
+
+_ABLE = {
+    "canNotUseMemoryManagementFunctions": "true", "canGetAndSetFMUstate": "true",
+    "canSerializeFMUstate": "true",
+}  # fmt: skip
+_OFFERED: dict[Kind, tuple[str, dict[str, str]]] = {
+    "co-simulation": ("CoSimulation", {"canHandleVariableCommunicationStepSize": "true"}),
+    "model-exchange": ("ModelExchange", {"completedIntegratorStepNotNeeded": "true"}),
+}
 
 
 def description_2(
@@ -30,14 +40,11 @@ def description_2(
     frame = repr(made.schedule.frame)
     root = Element("fmiModelDescription", {
         "fmiVersion": "2.0", "guid": token, "variableNamingConvention": "structured",
-        "numberOfEventIndicators": "0", **head,
+        "numberOfEventIndicators": str(len(faces.at("indicator"))), **head,
     })  # fmt: skip
-    slave = SubElement(
-        root, "CoSimulation", modelIdentifier=identifier,
-        canHandleVariableCommunicationStepSize="true", canNotUseMemoryManagementFunctions="true",
-        canGetAndSetFMUstate="true", canSerializeFMUstate="true",
-    )  # fmt: skip
-    files = SubElement(slave, "SourceFiles")
+    offers, able = _OFFERED[faces.kind]
+    offered = SubElement(root, offers, {"modelIdentifier": identifier, **_ABLE, **able})
+    files = SubElement(offered, "SourceFiles")
     for name in sources:
         SubElement(files, "File", name=name)
     root.append(unit_definitions(each.unit for each in faces.variables))
@@ -48,17 +55,29 @@ def description_2(
                stepSize=frame)  # fmt: skip
     variables = SubElement(root, "ModelVariables")
     for reference, each in enumerate(faces.variables):
-        variables.append(_scalar(reference, each))
+        variables.append(_scalar(reference, each, states_of_rates(faces).get(reference)))
     structure = SubElement(root, "ModelStructure")
-    results = [k for k, each in enumerate(faces.variables, 1) if each.causality == "output"]
-    for section in ("Outputs", "InitialUnknowns"):
-        unknown = SubElement(structure, section)
-        for k in results:
-            SubElement(unknown, "Unknown", index=str(k))
+    results = [k for k, each in enumerate(faces.variables) if each.causality == "output"]
+    rates = states_of_rates(faces)
+    unknowns = sorted({*results, *rates, *rates.values()})
+    sections = {"Outputs": results, "Derivatives": list(rates), "InitialUnknowns": unknowns}
+    for section, references in sections.items():
+        listed = SubElement(structure, section) if references else root
+        for k in references:
+            SubElement(listed, "Unknown", index=str(k + 1))
     return root
 
 
-def _scalar(reference: int, each: Variable) -> Element:
+def states_of_rates(faces: Interface) -> dict[int, int]:
+    """Return the value reference of the state of each derivative, by that of the derivative.
+
+    The states that are integrated stand first in the state vector.
+    """
+    states = faces.at("state")
+    return {rate: states[k] for k, rate in faces.at("rate").items()}
+
+
+def _scalar(reference: int, each: Variable, state: int | None) -> Element:
     scalar = Element("ScalarVariable", {
         "name": each.name, "valueReference": str(reference), "causality": each.causality,
         "variability": variability(each), **({"description": each.label} if each.label else {}),
@@ -68,6 +87,8 @@ def _scalar(reference: int, each: Variable) -> Element:
     elif each.causality != "input":
         scalar.set("initial", "calculated")
     real = SubElement(scalar, "Real")
+    if state is not None:
+        real.set("derivative", str(state + 1))
     for name, value in real_attributes(each).items():
         real.set(name, value)
     return scalar

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from bywire.export.exported import Exported
-from bywire.export.fmu.description2 import real_attributes, variability
+from bywire.export.fmu.description2 import real_attributes, states_of_rates, variability
 from bywire.export.fmu.units import unit_definitions
 from bywire.export.interface import Interface, Numbered, tables
 
@@ -20,12 +20,18 @@ def description_3(
         "fmiVersion": "3.0", "instantiationToken": token,
         "variableNamingConvention": "structured", **head,
     })  # fmt: skip
-    SubElement(
-        root, "CoSimulation", modelIdentifier=identifier, canGetAndSetFMUState="true",
-        canSerializeFMUState="true", canHandleVariableCommunicationStepSize="true",
-        canReturnEarlyAfterIntermediateUpdate="false", hasEventMode="true",
-        fixedInternalStepSize=repr(schedule.frame),
-    )  # fmt: skip
+    offered = {
+        "modelIdentifier": identifier, "canGetAndSetFMUState": "true",
+        "canSerializeFMUState": "true",
+    }  # fmt: skip
+    if faces.kind == "model-exchange":
+        SubElement(root, "ModelExchange", offered)
+    else:
+        SubElement(root, "CoSimulation", {
+            **offered, "canHandleVariableCommunicationStepSize": "true", "hasEventMode": "true",
+            "canReturnEarlyAfterIntermediateUpdate": "false",
+            "fixedInternalStepSize": repr(schedule.frame),
+        })  # fmt: skip
     root.append(unit_definitions(each.unit for each in faces.variables))
     categories = SubElement(root, "LogCategories")
     for name in ("logStatusWarning", "logStatusError"):
@@ -33,8 +39,9 @@ def description_3(
     SubElement(root, "DefaultExperiment", startTime="0.0", stopTime=repr(made.run.duration),
                stepSize=repr(schedule.frame))  # fmt: skip
     variables = SubElement(root, "ModelVariables")
+    rates = states_of_rates(faces)
     for nodes in tables(faces):
-        variables.append(_float(nodes))
+        variables.append(_float(nodes, rates.get(nodes[0][0])))
     count = len(faces.variables)
     SubElement(variables, "Float64", name="time", valueReference=str(count),
                causality="independent", variability="continuous",
@@ -48,14 +55,19 @@ def description_3(
                 description=f"ticks of the task {task.name}",
             )  # fmt: skip
     structure = SubElement(root, "ModelStructure")
-    results = [str(k) for k, each in enumerate(faces.variables) if each.causality == "output"]
-    for section in ("Output", "InitialUnknown"):
-        for reference in results:
-            SubElement(structure, section, valueReference=reference)
+    results = [k for k, each in enumerate(faces.variables) if each.causality == "output"]
+    sections = {
+        "Output": results, "ContinuousStateDerivative": list(rates),
+        "InitialUnknown": sorted({*results, *rates, *rates.values()}),
+        "EventIndicator": list(faces.at("indicator").values()),
+    }  # fmt: skip
+    for section, references in sections.items():
+        for reference in references:
+            SubElement(structure, section, valueReference=str(reference))
     return root
 
 
-def _float(nodes: list[Numbered]) -> Element:
+def _float(nodes: list[Numbered], state: int | None) -> Element:
     reference, first = nodes[0]
     name = first.name.partition("[")[0]
     made = Element("Float64", {
@@ -63,6 +75,8 @@ def _float(nodes: list[Numbered]) -> Element:
         "variability": variability(first), **real_attributes(first),
         **({"description": first.label} if first.label else {}),
     })  # fmt: skip
+    if state is not None:
+        made.set("derivative", str(state))
     if first.causality == "parameter":
         made.set("initial", "exact")
     elif first.causality != "input":

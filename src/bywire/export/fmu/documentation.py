@@ -19,6 +19,12 @@ _STEPS = {
        "right before the ticks that are due then. With event mode, ticks are done there, when "
        "their clocks tick, and results after them are those that a bench records.",
 }  # fmt: skip
+_EXCHANGED = (
+    "A client's solver integrates the states. Bodies with dry friction are stuck or slide, states "
+    "with limits are free or at them, contacts press or are open: these modes (mode.*) change in "
+    "event mode alone, where an event indicator has changed its sign or inputs have. What the ECU "
+    "holds are inputs; set them in event mode. Energies and other integrals are not in this unit."
+)
 
 
 def documentation(made: Exported, faces: Interface, begins_anywhere: bool, version: int) -> str:
@@ -34,19 +40,22 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
     tasks = ", ".join(
         f"{task.name} every {shown(task.period, 's')}" for task in made.run.model.tasks(par)
     )
+    is_exchanged = faces.kind == "model-exchange"
     facts = [
         ("Model", made.run.model.name),
         ("Experiment", f"{bench.experiment}, run {made.case.label!r}: {bench.definition.summary}"),
         ("Parameter set", bench.parameters),
         ("Time 0", f"{shown(made.case.settle, 's')} before time zero of the bench's recording"),
-        ("Internal step", f"{shown(schedule.step, 's')}, fixed"),
-        ("Communication step", f"whole multiples of {shown(schedule.frame, 's')}; others are "
-                               "refused"),
-        ("Tasks", tasks),
+        *(() if is_exchanged else (
+            ("Internal step", f"{shown(schedule.step, 's')}, fixed"),
+            ("Communication step", f"whole multiples of {shown(schedule.frame, 's')}; others are "
+                                   "refused"),
+            ("Tasks", tasks),
+        )),
         ("Structure", ", ".join(f"{k} = {v}" for k, v in par.choices().items())),
     ]  # fmt: skip
     texts = [
-        _STEPS[version],
+        _EXCHANGED if is_exchanged else _STEPS[version],
         f"{begins} Values that are no numbers or out of their range are refused, and those before "
         "stay. Noise of sensors is an input: a standard normal number for each tick, or zero.",
         "reference.csv, beside this page, is the bench's own run: time, stimulus, and every "
@@ -56,7 +65,7 @@ def documentation(made: Exported, faces: Interface, begins_anywhere: bool, versi
     rows = [
         (v.name, v.causality, v.unit, "" if v.start is None else f"{v.start:.6g}",
          "" if v.leaf is None else v.leaf.range_text, v.label)
-        for v in faces.variables if v.causality != "local"
+        for v in faces.variables if v.causality != "local" or is_exchanged
     ]  # fmt: skip
     heading = ("name", "what", "unit", "start", "range", "meaning")
     return f"""<!DOCTYPE html>

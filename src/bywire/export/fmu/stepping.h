@@ -1,14 +1,8 @@
-/* A run that a client advances frame by frame: values, ranges, and calls of the kernel.
+/* A run that a client advances frame by frame, by calls of the kernel.
  *
- * What the model gives stands in model.h: counts, tables of variables, initial values. A frame is
- * the longest interval that divides the tasks' sample times and the recording interval.
+ * A frame is the longest interval that divides the tasks' sample times and the recording interval.
  */
-#include <math.h>
-#include <stdarg.h>
 #include <stdint.h>
-#include <stdio.h>
-#include <stdlib.h>
-#include <string.h>
 
 #include "model.h"
 
@@ -16,14 +10,16 @@ void bw_run(const double *p, double h, const double *u, double *state, const int
     const int32_t *selection, double *rec);
 
 #define NEVER INT64_MAX
-#define MESSAGE 600
 
 typedef struct {
   double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1], sampled[ROWS + 1];
   int64_t frame;     /* frames since the start */
   int32_t is_set;    /* a value was set since the rows were computed */
   int32_t is_begun;  /* the initial values are there */
+  int32_t is_done[TASKS + 1], is_active[TASKS + 1]; /* 3.0: tasks that have ticked now, or shall */
 } run;
+
+#include "values.h"
 
 /* Frames between the ticks of every task, and what makes none or all of them tick. */
 static const int64_t task_frames[] = TASK_FRAMES;
@@ -57,36 +53,10 @@ static void refresh(run *r) {
   r->is_set = 0;
 }
 
-/* Take the initial values of the parameters; 0 where they are no numbers. */
-static int begin(run *r) {
-  double kept[STATE];
-  memcpy(kept, r->state, sizeof kept);
-  if (memcmp(r->p, p_start, sizeof p_start)) bw_start(r->p, r->state);
-  for (int k = 0; k < STATE; ++k) /* what was set stays: a part's inputs lie in the state */
-    if (memcmp(&kept[k], &state_start[k], sizeof(double))) r->state[k] = kept[k];
-  for (int k = 0; k < STATE; ++k)
-    if (!isfinite(r->state[k])) return 0;
+static void started(run *r) {
   r->frame = 0;
-  r->is_set = 1;
   refresh(r);
   memcpy(r->sampled, r->row, sizeof r->row);
-  r->is_begun = 1;
-  return 1;
-}
-
-static void reset(run *r) {
-  memset(r, 0, sizeof *r);
-  memcpy(r->p, p_start, sizeof p_start);
-  memcpy(r->state, state_start, sizeof state_start);
-  for (int k = 0; k < STIMULI; ++k) r->u[k] = u_start[k];
-  r->is_set = 1;
-}
-
-/* What is to be said of a run that has left the numbers; NULL where it has not. */
-static const char *lost(const run *r) {
-  for (int k = 0; k < STATE; ++k)
-    if (!isfinite(r->state[k])) return k < STATES ? state_names[k] : "an integral or the memory";
-  return NULL;
 }
 
 /* Advance some frames, with the ticks that are due in them or without any. */
@@ -112,6 +82,9 @@ static inline void tick(run *r, const int *is_active) {
   r->is_set = 0;
 }
 
+/* Time since the beginning of the run [s]. */
+static inline double seconds(const run *r) { return STEP * SUBSTEPS * (double)r->frame; }
+
 static double unsettled(const run *r) { return r->state[STATE - 2]; }
 
 static double *place_of(run *r, unsigned k) {
@@ -125,31 +98,9 @@ static double *place_of(run *r, unsigned k) {
   }
 }
 
-/* Set a variable; what is wrong with the value is written to said, else it stays empty. */
-static void set_value(run *r, unsigned k, double value, int is_running, char *said) {
-  const variable *v;
-  said[0] = 0;
-  if (k >= VARIABLES) {
-    snprintf(said, MESSAGE, "there is no variable with the value reference %u", k);
-    return;
-  }
-  v = &variables[k];
-  if (v->kind == RESULT) {
-    snprintf(said, MESSAGE, "%s is computed and cannot be set", v->name);
-  } else if (v->kind == FIXED && is_running) {
-    snprintf(said, MESSAGE, "%s is fixed: set it before or during initialization", v->name);
-  } else if (!isfinite(value) || value < v->low || value > v->high) {
-    snprintf(said, MESSAGE, "%s = %.6g%s is not admissible: it must be %s", v->name, value,
-        v->unit, v->range);
-  } else {
-    *place_of(r, k) = value;
-    r->is_set = 1;
-  }
-}
-
 /* How many frames a step from a time makes; 0 with a message where it makes none. */
 static int64_t frames_of(const run *r, double time, double step, char *said) {
-  const double frame = STEP * SUBSTEPS, here = frame * (double)r->frame;
+  const double frame = STEP * SUBSTEPS, here = seconds(r);
   const double frames = step / frame;
   said[0] = 0;
   if (!(isfinite(time) && fabs(time - here) <= 1e-6 * frame)) {

@@ -18,8 +18,9 @@ from bywire.core.scratch import process_folder, scratch_folder
 from bywire.core.signals import Signal, signals_of
 from bywire.export.exported import Exported
 from bywire.export.initial_values import start_source
-from bywire.export.interface import finite_range, interface
+from bywire.export.interface import interface
 from bywire.export.model_header import model_header
+from bywire.export.variables import finite_range
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT
 from bywire.simulation.run import sampled_stimulus
 

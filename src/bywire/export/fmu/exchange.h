@@ -1,0 +1,163 @@
+/* A plant between the events of a client's solver: modes, derivatives, event indicators.
+ *
+ * A modal state carries dry friction or a limit. Its mode is 1 or -1, the direction in which it
+ * moves, or 0 while it is stuck: then it is zero, and so is its derivative. Contacts press or are
+ * open. Modes change in event mode alone; in between all equations are smooth but for what bends
+ * in the plant's own laws.
+ */
+#include <stdint.h>
+
+#include "model.h"
+
+void bw_closing(const double *p, const double *x, double *closed);
+void bw_equations(const double *p, const double *x, const double *m, const double *closed,
+    double *balance, double *mass, double *low, double *high, double *pressed, double *lack);
+void bw_output(const double *p, const double *x, const double *m, const double *closed,
+    const double *reaction, double *row);
+
+#define INDICATORS (2 * MODAL + CONTACTS)
+/* What is exactly on an edge is not beyond it: solvers that stop there must not find that nothing
+ * has changed. Edges have a width where rounding plays: of a velocity, as a share of its usual
+ * magnitude, which a solver errs by when a body breaks away; of an overlap [m], a sum of others. */
+#define EDGE 1e-300
+#define MOTION_EDGE 1e-9
+#define CONTACT_EDGE 1e-14
+
+static const int modal_states[] = MODAL_STATES;
+static const double nominals[] = NOMINALS;
+
+typedef struct {
+  double p[PARAMETERS + 1], u[STIMULI + 1], state[STATE], row[ROWS + 1];
+  double time, events; /* events: how often a mode has changed */
+  double mode[MODAL + 1], closed[CONTACTS + 1], reaction[MODAL + 1];
+  double rate[STATES], indicator[INDICATORS + 1];
+  int32_t is_set;   /* a value was set since the derivatives were computed */
+  int32_t is_stale; /* the rows are older than the derivatives */
+  int32_t is_begun; /* the initial values are there */
+} run;
+
+#include "values.h"
+
+static double *states(run *r) { return r->state + X_AT; }
+
+static inline double seconds(const run *r) { return r->time; }
+
+/* Derivatives and event indicators; what holds a stuck body is what acts on it, and an indicator
+ * turns negative where that leaves the bounds, a body turns, or a contact closes or opens. */
+static void evaluate(run *r) {
+  double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
+  double pressed[CONTACTS + 1], lack[CONTACTS + 1];
+  if (!r->is_set) return;
+  bw_equations(r->p, states(r), r->state + M_AT, r->closed, balance, mass, low, high, pressed, lack);
+  for (int k = 0; k < MODAL; ++k) {
+    const int at = modal_states[k];
+    const double f = balance[at], mode = r->mode[k];
+    r->reaction[k] = mode > 0.0 ? low[k] : mode < 0.0 ? high[k] : -f;
+    balance[at] = mode == 0.0 ? 0.0 : f + r->reaction[k];
+    r->indicator[2 * k] = mode == 0.0 ? 1.0 : mode * states(r)[at] + MOTION_EDGE * nominals[at];
+    r->indicator[2 * k + 1] = mode == 0.0 ? fmin(high[k] + f, -low[k] - f) + EDGE : 1.0;
+  }
+  for (int k = 0; k < STATES; ++k) r->rate[k] = balance[k] / mass[k];
+  for (int k = 0; k < CONTACTS; ++k)
+    r->indicator[2 * MODAL + k] = CONTACT_EDGE + (r->closed[k] != 0.0 ? pressed[k] : -lack[k]);
+  r->is_set = 0;
+  r->is_stale = 1;
+}
+
+static void refresh(run *r) {
+  evaluate(r);
+  if (!r->is_stale) return;
+  bw_output(r->p, states(r), r->state + M_AT, r->closed, r->reaction, r->row);
+  r->is_stale = 0;
+}
+
+/* Take the modes that state and inputs ask for; 1 where a state was set to zero for that. */
+static int settle(run *r) {
+  double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
+  double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + 1], closed[CONTACTS + 1];
+  int is_moved = 0;
+  memcpy(mode, r->mode, sizeof mode);
+  memcpy(closed, r->closed, sizeof closed);
+  for (int k = 0; k < MODAL; ++k) {
+    double *x = &states(r)[modal_states[k]];
+    if (mode[k] * *x > 0.0) continue; /* it goes on as it went */
+    is_moved |= *x != 0.0;
+    *x = 0.0;
+    r->mode[k] = 0.0;
+  }
+  bw_closing(r->p, states(r), r->closed);
+  bw_equations(r->p, states(r), r->state + M_AT, r->closed, balance, mass, low, high, pressed, lack);
+  for (int k = 0; k < MODAL; ++k) {
+    const double f = balance[modal_states[k]];
+    if (r->mode[k] == 0.0) r->mode[k] = (f + low[k] > 0.0) - (f + high[k] < 0.0);
+  }
+  if (memcmp(mode, r->mode, sizeof mode) || memcmp(closed, r->closed, sizeof closed))
+    r->events += 1.0;
+  r->is_set = 1;
+  return is_moved;
+}
+
+static void started(run *r) {
+  for (int k = 0; k < MODAL; ++k) {
+    const double x = states(r)[modal_states[k]];
+    r->mode[k] = (x > 0.0) - (x < 0.0);
+  }
+  settle(r);
+  r->events = 0.0;
+  r->time = 0.0;
+}
+
+static double *place_of(run *r, unsigned k) {
+  const int at = variables[k].index;
+  switch (variables[k].place) {
+    case PARAMETER: return &r->p[at];
+    case IN_STATE: return &r->state[at];
+    case IN_ROW: return &r->row[at];
+    case IN_RATE: return &r->rate[at];
+    case IN_MODE: return &r->mode[at];
+    case IN_CLOSED: return &r->closed[at];
+    case IN_INDICATOR: return &r->indicator[at];
+    default: return &r->events;
+  }
+}
+
+/* What the functions of both versions do; each returns what is wrong, NULL for nothing. */
+static const char *take_states(run *r, const double *x, size_t n) {
+  if (n != STATES) return "there are not as many continuous states";
+  memcpy(states(r), x, n * sizeof *x);
+  r->is_set = 1;
+  return NULL;
+}
+
+static const char *give_states(run *r, double *x, size_t n) {
+  if (n != STATES) return "there are not as many continuous states";
+  memcpy(x, states(r), n * sizeof *x);
+  return NULL;
+}
+
+static const char *give_rates(run *r, double *rate, size_t n) {
+  if (n != STATES) return "there are not as many continuous states";
+  evaluate(r);
+  memcpy(rate, r->rate, n * sizeof *rate);
+  return NULL;
+}
+
+static const char *give_indicators(run *r, double *z, size_t n) {
+  if (n != INDICATORS) return "there are not as many event indicators";
+  evaluate(r);
+  memcpy(z, r->indicator, n * sizeof *z);
+  return NULL;
+}
+
+static const char *give_nominals(double *x, size_t n) {
+  if (n != STATES) return "there are not as many continuous states";
+  memcpy(x, nominals, n * sizeof *x);
+  return NULL;
+}
+
+/* The state whose derivative is no number; NULL where there is none. */
+static const char *unknown_rate(const run *r) {
+  for (int k = 0; k < STATES; ++k)
+    if (!isfinite(r->rate[k])) return state_names[k];
+  return NULL;
+}

@@ -1,0 +1,256 @@
+/* Functional Mock-up Interface 3.0: what co-simulation and model exchange have in common.
+ *
+ * The file that includes this one has included what a run is, and says by KIND_TEXT which of both
+ * it is. Value references: the variables, then time, then what else there is.
+ */
+#include <stdbool.h>
+#include <stddef.h>
+
+#if defined(_WIN32)
+#define API __declspec(dllexport)
+#else
+#define API __attribute__((visibility("default")))
+#endif
+
+#define TIME VARIABLES
+
+typedef void *fmi3Instance, *fmi3FMUState;
+typedef uint32_t fmi3ValueReference;
+typedef enum { fmi3OK, fmi3Warning, fmi3Discard, fmi3Error, fmi3Fatal } fmi3Status;
+typedef void (*logger)(void *, fmi3Status, const char *, const char *);
+typedef enum { INSTANTIATED, INITIALIZING, IN_EVENT, RUNNING, FAILED } phase;
+
+typedef struct {
+  run r;
+  int now; /* a phase */
+  bool is_logging, has_events, may_return_early;
+  void *environment;
+  logger log;
+} instance;
+
+static fmi3Status refuse(fmi3Instance c, fmi3Status status, const char *text) {
+  const instance *one = c;
+  const char *category = status == fmi3Warning ? "logStatusWarning" : "logStatusError";
+  if (one->log && (one->is_logging || status >= fmi3Error))
+    one->log(one->environment, status, category, text);
+  return status;
+}
+
+/* Return the status of what may have gone wrong. */
+static fmi3Status answer(fmi3Instance c, const char *wrong) {
+  return wrong ? refuse(c, fmi3Error, wrong) : fmi3OK;
+}
+
+static int is_running(const instance *one) {
+  return one->now == IN_EVENT || one->now == RUNNING;
+}
+
+API const char *fmi3GetVersion(void) { return "3.0"; }
+
+API fmi3Status fmi3SetDebugLogging(fmi3Instance c, bool on, size_t n, const char *const names[]) {
+  (void)n, (void)names;
+  ((instance *)c)->is_logging = on;
+  return fmi3OK;
+}
+
+/* Return an instance; NULL with a message where the token is another model's. */
+static fmi3Instance instantiated(const char *token, bool logging, void *environment, logger log) {
+  instance *one = calloc(1, sizeof *one);
+  if (!one) return NULL;
+  one->is_logging = logging;
+  one->environment = environment;
+  one->log = log;
+  if (!token || strcmp(token, TOKEN)) {
+    refuse(one, fmi3Error, "the instantiation token is not that of this model's description");
+    free(one);
+    return NULL;
+  }
+  reset(&one->r);
+  return one;
+}
+
+/* Say that an interface type is not offered. */
+static inline fmi3Instance not_this(void *environment, logger log) {
+  if (log) log(environment, fmi3Error, "logStatusError", "only " KIND_TEXT " is offered");
+  return NULL;
+}
+
+API fmi3Instance fmi3InstantiateScheduledExecution(const char *name, const char *token,
+    const char *resources, bool visible, bool logging, void *environment, logger log,
+    void *update, void *lock, void *unlock) {
+  (void)name, (void)token, (void)resources, (void)visible, (void)logging;
+  (void)update, (void)lock, (void)unlock;
+  return not_this(environment, log);
+}
+
+API void fmi3FreeInstance(fmi3Instance c) { free(c); }
+
+API fmi3Status fmi3EnterInitializationMode(fmi3Instance c, bool has_tolerance, double tolerance,
+    double start, bool has_stop, double stop) {
+  (void)has_tolerance, (void)tolerance, (void)has_stop, (void)stop;
+  if (start != 0.0)
+    return refuse(c, fmi3Error, "the run starts at time 0 s: the settling of the bench first");
+  ((instance *)c)->now = INITIALIZING;
+  return fmi3OK;
+}
+
+API fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
+  instance *one = c;
+  if (!one->r.is_begun && !begin(&one->r)) {
+    one->now = FAILED;
+    return refuse(one, fmi3Error, "there is no state at rest with these parameters");
+  }
+  one->now = one->has_events ? IN_EVENT : RUNNING;
+  return fmi3OK;
+}
+
+API fmi3Status fmi3Terminate(fmi3Instance c) {
+  (void)c;
+  return fmi3OK;
+}
+
+API fmi3Status fmi3Reset(fmi3Instance c) {
+  instance *one = c;
+  reset(&one->r);
+  one->now = INSTANTIATED;
+  return fmi3OK;
+}
+
+/* How many numbers a value reference stands for; 0 where it stands for none. */
+static int size_of(fmi3ValueReference vr) {
+  return vr < VARIABLES ? sizes[vr] : vr == TIME;
+}
+
+API fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+    double values[], size_t count) {
+  instance *one = c;
+  run tried = one->r, *r = &one->r;
+  size_t at = 0;
+  if (one->now == INITIALIZING && !r->is_begun && begin(&tried)) r = &tried; /* a look ahead */
+  else refresh(r);
+  for (size_t k = 0; k < n; ++k) {
+    const int size = size_of(vr[k]);
+    if (!size || at + (size_t)size > count)
+      return refuse(one, fmi3Error, "there is no such variable, or no room for its values");
+    for (int j = 0; j < size; ++j)
+      values[at++] = vr[k] == TIME ? seconds(r)
+                                   : *place_of(r, vr[k] + (unsigned)j);
+  }
+  return fmi3OK;
+}
+
+API fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+    const double values[], size_t count) {
+  instance *one = c;
+  run before = one->r; /* all of them, or none */
+  char said[MESSAGE] = "there is no such variable, or there are not as many values";
+  size_t at = 0;
+  for (size_t k = 0; k < n; ++k) {
+    const int size = vr[k] == TIME ? 0 : size_of(vr[k]);
+    if (!size || at + (size_t)size > count) {
+      one->r = before;
+      return refuse(one, fmi3Error, said);
+    }
+    for (int j = 0; j < size; ++j) {
+      set_value(&one->r, vr[k] + (unsigned)j, values[at++], is_running(one), said);
+      if (said[0]) {
+        one->r = before;
+        return refuse(one, fmi3Error, said);
+      }
+    }
+  }
+  return fmi3OK;
+}
+
+API fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *state) {
+  instance *one = c;
+  return answer(c, put_aside(&one->r, one->now, state));
+}
+
+API fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState state) {
+  instance *one = c;
+  return answer(c, taken_back(&one->r, &one->now, state));
+}
+
+API fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *state) {
+  (void)c;
+  if (state) free(*state), *state = NULL;
+  return fmi3OK;
+}
+
+API fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState state, size_t *size) {
+  (void)c, (void)state;
+  *size = sizeof(snapshot);
+  return fmi3OK;
+}
+
+API fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState state, uint8_t bytes[],
+    size_t size) {
+  return answer(c, serialized(state, bytes, size));
+}
+
+API fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const uint8_t bytes[], size_t size,
+    fmi3FMUState *state) {
+  return answer(c, deserialized(bytes, size, state));
+}
+
+API fmi3Status fmi3EvaluateDiscreteStates(fmi3Instance c) {
+  (void)c;
+  return fmi3OK;
+}
+
+/* What is not offered: no variables of other types, derivatives, partitions or configurations. */
+#define NO_TYPE(type, ctype) \
+  API fmi3Status fmi3Get##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
+      ctype values[], size_t count) { \
+    (void)vr, (void)values, (void)count; \
+    return n ? refuse(c, fmi3Error, "all variables are Float64 or clocks") : fmi3OK; \
+  } \
+  API fmi3Status fmi3Set##type(fmi3Instance c, const fmi3ValueReference vr[], size_t n, \
+      const ctype values[], size_t count) { \
+    (void)vr, (void)values, (void)count; \
+    return n ? refuse(c, fmi3Error, "all variables are Float64 or clocks") : fmi3OK; \
+  }
+#define NOT_OFFERED(name, arguments) \
+  API fmi3Status name arguments { return refuse(c, fmi3Error, #name " is not offered"); }
+typedef const char *text;
+NO_TYPE(Float32, float)
+NO_TYPE(Int8, int8_t)
+NO_TYPE(UInt8, uint8_t)
+NO_TYPE(Int16, int16_t)
+NO_TYPE(UInt16, uint16_t)
+NO_TYPE(Int32, int32_t)
+NO_TYPE(UInt32, uint32_t)
+NO_TYPE(Int64, int64_t)
+NO_TYPE(UInt64, uint64_t)
+NO_TYPE(Boolean, bool)
+NO_TYPE(String, text)
+
+API fmi3Status fmi3GetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+    size_t lengths[], const uint8_t *values[], size_t count) {
+  (void)vr, (void)lengths, (void)values, (void)count;
+  return n ? refuse(c, fmi3Error, "all variables are Float64 or clocks") : fmi3OK;
+}
+
+API fmi3Status fmi3SetBinary(fmi3Instance c, const fmi3ValueReference vr[], size_t n,
+    const size_t lengths[], const uint8_t *const values[], size_t count) {
+  (void)vr, (void)lengths, (void)values, (void)count;
+  return n ? refuse(c, fmi3Error, "all variables are Float64 or clocks") : fmi3OK;
+}
+
+/* They read no other argument than the instance, which comes first in all of them. */
+NOT_OFFERED(fmi3EnterConfigurationMode, (fmi3Instance c))
+NOT_OFFERED(fmi3ExitConfigurationMode, (fmi3Instance c))
+NOT_OFFERED(fmi3GetNumberOfVariableDependencies, (fmi3Instance c))
+NOT_OFFERED(fmi3GetVariableDependencies, (fmi3Instance c))
+NOT_OFFERED(fmi3GetDirectionalDerivative, (fmi3Instance c))
+NOT_OFFERED(fmi3GetAdjointDerivative, (fmi3Instance c))
+NOT_OFFERED(fmi3GetIntervalFraction, (fmi3Instance c))
+NOT_OFFERED(fmi3GetShiftDecimal, (fmi3Instance c))
+NOT_OFFERED(fmi3GetShiftFraction, (fmi3Instance c))
+NOT_OFFERED(fmi3SetIntervalDecimal, (fmi3Instance c))
+NOT_OFFERED(fmi3SetIntervalFraction, (fmi3Instance c))
+NOT_OFFERED(fmi3SetShiftDecimal, (fmi3Instance c))
+NOT_OFFERED(fmi3SetShiftFraction, (fmi3Instance c))
+NOT_OFFERED(fmi3GetOutputDerivatives, (fmi3Instance c))
+NOT_OFFERED(fmi3ActivateModelPartition, (fmi3Instance c))

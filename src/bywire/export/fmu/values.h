@@ -1,0 +1,112 @@
+/* Values of a run: what it begins with, what a client may set, and what cannot be.
+ *
+ * What the model gives stands in model.h: counts, tables of variables, initial values. The file
+ * that includes this one defines what a run is, with p, u, state, is_set and is_begun in it, and
+ * the three functions declared here.
+ */
+#include <math.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define MESSAGE 600
+
+static void refresh(run *r);  /* renew what is computed from the values */
+static void started(run *r);  /* take the values as those of the beginning */
+static double *place_of(run *r, unsigned k);
+
+/* Take the initial values of the parameters; 0 where they are no numbers. */
+static int begin(run *r) {
+  double kept[STATE];
+  memcpy(kept, r->state, sizeof kept);
+  if (memcmp(r->p, p_start, sizeof p_start)) bw_start(r->p, r->state);
+  for (int k = 0; k < STATE; ++k) /* what was set stays: a part's inputs lie in the state */
+    if (memcmp(&kept[k], &state_start[k], sizeof(double))) r->state[k] = kept[k];
+  for (int k = 0; k < STATE; ++k)
+    if (!isfinite(r->state[k])) return 0;
+  r->is_set = 1;
+  started(r);
+  r->is_begun = 1;
+  return 1;
+}
+
+static void reset(run *r) {
+  memset(r, 0, sizeof *r);
+  memcpy(r->p, p_start, sizeof p_start);
+  memcpy(r->state, state_start, sizeof state_start);
+  for (int k = 0; k < STIMULI; ++k) r->u[k] = u_start[k];
+  r->is_set = 1;
+}
+
+/* What is to be said of a run that has left the numbers; NULL where it has not. */
+static const char *lost(const run *r) {
+  for (int k = 0; k < STATE; ++k)
+    if (!isfinite(r->state[k])) return k < STATES ? state_names[k] : "an integral or the memory";
+  return NULL;
+}
+
+/* Set a variable; what is wrong with the value is written to said, else it stays empty. */
+static void set_value(run *r, unsigned k, double value, int is_running, char *said) {
+  const variable *v;
+  said[0] = 0;
+  if (k >= VARIABLES) {
+    snprintf(said, MESSAGE, "there is no variable with the value reference %u", k);
+    return;
+  }
+  v = &variables[k];
+  if (v->kind == RESULT) {
+    snprintf(said, MESSAGE, "%s is computed and cannot be set", v->name);
+  } else if (v->kind == FIXED && is_running) {
+    snprintf(said, MESSAGE, "%s is fixed: set it before or during initialization", v->name);
+  } else if (!isfinite(value) || value < v->low || value > v->high) {
+    snprintf(said, MESSAGE, "%s = %.6g%s is not admissible: it must be %s", v->name, value,
+        v->unit, v->range);
+  } else {
+    *place_of(r, k) = value;
+    r->is_set = 1;
+  }
+}
+
+/* A run put aside. Its bytes are those of its serialized form, for the same library. */
+typedef struct {
+  char token[sizeof TOKEN];
+  int32_t now;
+  run r;
+} snapshot;
+
+/* Each of these returns what is wrong; NULL for nothing. */
+static const char *put_aside(const run *r, int now, void **state) {
+  snapshot *kept = *state ? *state : calloc(1, sizeof *kept);
+  if (!kept) return "there is no memory for the state";
+  memcpy(kept->token, TOKEN, sizeof TOKEN);
+  kept->now = now;
+  kept->r = *r;
+  *state = kept;
+  return NULL;
+}
+
+static const char *taken_back(run *r, int *now, const void *state) {
+  const snapshot *kept = state;
+  if (!kept || memcmp(kept->token, TOKEN, sizeof TOKEN)) return "the state is not one of this model";
+  *now = kept->now;
+  *r = kept->r;
+  return NULL;
+}
+
+static const char *serialized(const void *state, void *bytes, size_t size) {
+  if (!state) return "there is no state";
+  if (size < sizeof(snapshot)) return "there is no room for the state";
+  memcpy(bytes, state, sizeof(snapshot));
+  return NULL;
+}
+
+static const char *deserialized(const void *bytes, size_t size, void **state) {
+  snapshot *kept;
+  if (size != sizeof *kept || memcmp(bytes, TOKEN, sizeof TOKEN))
+    return "the bytes are not a state of this model";
+  kept = *state ? *state : malloc(sizeof *kept);
+  if (!kept) return "there is no memory for the state";
+  memcpy(kept, bytes, sizeof *kept);
+  *state = kept;
+  return NULL;
+}

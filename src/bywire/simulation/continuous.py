@@ -1,0 +1,123 @@
+"""A plant in continuous time: equations between events, for solvers that locate these themselves.
+
+Set-valued forces become modes that only events change. A body with dry friction slides forward or
+back, or is stuck until the force on it leaves the bounds of the friction; a state with a limit is
+the same, its bounds no force and any push. A contact presses or is open.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from bywire.core.model import Model
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.contact_set import gaps, stiffness
+from bywire.simulation.scheme import NEVER
+from bywire.simulation.set_valued import solve_small
+from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
+
+
+@dataclass(frozen=True)
+class Continuous:
+    """Symbolic functions of a plant between two events.
+
+    Parameters
+    ----------
+    modal
+        States that carry a set-valued force: those with friction, then those with a limit.
+    contacts
+        How many contacts there are.
+    closing
+        ``(x, p) -> closed``: 1 of each contact that presses, else 0.
+    equations
+        ``(x, m, p, closed) -> (balance, mass, low, high, pressed, lack)``: right-hand sides without
+        set-valued forces and factors of the derivatives, (nx,) each; bounds of the set-valued
+        forces; of the contacts by how much the force on each presses it alone, and by how much it
+        overlaps beyond what it gives.
+    output
+        ``(x, m, p, closed, reaction, flow) -> o``: what is recorded; ``flow``: integrals.
+    """
+
+    modal: tuple[str, ...]
+    contacts: int
+    closing: Any
+    equations: Any
+    output: Any
+
+
+def build_continuous(model: Model, par: ParameterSet) -> Continuous:
+    """Evaluate a plant on symbols.
+
+    Parameters
+    ----------
+    model
+        The system.
+    par
+        Any parameter set of the wanted structure: its numbers become arguments.
+    """
+    names = tuple(par.leaves())
+    p, x = SX.sym("p", len(names)), SX.sym("x", len(model.State._fields))
+    symbolic: Any = par.with_leaves(dict(zip(names, scalars(p), strict=True)))
+    m = SX.sym("m", len(model.Memory._fields))
+    overlap = gaps(model, symbolic, x, x)
+    closed = SX.sym("closed", overlap.shape[0])
+    modal = (*model.frictions, *model.limits)
+    reaction = SX.sym("reaction", len(modal))
+    compliance = _compliance(model, symbolic)
+    force = _forces(compliance, overlap, closed)
+    state, memory = symbol_tuple(model.State, x), symbol_tuple(model.Memory, m)
+    pressed = scalars(force)
+    pairs = [
+        (ca.fmin(SX(low), 0), ca.fmax(SX(high), 0))
+        for low, high in model.bounds(state, state, memory, symbolic, pressed)
+    ]
+    pairs += [(SX(0), SX(NEVER))] * len(model.limits)
+    equations = [
+        column(model.balance(state, state, memory, symbolic, pressed)),
+        column(model.mass(state, symbolic)),
+        column([low for low, _ in pairs]),
+        column([high for _, high in pairs]),
+        column([compliance[k, k] * force[k] for k in range(overlap.shape[0])]),
+        overlap - compliance @ force,
+    ]
+    flow = SX.sym("flow", len(model.Flow._fields))
+    integrals = symbol_tuple(model.Flow, flow)
+    shown = model.output(state, memory, symbolic, pressed, scalars(reaction), integrals)
+    K = stiffness(model, symbolic, overlap, exact=True)
+    presses = column([ca.if_else(K[k, k] > 0, 1, 0) for k in range(overlap.shape[0])])
+    return Continuous(
+        modal,
+        overlap.shape[0],
+        _function("closing", [x, p], [presses]),
+        _function("equations", [x, m, p, closed], equations),
+        _function("output", [x, m, p, closed, reaction, flow], [column(shown)]),
+    )
+
+
+def _function(name: str, arguments: list[Any], results: list[Any]) -> Any:
+    return ca.Function(name, arguments, [ca.densify(SX(each)) for each in results])
+
+
+def _compliance(model: Model, par: ParameterSet) -> Any:
+    """Return the compliances of all groups, block by block, shape (n, n)."""
+    blocks = [
+        SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))) for C in model.compliance(par)
+    ]
+    return ca.densify(ca.diagcat(*blocks)) if blocks else SX(0, 0)
+
+
+def _forces(C: Any, overlap: Any, closed: Any) -> Any:
+    """Return the forces F of given contacts: C F = d of those that press, zero of the others."""
+    n = overlap.shape[0]
+    if n == 0:
+        return SX(0, 1)
+    M, b = SX(C), SX(n, 1)
+    for k in range(n):
+        b[k] = ca.if_else(closed[k], overlap[k], 0)
+        for j in range(n):
+            if not M[k, j].is_zero():
+                M[k, j] = ca.if_else(closed[k], C[k, j], 1.0 if j == k else 0.0)
+    return ca.densify(solve_small(M, b))
