@@ -61,7 +61,8 @@ def export_fmu_command(
     bench: BenchFile,
     out: ExportFolder,
     part: Annotated[
-        str, typer.Option(help="brake, plant or ecu.", show_default="brake; plant for model-exchange")
+        str,
+        typer.Option(help="brake, plant or ecu.", show_default="brake; plant for model-exchange"),
     ] = "",
     kind: Annotated[
         str, typer.Option(help="co-simulation, or model-exchange of the plant.")
