@@ -21,6 +21,7 @@ from bywire.bench.running import Progress
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
+    Attachment,
     Banner,
     Block,
     Details,
@@ -46,7 +47,12 @@ RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "see
 
 @dataclass(frozen=True)
 class BenchResult(Result, Answer):
-    """What a bench gave, with recordings as xarray and key figures with their verdicts."""
+    """What a bench gave, with recordings as xarray and key figures with their verdicts.
+
+    ``animated``: whether its folder gets a page that plays each run.
+    """
+
+    animated: bool = False
 
     @property
     def holds(self) -> bool:
@@ -86,7 +92,7 @@ class BenchResult(Result, Answer):
         """Return key figures, verdicts, figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
-        said = remarks(self)
+        said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
         notes += [Listing(said)] if said else []
         return Document(
@@ -104,11 +110,24 @@ class BenchResult(Result, Answer):
             attachments=[
                 recording_file(f"{label}.nc", recording)
                 for label, recording in self.recordings.items()
-            ],
+            ] + self._animations(),
             record="result.json",
             remarks=[_remark(v) for v in self.verdicts if not v.met],
             is_paged=self.status != "interrupted",
         )  # fmt: skip
+
+    def _animations(self) -> list[Attachment]:
+        if not self.animated or self.status == "interrupted":
+            return []
+        from bywire.api.animation import animations
+
+        return animations(self)
+
+    def _unplayed(self) -> list[str]:
+        """Return what to say where an animation was wanted and nothing recorded has one."""
+        if not self.animated or self._animations():
+            return []
+        return ["no animation: no recording of this experiment holds where the vehicle is"]
 
     def _figures(self) -> list[FigureBlock]:
         if self.status == "interrupted":
@@ -206,6 +225,7 @@ def run(
     progress: Progress | None = None,
     engine: str = "auto",
     estimate_error: bool = True,
+    animate: bool = ...,
 ) -> BenchResult: ...
 
 
@@ -219,6 +239,7 @@ def run(
     progress: Progress | None = None,
     engine: str = "auto",
     estimate_error: bool = True,
+    animate: bool = ...,
 ) -> BenchRange: ...
 
 
@@ -232,6 +253,7 @@ def run(
     progress: Progress | None = None,
     engine: str = "auto",
     estimate_error: bool = True,
+    animate: bool = False,
 ) -> BenchResult | BenchRange:
     """Make all runs of a bench, and judge them; over a range, for each of its values.
 
@@ -257,11 +279,8 @@ def run(
         Whether all runs are made in half and double steps too, for the error from the step of key
         figures and recorded signals. A requirement that is closer to its limit than this error
         is undecided, neither met nor missed.
-
-    Returns
-    -------
-    BenchResult
-        Recordings [SI] by label, key figures with unit and error, verdicts.
+    animate
+        Whether the result's folder gets a page that plays each run, where its assembly has one.
 
     Returns
     -------
@@ -283,12 +302,17 @@ def run(
         bench = bench.with_overrides(overrides)
     if faults:
         bench = replace(bench, faults=(*bench.faults, *map(from_text, faults)))
+    if animate:
+        from bywire.api.animation import require_scene
+
+        require_scene(bench, over)
     if over:
         from bywire.api.run_over import run_over
 
         return run_over(bench, over, progress, engine, estimate_error)
     result = running.run(bench, progress, engine, estimate_error)
-    return BenchResult(**{each.name: getattr(result, each.name) for each in fields(result)})
+    given = {each.name: getattr(result, each.name) for each in fields(result)}
+    return BenchResult(**given, animated=animate)
 
 
 def _remark(verdict: Verdict) -> str:

@@ -54,16 +54,22 @@ def run(
         str, typer.Option(help="What computes, e.g. sil: the ECU's compiled C in the loop.")
     ] = "auto",
     error_estimate: ErrorEstimate = True,
+    animate: Annotated[
+        bool, typer.Option("--animate", help="Write pages that play the runs, with --out.")
+    ] = False,
     out: OutFolder = None,
     json: JsonFlag = False,
 ) -> None:
     """Run a bench file or an experiment; exit status 1 unless every requirement is met."""
     from bywire.api.run import run as run_bench
+    from bywire.core.errors import InputError
 
+    if animate and out is None:
+        raise InputError("--animate writes into a folder: give one by --out")
     show(
         lambda progress: run_bench(
             bench, changes(set_), over=over, faults=fault or (), progress=progress, engine=engine,
-            estimate_error=error_estimate,
+            estimate_error=error_estimate, animate=animate,
         ),
         out,
         json,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bywire.plant import adhesion, road
 from bywire.plant.road import SURFACES, SurfaceName
 
 
@@ -19,3 +20,9 @@ def laid(
         if name != "own"
         for key, value in SURFACES[name]._asdict().items()
     }
+
+
+def surface_name(place: float, ways: road.Parameters) -> str:
+    """Return what the surface at a place [m] is called, the factor on its adhesion apart."""
+    numbers = adhesion.surface_of(ways.further if road.share(place, ways) > 0.5 else ways.first)
+    return next((name for name, known in SURFACES.items() if known == numbers), "own")

@@ -12,20 +12,15 @@ from matplotlib.figure import Figure
 from bywire.bench.result import Result
 from bywire.brakes.two_wheeler.case import vehicle_of
 from bywire.core.typing import Array
-from bywire.plant import adhesion, road
-from bywire.plant.road import SURFACES
 from bywire.report import style
 from bywire.report.bench_figures import FigureKind, Shown
 from bywire.report.channel import channel
 from bywire.report.decimation import decimate, phases
 from bywire.vehicle.ideal_stop import ideal_distance
+from bywire.vehicle.stop_scene import TINTS
+from bywire.vehicle.surfaces import surface_name
 from bywire.vehicle.two_wheeler import VehicleParameters
 
-_TINTS = {
-    "dry-asphalt": style.GRAY, "wet-asphalt": style.BLUE, "dry-concrete": style.YELLOW,
-    "dry-cobble": style.ORANGE, "wet-cobble": style.GREEN, "snow": style.SKY, "ice": style.PURPLE,
-    "own": style.PALE,
-}  # fmt: skip
 _STROKES: dict[str, tuple[str, style.Dash]] = {
     "v": (style.BLUE, "-"),
     "v_f": (style.ORANGE, (0, (1.5, 1.5))),
@@ -90,20 +85,12 @@ def _draw_surfaces(axes: Axes, par: VehicleParameters, span: tuple[float, float]
         left, right = max(begin, span[0]), min(end, span[1])
         if not left < right:
             continue
-        name = _surface_name(0.5 * (left + right), par)
+        name = surface_name(0.5 * (left + right), ways)
         axes.axvspan(
-            left, right, color=_TINTS[name], alpha=_TINT, linewidth=0, zorder=0.5,
+            left, right, color=TINTS[name], alpha=_TINT, linewidth=0, zorder=0.5,
             label=None if name in drawn else name.replace("-", " "),
         )  # fmt: skip
         drawn.add(name)
-
-
-def _surface_name(place: float, par: VehicleParameters) -> str:
-    """Return what the surface at a place is called, the factor on its adhesion apart."""
-    far = road.share(place, par.road) > 0.5
-    own = par.road.further if far else par.road.first
-    numbers = adhesion.surface_of(own)
-    return next((name for name, known in SURFACES.items() if known == numbers), "own")
 
 
 def _draw_marks(axes: Axes, run: xr.Dataset, place: Array, wheel: str, row: int) -> None:

@@ -1,0 +1,1 @@
+"""Runs as moving pictures: one HTML file that plays them."""

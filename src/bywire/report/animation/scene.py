@@ -1,0 +1,117 @@
+"""What moves in an animation: drawing, parts that move in it, and dials."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from bywire.core.registry import Kind, instances
+from bywire.core.typing import Array
+
+Frames = Array | float
+
+
+@dataclass(frozen=True)
+class Move:
+    """How a part of the drawing moves, over the frames or all along.
+
+    Parameters
+    ----------
+    x, y
+        Shift in units of the drawing, y downward, shape (frames,) or a number.
+    turn
+        Angle about the part's origin [rad], clockwise.
+    stretch
+        Factor on the part's width.
+    """
+
+    x: Frames = 0.0
+    y: Frames = 0.0
+    turn: Frames = 0.0
+    stretch: Frames = 1.0
+
+
+@dataclass(frozen=True)
+class Dial:
+    """A bar beside the drawing.
+
+    Parameters
+    ----------
+    label, unit
+        What it shows, and in which unit.
+    values
+        Over the frames, in that unit, shape (frames,).
+    full
+        Value at which the bar is full.
+    color
+        Of the bar, as in CSS.
+    """
+
+    label: str
+    unit: str
+    values: Array
+    full: float
+    color: str
+
+
+@dataclass(frozen=True)
+class Scene:
+    """An animation.
+
+    Parameters
+    ----------
+    time
+        Of the frames [s], shape (frames,), evenly spaced.
+    width, height
+        Of the drawing, in its own units.
+    drawing
+        SVG markup; parts that move are groups whose ``id`` stands in ``moves``.
+    moves
+        How these move.
+    dials
+        Bars below the drawing.
+    """
+
+    time: Array
+    width: float
+    height: float
+    drawing: str
+    moves: Mapping[str, Move]
+    dials: tuple[Dial, ...]
+
+
+@dataclass(frozen=True)
+class SceneKind:
+    """How runs of an assembly are shown.
+
+    Parameters
+    ----------
+    name
+        The assembly.
+    place
+        Signal without which a recording cannot be shown: where the vehicle is.
+    draw
+        ``draw(recording)``: its scene.
+    """
+
+    name: str
+    place: str
+    draw: Callable[[xr.Dataset], Scene]
+
+
+def frames_of(run: xr.Dataset, per_second: float = 50.0) -> Array:
+    """Return the times of frames [s] from time zero to the end of a recording, shape (frames,)."""
+    return np.arange(0.0, float(run["time"].values[-1]) + 1e-9, 1.0 / per_second)
+
+
+def over_frames(run: xr.Dataset, name: str, frames: Array) -> Any:
+    """Return a recorded signal at the times of frames [s], shape (frames,)."""
+    return np.interp(frames, run["time"].values, run[name].values)
+
+
+SCENES = Kind("animation", ("animations",), instances(SceneKind), declared="a SceneKind")
+"""how runs of assemblies are shown, by the assembly's name"""
