@@ -5,7 +5,7 @@ repeats one. Benches and commands are admissible but for a quarter, which has a 
 the others gave a result is said. What is wrong is listed with kind and number, and the status is 1.
 Seconds each take commands that are killed or interrupted (``--kills 30 --interrupts 30``), and
 those that are compared with the same in a process of its own (``--alone 30``), and studies whose
-processes are killed up to four times each (``--studies 10``).
+processes are killed up to eight times each (``--studies 10``).
 """
 
 from __future__ import annotations
@@ -148,7 +148,7 @@ ONE_BY_ONE: dict[str, Callable[[Random, Path], str]] = {
     "kills": partial(kills.case, sign=signal.SIGKILL),
     "interrupts": partial(kills.case, sign=signal.SIGINT),
     "alone": alone,
-    "studies": study_kills.case,
+    "studies": partial(study_kills.case, forked=True),
 }
 
 

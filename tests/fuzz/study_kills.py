@@ -19,6 +19,7 @@ import pandas as pd
 
 import bywire
 from bywire.core.scratch import PREFIX
+from fuzz.forked import Forked
 
 RARE = 19.05  # A, which few cases exceed
 _STUDY = """
@@ -59,21 +60,27 @@ if __name__ == "__main__":
 KILLED: Counter[str] = Counter()
 """processes killed until now, by what they were"""
 _MOST = 4  # kills of a case
+_FORKED = 0.9  # of the clients
+_WHERE = (*("pool",) * 7, "cluster")
 _LONGEST = 120.0  # s that a command may take to end
 
 
-def case(rng: Random, folder: Path, kills: int = 0, design: str = "", where: str = "") -> str:
+def case(
+    rng: Random, folder: Path, kills: int = 0, design: str = "", where: str = "",
+    forked: bool = False,
+) -> str:  # fmt: skip
     """Kill a study again and again, finish it, and say what is wrong with what it gave.
 
     ``design``, ``where``: one of `DESIGNS`, and ``pool`` or ``cluster``; drawn where empty.
+    ``forked``: whether most clients are copies of this process, which takes a third of the time.
     """
     design = design or rng.choice(("monte-carlo", "monte-carlo", *DESIGNS))
-    where = where or rng.choice(("pool", "pool", "cluster"))
+    where = where or rng.choice(("pool", "pool", "cluster") if not forked else _WHERE)
     path, out = folder / "study.toml", folder / "out"
     path.write_text(DESIGNS[design], encoding="utf-8")
     with _computing(rng, folder, where) as (options, further):
-        for _ in range(kills or rng.randint(1, _MOST)):
-            wrong = _killed(rng, path, out, options, further)
+        for _ in range(kills or rng.randint(1, _MOST * (2 if forked else 1))):
+            wrong = _killed(rng, path, out, options, further, forked and rng.random() < _FORKED)
             if wrong:
                 return f"{design} with {' '.join(options)}: {wrong}"
     whole = bywire.run_study(path, out, workers=1).cases
@@ -107,14 +114,23 @@ def _environment() -> dict[str, str]:
     return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
 
 
-def _killed(rng: Random, path: Path, out: Path, options: list[str], further: int) -> str:
+def _started(words: list[str], errors: Path, forked: bool) -> subprocess.Popen[str] | Forked:
+    """Start a command."""
+    if forked:
+        return Forked(words, errors)
+    return subprocess.Popen(
+        [sys.executable, "-m", "bywire.cli", *words], stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE, text=True, env=_environment(),
+    )  # fmt: skip
+
+
+def _killed(
+    rng: Random, path: Path, out: Path, options: list[str], further: int, forked: bool
+) -> str:
     """Start a study, and kill its client or a worker of it after a while."""
-    line = [sys.executable, "-m", "bywire.cli", "study", "run", str(path), "--out", str(out),
-            *options]  # fmt: skip
-    with subprocess.Popen(
-        line, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env=_environment()
-    ) as process:
-        _waited(rng, process, out / "chunks")
+    words = ["study", "run", str(path), "--out", str(out), *options]
+    with _started(words, path.with_name("errors"), forked) as process:
+        _waited(rng, process, out / "chunks", 2.0 if forked else 9.0)
         below = _children(process.pid)
         workers = [*below, *(_children(further) if further else [])]
         victim = rng.choice(workers) if workers and rng.random() < 0.5 else process.pid
@@ -138,15 +154,17 @@ def _killed(rng: Random, path: Path, out: Path, options: list[str], further: int
     return ""
 
 
-def _waited(rng: Random, process: subprocess.Popen[str], chunks: Path) -> None:
-    """Wait for any time, or until a further chunk is there and a moment more."""
+def _waited(
+    rng: Random, process: subprocess.Popen[str] | Forked, chunks: Path, longest: float
+) -> None:
+    """Wait for any time [s], or until a further chunk is there and a moment more."""
     if rng.random() < 0.3:
-        time.sleep(rng.uniform(0.5, 9.0))
+        time.sleep(rng.uniform(0.0, longest))
         return
     before, give_up = len([*chunks.glob("*")]), time.monotonic() + _LONGEST
     while process.poll() is None and time.monotonic() < give_up:
         if len([*chunks.glob("*")]) > before:
-            time.sleep(rng.expovariate(4.0))
+            time.sleep(rng.expovariate(40.0 / longest))
             return
         time.sleep(0.005)
 
