@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -124,7 +123,7 @@ class Bench:
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy is made of: not what follows from it."""
-        return {each.name: getattr(self, each.name) for each in fields(self)}
+        return {name: self.__dict__[name] for name in type(self).__dataclass_fields__}
 
     def _check_stimulus(self, chosen: Experiment) -> None:
         """Refuse a stimulus that the experiment does not take."""
@@ -205,7 +204,8 @@ class Bench:
         cases = self.cases_with(self.par, self.chosen_options, make)
         for case in cases:
             _check_driven(case, self.definition)
-        for name in self.overrides:
+        is_changed = any(case.par is not self.par for case in cases)
+        for name in self.overrides if is_changed else ():
             wanted, given = self.par.value(name), [case.par.value(name) for case in cases]
             if given and all(value != wanted for value in given):
                 raise ParameterError(
@@ -253,8 +253,9 @@ class Bench:
         InputError
             For values out of range, or with which the experiment cannot be set up.
         """
-        made = copy(self)
+        made = object.__new__(type(self))
         known = made.__dict__
+        known |= self.__getstate__()
         known |= {name: getattr(self, name) for name in ("definition", "system", "chosen_stimuli")}
         known["overrides"] = {**self.overrides, **overrides}
         known["options"] = {**self.options, **options}

@@ -7,7 +7,7 @@ other ``E_...`` is taken.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any
@@ -77,13 +77,14 @@ def role_attributes(role: Role | None) -> dict[str, str]:
     return {f"{_PREFIX}{name}": str(value) for name, value in values.items() if value}
 
 
-def actuator_ledger(recording: xr.Dataset) -> Ledger:
+def actuator_ledger(recording: xr.Dataset, is_split: bool = True) -> Ledger:
     """Return the books of an actuator or rig, between the ends of a recording.
 
     ``recording``: recording with energies [J]. Where all of these stand in further books, as those
-    of a vehicle without actuators do, it is the first of them.
+    of a vehicle without actuators do, it is the first of them. ``is_split``: whether sinks that are
+    booked in two parts, moving and holding, are; that takes all rows of them.
     """
-    return _ledger(recording, _main_book(recording))
+    return _ledger(recording, _main_book(recording), is_split)
 
 
 def further_ledgers(recording: xr.Dataset) -> dict[str, Ledger]:
@@ -113,7 +114,7 @@ def _books(
     recording: xr.Dataset, sides: tuple[str, ...] = ("source", "sink", "standstill")
 ) -> dict[str, None]:
     """Return the names of all books with postings on some sides, in the recording's order."""
-    roles = _roles(recording, _changes(recording)).values()
+    roles = _roles(recording, _energies(recording)).values()
     return dict.fromkeys(role.book for role in roles if role.side in sides)
 
 
@@ -138,7 +139,7 @@ def ledger(recording: xr.Dataset, sources: Mapping[str, str], sinks: Mapping[str
     return Ledger(tuple(given), tuple(parts))
 
 
-def _ledger(recording: xr.Dataset, book: str) -> Ledger:
+def _ledger(recording: xr.Dataset, book: str, is_split: bool = True) -> Ledger:
     changes = _changes(recording)
     roles = _roles(recording, changes)
     widens = any(role.whole for role in roles.values() if role.book == book)
@@ -155,7 +156,7 @@ def _ledger(recording: xr.Dataset, book: str) -> Ledger:
         for name, role in sources.items()
         if role.rest and role.whole in sources
     ]
-    split = _split(recording)
+    split = _split(recording) if is_split else {}
     for name, role in known.items():
         if role.side == "sink":
             kinds = [kind for kind in ("moving", "holding") if f"{name}_{kind}" in split]
@@ -166,13 +167,13 @@ def _ledger(recording: xr.Dataset, book: str) -> Ledger:
     return Ledger(tuple(given), tuple(taken))
 
 
-def _roles(recording: xr.Dataset, changes: Mapping[str, float]) -> dict[str, Role]:
+def _roles(recording: xr.Dataset, names: Collection[str]) -> dict[str, Role]:
     """Return what every energy is in the books: what is declared first, then what names say."""
-    said = {name: _role_of(recording.variables[name]) for name in changes}
+    said = {name: _role_of(recording.variables[name]) for name in names}
     roles = {name: role for name, role in said.items() if role is not None}
-    if "E_source" in changes and not any(role.side == "source" for role in roles.values()):
+    if "E_source" in names and not any(role.side == "source" for role in roles.values()):
         roles["E_source"] = Role("source", "source")
-    for name in sorted(changes, key=lambda name: name != "E_stored"):
+    for name in sorted(names, key=lambda name: name != "E_stored"):
         if name.startswith("E_") and name != "E_source" and name not in roles:
             label = str(recording.variables[name].attrs.get("long_name", name))
             roles[name] = Role("sink", "stored" if name == "E_stored" else label)
@@ -194,13 +195,17 @@ def _role(attributes: tuple[tuple[str, str], ...]) -> Role | None:
 def _changes(recording: xr.Dataset) -> dict[str, float]:
     """Return what every energy grew by [J]."""
     changes = {}
-    for key in recording.data_vars:
-        # Its variables: to give an array its coordinates costs more than all the books.
-        name, variable = str(key), recording.variables[key]
-        if name.startswith(("E_", "W_")) and variable.ndim == 1:
-            values = variable.values
-            changes[name] = _plain(values[..., -1] - values[..., 0])
+    for name in _energies(recording):
+        values = recording.variables[name].values
+        changes[name] = _plain(values[..., -1] - values[..., 0])
     return changes
+
+
+def _energies(recording: xr.Dataset) -> list[str]:
+    """Return the names of all energies."""
+    named = (str(key) for key in recording.data_vars if str(key).startswith(("E_", "W_")))
+    # Its variables: to give an array its coordinates costs more than all the books.
+    return [name for name in named if recording.variables[name].ndim == 1]
 
 
 def _split(recording: xr.Dataset) -> dict[str, float]:

@@ -128,11 +128,13 @@ def watch_cases(rows: Rows, runs: Sequence[Run], unsettled: Sequence[int]) -> li
     ``rows``: of all of them; ``unsettled``: substeps of each that hit the cap of the contacts.
     """
     solver = map(_solver_doubts, doubts_of(runs), unsettled)
-    rows.silent = runs[0].model.silent(rows, [run.par for run in runs])
+    model, pars = runs[0].model, [run.par for run in runs]
+    rows.silent = model.silent(rows, pars)
+    asked = set(model.may_warn(rows, pars))
     books = open_books_of_cases(cast(xr.Dataset, rows), len(runs))
     return [
-        [*doubts, *book, *run.model.watch(rows.case(k), run.par)]
-        for k, (doubts, book, run) in enumerate(zip(solver, books, runs, strict=True))
+        [*doubts, *book, *(model.watch(rows.case(k), pars[k]) if k in asked else ())]
+        for k, (doubts, book) in enumerate(zip(solver, books, strict=True))
     ]
 
 
@@ -156,9 +158,13 @@ def open_books(recording: xr.Dataset) -> list[str]:
 
 def open_books_of_cases(recording: xr.Dataset, cases: int) -> list[list[str]]:
     """Return what `open_books` says of each of several runs, of the rows of all."""
-    books = actuator_ledger(recording)
+    books = actuator_ledger(recording, is_split=False)
     if not (books.sources and books.sinks):
         return [[] for _ in range(cases)]
+    # What is split turns over no less: where the whole is far from open, so are its parts.
+    if np.all(2.0 * np.abs(books.closing_error) <= _OPEN * books.turnover + _NOTHING):
+        return [[] for _ in range(cases)]
+    books = actuator_ledger(recording)
     error, turned = (
         np.broadcast_to(each, cases) for each in (books.closing_error, books.turnover)
     )

@@ -18,7 +18,6 @@ from bywire.core.errors import ModelError, unknown_name
 from bywire.core.gathering import AnyPart, contacts, gather, stores
 from bywire.core.model import Bounds, Matrix, Model
 from bywire.core.parts import Part
-from bywire.core.signals import zeros
 from bywire.core.watching import silent_parts, warnings_of, watched_by_elements
 from bywire.core.wired import Instant, Wired, instant_of, line
 from bywire.core.wires import Integral, Shown, Wire
@@ -269,15 +268,23 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         ModelError
             When there is no such part, or the state is another element's.
         """
-        values: dict[str, float] = {}
+        values: list[Any] = [0.0] * len(cls.State._fields)
         for name, given in parts.items():
-            part = cls.parts.get(name)
-            if part is None:
-                raise ModelError(f"{cls.__name__}: {unknown_name('part', name, cls.parts)}")
-            if not part.has("State") or not isinstance(given, part.element.State):
-                raise ModelError(f"{part.where}: {type(given).__name__} is no state of {part.kind}")
-            values |= {part.state_name(k): v for k, v in given._asdict().items()}
-        return zeros(cls.State)._replace(**values)
+            for place, value in zip(cls._places(name, type(given)), given, strict=True):
+                values[place] = value
+        return cls.State._make(values)
+
+    @classmethod
+    @cache  # studies begin thousands of runs a second
+    def _places(cls, name: str, kind: type) -> tuple[int, ...]:
+        """Return where the states of a part stand in the assembly's."""
+        part = cls.parts.get(name)
+        if part is None:
+            raise ModelError(f"{cls.__name__}: {unknown_name('part', name, cls.parts)}")
+        if not part.has("State") or not issubclass(kind, part.element.State):
+            raise ModelError(f"{part.where}: {kind.__name__} is no state of {part.kind}")
+        fields: tuple[str, ...] = cls.State._fields
+        return tuple(fields.index(part.state_name(each)) for each in part.element.State._fields)
 
     def watch(self, recording: Any, par: Any) -> list[str]:
         """Return what the elements say of a recording, each of what it felt in every row.
@@ -296,6 +303,19 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         ``rows``: signals of shape (cases, rows); ``pars``: parameters of each case.
         """
         return silent_parts(self, rows, pars)
+
+    def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
+        """Return the cases of which ``watch`` may say something: none where all parts are silent.
+
+        All where ``watch`` is written by hand, unless this is too.
+        """
+        is_own = type(self).watch is not Assembly.watch
+        return range(len(pars)) if is_own or not self.are_silent(rows) else ()
+
+    def are_silent(self, rows: Any) -> bool:
+        """Return whether no part has anything to say of cases of which ``rows.silent`` is known."""
+        watching = (part.name for part in self.parts.values() if part.has("watch"))
+        return all(name in rows.silent for name in watching)
 
     def _nothing(self) -> Any:
         """Return a memory that is not known: where it does not count, nobody must see it."""

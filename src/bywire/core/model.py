@@ -17,7 +17,7 @@ differentiated for the Newton matrix. Use it for slowly varying geometry and per
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, NamedTuple, Protocol
@@ -194,6 +194,14 @@ class Model(Protocol):
     def silent(self, rows: Any, pars: Any) -> frozenset[str]:
         """Return what ``watch`` need not look at in any of several cases; see `Assembly.silent`."""
         return frozenset()
+
+    def may_warn(self, rows: Any, pars: Any) -> Sequence[int]:
+        """Return the cases of several of which ``watch`` may say something; all by default.
+
+        ``rows``: signals of shape (cases, rows), ``rows.silent`` what is `silent` in all of them;
+        ``pars``: parameters of each case.
+        """
+        return range(len(pars))
 
 
 def _declared(module: ModuleType) -> Iterator[type[Any]]:

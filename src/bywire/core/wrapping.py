@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from bywire.core.model import Bounds, Matrix, Model, Task
@@ -124,3 +125,7 @@ class Wrapping(Model):
     def silent(self, rows: Any, pars: Any) -> frozenset[str]:
         """Return what ``watch`` need not look at."""
         return self.inner.silent(rows, pars)
+
+    def may_warn(self, rows: Any, pars: Any) -> Sequence[int]:
+        """Return the cases of which ``watch`` may say something."""
+        return self.inner.may_warn(rows, pars)

@@ -234,11 +234,17 @@ def doubts_of(runs: Sequence[Run]) -> list[str]:
     jacobians = prepare(first.model, first.par).contact_jacobians
     each = [(run.state, run.memory, list(run.par.leaves().values())) for run in runs]
     columns = [np.array(rows, dtype=np.float64).T for rows in zip(*each, strict=True)]
-    size = len(first.state)
-    opened, *closed = (
-        J.full().reshape(size, len(runs), size).swapaxes(0, 1) for J in jacobians(*columns)
-    )
+    opened, *closed = (_matrices(J, len(runs)) for J in jacobians(*columns))
     return unresolved(opened, closed, first.step)
+
+
+def _matrices(J: Any, count: int) -> Array:
+    """Return sparse square matrices that stand side by side, shape (count, size, size)."""
+    size = J.size1()
+    rows, columns = J[:, :size].sparsity().get_triplet()  # alike in all of them
+    matrices = np.zeros((count, size, size))
+    matrices[:, rows, columns] = np.array(J.nonzeros()).reshape(count, -1)
+    return matrices
 
 
 def sampled_stimulus(run: Run, schedule: Schedule) -> Array:

@@ -6,6 +6,7 @@ brake-by-wire actuator for a sport motorbike", 5th IFAC Symposium on Mechatronic
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 from bywire.brakes.motorcycle import ecu
@@ -229,6 +230,11 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         source = {"i_source": ("time", recording["i"].values)} if held else {}
         seen = recording.assign(source) if held else recording
         return warnings.watch(recording, par) + super().watch(seen, par)
+
+    def may_warn(self, rows: Any, pars: Sequence[Any]) -> Sequence[int]:
+        """Return the cases of which ``watch`` may say something."""
+        is_known = pars[0].drive.mode != "current-source" and self.are_silent(rows)
+        return warnings.may_warn(rows) if is_known else range(len(pars))
 
     def watched(self, par: Any) -> tuple[str, ...]:
         """Return the signals that ``watch`` looks at."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -55,17 +56,28 @@ def travel_at(p: float, par: Par) -> float:
     The integral runs from node to node of the caliper's table, by Gauss: it never looks at a node,
     where the slope jumps.
     """
-    cylinder, fluid = par.master_cylinder, par.fluid
-    start = cylinder.x_rest + reservoir_port.closed_at(par.port)
+    groups = (par.master_cylinder, par.fluid, par.port, par.caliper)
+    is_plain = type(p) is float and type(par.fluid.beta) is float
+    return _kept_travel(p, *groups) if is_plain else _travel(p, *groups)
+
+
+def _travel(
+    p: float, cylinder: master_cylinder.Parameters, fluid: brake_fluid.Parameters,
+    port: reservoir_port.Parameters, pads: caliper.Parameters,
+) -> float:  # fmt: skip
+    start = cylinder.x_rest + reservoir_port.closed_at(port)
     empty = cylinder.A_mc * (cylinder.s_mc - start) - brake_fluid.gas_volume(0.0, fluid)
     taken = 0.0
-    for low, high in pairwise((0.0, *(ops.clip(node, 0.0, p) for node in par.caliper.p_table), p)):
+    for low, high in pairwise((0.0, *(ops.clip(node, 0.0, p) for node in pads.p_table), p)):
         for share, weight in _GAUSS:
             at = 0.5 * (low + high) + 0.5 * (high - low) * share
-            slope = caliper.mass(caliper.State(at), par.caliper, fluid)
+            slope = caliper.mass(caliper.State(at), pads, fluid)
             taken += 0.5 * (high - low) * weight * slope * ops.exp((at - p) / fluid.beta)
     left = empty * ops.exp(-p / fluid.beta) - taken
     return cylinder.s_mc - (left + brake_fluid.gas_volume(p, fluid)) / cylinder.A_mc
+
+
+_kept_travel = lru_cache(maxsize=64)(_travel)  # mostly, a study varies none of these groups
 
 
 def highest_pressure(par: Par) -> float:

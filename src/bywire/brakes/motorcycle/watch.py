@@ -28,6 +28,15 @@ def watch(recording: xr.Dataset, par: ParameterSet) -> list[str]:
     return warnings + _pressed_back(recording, par.choices())
 
 
+def may_warn(rows: Any) -> list[int]:
+    """Return the cases of which `watch` says something; ``rows``: shape (cases, rows) each."""
+    speaks: Any = False
+    if "F_stop" in rows:
+        force = rows["F_stop"].values
+        speaks = (force > 0).any(axis=-1) | (force[..., -1] < 0)
+    return np.flatnonzero(speaks).tolist()
+
+
 def _pressed_back(recording: xr.Dataset, known: Mapping[str, Any]) -> list[str]:
     """Return whether current pulls the piston against its retracted stop at the end."""
     if "port.law" not in known or not {"F_stop", "i", "p_pd"} <= set(recording):
