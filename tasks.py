@@ -27,11 +27,14 @@ LOCKS["trust"] = LOCKS["test"]
 PYTEST = ["pytest", "-n", "auto", "-q"]
 # A file's tests share runs and kernels, so one process has them all; the longest files come first.
 BY_FILE = ["--dist", "loadfile", "--no-loadscope-reorder"]
+# Rewritten assertions, which tell their values, cost as much as a hundred tests: what fails is run
+# once more with them.
 CHECKS = {
     "format and lint": ["ruff", "check", "."],
     "layers": ["lint-imports"],
-    "tests": [*PYTEST, *BY_FILE, "-m", "not trust"],
+    "tests": [*PYTEST, *BY_FILE, "--assert=plain", "-m", "not trust"],
 }
+AGAIN = {"tests": ["pytest", "-q", "--last-failed", "--last-failed-no-failures", "none"]}
 TYPES = ["mypy"]  # on one core alone, for most of a minute: beside the others
 TRUST = {"trust": [*PYTEST, "--dist", "worksteal", "-m", "trust"]}
 
@@ -113,6 +116,9 @@ def every(checks: dict[str, list[str]]) -> int:
     for title, check in checks.items():
         print(f"== {title}", flush=True)
         status = run(*check)
+        if status == 1 and title in AGAIN:
+            print(f"== {title} that failed, with their values", flush=True)
+            run(*AGAIN[title])
         if status:
             return status
     return 0
@@ -150,7 +156,8 @@ def install(recipe: str) -> None:
         if digest in done:
             continue
         print(f"installing {name}", flush=True)
-        pip("install", "--require-hashes", "-r", name)
+        # Python compiles what is imported; all that is installed would take half a minute.
+        pip("install", "--no-compile", "--require-hashes", "-r", name)
         pip("install", "--no-deps", "--no-build-isolation", "-e", ".")
         done.append(digest)
         stamp.write_text("\n".join(done))

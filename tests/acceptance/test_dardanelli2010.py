@@ -5,12 +5,15 @@ from __future__ import annotations
 import copy
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from bywire.brakes.motorcycle.methods import friction_ramp
+from bywire.brakes.motorcycle.paper import table3
 from bywire.brakes.motorcycle.paper.dardanelli2010 import PARTS, reproduce
 from bywire.reproduction.reproduction import Reproduction
 from undrawn import drawn_once, undrawn
@@ -76,11 +79,22 @@ BY_CONSTRUCTION = re.compile(
 )
 """tuned to the statement, or an input: no evidence"""
 STAGES: list[tuple[str, float]] = []
+COARSE = {"step": 1e-4, "longest": 2.0}
+"""steps and slips by which the friction's own identification takes a third of its time"""
 
 
-@pytest.fixture(scope="module")
-def reproduction() -> Reproduction:
-    return reproduce(lambda label, share: STAGES.append((label, share)))
+@pytest.fixture(
+    scope="module", params=[COARSE, pytest.param({}, marks=pytest.mark.trust, id="as published")]
+)
+def reproduction(request: pytest.FixtureRequest) -> Iterator[Reproduction]:
+    method = friction_ramp.METHOD
+    STAGES.clear()
+    table3._identified.cache_clear()
+    with pytest.MonkeyPatch.context() as patch:
+        defaults = method.defaults.replace(request.param)
+        patch.setattr(friction_ramp, "METHOD", replace(method, defaults=defaults))
+        yield reproduce(lambda label, share: STAGES.append((label, share)))
+    table3._identified.cache_clear()
 
 
 @pytest.fixture(scope="module")

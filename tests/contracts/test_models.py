@@ -22,9 +22,12 @@ LONG = {
     ("wedge-corner", "derivatives of a run"),
     ("two-wheeler-by-wire", "order of the step"),
     ("wedge-corner", "order of the step"),
+    ("wedge-brake", "order of the step"),
+    ("wedge-corner", "exact rest"),
+    ("two-wheeler-by-wire", "lanes"),
 }
-"""what takes as long as all else of a model; other models put the contract to the test, and tests
-of stops halve the step"""
+"""what takes as long as all else of a model; other models put the contract to the test, tests of
+stops halve the step, and every experiment of the vehicle runs in lanes as alone"""
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

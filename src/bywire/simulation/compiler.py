@@ -43,7 +43,8 @@ _SCHEDULED = ("-fschedule-insns", "-fsched-pressure")  # a tenth quicker
 # both operands. Only with these does scheduling pay here.
 SINGLE = (*PLAIN, *_HERE, *_SCHEDULED)
 VECTOR = ("-O2", "-fopenmp-simd", *_WIDE, *_SCHEDULED)
-_QUICK = ("-Og", "-fira-region=one")  # half the time of -O2, and kernels as quick as by -O1
+# Half the time of -O2, and kernels as quick as by -O1. What is rare in them is told to leave it.
+_QUICK = ("-Og", "-fira-region=one", "-DQUICK")
 _GCC_ONLY = frozenset({*_BRANCHES, *_SHARED, *_SCHEDULED, "-fira-region=one"})
 TIMEOUT = 300.0
 _OTHERWISE = (

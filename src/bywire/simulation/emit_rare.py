@@ -166,7 +166,11 @@ def rare_substep(stages: Stages) -> str:
     nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     slots = _constants(stages)
     return f"""
+#if defined(QUICK) && !defined(__clang__)
+#define RARE __attribute__((noinline, optimize("O0")))
+#else
 #define RARE __attribute__((noinline, cold))
+#endif
 #define APART {APART}
 enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
   JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, CONSTANTS = {len(slots)},

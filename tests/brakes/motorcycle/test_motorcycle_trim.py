@@ -58,7 +58,9 @@ def fine_travel(p: float, par: MotorcycleParameters, x: float) -> float:
     return x
 
 
-@pytest.mark.parametrize("name", ["dardanelli2010", "dardanelli2010-table1"])
+@pytest.mark.parametrize(
+    "name", ["dardanelli2010", pytest.param("dardanelli2010-table1", marks=pytest.mark.trust)]
+)
 @pytest.mark.parametrize("law", LAWS)
 def test_travel_is_that_of_fine_steps(law: str, name: str) -> None:
     par, p = brake(LAWS[law], name), 40e5

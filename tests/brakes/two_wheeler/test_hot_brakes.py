@@ -38,6 +38,11 @@ def locked():
 
 
 @pytest.fixture(scope="module")
+def cold_and_warm():
+    return stop({"front.heat.law": "off", "rear.heat.law": "off"}), stop()
+
+
+@pytest.fixture(scope="module")
 def series():
     small = {"options.stops": f"{STOPS}", "options.pause": "5 s", "front.heat.C_d": "450 J/K"}
     return bywire.run("repeated-stops", small, estimate_error=False)
@@ -99,8 +104,8 @@ def test_what_changes_put_in_stands_in_the_book_of_its_store():
         assert abs(books.closing_error) < 1e-6 * books.turnover
 
 
-def test_cold_brakes_are_those_without_heat():
-    cold, warm = stop({"front.heat.law": "off", "rear.heat.law": "off"}), stop()
+def test_cold_brakes_are_those_without_heat(cold_and_warm):
+    cold, warm = cold_and_warm
     assert further_ledgers(cold.recording) == {}
     assert growth(cold.recording, "T_disc_f") == 0.0
     for name in ("v", "x", "omega_f", "p_f"):  # up to 350 degC no pad fades
@@ -202,10 +207,9 @@ def test_the_series_is_told_to_the_substep():
     assert np.interp(still, run.time, run["T_disc_f"]) == pytest.approx(end, abs=1e-5)
 
 
-def test_time_traces_show_temperatures_that_move():
-    cold, warm = stop({"front.heat.law": "off", "rear.heat.law": "off"}), stop()
+def test_time_traces_show_temperatures_that_move(cold_and_warm):
     shown = [
         {panel.quantity for panel, _ in drawable(each.recording, PANELS.panels)}
-        for each in (cold, warm)
+        for each in cold_and_warm
     ]
     assert shown[1] - shown[0] == {"discs", "pads"}

@@ -14,6 +14,8 @@ KMH_100 = "100 km/h"
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
 WET = {"options.surface": "wet-asphalt"}
 SURFACES = ["dry-asphalt", "wet-asphalt", "snow", "dry-cobble", "wet-cobble"]
+LESS_SNOW = [pytest.param(s, marks=pytest.mark.trust) if s == "snow" else s for s in SURFACES]
+"""on snow a stop takes as long as on all others, and rules stop there, too"""
 KNOWN = {"ecu.sees": "known", "sensors.encoder.law": "ideal"}
 
 
@@ -80,7 +82,7 @@ def test_a_controlled_stop_on_wet_road(controlled):
     assert all(verdict.met for verdict in controlled.verdicts)
 
 
-@pytest.mark.parametrize("surface", SURFACES)
+@pytest.mark.parametrize("surface", LESS_SNOW)
 def test_a_larger_slip_does_for_every_surface(surface):
     larger = {"ecu.front_slip.slip_set": "0.28", "ecu.rear_slip.slip_set": "0.28"}
     result = stopped(larger, surface=surface, v_0="30 m/s")
@@ -133,11 +135,11 @@ def test_mixed_control_sees_the_deceleration_of_its_wheel():
     assert float(steady["eta_f"].mean()) == pytest.approx(slowed, rel=0.05)
 
 
-def test_a_stop_is_recorded_to_its_end_on_any_surface():
-    for surface in ("dry-asphalt", "snow"):
-        result = stopped(OFF, surface=surface)
-        last = float(result.recording["time"][-1])
-        assert 0.5 * last < result.kpi("stopping_time").value < last
+@pytest.mark.parametrize("surface", LESS_SNOW)
+def test_a_stop_is_recorded_to_its_end_on_any_surface(surface):
+    result = stopped(OFF, surface=surface)
+    last = float(result.recording["time"][-1])
+    assert 0.5 * last < result.kpi("stopping_time").value < last
 
 
 def test_a_slope_on_which_locked_wheels_slide_on_needs_a_duration():
@@ -208,8 +210,8 @@ def test_a_stop_on_tyres_that_follow_the_magic_formula():
 @pytest.mark.parametrize(
     ("gradient", "held"),
     [
-        ("-0.1", 60), ("0", 10), ("0.1", 10),
-        *(pytest.param(each, 60, marks=pytest.mark.trust) for each in ("0", "0.1")),
+        ("-0.1", 10), ("0", 10), ("0.1", 10),
+        *(pytest.param(each, 60, marks=pytest.mark.trust) for each in ("-0.1", "0", "0.1")),
     ],
 )  # fmt: skip
 def test_it_stands_still_on_any_slope(gradient, held):
