@@ -46,8 +46,10 @@ STRUCTURES: dict[str, tuple[str, str, dict[str, Any]]] = {
          "ecu.vehicle_speed.law": "accelerometer", "ecu.wheel_speed.law": "difference"},
     ),
     "known speeds, no lift control": (
-        "straight-stop", "sport600", {"ecu.sees": "known", "ecu.lift": "off"},
+        "straight-stop", "sport600",
+        {"ecu.sees": "known", "ecu.lift": "off", "ecu.front_slip.eager": 10.0},
     ),
+    "slip over a moment, in a hurry": ("corner-panic", "roberts2003-corner", {}),
 }  # fmt: skip
 """structural choices of all brakes: experiment, parameter set, overrides"""
 

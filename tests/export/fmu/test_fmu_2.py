@@ -24,6 +24,11 @@ WEDGE = bywire.Bench("moment-pulses", "roberts2003", options={
     "t_hold": "60 ms", "pulses": 1, "t_low": "20 ms", "t_high": "20 ms", "settle": "20 ms",
 })  # fmt: skip
 
+SLIP = bywire.Bench(
+    "straight-stop", "sport600", {"ecu.front_slip.eager": 10.0},
+    options={"v_0": "6 m/s", "duration": "1 s"},
+)  # fmt: skip
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -40,12 +45,19 @@ def wedge(folder: Path) -> ExportedFmu:
     return export_fmu(WEDGE, folder)
 
 
+@pytest.fixture(scope="module")
+def slip(folder: Path) -> ExportedFmu:
+    return export_fmu(SLIP, folder)
+
+
 @pytest.fixture
 def client(motorcycle: ExportedFmu) -> Client:
     return Client(motorcycle.path, motorcycle.path.with_suffix(""))
 
 
-@pytest.mark.parametrize("name", ["motorcycle", "wedge"])
+@pytest.mark.parametrize(
+    "name", ["motorcycle", "wedge", pytest.param("slip", marks=pytest.mark.trust)]
+)
 @pytest.mark.parametrize("step", [1e-3, 5e-3, 20e-3])
 def test_every_row_is_the_benchs_own(
     name: str, step: float, request: pytest.FixtureRequest

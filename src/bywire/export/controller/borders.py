@@ -184,7 +184,8 @@ class Borders:
         x, u, m = _traced(_with(inputs, part, name, value))
         _now.margins = {}
         try:
-            self.tick(x, m, u, par)
+            with np.errstate(all="ignore"):  # numbers of single precision warn where others raise
+                self.tick(x, m, u, par)
         except (ArithmeticError, ValueError):
             return {}
         found: Margins = _now.margins
@@ -193,7 +194,8 @@ class Borders:
     def _is_seen(self, pair: Sequence[Inputs], par: Any) -> bool:
         """Return whether the memory jumps between two inputs next to each other."""
         try:
-            first, last = (list(self.tick(x, m, u, par)) for x, u, m in pair)
+            with np.errstate(all="ignore"):
+                first, last = (list(self.tick(x, m, u, par)) for x, u, m in pair)
         except (ArithmeticError, ValueError):
             return False
         return any(abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True))

@@ -7,6 +7,7 @@ import inspect
 import types
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 from bywire.core.errors import ModelError
@@ -163,6 +164,9 @@ class Translation:
         made = CFunction(name, module, description(function), is_plant)
         body = Body(self.structs, stores(node), Memories(name, self.copied))
         scope: dict[str, Any] = {n: Known(v) for n, v in closure.items()}
+        bound = next(iter(arguments.values()), None)
+        if "__class__" in closure and isinstance(bound, Known):
+            scope["super"] = Known(partial(super, closure["__class__"], bound.value))
         for python_name, value in arguments.items():
             (scope[python_name], first), *more = received(value, python_name, body)
             made.arguments += [a for _, a in [(None, first), *more] if a is not None]
