@@ -125,6 +125,16 @@ def test_warnings_of_cases_need_no_more_than_the_signals_that_are_watched(bench)
     assert [len(texts) for texts in figures.warnings] == [1, 2, 1, 0]
 
 
+def test_elements_that_all_cases_share_may_warn_of_some(bench):
+    """The sensor is of the same range in both, and its end passed in one of them."""
+    same = {"current_sensor.i_high": 4.0}
+    benches = [bench.varied(same, options) for options in ({}, {"p_to": 6.5e5})]
+    figures = key_figures_of(benches)
+    for texts, result in zip(figures.warnings, ensemble.run_benches(benches), strict=True):
+        assert list(texts) == result.warnings
+    assert [len(texts) for texts in figures.warnings] == [1, 0]
+
+
 def test_a_varied_bench_is_the_one_that_is_made_anew(bench):
     changes = {"motor.R_m": 0.5, "adc.law": "ideal"}
     varied = bench.varied(changes, {"p_to": 20e5}, seed=7)

@@ -39,11 +39,13 @@ def first(t: Array, happens: Any, text: str, after: str = "") -> list[str]:
     t
         Times of the rows [s], shape (n,).
     happens
-        Whether it happens in each row, shape (n,), or one for all.
+        Whether it happens in each row, shape (n,), or one for all; of many cases (cases, n).
     text, after
         What is said before and behind the time.
     """
     if not np.any(happens):
         return []
-    rows = np.broadcast_to(np.asarray(happens, dtype=bool), t.shape)
+    there = np.asarray(happens, dtype=bool)
+    each = np.broadcast_to(there, np.broadcast_shapes(there.shape, t.shape))
+    rows = each.reshape(-1, t.size).any(axis=0)
     return [f"{text} at t = {float(t[int(np.argmax(rows))]):.4g} s{after}"]
