@@ -13,6 +13,8 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+from bywire.core.engines import Make as _Make
+from bywire.core.engines import declare_engine as _declare_engine
 from bywire.core.version import __version__ as __version__
 
 if TYPE_CHECKING:
@@ -190,6 +192,21 @@ __all__ = [
     "write_measurement",
     "write_recording",
 ]
+
+
+def _ecu_in_the_loop(precision: str) -> _Make:
+    """Return what makes the engine whose ticks are the compiled C of the ECU."""
+
+    def make(model: Any, par: Any, kernel: Any) -> Any:
+        from bywire.export.controller.in_the_loop import SoftwareInTheLoop
+
+        return SoftwareInTheLoop(model, par, precision, kernel)
+
+    return make
+
+
+_declare_engine("sil", _ecu_in_the_loop("double"))
+_declare_engine("sil-single", _ecu_in_the_loop("single"))
 
 
 def __getattr__(name: str) -> Any:

@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
-from repository_sources import MODULES, PACKAGE, ROOT, imports, label, offenders
+from repository_sources import MODULES, PACKAGE, ROOT, imports, label, offenders, tree
 
 CONTRACT = ROOT / ".importlinter"
 SYMBOLIC = ("casadi", "numpy", "scipy", "xarray", "pint", "matplotlib")
@@ -111,6 +111,49 @@ def test_every_layer_of_the_contract_exists():
     there = {path.stem for path in PACKAGE.glob("*.py")}
     there |= {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
     assert set(layers) <= there - {"__init__"}
+
+
+def ranks() -> dict[str, int]:
+    """Return how deep every room lies: what is below has the larger number."""
+    contract = configparser.ConfigParser()
+    contract.read(CONTRACT, encoding="utf-8")
+    layers = contract["importlinter:contract:layers"]["layers"].strip().splitlines()
+    return {room.strip(): k for k, line in enumerate(layers) for room in line.split("|")}
+
+
+NAMED = {
+    "src/bywire/core/brake.py": "where our brakes stand, which the registry finds like anybody's",
+    "src/bywire/core/sources.py": "rooms whose files shape models, of which it loads none",
+    "src/bywire/api/new.py": "files that are copied and not run",
+    "src/bywire/benchmark/commands.py": "a command in a process of its own",
+}
+
+
+def named_above(room: str, module: ast.Module) -> list[str]:
+    """Return the modules of rooms above that a module of a room names in a text.
+
+    By its name it could be loaded where the linter does not see it.
+    """
+    depth = ranks()
+    texts = [n.value for n in ast.walk(module) if isinstance(n, ast.Constant)]
+    dotted = [t for t in texts if isinstance(t, str) and re.fullmatch(r"bywire(\.\w+)+(:\w+)?", t)]
+    return [text for text in dotted if depth.get(text.split(".")[1], 99) < depth[room]]
+
+
+def test_no_text_names_a_room_above() -> None:
+    rooms = {path: path.relative_to(PACKAGE).parts[0] for path in MODULES}
+    named = {
+        label(path): above
+        for path, room in rooms.items()
+        if room in ranks() and (above := named_above(room, tree(path)))
+    }
+    assert named.keys() == NAMED.keys()
+
+
+def test_the_gate_of_named_rooms_can_fail() -> None:
+    text = "home = 'bywire.export.controller.in_the_loop:double'"
+    assert named_above("simulation", ast.parse(text)) == [text[8:-1]]
+    assert named_above("api", ast.parse(text)) == []
 
 
 def equations() -> list[Path]:

@@ -24,7 +24,7 @@ from bywire.core.errors import ModelError, ParameterError, place_of, quoted, unk
 from bywire.core.model import ASSEMBLIES
 from bywire.core.parameters import ParameterSet
 from bywire.core.registry import pick
-from bywire.simulation.engine import KINDS
+from bywire.simulation.engine import engine_names
 from bywire.simulation.run import Run
 
 
@@ -97,8 +97,8 @@ class Bench:
         object.__setattr__(self, "step", checked_step(self.step))
         object.__setattr__(self, "record", checked_interval(self.record))
         check_seed(self.seed)
-        if self.engine not in KINDS:
-            raise unknown_name("engine", self.engine, KINDS)
+        if self.engine not in engine_names():
+            raise unknown_name("engine", self.engine, engine_names())
         known = PARAMETER_SETS.find(self.parameters)
         object.__setattr__(self, "overrides", settled(known.parameters(), self.overrides))
         if self.assembly == known.assembly:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 import threading
 import warnings
 from collections.abc import Callable, Mapping
@@ -12,6 +11,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, Protocol, TypeVar, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from bywire.core.engines import declared_engines
 from bywire.core.errors import CompilerError, unknown_name
 from bywire.core.interrupts import interrupts_deferred
 from bywire.core.model import Model
@@ -26,13 +26,6 @@ from bywire.simulation.virtual_machine import VirtualMachine
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
 
-_FROM_ABOVE = {
-    "sil": "bywire.export.controller.in_the_loop:double",
-    "sil-single": "bywire.export.controller.in_the_loop:single",
-}
-"""engines of rooms above, which step the plant by the compiled kernel: module and function of each,
-``function(model, par, kernel)``; found when one is asked for"""
-KINDS = ("auto", "compiled", "virtual-machine", *_FROM_ABOVE)
 _LOCK = threading.RLock()
 _P = ParamSpec("_P")
 _T = TypeVar("_T")
@@ -48,6 +41,11 @@ def built_once(build: Callable[_P, _T]) -> Callable[_P, _T]:
             return cached(*arguments, **named)  # type: ignore[arg-type]
 
     return waiting
+
+
+def engine_names() -> tuple[str, ...]:
+    """Return what may compute a run: ours, then what rooms above declare."""
+    return ("auto", "compiled", "virtual-machine", *declared_engines())
 
 
 class Engine(Protocol):
@@ -124,20 +122,21 @@ class Prepared:
         ----------
         kind
             ``"compiled"``, ``"virtual-machine"``, or ``"auto"``: compiled where there is a
-            compiler, else the virtual machine, with one warning; ``"sil"`` and ``"sil-single"``:
-            compiled, with the ticks by the exported C of the ECU in double or single precision.
+            compiler, else the virtual machine, with one warning; or a declared one, see
+            `core.engines`.
 
         Raises
         ------
         UnknownNameError
             For any other name.
         CompilerError
-            For ``"compiled"`` or an ECU in the loop without a compiler.
+            For ``"compiled"`` or a declared engine without a compiler.
         ModelError
-            Where the ECU cannot be exported.
+            Where a declared engine cannot serve the model.
         """
-        if kind not in KINDS:
-            raise unknown_name("engine", kind, KINDS)
+        names = engine_names()
+        if kind not in names:
+            raise unknown_name("engine", kind, names)
         with _LOCK:
             if kind not in self._engines:
                 self._engines[kind] = self._build(kind)
@@ -145,14 +144,12 @@ class Prepared:
 
     def _build(self, kind: str) -> Engine:
         compiler = None if kind == "virtual-machine" else find_compiler()
-        if compiler is not None and kind in _FROM_ABOVE:
-            module, _, function = _FROM_ABOVE[kind].partition(":")
-            make = getattr(importlib.import_module(module), function)
-            made: Engine = make(self.model, self._par, self._kernel(compiler))
-            return made
+        make = declared_engines().get(kind)
         if compiler is not None:
-            return self._kernel(compiler)
-        if kind == "compiled" or kind in _FROM_ABOVE:
+            kernel = self._kernel(compiler)
+            engine: Engine = kernel if make is None else make(self.model, self._par, kernel)
+            return engine
+        if kind == "compiled" or make is not None:
             raise CompilerError(
                 "there is no C compiler: install one, or the extra bywire[compiler], or take "
                 "engine = 'auto'"

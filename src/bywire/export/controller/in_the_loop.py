@@ -166,13 +166,3 @@ def _leaves_read(made: Program, leaves: Sequence[str]) -> NDArray[np.int64]:
 
 def _belongs(leaf: str, dotted: str, length: int) -> bool:
     return leaf.rpartition(".")[0] == dotted if length else leaf == dotted
-
-
-def double(model: Model, par: ParameterSet, plant: SingleKernel) -> SoftwareInTheLoop:
-    """Return the engine ``sil``."""
-    return SoftwareInTheLoop(model, par, "double", plant)
-
-
-def single(model: Model, par: ParameterSet, plant: SingleKernel) -> SoftwareInTheLoop:
-    """Return the engine ``sil-single``."""
-    return SoftwareInTheLoop(model, par, "single", plant)
