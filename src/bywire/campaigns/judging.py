@@ -6,6 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 
@@ -68,13 +69,12 @@ def _scaled(limit: float, factor: float) -> float:
     return limit * factor if limit >= 0 else limit / factor
 
 
-def judge_fault(plan: CampaignPlan, failing: Failing, number: int, healthy: Healthy) -> Outcome:
-    """Return what all runs with a fault did, as plain numbers.
-
-    ``number``: of the fault in the plan.
-    """
+def judge_fault(plan: CampaignPlan, failing: Failing, healthy: Healthy) -> Outcome:
+    """Return what all runs with a fault did, as plain numbers."""
     onsets = np.array(plan.onsets_of(failing))
-    samples = [plan.sample_of(number * onsets.size + k) for k in range(onsets.size)]
+    # By its name: another fault in the catalog must not change whose scatter this one has.
+    first = crc32(failing.name.encode())
+    samples = [plan.sample_of(first + k) for k in range(onsets.size)]
     traces = faulty_traces(plan, failing, onsets.tolist(), samples)
     beside = healthy.traces.of(samples)
     seen = _detections(plan, traces, onsets, healthy.thresholds)

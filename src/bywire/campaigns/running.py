@@ -39,7 +39,7 @@ def complete(plan: CampaignPlan, store: CampaignStore, progress: Progress) -> Ca
     # A few lanes each: faults side by side use the cores better than the runs of one.
     with ThreadPoolExecutor(os.cpu_count() or 1) as pool:
         made = {
-            pool.submit(judge_fault, plan, plan.faults[number], number, healthy): number
+            pool.submit(judge_fault, plan, plan.faults[number], healthy): number
             for number in missing
         }
         try:

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, NamedTuple
 from pydantic import Field
 
 from bywire.core import ops
+from bywire.core.faults import ParameterFault
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Unit
 from bywire.core.signals import Energy, Power, Signal
@@ -37,6 +38,11 @@ class Parameters(ParameterSet):
     """speed up to which the disc counts as stopped"""
     runout: RunOut
     """amplitude of the run-out that the floating caliper does not follow"""
+
+
+FAULTS = (
+    ParameterFault("run-out", "the disc runs out of true, by a multiple", ("runout",), 5.0),
+)
 
 
 class State(NamedTuple):

@@ -18,6 +18,8 @@ _SIGNALS = (
     Channel("power", "switch of the power stages", "1", "power_off", "demand", stuck=1.0),
 )
 
+_NOTHING = 1e-6  # of a torque constant, which is positive
+
 BRAKE_CHANNELS = Channels(WedgeBrake.name, _SIGNALS)
 CORNER_CHANNELS = Channels(WedgeCorner.name, _SIGNALS)
 
@@ -31,8 +33,22 @@ def _jammed(motor: str) -> Any:
     return changes
 
 
-FAULTS = tuple(
-    Fault(f"screw_{number}.jammed", f"screw {number} jams where it is, by damping",
-          _jammed(f"motor_{number}"), WedgeBrake.name, "N*m*s/rad", 1e3)
-    for number in (1, 2)
+def _shorted(motor: str) -> Any:
+    """Return the changes in which a winding is shorted: no torque but a drag, K^2/R."""
+
+    def changes(par: Any, value: float) -> Mapping[str, Any]:
+        own = getattr(par, motor)
+        drag = own.K_ref * own.K_ref / own.R_ref
+        return {f"{motor}.D_M": own.D_M + drag, f"{motor}.K_ref": _NOTHING * own.K_ref}
+
+    return changes
+
+
+FAULTS = (
+    *(Fault(f"screw_{number}.jammed", f"screw {number} jams where it is, by damping",
+            _jammed(f"motor_{number}"), WedgeBrake.name, "N*m*s/rad", 1e3)
+      for number in (1, 2)),
+    *(Fault(f"motor_{number}.shorted", f"winding of motor {number} shorted: no torque, but a drag",
+            _shorted(f"motor_{number}"), WedgeBrake.name)
+      for number in (1, 2)),
 )  # fmt: skip
