@@ -2,7 +2,8 @@
 
 Everything goes into the folder .venv beside this file; the system's Python is left alone. The
 recipes of ``test`` are exactly those of continuous integration. ``trust`` takes hours: it repeats
-the statistical tests, and the studies of docs/trust.md, which it writes anew.
+the statistical tests, and the studies of docs/trust.md, which it writes anew. ``docs`` makes the
+site, docs/_build/index.html, in minutes the first time and seconds from then on.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ BIN = VENV / ("Scripts" if os.name == "nt" else "bin")
 PYTHON = BIN / ("python.exe" if os.name == "nt" else "python")
 LOCKS = {"demo": ["requirements.lock"], "test": ["requirements-dev.lock"]}
 LOCKS["trust"] = LOCKS["test"]
+LOCKS["docs"] = ["requirements-docs.lock"]
 
 PYTEST = ["pytest", "-n", "auto", "-q"]
 # A file's tests share runs and kernels, so one process has them all; the longest files come first.
@@ -63,12 +65,12 @@ def main() -> int:
         print(f"bywire needs Python 3.11 or newer, this is {sys.version.split()[0]}")
         return 2
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("recipe", choices=["demo", "test", "trust", "lock"])
+    parser.add_argument("recipe", choices=["demo", "test", "trust", "docs", "lock"])
     recipe = parser.parse_args().recipe
     if recipe == "lock":
         return lock()
     install(recipe)
-    return demo() if recipe == "demo" else test() if recipe == "test" else trust()
+    return {"demo": demo, "test": test, "trust": trust, "docs": docs}[recipe]()
 
 
 def demo() -> int:
@@ -109,6 +111,14 @@ def trust() -> int:
     return run(PYTHON.name, "docs/make_trust.py", str(folder))
 
 
+def docs() -> int:
+    """Make the site; whatever Sphinx warns of is an error."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    return run(
+        PYTHON.name, "-m", "sphinx", "-q", "-W", "-n", "-b", "html", "docs", "docs/_build"
+    )
+
+
 def every(checks: dict[str, list[str]]) -> int:
     """Run commands until one fails, and return its status."""
     # One process per core already: more threads of the libraries would wait for each other.
@@ -131,9 +141,12 @@ def lock() -> int:
               "--generate-hashes", "--no-header", "--quiet", "--no-emit-index-url",
               "--no-annotate", "--extra", "compiler", "--extra", "build",
               "--extra", "studies"]  # fmt: skip
-    return run(*common, "-o", "requirements.lock") or run(
-        *common, "--extra", "dev", "-o", "requirements-dev.lock"
-    )
+    return (
+        run(*common, "-o", "requirements.lock")
+        or run(*common, "--extra", "dev", "-o", "requirements-dev.lock")
+        or run(*common, "--extra", "docs", "-c", "requirements-dev.lock",
+               "-o", "requirements-docs.lock")
+    )  # fmt: skip
 
 
 def install(recipe: str) -> None:

@@ -1,4 +1,5 @@
-"""Hard braking: one bench file, one thing changed.
+"""Hard braking: one bench file, one thing changed
+===============================================
 
 The bench asks for a pressure step from 6 to 37 bar, as in Fig. 7a of Dardanelli, Alli, Savaresi
 (2010). Its ECU shakes the piston with a dither current that just overcomes the seals' breakaway

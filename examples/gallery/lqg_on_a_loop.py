@@ -1,4 +1,5 @@
-"""LQG from python-control, on the exact sampled model of a loop.
+"""LQG from python-control, on the exact sampled model of a loop
+=============================================================
 
 Loops are designed from requirements by ``bywire design``. What textbooks offer beyond that (LQR,
 observers, pole placement, loop shaping) comes from python-control: a loop's models are

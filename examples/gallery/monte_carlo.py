@@ -1,4 +1,5 @@
-"""Monte Carlo: 256 motorcycles whose seals differ.
+"""Monte Carlo: 256 motorcycles whose seals differ
+===============================================
 
 Five friction parameters of the seals vary independently, by 25 % (log-normal, one standard
 deviation); the ECU goes on believing in the nominal ones. All cases run side by side in the

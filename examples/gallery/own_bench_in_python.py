@@ -1,4 +1,5 @@
-"""A bench in Python, without a file: find the weakest battery that still serves.
+"""A bench in Python, without a file: find the weakest battery that still serves
+=============================================================================
 
 The winding is hot (0.5 ohm instead of 0.35) and the battery's leads are old (40 mohm). The brake
 shall still rise to 35 bar within 0.1 s and overshoot by 15 % at most. A bench is a frozen object:

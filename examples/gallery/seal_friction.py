@@ -1,4 +1,5 @@
-"""Friction of a sealed piston: why it grows with pressure, and what the loop alone gets wrong.
+"""Friction of a sealed piston: why it grows with pressure, and what the loop alone gets wrong
+===========================================================================================
 
 A seal is pressed on by the pressure that it holds: its friction is F_0 + f p, as in eq. (16) of
 Dardanelli, Alli, Savaresi (2010). The usual way to find it is half the height of the loop of force

@@ -1,4 +1,5 @@
-"""Which parameters move the pressure, and when.
+"""Which parameters move the pressure, and when
+============================================
 
 The kernel computes exact derivatives of a whole run, here of the pressure in hard braking, with
 respect to any number of parameters. Times one per cent of the parameter they are bars.

@@ -1,4 +1,5 @@
-"""Stick and slip: a slow current ramp, without and with dither.
+"""Stick and slip: a slow current ramp, without and with dither
+============================================================
 
 The current demand rises to 5 A and falls again, 0.2 A/s, as in eq. (17) and Fig. 5 of
 Dardanelli, Alli, Savaresi (2010). Without dither the piston sticks most of the time. It breaks

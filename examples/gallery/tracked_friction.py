@@ -1,4 +1,5 @@
-"""Fading pads: the friction of a wedge brake, tracked through brakings.
+"""Fading pads: the friction of a wedge brake, tracked through brakings
+====================================================================
 
 From braking to braking the pads' coefficient of friction falls, as hot pads' does. Moment and
 normal force tell it, M = mu_B 2 r_B F_N (Roberts et al. 2003): a relation that is linear in mu_B. A

@@ -68,7 +68,7 @@ def friction(u: Input, par: Parameters) -> Annotated[float, Signal("N*m", "beari
     -----
     The paper's exponential has the signed speed, which would grow without bound in one direction;
     its magnitude is meant. The grease term is written with a reference point, so that no unit
-    hides in a coefficient: G_nu (nu |omega|)^k_nu of the paper with nu in mm^2/s.
+    hides in a coefficient: ``G_nu (nu |omega|)^k_nu`` of the paper with nu in mm^2/s.
 
     References
     ----------

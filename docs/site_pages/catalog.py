@@ -1,0 +1,115 @@
+"""What the registry finds, a page for each kind of thing: all that ``bywire list NAME`` says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from bywire.analysis.linear.plant import PLANTS
+from bywire.analysis.loop import LOOPS
+from bywire.api.describe import Description, described
+from bywire.api.described_faults import fault_summaries
+from bywire.bench.experiment import EXPERIMENTS
+from bywire.bench.generic_experiment import GENERIC_EXPERIMENTS
+from bywire.bench.kpis.registry import definitions
+from bywire.bench.stimuli.registry import STIMULI
+from bywire.campaigns.declared import CAMPAIGNS
+from bywire.core.brake import brakes
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.model import ASSEMBLIES
+from bywire.identification.fitting.question import BENCH_METHODS
+from bywire.identification.method import METHODS
+from bywire.life.declaration import LIVES
+from bywire.synthesis.study import STUDIES
+from site_pages.markdown import plain, section_lines, table_lines
+
+
+@dataclass(frozen=True)
+class Topic:
+    """A page of things.
+
+    Parameters
+    ----------
+    title, about
+        Heading, and what stands below it.
+    names
+        Kind of thing, as `bywire.describe` calls it -> what returns the names of all.
+    """
+
+    title: str
+    about: str
+    names: dict[str, Callable[[], Iterable[str]]]
+
+
+TOPICS = {
+    "assemblies": Topic(
+        "Brakes and their assemblies",
+        "What can be simulated, with the signals that a recording holds.",
+        {"assembly": lambda: ASSEMBLIES.all()},
+    ),
+    "parameter-sets": Topic(
+        "Parameter sets",
+        "Every value says where it comes from: a source, a derivation, a calibration, a choice.",
+        {"parameter set": lambda: PARAMETER_SETS.all()},
+    ),
+    "experiments": Topic(
+        "Experiments",
+        "What a bench file's `experiment` names, with options and key figures.",
+        {
+            "experiment": lambda: EXPERIMENTS.all(),
+            "experiment of any brake": lambda: GENERIC_EXPERIMENTS.all(),
+        },
+    ),
+    "stimuli": Topic(
+        "Stimuli", "What a bench drives an experiment with.",
+        {"stimulus": lambda: STIMULI.all()},
+    ),
+    "key-figures": Topic(
+        "Key figures", "How each is computed.", {"KPI": lambda: definitions()},
+    ),
+    "loops": Topic(
+        "Loops and plants",
+        "What `linearize`, `margins`, `frequency-response` and `design` take.",
+        {"loop": lambda: LOOPS.all(), "plant": lambda: PLANTS.all()},
+    ),
+    "methods": Topic(
+        "Methods of identification", "What `identify` takes.",
+        {"method": lambda: METHODS.all(), "method of any bench": lambda: BENCH_METHODS.all()},
+    ),
+    "studies": Topic(
+        "Studies and lives", "What `study size` and `life` take.",
+        {"study": lambda: STUDIES.all(), "life": lambda: LIVES.all()},
+    ),
+    "campaigns": Topic(
+        "Campaigns of faults", "What `faults` takes.", {"campaign": lambda: CAMPAIGNS.all()},
+    ),
+}  # fmt: skip
+
+
+def page(name: str) -> str:
+    """Return the page of a topic."""
+    topic = TOPICS[name]
+    lines = [f"# {topic.title}", "", topic.about, ""]
+    for kind, names in topic.names.items():
+        for thing in names():
+            objects = [each for each in described(thing) if each["kind"] == kind]
+            sections = Description(thing, tuple(objects)).document().page
+            lines += section_lines(sections, 2)
+    return "\n".join(lines)
+
+
+def faults_page() -> str:
+    """Return the page of all faults, a line each: most differ by their signal alone."""
+    lines = [
+        "# Faults", "",
+        "What `[[faults]]` of a bench file and `--fault` take; `bywire list NAME` says all about "
+        "one.", "",
+    ]  # fmt: skip
+    rows = ([f"`{name}`", plain(summary)] for name, summary in fault_summaries().items())
+    return "\n".join([*lines, *table_lines(["fault", "what happens"], rows)])
+
+
+def brakes_page() -> str:
+    """Return the page of the brakes that come with bywire."""
+    rows = ([f"`{brake.name}`", plain(brake.summary)] for brake in brakes().values())
+    return "\n".join(["# Brakes", "", *table_lines(["brake", "what it is"], rows)])

@@ -1,0 +1,53 @@
+"""All commands with their arguments and options, as their help has them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from typer.main import get_command
+
+from bywire.cli.app import app
+from site_pages.markdown import plain, table_lines
+
+
+def commands() -> dict[str, Any]:
+    """Return what a user types -> the command, subcommands in the place of their group."""
+    return dict(_leaves("bywire", get_command(app)))
+
+
+def _leaves(words: str, command: Any) -> Iterator[tuple[str, Any]]:
+    if hasattr(command, "commands"):
+        for name, inner in command.commands.items():
+            yield from _leaves(f"{words} {name}", inner)
+    else:
+        yield words, command
+
+
+def page() -> str:
+    """Return the page of commands."""
+    lines = [
+        "# Commands", "",
+        "Each is a call of a public function of the same name, with the same checks and warnings; "
+        "`bywire COMMAND --help` says the same. With `--system PATH` a brake of one's own takes "
+        "part in all.", "",
+    ]  # fmt: skip
+    for words, command in commands().items():
+        context = command.make_context(words, [], resilient_parsing=True)
+        usage = re.sub(r"\s+", " ", command.get_usage(context).removeprefix("Usage: "))
+        lines += [f"## {words}", "", f"`{usage}`", "", *_help(command.help or ""), ""]
+        lines += table_lines(["", "what it is"], _rows(command, context))
+    return "\n".join(lines)
+
+
+def _help(text: str) -> Iterator[str]:
+    for paragraph in text.replace("\b", "").split("\n\n"):
+        yield from (plain(paragraph), "")
+
+
+def _rows(command: Any, context: Any) -> Iterator[list[str]]:
+    for each in command.get_params(context):
+        if (record := each.get_help_record(context)) is not None:
+            name, said = record
+            yield [f"`{name.replace('|', '/')}`", plain(said)]

@@ -1,0 +1,132 @@
+"""What Sphinx is told: pages made from the code, links that leave the folder, formulas, names."""
+
+from __future__ import annotations
+
+import builtins
+import re
+from pathlib import Path
+from typing import Any
+
+from docutils import nodes
+from docutils.utils.math import MathError
+from docutils.utils.math.latex2mathml import tex2mathml
+from sphinx.addnodes import pending_xref
+from sphinx.application import Sphinx
+from sphinx.environment import BuildEnvironment
+from sphinx.errors import ExtensionError
+from sphinx.util import logging
+from sphinx_gallery.scrapers import figure_rst
+
+from site_pages import pages, python_names
+
+HERE = Path(__file__).parents[1]
+GENERATED = HERE / "_generated"
+GALLERY = HERE.parent / "examples" / "gallery"
+FIGURES = GENERATED / "gallery-figures"
+_log = logging.getLogger(__name__)
+
+# Where a link goes that leads out of this folder in the repository, from a page of this folder.
+_MOVED = {
+    "../examples/emb_caliper": "_generated/third-brake.md",
+    "../examples/emb_caliper/README.md": "_generated/third-brake.md",
+    "../benches": "_generated/benches.md",
+    "../src/bywire/plant": "_generated/elements/index.rst",
+    "trust/": "trust.md",
+}
+# A script, a style sheet, a picture or a frame that a browser would ask another host for.
+_ELSEWHERE = re.compile(
+    r"<(?:script|img|iframe|link(?![^>]*rel=\"(?:canonical|search|author)\"))[^>]*"
+    r"(?:src|href)=\"(?:https?:)?//[^\"]*", re.IGNORECASE,
+)  # fmt: skip
+
+
+def setup(app: Sphinx) -> dict[str, Any]:
+    """Connect everything."""
+    app.connect("builder-inited", _make_pages, priority=100)  # before the gallery
+    app.connect("source-read", _follow_links)
+    app.connect("missing-reference", _public_name)
+    app.connect("build-finished", _require_one_host)
+    app.add_html_math_renderer("mathml", (_inline_math, None), (_displayed_math, None))
+    return {"parallel_read_safe": True, "parallel_write_safe": True}
+
+
+def _make_pages(app: Sphinx) -> None:
+    pages.write(GENERATED, lambda what: _log.info("%s", what))
+
+
+def _follow_links(app: Sphinx, name: str, source: list[str]) -> None:
+    up = "../" * name.count("/")
+    for target, page in _MOVED.items():
+        source[0] = source[0].replace(f"]({up}{target})", f"]({up}{page})")
+
+
+class FileScraper:
+    """Takes the figures that an example leaves in the folder of its ``--out``."""
+
+    def __call__(self, block: Any, block_vars: dict[str, Any], gallery_conf: Any) -> str:
+        """Return the figures that are new, as reStructuredText."""
+        moved = []
+        for file in sorted(FIGURES.glob("*.png")):
+            target = Path(next(block_vars["image_path_iterator"]))
+            file.replace(target)
+            moved.append(str(target))
+        return figure_rst(moved, gallery_conf["src_dir"])
+
+    def __repr__(self) -> str:
+        return "FileScraper()"
+
+
+def name_script(gallery_conf: Any, script: str) -> None:
+    """Give an example the ``__file__`` that it has when it is started as a script."""
+    vars(builtins)["__file__"] = str(GALLERY / Path(script).name)
+
+
+def arguments(gallery_conf: Any, script: dict[str, Any]) -> list[str]:
+    """Return what an example of the gallery is called with."""
+    FIGURES.mkdir(parents=True, exist_ok=True)
+    return ["--out", str(FIGURES)]
+
+
+def _public_name(
+    app: Sphinx, env: BuildEnvironment, node: pending_xref, content: nodes.Element
+) -> nodes.Node | None:
+    """Lead a type in a signature to the name that users import, or show it without a link."""
+    if node.get("refdomain") != "py":
+        return None
+    target = node["reftarget"]
+    public = python_names.homes().get(target, "")
+    if public and public != target:
+        found = env.domains["py"].resolve_xref(
+            env, node["refdoc"], app.builder, "obj", public, node, content
+        )
+        if found is not None:
+            return found
+    is_written = node.get("refexplicit") or node.get("reftype") not in ("class", "obj")
+    return None if is_written else content
+
+
+def _math(text: str, node: nodes.Element, as_block: bool) -> str:
+    try:
+        return str(tex2mathml(text, as_block=as_block))
+    except MathError as error:
+        _log.warning("a formula that cannot be shown: %s: %s", text, error, location=node)
+        return f"<code>{nodes.unescape(text)}</code>"
+
+
+def _inline_math(writer: Any, node: nodes.Element) -> None:
+    writer.body.append(_math(node.astext(), node, as_block=False))
+    raise nodes.SkipNode
+
+
+def _displayed_math(writer: Any, node: nodes.Element) -> None:
+    for part in re.split(r"\n\s*\n", node.astext()):
+        writer.body.append(f'<div class="math">{_math(part, node, as_block=True)}</div>')
+    raise nodes.SkipNode
+
+
+def _require_one_host(app: Sphinx, error: Exception | None) -> None:
+    if error is not None or app.builder.format != "html":
+        return
+    for path in sorted(Path(app.outdir).rglob("*.html")):
+        if asked := _ELSEWHERE.search(path.read_text(encoding="utf-8")):
+            raise ExtensionError(f"{path.name} asks another host: {asked.group()}")

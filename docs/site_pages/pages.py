@@ -1,0 +1,79 @@
+"""All pages that are made from the code, and when they are made anew."""
+
+from __future__ import annotations
+
+import hashlib
+import shutil
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+from site_pages import (
+    catalog,
+    commands,
+    elements,
+    live_pages,
+    papers,
+    python_names,
+    repository_files,
+)
+
+ROOT = Path(__file__).parents[2]
+STAMP = "made-of"
+
+
+def texts() -> Iterator[tuple[str, str]]:
+    """Yield file and text of the pages that take no computing."""
+    yield "brakes.md", catalog.brakes_page()
+    for topic in catalog.TOPICS:
+        yield f"{topic}.md", catalog.page(topic)
+    yield "faults.md", catalog.faults_page()
+    yield "commands.md", commands.page()
+    yield "python.rst", python_names.page()
+    yield "authoring.rst", python_names.authoring_page()
+    yield "errors.rst", python_names.errors_page()
+    yield "elements/index.rst", elements.index()
+    for inside in elements.modules().values():
+        for module in inside.values():
+            yield f"elements/{module.__name__}.rst", elements.page(module)
+    yield "benches.md", repository_files.benches_page()
+    yield "third-brake.md", repository_files.third_brake_page()
+    yield "changes.md", repository_files.changes_page()
+    yield "live.md", live_pages.page()
+
+
+def write(folder: Path, said: Callable[[str], None]) -> None:
+    """Write all pages, unless what they are made of is what it was."""
+    digest = _digest()
+    stamp = folder / STAMP
+    if stamp.exists() and stamp.read_text() == digest:
+        return
+    if stamp.exists():
+        stamp.unlink()
+    kept = {"gallery"}  # of which Sphinx-Gallery itself knows what is current
+    for path in folder.iterdir() if folder.exists() else ():
+        if path.name not in kept:
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+    said("pages of elements, commands and names")
+    for name, text in texts():
+        _write(folder / name, text)
+    for source in papers.sources():
+        said(f"reproducing {source}")
+        _write(folder / "papers" / f"{source}.md", papers.page(source, folder / "papers"))
+    said("live benches")
+    live_pages.write(folder / "extra" / "live")
+    stamp.write_text(digest)
+
+
+def _write(path: Path, text: str) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+
+
+def _digest() -> str:
+    """Return a digest of the package's sources and of these modules."""
+    digest = hashlib.sha256()
+    for folder in (ROOT / "src", Path(__file__).parent):
+        for path in sorted(p for p in folder.rglob("*") if p.is_file() and p.suffix != ".pyc"):
+            digest.update(path.relative_to(ROOT).as_posix().encode())
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
