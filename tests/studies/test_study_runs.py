@@ -101,13 +101,19 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     assert {each.exitcode for each in workers} == {-signal.SIGTERM}
 
 
-def test_a_cluster_computes_the_same(study, tmp_path):
+def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):
     distributed = pytest.importorskip("distributed")
     plan = read_study(study())
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None
     ) as cluster:
         ((_, theirs),) = Cluster(cluster.scheduler_address).computed(plan, [1])
+        with Cluster(cluster.scheduler_address).opened(plan) as compute:
+            given = compute(range(64))
+            next(given)
+            cluster.scale(0)
+            with pytest.raises(RunError, match=r"lost its workers.*resume the study"):
+                list(given)
     ((_, ours),) = InProcess().computed(plan, [1])
     for name, column in ours.items():
         np.testing.assert_array_equal(column, theirs[name])

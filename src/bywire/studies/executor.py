@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import threading
@@ -26,6 +27,7 @@ _AHEAD = 2  # chunks, or tasks of a cluster, in flight for each worker, so that 
 _SECONDS = 10.0  # to reach a cluster
 _TASK = 0.5  # s that a task of a cluster is to take
 _WORTH = 8  # chunks from which on processes are worth their start
+_LOST = "the cluster lost its workers ({}): resume the study when some are there"
 _WHAT = ("studies on a cluster", "cluster")
 
 
@@ -228,10 +230,14 @@ def _client(address: str) -> Iterator[Any]:
             f"no cluster answers at {address!r} ({error}): start one with 'dask scheduler' and "
             "'dask worker', and give the address that the scheduler says"
         ) from None
+    log = logging.getLogger("distributed.client")  # it would print how a connection is lost
+    before = log.level
+    log.setLevel(logging.CRITICAL)
     try:
         yield client
     finally:
         client.close()
+        log.setLevel(before)
 
 
 def _timed(chunks: Sequence[int | PlacedChunk], plan: StudyPlan) -> _Task:
@@ -265,9 +271,12 @@ def _of_cluster(
     try:
         for _ in range(_AHEAD * workers):
             submit()
-        for _, (seconds, given) in tasks:
+        for _, answer in tasks:
+            if isinstance(answer, BaseException):  # a task that was cancelled gives why
+                raise RunError(_LOST.format(getattr(answer, "reason", answer)))
+            seconds, given = answer
             size = max(1, round(_TASK * len(given) / seconds))
             submit()
             yield from given
     except distributed.KilledWorker as error:
-        raise RunError(f"the cluster lost its workers ({error}): resume the study") from None
+        raise RunError(_LOST.format(error)) from None
