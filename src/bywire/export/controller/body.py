@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.derived import is_exact
 from bywire.export.controller.memories import Memories
 from bywire.export.controller.statements import Statement
 from bywire.export.controller.structs import Structs
@@ -42,6 +43,8 @@ class Body:
         How often every Python variable is assigned.
     memory
         Which versions of memory there are, and which places keep theirs.
+    fixed
+        Arguments that parameters alone decide: shapes of parameter sets, None of numbers.
     """
 
     structs: Structs
@@ -52,6 +55,7 @@ class Body:
     types: dict[str, str] = field(default_factory=dict)
     moving: set[str] = field(default_factory=set)
     notes: list[str] = field(default_factory=list)
+    fixed: dict[str, Shape | None] = field(default_factory=dict)
 
     def fresh(self, hint: str) -> str:
         """Return a C name that no variable has yet."""
@@ -78,6 +82,38 @@ class Body:
         """Return whether a text means the same further down: it reads nothing that changes."""
         changing = {use[1] for use in expr.uses if use[0] == "local"} & self.moving
         return expr.is_path and not changing and not self.memory.versions_in(expr.uses)
+
+    def is_steady(self, value: Any) -> bool:
+        """Return whether parameters alone decide a number, or it is known."""
+        if isinstance(value, Group):
+            return bool(value.origin) and value.origin[0] in self.fixed
+        if isinstance(value, Known):
+            return is_number(value)
+        if not isinstance(value, Expr) or value.truth or "?" in value.text:
+            return False
+        places = {use[1] for use in value.uses if use[0] == "local"}
+        return is_exact(value.uses) and places <= self.fixed.keys()
+
+    def derived(self, value: Expr, hint: str = "") -> Expr:
+        """Return a number that parameters alone decide as one that is computed with them."""
+        groups = [n for n, shape in self.fixed.items() if shape is not None
+                  and ("local", n) in value.uses]  # fmt: skip
+        is_plain = value.is_path or Expr(value.text.removeprefix("-")).is_path
+        if self.structs.precision.name == "single" and not hint:
+            # There a sum or a product takes one instruction, as reading it would.
+            is_plain |= "/" not in value.text and not any(u[0] == "own" for u in value.uses)
+        refused = (self.memory.function, value.text) in self.structs.derivations.refused
+        if not groups or is_plain or refused or not self.is_steady(value):
+            return value
+        shape = self.fixed[groups[0]]
+        assert shape is not None
+        return self.structs.derive(self.memory.function, groups[0], shape, value, hint)
+
+    def operands(self, *values: Expr) -> list[Expr]:
+        """Return operands of which some change: those that parameters decide are derived."""
+        if all(map(self.is_steady, values)):
+            return list(values)
+        return [self.derived(each) for each in values]
 
     def ctype_of(self, value: Any) -> str:
         """Return the C type of a number, a truth value or a structure."""

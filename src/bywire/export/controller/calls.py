@@ -83,7 +83,7 @@ def _elementary(at: Context, node: ast.AST, function: Any, given: list[Any]) -> 
     """Return a function of core.ops of numbers."""
     if all(isinstance(each, Known) for each in given):
         return Known(function(*(each.value for each in given)))
-    arguments = [at.body.as_number(at.number(node, each)) for each in given]
+    arguments = at.body.operands(*(at.body.as_number(at.number(node, v)) for v in given))
     uses: frozenset[Any] = frozenset().union(*(each.uses for each in arguments))
     if function in EXTREMES:
         name = EXTREMES[function]

@@ -15,7 +15,11 @@ from bywire.export.controller.c_text import Precision
 MAGNITUDE = frozenset({"whole", "sine", "cosine"})
 """functions that take a magnitude"""
 _MAGNITUDE = {"double": "fabs", "float": "fabsf"}
-_WHOLE = {"double": (2.0**52, "int64_t"), "single": (2.0**23, "int32_t")}
+_WHOLE = {
+    "double": ((2.0**31, "int32_t"), (2.0**52, "int64_t")), "single": ((2.0**23, "int32_t"),)
+}  # fmt: skip
+"""up to which magnitude an integer takes what is not whole; 64 bits take a processor without a unit
+for doubles four times as long as 32"""
 Literal = Callable[[float], str]
 
 
@@ -25,7 +29,7 @@ def elementary(wanted: Collection[str], precision: Precision) -> list[str]:
     real, lit = precision.real, precision.literal
     parts: list[str] = []
     if "whole" in wanted:
-        parts.append(_whole(real, lit, *_WHOLE[precision.name]))
+        parts.append(_whole(real, lit, _WHOLE[precision.name]))
     if {"sine", "cosine"} & set(wanted):
         parts.append(_turned(real, lit, number))
     for name, quarter in (("sine", "0u"), ("cosine", "1u")):
@@ -61,18 +65,21 @@ def _nested(names: Sequence[float], variable: str, lit: Literal) -> str:
     return f"{text}{first[-1]} + {variable} * {last}{')' * (len(first) - 1)}"
 
 
-def _whole(real: str, lit: Literal, most: float, integer: str) -> str:
-    fabs = _MAGNITUDE[real]
+def _whole(real: str, lit: Literal, integers: Sequence[tuple[float, str]]) -> str:
+    every = " else ".join(
+        f"if (size < {lit(most)}) {{\n        toward_zero = ({real})({integer})x;\n    }}"
+        for most, integer in integers
+    )
     return f"""/* Return the largest whole number that is not above x. */
 static inline {real} whole({real} x)
 {{
-    {real} result = x;
+    const {real} size = {_MAGNITUDE[real]}(x);
+    {real} toward_zero;
 
-    if ({fabs}(x) < {lit(most)}) {{
-        const {real} toward_zero = ({real})({integer})x;
-        result = (toward_zero > x) ? (toward_zero - {lit(1.0)}) : toward_zero;
+    {every} else {{
+        toward_zero = x;
     }}
-    return result;
+    return (toward_zero > x) ? (toward_zero - {lit(1.0)}) : toward_zero;
 }}"""
 
 

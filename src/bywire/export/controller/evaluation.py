@@ -228,6 +228,7 @@ class Evaluator:
             raise self.refuse(node, "this operator is not translated")
         sign, level, _ = _ARITHMETIC[kind]
         a, b = (self.body.as_number(self.number(node, each)) for each in (left, right))
+        a, b = self.body.operands(a, b)
         text = f"{a.at(level)} {sign} {b.at(level + 1)}"
         return Expr(text, level, a.uses | b.uses)
 
@@ -250,7 +251,7 @@ class Evaluator:
             return self._equal(node, left, right, sign)
         if sign not in ("<", "<=", ">", ">="):
             raise self.refuse(node, "this comparison is not translated")
-        a, b = (self.number(node, each) for each in (left, right))
+        a, b = self.body.operands(*(self.number(node, each) for each in (left, right)))
         return Expr(f"{a.at(SUM)} {sign} {b.at(SUM)}", COMPARED, a.uses | b.uses, truth=True)
 
     def _equal(self, node: ast.AST, left: Any, right: Any, sign: str) -> Expr:

@@ -119,6 +119,10 @@ class Executor(Evaluator):
         """Return a value under the name of a Python variable, put into one of C where it runs."""
         value = lifted(value)
         body = self.body
+        if isinstance(value, Expr):
+            there = body.derived(value, name)
+            if there is not value:
+                return there
         if isinstance(value, (Known, Closure, Method, Array)):
             return value
         if body.structs.is_memory(value):

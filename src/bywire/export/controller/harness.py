@@ -57,15 +57,35 @@ def harness(program: Program, every: Sequence[Vectors]) -> str:
     what = f"Compares the compiled ECU of {program.model.name} with its test vectors."
     calls = " + ".join(f"differing_{c_name(e.step.task.name)}()" for e in every)
     count = " + ".join(f"VECTORS_{c_name(e.step.task.name)}" for e in every)
+    derived = " + differing_derived()" if _derived(program, every) else ""
     parts = [
         *comparison(program, every, what, "#include <stdio.h>"),
+        *_derived(program, every),
         f"int main(void)\n{{\n    {name}_Memory memory;\n    int wrong;\n\n"
-        f"    {name}_ecu_init(&memory);\n    wrong = {calls};\n"
+        f"    {name}_ecu_init(&memory);\n    wrong = {calls}{derived};\n"
         f'    printf("%d vectors, %d values differ, bits %08lx\\n", {count}, wrong,\n'
         "            (unsigned long)bits);\n"
         "    return (wrong == 0) ? 0 : 1;\n}",
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _derived(program: Program, every: Sequence[Vectors]) -> list[str]:
+    """Return the function that compares what follows from parameters with Python's numbers."""
+    if not program.derived:
+        return []
+    name = program.name
+    sets = [f"{name}_parameters", *(["other_parameters"] if every else [])]
+    lines = ["static int differing_derived(void)", "{", "    int wrong = 0;", ""]
+    for each in sets:
+        lines.append(f"    {name}_Parameters made_{each} = {each};")
+    for each in sets:
+        lines.append(f"    {name}_ecu_derive(&made_{each});")
+        lines += [
+            f"    wrong += is_same(made_{each}.{number.place}, {each}.{number.place}) ? 0 : 1;"
+            for number in program.derived
+        ]
+    return ["\n".join([*lines, "    return wrong;", "}"])]
 
 
 def comparison(

@@ -74,6 +74,7 @@ class SoftwareInTheLoop:
         classes = {"memory": inner.Memory, "x": inner.State, "u": inner.Stimulus}
         self._places = {short: _places(made, cls) for short, cls in classes.items()}
         self._leaves = _leaves_read(made, list(par.leaves()))
+        self._derive = getattr(loaded, f"{made.name}_ecu_derive") if made.derived else None
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
         """Run frames begin..end: renews ``state`` and fills ``rows`` in place."""
@@ -102,7 +103,11 @@ class SoftwareInTheLoop:
 
     def _tasks(self, parameters: Array) -> tuple[Task, ...]:
         """Return the compiled tasks for parameters, behind the model's taps where it has some."""
-        par = np.ascontiguousarray(parameters[self._leaves], self._real)
+        is_leaf = self._leaves >= 0
+        par = np.zeros(len(is_leaf), self._real)
+        par[is_leaf] = parameters[self._leaves[is_leaf]]
+        if self._derive is not None:
+            self._derive(pointer(par))
         tasks = tuple(
             Task(step.task.name, step.task.period, self._tick(step, function, par))
             for step, function in zip(self._made.steps, self._functions, strict=True)
@@ -156,9 +161,12 @@ def _places(made: Program, cls: Any) -> list[int]:
 
 
 def _leaves_read(made: Program, leaves: Sequence[str]) -> NDArray[np.int64]:
-    """Return which numbers of the parameters C has, in the order of its structure."""
+    """Return which numbers of the parameters C has, in the order of its structure; -1: derived."""
     places = []
-    for dotted, member in made.parameters():
+    for dotted, member in made.held():
+        if member.is_derived:
+            places.append(-1)
+            continue
         found = [k for k, name in enumerate(leaves) if _belongs(name, dotted, member.length)]
         places += found
     return np.array(places, dtype=np.int64)

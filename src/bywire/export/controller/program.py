@@ -15,6 +15,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import PRECISIONS, Precision, c_name, unique
 from bywire.export.controller.calls import called
+from bywire.export.controller.derived import Derivations, Derived
 from bywire.export.controller.execution import Executor
 from bywire.export.controller.functions import CFunction
 from bywire.export.controller.memories import Memories, Site
@@ -64,6 +65,8 @@ class Program:
         What its files and functions begin with.
     functions
         Laws and the plant's side, those first that others call.
+    derived
+        What follows from parameters alone and is kept beside them.
     """
 
     name: str
@@ -75,6 +78,7 @@ class Program:
     structs: Structs
     constants: Mapping[str, float]
     uses: frozenset[Use]
+    derived: tuple[Derived, ...]
 
     @property
     def libraries(self) -> tuple[str, ...]:
@@ -100,12 +104,16 @@ class Program:
 
     def parameters(self) -> list[tuple[str, Member]]:
         """Return what of the parameters is read, by dotted name."""
+        return [each for each in self.held() if not each[1].is_derived]
+
+    def held(self) -> list[tuple[str, Member]]:
+        """Return what stands in the structure of the parameters, derived numbers too."""
         return list(self._leaves(self.shape, ""))
 
     def _leaves(self, shape: Shape, prefix: str) -> Any:
         struct = self.structs.of_group(shape)
         for member in self.structs.kept(struct):
-            inner = shape.by_name[member.name]
+            inner = shape.by_name.get(member.name)
             if isinstance(inner, Shape):
                 yield from self._leaves(inner, f"{prefix}{member.name}.")
             else:
@@ -123,22 +131,25 @@ def program(model: Model, par: ParameterSet, precision: str = "double", name: st
     short = c_name(name or model.name).lower()
     used: frozenset[Use] | None = None
     copied: set[Site] = set()
+    refused: set[tuple[str, str]] = set()
     for _ in range(_MOST):
-        before = len(copied)
-        made = _translated(model, par, PRECISIONS[precision], short, used, copied)
+        before = len(copied), len(refused)
+        made = _translated(model, par, PRECISIONS[precision], short, used, copied, refused)
         fields = frozenset(use for use in made.uses if use[0] == "field")
-        if fields == used and len(copied) == before:
+        if fields == used and (len(copied), len(refused)) == before:
             return made
         used = fields
     raise ModelError(f"{model.name}: what its ECU reads does not settle")  # pragma: no cover
 
 
 def _translated(
-    model: Model, par: ParameterSet, precision: Precision, name: str, used: Any, copied: set[Site]
-) -> Program:
+    model: Model, par: ParameterSet, precision: Precision, name: str, used: Any,
+    copied: set[Site], refused: set[tuple[str, str]],
+) -> Program:  # fmt: skip
     public = {model.Stimulus: f"{name}_Stimulus", model.State: f"{name}_Plant",
               model.Memory: f"{name}_Memory", type(par): f"{name}_Parameters"}  # fmt: skip
-    structs = Structs(precision, used, public, model.Memory, names=set(public.values()))
+    structs = Structs(precision, used, public, model.Memory, names=set(public.values()),
+                      derivations=Derivations(refused))  # fmt: skip
     home = type(model).__module__
 
     def is_plant(function: FunctionType, arguments: Mapping[str, Any]) -> bool:
@@ -160,10 +171,12 @@ def _translated(
             if use[0] == "call" and use[1] not in reached:
                 reached.add(use[1])
                 waiting.append(by_name[use[1]].uses)
+    derived = tuple(structs.derivations.derived(frozenset(uses)))
+    uses |= frozenset[Use]().union(*(each.uses for each in derived))
     functions = tuple(each for each in made.functions.values() if each.name in reached)
     constants = {use[1]: use[2] for use in sorted(u for u in uses if u[0] == "constant")}
     return Program(name, precision, model, par, tuple(steps), functions, structs, constants,
-                   frozenset(uses))  # fmt: skip
+                   frozenset(uses), derived)  # fmt: skip
 
 
 def _class_of(value: Any) -> Any:
@@ -188,7 +201,8 @@ def _step(
     here = Expr("par", uses=frozenset({("local", "par")}))
     structs.of_tuple(model.Memory)
     given["memory"] = body.memory.at(model.Memory, "memory", pointer=True)
-    given["par"] = Group(shape_of(par), here, pointer=True)
+    given["par"] = Group(shape_of(par), here, pointer=True, origin=("par",))
+    body.fixed["par"] = shape_of(par)
     at = Executor(made, body, f"task {task.name!r} of {model.name}", {}, {})
     node = ast.parse(f"{c_name(task.name)}(x, m, u, par)", mode="eval").body
     assert isinstance(node, ast.Call)

@@ -25,6 +25,7 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
         f"Call {name}_ecu_init once, then every task at its period, tasks that are due together "
         "in this order:",
         *tasks,
+        _derived(program),
         f"Memory ({memory} numbers of {size} bytes) belongs to the caller; the description for "
         f"calibration tools expects it to be called {name}_memory. Parameters ({values} numbers) "
         f"are constants in {name}_parameters.c. Nothing is allocated, nothing calls itself, and "
@@ -40,6 +41,15 @@ def readme(program: Program, files: Iterable[str], count: int) -> str:
         each if each.startswith("    ") else textwrap.fill(each, 88, break_on_hyphens=False)
         for each in said if each
     ) + "\n"  # fmt: skip
+
+
+def _derived(program: Program) -> str:
+    if not program.derived:
+        return ""
+    return (
+        "Beside the parameters stands what follows from them alone. Where parameters are changed "
+        f"in place, call {program.name}_ecu_derive before the next step."
+    )
 
 
 def _plant(program: Program) -> str:

@@ -19,6 +19,9 @@ def header(program: Program) -> str:
     name = program.name
     structs = [struct for struct in program.structs.ordered() if struct.public]
     prototypes = [f"void {name}_ecu_init({name}_Memory *memory);"]
+    if program.derived:
+        said = "Renew what follows from other parameters: where these were changed, before a step."
+        prototypes += ["", comment([said]), f"{_derive(program)};"]
     for step in program.steps:
         text = f"Once every {step.task.period:.9g} s: task {step.task.name}."
         prototypes += ["", comment([text]), wrapped(f"{_signature_of(step)};")]
@@ -133,9 +136,22 @@ def source(program: Program) -> str:
         *(_struct(program, each) for each in structs),
         *(_function(program, each, "static ") for each in laws),
         init,
+        *_derivation(program),
         *(_step(each) for each in program.steps),
     ]
     return "\n\n".join(parts) + "\n"
+
+
+def _derive(program: Program) -> str:
+    return f"void {program.name}_ecu_derive({program.name}_Parameters *par)"
+
+
+def _derivation(program: Program) -> list[str]:
+    """Return the function that computes what follows from parameters."""
+    if not program.derived:
+        return []
+    lines = [wrapped(each.statement, "    ") for each in program.derived]
+    return ["\n".join([_derive(program), "{", *lines, "}"])]
 
 
 def has_io(program: Program) -> bool:

@@ -11,8 +11,10 @@ from bywire.core.field_notes import field_notes
 from bywire.core.parameters import leaf_fields
 from bywire.core.signals import signal_in
 from bywire.export.controller.c_text import Precision, c_name, unique
+from bywire.export.controller.derived import Derivations
 from bywire.export.controller.values import (
     Choice,
+    Expr,
     Nodes,
     Shape,
     Use,
@@ -22,12 +24,16 @@ from bywire.export.controller.values import (
 
 @dataclass(frozen=True)
 class Member:
-    """A field of a structure: its name in Python, its type, its length as an array, its meaning."""
+    """A field of a structure: its name in Python, its type, its length as an array, its meaning.
+
+    ``is_derived``: whether it follows from parameters and is none.
+    """
 
     name: str
     ctype: str
     length: int = 0
     note: str = ""
+    is_derived: bool = False
 
     @property
     def declaration(self) -> str:
@@ -40,7 +46,7 @@ class Struct:
     """A structure of C."""
 
     name: str
-    members: Mapping[str, Member]
+    members: dict[str, Member]
     doc: str = ""
     public: bool = False
     is_memory: bool = False
@@ -66,6 +72,7 @@ class Structs:
     memory: type[Any]
     known: dict[Any, Struct] = field(default_factory=dict)
     names: set[str] = field(default_factory=set)
+    derivations: Derivations = field(default_factory=Derivations)
 
     def of_tuple(self, cls: Any) -> Struct:
         """Return the structure of a NamedTuple class."""
@@ -115,6 +122,16 @@ class Structs:
         self.names.add(name)
         self.known["result", name] = Struct(name, made, f"What {function} returns.")
         return self.known["result", name]
+
+    def derive(self, function: str, holder: str, shape: Shape, expr: Expr, hint: str) -> Expr:
+        """Return a number that follows from parameters as a member of their set."""
+        struct = self.of_group(shape)
+        taken = struct.members
+        name = self.derivations.member(function, holder, struct.name, expr, hint, taken)
+        note = "follows from other parameters"
+        struct.members.setdefault(name, Member(name, self.precision.real, 0, note, True))
+        uses = frozenset({("local", holder), ("field", struct.name, name)})
+        return Expr(f"{holder}->{name}", uses=uses)
 
     def keeps(self, struct: Struct, name: str) -> bool:
         """Return whether anybody reads a field."""

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
+from bywire.core import ops
 from bywire.core.errors import ModelError
 from bywire.export.controller.arguments import kind_of, passed, received
 from bywire.export.controller.body import Body
@@ -77,8 +78,8 @@ class Translation:
             bound = inspect.signature(function).bind(*given, **named)
         except TypeError as error:
             raise at.refuse(node, f"{function.__qualname__}: {error}") from None
-        arguments = self._arguments(function, bound)
-        made = self.function(function, arguments)
+        arguments = self._arguments(at.body, bound)
+        made = self.function(function, arguments, at.body)
         expr, memories = self._called(at, made, arguments)
         if not made.result:
             return _rooted(at, node, made.value, arguments, memories)
@@ -94,7 +95,7 @@ class Translation:
         value = as_value(made.value, expr)
         return at.body.variable("values", value) if isinstance(value, Group) else value
 
-    def _arguments(self, function: Any, bound: inspect.BoundArguments) -> dict[str, Any]:
+    def _arguments(self, body: Body, bound: inspect.BoundArguments) -> dict[str, Any]:
         arguments: dict[str, Any] = {}
         for name, parameter in bound.signature.parameters.items():
             if name not in bound.arguments:
@@ -110,7 +111,7 @@ class Translation:
                 value = Items(tuple(value))
             elif parameter.kind is inspect.Parameter.VAR_KEYWORD:
                 value = Table(value)
-            arguments[name] = value
+            arguments[name] = body.derived(value) if isinstance(value, Expr) else value
         return arguments
 
     def _called(
@@ -119,6 +120,8 @@ class Translation:
         """Return the call, and the memory that it is given by the names of its arguments."""
         wanted = {each.name for each in made.arguments}
         every = [e for value in arguments.values() for e in passed(value, at.body)]
+        given = dict(zip(made.all_arguments, every, strict=True))
+        self.structs.derivations.called(made.name, at.body.memory.function, given)
         memories: dict[str, Record] = {}
         kept: list[Expr] = []
         for name, value in zip(made.all_arguments, every, strict=True):
@@ -133,13 +136,18 @@ class Translation:
         uses: Uses = frozenset({("call", made.name)}).union(*(each.uses for each in kept))
         return Expr(f"{made.name}({', '.join(each.text for each in kept)})", uses=uses), memories
 
-    def function(self, function: types.FunctionType, arguments: Mapping[str, Any]) -> CFunction:
+    def function(
+        self, function: types.FunctionType, arguments: Mapping[str, Any], caller: Body
+    ) -> CFunction:
         """Return the C function of a Python function for arguments of a kind."""
+        # Of elementary functions one serves, whatever decides their arguments.
+        is_law = function.__module__ != ops.__name__
+        steady = tuple(is_law and caller.is_steady(each) for each in arguments.values())
         closure = closure_of(function)
         self.alive += [*closure.values(), *(v for v in arguments.values())]
         kinds = tuple(kind_of(each, self.structs) for each in arguments.values())
         held = tuple((n, kind_of(Known(v), self.structs)) for n, v in closure.items())
-        key = (function.__code__, held, kinds)
+        key = (function.__code__, held, kinds, steady)
         if key not in self.functions:
             self.depth += 1
             if self.depth > DEEP:
@@ -147,14 +155,15 @@ class Translation:
                     f"{function.__code__.co_filename}, line {function.__code__.co_firstlineno}: "
                     f"the ECU cannot be exported as C: {function.__qualname__} calls itself"
                 )
-            made = self._translated(function, arguments, closure)
+            made = self._translated(function, arguments, closure, steady)
             self.depth -= 1
             self.functions[key] = made
         return self.functions[key]
 
     def _translated(
-        self, function: types.FunctionType, arguments: Mapping[str, Any], closure: dict[str, Any]
-    ) -> CFunction:
+        self, function: types.FunctionType, arguments: Mapping[str, Any], closure: dict[str, Any],
+        steady: tuple[bool, ...],
+    ) -> CFunction:  # fmt: skip
         node = node_of(function)
         short = "tick" if isinstance(node, ast.Lambda) else node.name
         module = function.__module__
@@ -167,12 +176,15 @@ class Translation:
         bound = next(iter(arguments.values()), None)
         if "__class__" in closure and isinstance(bound, Known):
             scope["super"] = Known(partial(super, closure["__class__"], bound.value))
-        for python_name, value in arguments.items():
+        for (python_name, value), is_steady in zip(arguments.items(), steady, strict=True):
             (scope[python_name], first), *more = received(value, python_name, body)
             made.arguments += [a for _, a in [(None, first), *more] if a is not None]
             is_changed = body.stores[python_name] > 1 and not self.structs.is_memory(value)
             if is_changed and first is not None:
                 body.moving.add(first.name)
+            elif is_steady and first is not None:
+                group = scope[python_name]
+                body.fixed[first.name] = group.shape if isinstance(group, Group) else None
         made.all_arguments = [each.name for each in made.arguments]
         at = Executor(self, body, function.__code__.co_filename, function.__globals__, scope)
         returned = self._run(at, node)
