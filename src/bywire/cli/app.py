@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import sys
 from contextlib import redirect_stdout
-from typing import Annotated
+from functools import cache
+from typing import Annotated, Any
 
 import typer
 
@@ -60,6 +61,12 @@ app.command("identify")(identify)
 app.command("replay")(replay)
 app.command("check")(check_command)
 app.command("new")(new_command)
+
+
+@cache
+def program() -> Any:
+    """Return the command line, called with its arguments: its options are read off once."""
+    return typer.main.get_command(app)
 
 
 @app.callback(invoke_without_command=True)

@@ -145,10 +145,10 @@ def _warned() -> int | str:
                 show_otherwise(text, category, *place)
 
         setattr(warnings, "showwarning", show)  # noqa: B010 - its type wants the very names
-        from bywire.cli.app import app
+        from bywire.cli.app import program
 
         try:
-            app(systems_first(sys.argv[1:]))
+            program()(systems_first(sys.argv[1:]))
         except SystemExit as done:
             return done.code or 0
         return 0

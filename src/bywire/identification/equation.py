@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from threading import Lock
 from typing import NamedTuple
 
 import casadi as ca
@@ -16,6 +17,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.typing import Array
 from bywire.identification.records import require_signals
 from bywire.identification.unknown import Unknown
+from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.symbols import SX, column, scalars
 
 
@@ -80,7 +82,10 @@ class EquationError:
         inputs = ca.vertcat(x, m, rate)
         pattern = set(ca.jacobian_sparsity(e, inputs).get_triplet()[1])
         self._needed = [name for k, name in enumerate(self._names) if k in pattern]
-        self._function = ca.Function("e", [inputs, theta], [e, ca.jacobian(e, theta)])
+        slopes = ca.densify(ca.jacobian(e, theta))
+        self._function = ca.Function("e", [inputs, theta], [ca.densify(e), slopes])
+        self._calls: dict[int, BufferedCall] = {}  # by how many samples
+        self._lock = Lock()  # a call's buffers serve one at a time
 
     def columns(self, data: xr.Dataset) -> Array:
         """Return the measured inputs of the equation, shape (inputs, n); zero where unread."""
@@ -107,5 +112,8 @@ class EquationError:
     def __call__(self, columns: Array, values: Array) -> tuple[Array, Array]:
         """Return the error and its derivatives, shapes (n,) and (n, p)."""
         n = columns.shape[1]
-        e, W = self._function.map(n)(columns, np.repeat(values[:, None], n, axis=1))
-        return np.array(e).ravel(), np.array(W).reshape(n, len(values), order="A")
+        with self._lock:
+            if n not in self._calls:
+                self._calls[n] = BufferedCall(self._function.map(n))
+            e, W = self._calls[n](columns.ravel(order="F"), np.tile(values, n))
+            return e.copy(), W.reshape(n, len(values)).copy()

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from bywire.core.typing import Array
+from bywire.simulation.buffered_call import BufferedCall
 from bywire.simulation.cut_substep import CutSubstep
 from bywire.simulation.layout import CAP, DOUBT, FLAG, Layout
 from bywire.simulation.native import Request
@@ -30,10 +31,10 @@ class VirtualMachine:
         start = dict(zip([*lengths, "counters"], map(int, starts), strict=True))
         self.layout = Layout(start, lengths)
         self._program, self._velocities = program, program.velocities
-        self._fast = _Call(program.fast)
-        self._exact = _Call(program.exact)
-        self._ticks = [_Call(tick) for tick in program.ticks]
-        self._output = _Call(program.output)
+        self._fast = BufferedCall(program.fast)
+        self._exact = BufferedCall(program.exact)
+        self._ticks = [BufferedCall(tick) for tick in program.ticks]
+        self._output = BufferedCall(program.output)
         self._lock = threading.Lock()  # the functions' buffers serve one run at a time
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
@@ -85,22 +86,3 @@ class VirtualMachine:
                     break
                 guess = result[1].copy()
         return [part.copy() for part in result], bool(result[DOUBT][0] != 0.0)
-
-
-class _Call:
-    """A CasADi function through its buffers, which skip the conversion of arguments."""
-
-    def __init__(self, function: Any) -> None:
-        self._buffer, self._trigger = function.buffer()
-        self._inputs = [np.zeros(function.nnz_in(k)) for k in range(function.n_in())]
-        self._outputs = [np.zeros(function.nnz_out(k)) for k in range(function.n_out())]
-        for k, array in enumerate(self._inputs):
-            self._buffer.set_arg(k, memoryview(array.data))
-        for k, array in enumerate(self._outputs):
-            self._buffer.set_res(k, memoryview(array.data))
-
-    def __call__(self, *arguments: Array) -> list[Array]:
-        for own, given in zip(self._inputs, arguments, strict=True):
-            own[:] = given
-        self._trigger()
-        return self._outputs
