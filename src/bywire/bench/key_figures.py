@@ -67,7 +67,7 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
     recordings: list[dict[str, Any]] = [static_recordings(bench) for bench in benches]
     warnings: list[list[str]] = [[] for _ in benches]
     wanted = set() if families is None else families.signals(options)
-    signals = partial(_needed, wanted) if families is not None else lambda _: None
+    signals = partial(needed, wanted) if families is not None else lambda _: None
     figures: tuple[KpiOfCases, ...] | None = None
     for made in rounds(benches, threads=threads, signals=signals):
         group = made.trajectories
@@ -96,7 +96,7 @@ def _is_plain(bench: Bench) -> bool:
     return definition.static is None and definition.finish is None and len(bench.cases()) == 1
 
 
-def _needed(wanted: set[str], run: Run) -> tuple[str, ...] | None:
+def needed(wanted: set[str], run: Run) -> tuple[str, ...] | None:
     """Return the outputs that key figures, warnings and books of energy look at; None for all."""
     watched = run.model.watched(run.par)
     if watched is None:
