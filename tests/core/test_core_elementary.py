@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ctypes
 import math
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from bywire.core import elementary, ops
+from bywire.core.elementary_series import EXPONENTIAL
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import PLAIN, compile_library, find_compiler
 
@@ -54,6 +56,15 @@ def test_floats_are_right(name: str) -> None:
             continue
         expected = exact(*point)
         assert math.isclose(OURS[name](*point), expected, rel_tol=5e-16, abs_tol=2e-16), point
+
+
+def test_the_exponentials_series_is_near_the_exponential() -> None:
+    """In rational numbers, against Taylor's series to r^20."""
+    coefficients = [Fraction(1), Fraction(1), Fraction(1, 2), *map(Fraction, EXPONENTIAL)]
+    for n in range(-30, 31):
+        r = Fraction(math.log(2.0) / 2.0) * n / 30
+        exact = sum(r**k / math.factorial(k) for k in range(21))
+        assert abs(sum(c * r**k for k, c in enumerate(coefficients)) / exact - 1) < 6e-18
 
 
 def test_large_angles_lose_no_more_than_their_last_digit() -> None:

@@ -7,7 +7,7 @@ ECUs, so that Python, kernel and target agree in every bit.
 References
 ----------
 W. J. Cody and W. Waite, Software Manual for the Elementary Functions, 1980: reduction of
-arguments in parts. The series are Taylor's.
+arguments in parts. The series are Taylor's, that of the exponential is Remez'.
 """
 
 from __future__ import annotations
@@ -47,13 +47,12 @@ def exp(x: float) -> float:
     r2 = r * r
     r4 = r2 * r2
     r8 = r4 * r4
-    e3, e4, e5, e6, e7, e8, e9, e10, e11, e12, e13 = EXPONENTIAL
+    e3, e4, e5, e6, e7, e8, e9, e10, e11 = EXPONENTIAL
     a = (1.0 + r) + r2 * (0.5 + r * e3)
     b = (e4 + r * e5) + r2 * (e6 + r * e7)
     c = (e8 + r * e9) + r2 * (e10 + r * e11)
-    d = e12 + r * e13
-    y = a + r4 * b + r8 * (c + r4 * d)
-    return y * math.ldexp(1.0, int(k))
+    scale = math.ldexp(1.0, int(k))
+    return scale * a + ((scale * r4) * b + (scale * r8) * c)
 
 
 def sin(x: float) -> float:

@@ -1,4 +1,4 @@
-"""Numbers of the elementary functions: reductions in parts, and Taylor's coefficients."""
+"""Numbers of the elementary functions: reductions in parts, coefficients of series."""
 
 from __future__ import annotations
 
@@ -32,7 +32,13 @@ def _factorials(first: int, last: int, step: int, alternates: bool) -> tuple[flo
     return tuple(signs[at % 2] / math.factorial(n) for at, n in enumerate(orders))
 
 
-EXPONENTIAL = _factorials(3, 13, 1, alternates=False)
+EXPONENTIAL = (
+    0.16666666666666433, 0.041666666666604, 0.008333333333499912, 0.0013888888926778338,
+    0.0001984126946643833, 2.4801508707160782e-05, 2.755764072946532e-06, 2.7625176287774916e-07,
+    2.497840191042191e-08,
+)  # fmt: skip
+"""of r^3 to r^11 behind 1 + r + r^2/2: the least largest relative error up to ln(2)/2, 5.9e-18, by
+Remez' exchange in 50 digits; Taylor's series to r^13 has 5.7e-18"""
 SINE = _factorials(3, 15, 2, alternates=True)
 COSINE = _factorials(2, 16, 2, alternates=True)
 LOGARITHM = tuple(2.0 / n for n in range(3, 22, 2))

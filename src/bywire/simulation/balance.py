@@ -2,7 +2,7 @@
 
 A substep is one long chain of dependent operations, and the processor waits for it. Sums and
 products of three and more are therefore rebuilt such that a late operand passes through as few
-operations as possible. Only the rounding changes.
+operations as possible, and k a + k b as k (a + b) where k changes rarely. Only rounding changes.
 """
 
 from __future__ import annotations
@@ -32,6 +32,7 @@ class _Balance:
         self._uses.update(roots)
         self._new: dict[Node, Node] = {}
         self._ready: dict[Node, int] = {}
+        self._differences: dict[frozenset[Node], Node] = {}
         for node in order:
             self._new[node] = self._rebuilt(node)
 
@@ -42,7 +43,7 @@ class _Balance:
     def _rebuilt(self, node: Node) -> Node:
         operation = self._graph.nodes[node]
         if operation.op in ("add", "sub"):
-            return self._combined("add", self._summands(node, 1, top=True))
+            return self._combined("add", self._joined(self._summands(node, 1, top=True)))
         if operation.op == "mul":
             return self._combined("mul", [(1, f) for f in self._factors(node, top=True)])
         return self._graph.apply(operation.op, *(self.node(a) for a in operation.args))
@@ -51,13 +52,51 @@ class _Balance:
         operation = self._graph.nodes[node]
         own = top or (self._level[node] == 2 and self._uses[node] == 1)
         if operation.op not in _SUMS or not own:
-            return [(sign, self.node(node))]
+            return [(sign, node)]
         signs = {"add": (sign, sign), "sub": (sign, -sign), "neg": (-sign,)}[operation.op]
         return [
             part
             for s, a in zip(signs, operation.args, strict=True)
             for part in self._summands(a, s)
         ]
+
+    def _joined(self, parts: list[tuple[int, Node]]) -> list[tuple[int, Node]]:
+        """Return summands rebuilt: what is there twice, or has a rare factor in common, as one."""
+        groups: dict[Node, list[tuple[int, int, Node, Node]]] = {}
+        joined: list[tuple[int, Node]] = []
+        for (sign, node), times in Counter(parts).items():
+            if times > 1 and times == self._uses[node]:
+                number = self._graph.constant(float(times))
+                joined.append((sign, self._graph.apply("mul", number, self.node(node))))
+            elif times == 1 and (split := self._split(node)) is not None:
+                turned, factor, rest = split
+                groups.setdefault(factor, []).append((sign, sign * turned, rest, node))
+            else:
+                joined += [(sign, self.node(node))] * times
+        for factor, terms in groups.items():
+            sign, first, _, node = terms[0]
+            if len(terms) == 1:
+                joined.append((sign, self.node(node)))
+                continue
+            inner = self._combined("add", [(first * s, self.node(a)) for _, s, a, _ in terms])
+            joined.append((first, self._graph.apply("mul", inner, factor)))
+        return joined
+
+    def _split(self, node: Node) -> tuple[int, Node, Node] | None:
+        """Return a rare factor and the rest of a product that nothing else needs.
+
+        Of two factors a - b and b - a the same is taken for both, and the sign that this turns.
+        """
+        nodes, level = self._graph.nodes, self._level
+        if nodes[node].op != "mul" or level[node] < 2 or self._uses[node] > 1:
+            return None
+        rest, factor = sorted(nodes[node].args, key=level.__getitem__, reverse=True)
+        if level[factor] == 2:
+            return None
+        if nodes[factor].op != "sub":
+            return 1, factor, rest
+        same = self._differences.setdefault(frozenset(nodes[factor].args), factor)
+        return 1 if same == factor else -1, same, rest
 
     def _factors(self, node: Node, top: bool = False) -> list[Node]:
         operation = self._graph.nodes[node]

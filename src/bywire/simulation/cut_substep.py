@@ -93,11 +93,11 @@ class CutSubstep:
         points = [(0.0, float(x[turns])), (length, float(o[0][turns]))]
         close = CLOSE * abs(points[0][1] - points[1][1])
         t = _zero_of(*points[0][1:], *points[1], 2.0 * float(d[turns]) / self._h, self._h)
-        for _ in range(ATTEMPTS):
+        for n in range(1, ATTEMPTS + 1):
             t = float(np.clip(t, first, final))
             o, failed = self._part(x, d, t)
             other, share = self._first_turn(x, o)
-            if other >= 0 and other != turns:
+            if other >= 0 and other != turns and n < ATTEMPTS:
                 turns, low, high = other, 0.0, t
                 points = [(0.0, float(x[turns])), (t, float(o[0][turns]))]
                 close = CLOSE * abs(points[0][1] - points[1][1])
@@ -105,8 +105,8 @@ class CutSubstep:
                 continue
             w = float(o[0][turns])
             (P, at_P), (Q, at_Q) = points
-            if abs(w) <= close or not first < t < final or t in (P, Q):
-                break
+            if abs(w) <= close or not first < t < final or t in (P, Q) or n == ATTEMPTS:
+                break  # with what this length gives
             low, high = (t, high) if w * x[turns] > 0.0 else (low, t)
             slope = (w - at_P) / (t - P) + (w - at_Q) / (t - Q) - (at_Q - at_P) / (Q - P)
             following = t - w / slope

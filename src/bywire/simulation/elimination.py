@@ -8,18 +8,22 @@ from typing import Any
 import casadi as ca
 
 from bywire.simulation.linear_form import Form
-from bywire.simulation.symbols import depends
+from bywire.simulation.symbols import SX, depends
 
 Entries = dict[tuple[int, int], Any]
 
 
 @dataclass(frozen=True)
 class Step:
-    """One eliminated row: pivot row's entries in the columns that were left, and its reciprocal."""
+    """One eliminated row: pivot row's entries in the columns that were left, and its reciprocal.
+
+    In the columns ``alike`` the right-hand side has the same factors, with the other sign.
+    """
 
     pivot: int
     reciprocal: Any
     row: dict[int, Any]
+    alike: frozenset[int]
 
 
 @dataclass(frozen=True)
@@ -48,21 +52,26 @@ class Reduced:
     def start(self, row: int, matrix: Any) -> Any:
         """Return the kept row's right-hand side plus a matrix times the kept states."""
         form = self.right[self.kept[row]]
+        coefficients = dict(form.coefficients)
         for column, index in enumerate(self.kept):
-            unit = Form({index: ca.SX(1)}, ca.SX(0))
-            form = form.plus(matrix[row, column], unit, self.x, self.changing)
-        return form.value(self.x)
+            coefficients[index] = coefficients.get(index, SX(0)) + matrix[row, column]
+        return Form(coefficients, form.rest).value(self.x)
 
-    def back_substitute(self, solution: dict[int, Any]) -> dict[int, Any]:
-        """Return all unknowns, given those of the kept rows."""
-        known = dict(solution)
+    def back_substitute(self, known: dict[int, Any], middle: dict[int, Any]) -> None:
+        """Add all unknowns to those of the kept rows, and the states plus the unknowns.
+
+        Where a state and its unknown have one factor, their sum takes it.
+        """
         for step in reversed(self.steps):
             value = self.right[step.pivot].times(step.reciprocal, self.x, self.changing)
-            total = value.value(self.x)
+            coefficients = dict(value.coefficients)
+            total = value.rest
             for column, entry in step.row.items():
-                total = total - (entry * step.reciprocal) * known[column]
-            known[step.pivot] = total
-        return known
+                factor = -entry * step.reciprocal
+                joint = column in step.alike and coefficients.pop(column, None) is not None
+                total = total + factor * (middle if joint else known)[column]
+            total = Form(coefficients, total).value(self.x)
+            known[step.pivot], middle[step.pivot] = total, self.x[step.pivot] + total
 
 
 def eliminate(
@@ -85,12 +94,14 @@ def eliminate(
     n = A.shape[0]
     entries: Entries = {(i, j): A[i, j] for i in range(n) for j in range(n) if _present(A[i, j])}
     right = dict(right)
+    # The matrix is a diagonal less what rows that are linear have before the states.
+    alike = {(i, j) for i, form in right.items() for j in form.coefficients if j != i}
     left = [i for i in range(n) if i not in keep]
     steps = []
     while left:
         pivot = min(left, key=lambda i: _price(entries, i, changing))
         left.remove(pivot)
-        steps.append(_pivot(entries, right, pivot, x, changing))
+        steps.append(_pivot(entries, right, alike, pivot, x, changing))
     m = len(keep)
     S = ca.SX.zeros(m, m)
     for a, i in enumerate(keep):
@@ -109,7 +120,14 @@ def _price(entries: Entries, pivot: int, changing: Any) -> tuple[int, bool, int]
     return rows * columns, depends(entries[pivot, pivot], changing), pivot
 
 
-def _pivot(entries: Entries, right: dict[int, Form], pivot: int, x: Any, changing: Any) -> Step:
+def _pivot(
+    entries: Entries,
+    right: dict[int, Form],
+    alike: set[tuple[int, int]],
+    pivot: int,
+    x: Any,
+    changing: Any,
+) -> Step:
     reciprocal = 1.0 / entries.pop((pivot, pivot))
     row = {j: e for (i, j), e in entries.items() if i == pivot}
     column = {i: e for (i, j), e in entries.items() if j == pivot}
@@ -118,7 +136,14 @@ def _pivot(entries: Entries, right: dict[int, Form], pivot: int, x: Any, changin
     for i, below in column.items():
         del entries[i, pivot]
         factor = below * reciprocal
+        sums = not depends(SX(factor), changing)  # else the form becomes a number
+        for j in (row.keys() | right[pivot].coefficients.keys()) - {i}:
+            is_free = (i, j) not in entries and j not in right[i].coefficients
+            if not (sums and (pivot, j) in alike and (is_free or (i, j) in alike)):
+                alike.discard((i, j))
+            elif is_free:
+                alike.add((i, j))
         right[i] = right[i].plus(-factor, right[pivot], x, changing)
         for j, entry in row.items():
             entries[i, j] = entries.get((i, j), ca.SX(0)) - factor * entry
-    return Step(pivot, reciprocal, row)
+    return Step(pivot, reciprocal, row, frozenset(j for j in row if (pivot, j) in alike))

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 from bywire.simulation.expressions import COSTLY, PLAIN_C, Dialect, Namer, text
 from bywire.simulation.graph import Graph
 from bywire.simulation.layout import Layout
-from bywire.simulation.operation import Node
+from bywire.simulation.operation import Node, Operation
 from bywire.simulation.stages import STATE, Stages
 
 # plan: first frame, end frame, whether the end is recorded, substeps a frame, frames a stimulus
@@ -33,6 +33,21 @@ def unread(stages: Stages) -> frozenset[str]:
         for k in range(len(stages.fast[kind]))
         if stages.graph.leaf(kind, k) not in read
     )
+
+
+def midpoints(graph: Graph, order: Iterable[Node]) -> dict[Node, int]:
+    """Return the nodes that are a state plus its half increment, and which state it is.
+
+    A kernel carries these from substep to substep: the next one begins with them. Half increments
+    alone only cut substeps read.
+    """
+    chosen = {}
+    for node in order:
+        parts = {graph.nodes[a] for a in graph.arguments(node)}
+        for k in {op.args[1] for op in parts if op.op == "leaf" and op.args[0] == "d"}:
+            if graph.nodes[node].op == "add" and Operation("leaf", ("x", k)) in parts:
+                chosen[node] = int(k)
+    return chosen
 
 
 def leaf_count(stages: Stages, kind: str) -> int:

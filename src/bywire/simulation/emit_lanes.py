@@ -11,6 +11,7 @@ from bywire.simulation.emission import (
     layout_of,
     leaf_count,
     leaf_namer,
+    midpoints,
     statements,
     unread,
 )
@@ -51,13 +52,19 @@ class _Lanes:
         self.flag = stages.fast["flag"][0]
         self.pass_roots = [*self.results.values(), *self.products, self.flag]
         self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
-        self.name = leaf_namer(self.graph, self._leaf, lambda n: f"v{n}", "SET({})")
-        self.mode = modes(self.graph, self.pass_roots, self.level)
+        self.carried = midpoints(
+            self.graph, needed(self.graph, self.pass_roots, lambda n: self.level[n] < 2)
+        )
+        self.name = leaf_namer(self.graph, self._leaf, self._value, "SET({})")
+        self.mode = modes(self.graph, self.pass_roots, self.level).without(self.carried)
 
     def _leaf(self, kind: str, index: int) -> str:
         if kind in ("p", "u"):
             return f"{kind.upper()}[{index}]"
         return "h" if kind == "h" else f"{kind}{index}"
+
+    def _value(self, node: Node) -> str:
+        return f"y{self.carried[node]}" if node in self.carried else f"v{node}"
 
     def block(self, roots: Sequence[Node], below: int) -> list[str]:
         """Return the statements that results need, apart from what is computed less often."""
@@ -123,6 +130,7 @@ def emit_lanes(stages: Stages) -> str:
     new += [f"V z{k} = {t.number(n)};" for k, n in enumerate(t.products)]
     commit = [f"{target} = {target}_;" for target in t.results]
     commit += [f"{s} += z{k};" for k, s in enumerate(sums)]
+    ahead = [f"y{k} = x{k} + d{k};" for k in t.carried.values()]
     integrals = [
         f"q{j} += {' + '.join(f'{t.number(c)} * s{k}' for c, k in pairs) or 'SET(0.0)'};"
         for j, pairs in enumerate(stages.quadrature.combinations)
@@ -144,6 +152,7 @@ def emit_lanes(stages: Stages) -> str:
   {indented([f"V {name} = vectors[{k}];" for k, name in enumerate(names)], 2)}
   {indented(t.once(), 2)}
   {indented(t.mode_state(), 2)}
+  {indented([f"V {each}" for each in ahead], 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
     for (int j = 0; j < {stimuli}; ++j) {{
       const double *row = u + (f / stim) * {stimuli} * (own ? W : 1);
@@ -163,7 +172,7 @@ def emit_lanes(stages: Stages) -> str:
       if (__builtin_expect(ANY(flagged), 0)) {{
         {indented(_repeat(t), 8)}
       }}
-      {indented(commit, 6)}
+      {indented(commit + ahead, 6)}
     }}
     {indented(integrals, 4)}
   }}

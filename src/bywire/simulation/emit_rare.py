@@ -81,11 +81,11 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
   double P = 0.0, at_P = x[turns], Q = *t, at_Q = o[turns];
   double N = zero_of(at_P, at_Q, Q, 2.0 * last[turns] / h, h);
   double close = CLOSE * fabs(at_P - at_Q);
-  for (int n = 0; n < ATTEMPTS; ++n) {
+  for (int n = 1;; ++n) { // what is left of the last attempt is of the length that is returned
     N = fmin(fmax(N, first), final);
     *failed = part(c, h, N, m, x, last, d, o);
     const int other = first_turn(x, o, &share);
-    if (other >= 0 && other != turns) { // another one is earlier
+    if (other >= 0 && other != turns && n < ATTEMPTS) { // another one is earlier
       turns = other;
       low = 0.0, high = N;
       P = 0.0, at_P = x[turns], Q = N, at_Q = o[turns], N = N * share;
@@ -93,7 +93,7 @@ static APART int locate(const double *c, double h, double *t, const double *m, c
       continue;
     }
     const double at_N = o[turns];
-    if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q) break;
+    if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q || n == ATTEMPTS) break;
     if (at_N * x[turns] > 0.0) low = N; else high = N;
     const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
         - (at_Q - at_P) / (Q - P);
@@ -211,7 +211,7 @@ def _constants_function(graph: Graph, slots: dict[Node, int]) -> str:
     name = leaf_namer(graph, _leaf, lambda node: f"v{node}")
     body = statements(graph, needed(graph, slots, lambda _: False), name, "const double ")
     body += [f"c[{k}] = {name(node)};" for node, k in slots.items()]
-    return f"""static RARE void constants(const double *restrict p, double *restrict c) {{
+    return f"""static APART void constants(const double *restrict p, double *restrict c) {{
   {indented(body, 2)}
 }}"""
 

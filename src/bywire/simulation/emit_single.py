@@ -10,6 +10,7 @@ from bywire.simulation.emission import (
     layout_of,
     leaf_count,
     leaf_namer,
+    midpoints,
     statements,
     unread,
 )
@@ -39,7 +40,6 @@ def emit_single(stages: Stages) -> str:
             return f"{kind}[{index}]" if kind == "p" else f"uk[{index}]"
         return "h" if kind == "h" else f"{kind}{index}"
 
-    name = leaf_namer(graph, leaf, lambda node: f"v{node}")
     skipped = unread(stages)
     results = {
         f"{kind}{k}": node
@@ -54,7 +54,12 @@ def emit_single(stages: Stages) -> str:
     every_root = pass_roots + coefficients + tick_roots + stages.output
     once = needed(graph, every_root, lambda _: False)
     hoisted = [node for node in once if level[node] == 0]
-    mode = modes(graph, pass_roots, level)
+    carried = midpoints(graph, needed(graph, pass_roots, lambda n: level[n] < 2))
+    name = leaf_namer(
+        graph, leaf, lambda node: f"y{carried[node]}" if node in carried else f"v{node}"
+    )
+    ahead = [f"y{k} = x{k} + d{k};" for k in carried.values()]
+    mode = modes(graph, pass_roots, level).without(carried)
     framed = [
         node
         for node in needed(graph, pass_roots + coefficients, lambda n: level[n] == 0)
@@ -82,6 +87,7 @@ def emit_single(stages: Stages) -> str:
   {indented(_loads(layout), 2)}
   {indented(block(hoisted), 2)}
   {indented(_mode_state(mode, name), 2)}
+  {indented([f"double {each}" for each in ahead], 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
     const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
     (void)uk;
@@ -100,9 +106,9 @@ def emit_single(stages: Stages) -> str:
       {indented(_mode_change(mode, graph, name), 6)}
       {indented(block(mode.rest), 6)}
       if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
-        {indented(_repeat(layout), 8)}
+        {indented(_repeat(layout) + ahead, 8)}
       }} else {{
-        {indented(_commit(results, products, name), 8)}
+        {indented(_commit(results, products, name) + ahead, 8)}
       }}
     }}
     {indented(_integrals(stages, name), 4)}

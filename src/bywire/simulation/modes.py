@@ -43,6 +43,11 @@ class Modes:
     values: list[Node]
     rest: list[Node]
 
+    def without(self, known: Collection[Node]) -> Modes:
+        """Return the parts less nodes that are known already."""
+        return Modes(*([n for n in each if n not in known] for each in
+                       (self.first, self.atoms, self.values, self.rest)))  # fmt: skip
+
 
 def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
     """Split what a substep computes.

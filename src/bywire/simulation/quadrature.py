@@ -171,9 +171,25 @@ class _Expansion:
             return self._sum(a, b)
         if operation.op == "mul":
             a, b = (self.terms(x) for x in operation.args)
-            if len(a) * len(b) <= _MOST:
+            if len(a) * len(b) <= _MOST and 1 in (len(a), len(b)):
                 return self._product(a, b)
+            return self._separated(node)  # the square of a difference is never negative
+            #return self._separated(node)
         return {node: self._one}
+
+    def _separated(self, product: Node) -> Terms:
+        """Return a product as what changes rarely times the rest."""
+        graph, coefficient, rest = self._graph, self._one, self._one
+        stack = [product]
+        while stack:
+            node = stack.pop()
+            if self._level[node] < 2:
+                coefficient = graph.apply("mul", coefficient, node)
+            elif graph.nodes[node].op == "mul" and node not in self._computed:
+                stack.extend(graph.nodes[node].args)
+            else:
+                rest = graph.apply("mul", rest, node)
+        return {rest: coefficient}
 
     def _scaled(self, terms: Terms, factor: Node) -> Terms:
         return {p: self._graph.apply("mul", c, factor) for p, c in terms.items()}

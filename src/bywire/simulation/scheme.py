@@ -109,8 +109,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     kept = _set_valued_states(model, exact)
     reduced = eliminate(A, right, kept, s.x, changing)
     projection, reaction = _project(model, s, reduced, bounds, exact)
-    d = _increments(s, reduced, projection)
-    middle = s.x + d
+    d, middle = _increments(s, reduced, projection)
     x = column(
         [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
     )
@@ -225,7 +224,11 @@ def _project(
     return projection, reaction
 
 
-def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> Any:
-    known = {k: 0.5 * (projection.w[a] - s.x[k]) for a, k in enumerate(reduced.kept)}
-    every = reduced.back_substitute(known)
-    return column([every[k] for k in range(s.x.shape[0])])
+def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> tuple[Any, Any]:
+    """Return half the increments, and the midpoints: the mean of start and end comes sooner."""
+    ends = {k: projection.w[a] for a, k in enumerate(reduced.kept)}
+    known = {k: 0.5 * (w - s.x[k]) for k, w in ends.items()}
+    middle = {k: 0.5 * (s.x[k] + w) for k, w in ends.items()}
+    reduced.back_substitute(known, middle)
+    every = range(s.x.shape[0])
+    return column([known[k] for k in every]), column([middle[k] for k in every])

@@ -170,6 +170,17 @@ def _neg(graph: Graph, a: Node) -> Node | None:
     return None
 
 
+def _eq(graph: Graph, a: Node, b: Node) -> Node | None:
+    """Turn k x == 0 into x == 0."""
+    for zero, other in ((a, b), (b, a)):
+        if graph.value(zero) == 0.0 and graph.nodes[other].op == "mul":
+            factors = graph.nodes[other].args
+            rest = [n for n in factors if graph.value(n) is None]
+            if len(rest) < len(factors):
+                return graph.apply("eq", rest[0], zero)
+    return None
+
+
 def _sign(graph: Graph, a: Node) -> Node:
     zero, one = graph.constant(0.0), graph.constant(1.0)
     above = graph.apply("if_else_zero", graph.apply("lt", zero, a), one)
@@ -215,6 +226,7 @@ RULES: dict[str, Callable[..., Node | None]] = {
     "sub": _sub,
     "mul": _mul,
     "neg": _neg,
+    "eq": _eq,
     "sign": _sign,
     "fmax": _fmax,
     "fmin": _fmin,

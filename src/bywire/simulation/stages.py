@@ -153,7 +153,24 @@ def _balanced(
     roots = [*_all_but(fast, "q"), *quadrature.products]
     new = iter(balanced(graph, collapsed(graph, roots, level), level))
     renewed = {kind: [next(new) for _ in range(count)] for kind, count in kinds}
-    return {**fast, **renewed}, Quadrature(list(new), quadrature.combinations)
+    known = dict(zip(roots, [*_all_but(renewed, "q"), *(products := list(new))], strict=True))
+    renewed["q"] = _renewed(graph, fast["q"], known)
+    return renewed, Quadrature(products, quadrature.combinations)
+
+
+def _renewed(graph: Graph, roots: list[Node], known: dict[Node, Node]) -> list[Node]:
+    """Return nodes with others in place of those that they are computed from.
+
+    As they are written, rates of losses cannot be negative; as sums of products they can, in the
+    last digit.
+    """
+    new = dict(known)
+    for node in needed(graph, roots, known.__contains__):
+        parts = graph.arguments(node)
+        renewed = tuple(new.get(a, a) for a in parts)
+        if renewed != parts:
+            new[node] = graph.apply(graph.nodes[node].op, *renewed)
+    return [new.get(root, root) for root in roots]
 
 
 def _with_tangents(function: Any, kinds: str, directions: Sequence[int], fixed: str) -> Any:

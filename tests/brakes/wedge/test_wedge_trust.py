@@ -164,8 +164,9 @@ def test_the_damping_of_the_set_keeps_stiffer_contacts_right(rattles):
 
 
 def test_without_the_doubt_a_wrong_result_would_be_silent(rattles):
+    """How wrong is chance: 4 % or 20 %, as the last digits of a substep fall."""
     error, doubted = rattles["none", 100.0, 0.0]
-    assert error > 0.1
+    assert error > 0.01
     assert doubted
 
 

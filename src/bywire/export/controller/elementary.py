@@ -138,10 +138,11 @@ def _exponential(precision: Precision, lit: Literal) -> str:
         body = f"{lit(1.0)} + (r + r * r * ({_nested(e2, 'r', lit)}))"
         scale = ("uint32_t", "127", "23")
         series = f"    const {real} y = {body};\n"
+        result = "y * scale"
     else:
         low, high = lit(-708.0), lit(709.0)
         magic, factor, ln_2 = lit(double.MAGIC), lit(1.4426950408889634), double.LN_2
-        e = dict(zip(range(3, 14), map(lit, double.EXPONENTIAL), strict=True))
+        e = dict(zip(range(3, 12), map(lit, double.EXPONENTIAL), strict=True))
         scale = ("uint64_t", "1023", "52")
         series = f"""    const double r2 = r * r;
     const double r4 = r2 * r2;
@@ -149,9 +150,8 @@ def _exponential(precision: Precision, lit: Literal) -> str:
     const double a = (1.0 + r) + r2 * (0.5 + r * {e[3]});
     const double b = ({e[4]} + r * {e[5]}) + r2 * ({e[6]} + r * {e[7]});
     const double c = ({e[8]} + r * {e[9]}) + r2 * ({e[10]} + r * {e[11]});
-    const double d = {e[12]} + r * {e[13]};
-    const double y = a + r4 * b + r8 * (c + r4 * d);
 """
+        result = "scale * a + ((scale * r4) * b + (scale * r8) * c)"
     integer, bias, shift = scale
     return f"""/* Return e to the power of x, which counts as within {low} and {high}. */
 static {real} exponential({real} x)
@@ -164,7 +164,7 @@ static {real} exponential({real} x)
     {real} scale;
 
     (void)memcpy(&scale, &exponent, sizeof scale);
-    return y * scale;
+    return {result};
 }}"""
 
 

@@ -270,11 +270,11 @@ static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double
     double low = 0.0, high = t, P = 0.0, at_P = s->om, Q = t, at_Q = y->q.om;
     const double close = CLOSE * fabs(at_P - at_Q);
     double N = t * at_P / (at_P - at_Q);
-    for (int n = 0; n < TRIES; n++) {
+    for (int n = 1;; n++) {
         N = clip(N, first, final);
         try_part(y, k, duty, s, N);
         const double at_N = y->q.om;
-        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q)
+        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q || n == TRIES)
             break;
         if (at_N * s->om > 0.0)
             low = N;

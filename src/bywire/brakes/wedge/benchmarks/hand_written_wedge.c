@@ -483,18 +483,18 @@ static int shorten(const Scheme *s, Sim *z, Sim *y, const double *i_ref, bool on
     int turns = first_turn(z, y, &share);
     double at_P = *speed_of(z, turns), at_Q = *speed_of(y, turns), N = *t * share;
     double close = CLOSE * fabs(at_P - at_Q);
-    for (int n = 0; n < TRIES; n++) {
+    for (int n = 1;; n++) {
         N = clip(N, first, final);
         *y = tried(s, z, i_ref, on, N);
         const int other = first_turn(z, y, &share);
-        if (other >= 0 && other != turns) { /* it is earlier */
+        if (other >= 0 && other != turns && n < TRIES) { /* it is earlier */
             turns = other, low = P = 0.0, high = Q = N, N *= share;
             at_P = *speed_of(z, turns), at_Q = *speed_of(y, turns);
             close = CLOSE * fabs(at_P - at_Q);
             continue;
         }
         const double at_N = *speed_of(y, turns);
-        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q)
+        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q || n == TRIES)
             break;
         if (at_N * *speed_of(z, turns) > 0.0)
             low = N;
