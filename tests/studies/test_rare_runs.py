@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import shutil
+from concurrent.futures.process import BrokenProcessPool
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,8 @@ import pytest
 from scipy import stats
 
 import bywire
-from bywire.core.errors import FileError, InputError
+from bywire.core.errors import FileError, InputError, RunError
+from bywire.studies import executor
 from bywire.studies.chunk import case_bench
 from bywire.studies.store import StudyStore
 from bywire.studies.study_file import read_study
@@ -252,3 +254,17 @@ def test_a_study_of_another_limit_is_another(spent):
     path.write_text(path.read_text().replace("19 A", "20 A"))
     with pytest.raises(FileError, match="holds another study"):
         bywire.study_report(out)
+
+
+def test_a_killed_worker_of_a_search_is_what_the_pool_says_it_is(study, tmp_path, monkeypatch):
+    """OpenTURNS, which asks for the cases, stands between the pool and who opened it."""
+    text = BRAKE.replace("subset-simulation", "importance-sampling")
+
+    def broken(pool, ahead, chunks):
+        raise BrokenProcessPool("terminated abruptly")
+        yield
+
+    monkeypatch.setattr(executor, "_as_completed", broken)
+    path = study(text.replace("cases_per_level = 640", ""), BENCH)
+    with pytest.raises(RunError, match=r"a process of the study was killed.*resume it"):
+        bywire.run_study(path, tmp_path / "out", workers=2)
