@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import threading
 import time
+import weakref
 
 import pytest
 
@@ -61,6 +62,22 @@ def test_interrupt_comes_before_the_error_that_it_may_have_caused():
 def test_blocks_may_be_nested():
     with pytest.raises(KeyboardInterrupt), interrupts_deferred(), interrupts_deferred():
         signal.raise_signal(signal.SIGINT)
+
+
+def test_an_interrupt_that_python_drops_is_raised_again(capsys: pytest.CaptureFixture[str]) -> None:
+    class Thing:
+        pass
+
+    def work() -> None:
+        thing = Thing()
+        reference = weakref.ref(thing, lambda _: signal.raise_signal(signal.SIGINT))
+        del thing  # what its callback raises has nowhere to go
+        assert reference() is None
+        time.sleep(5.0)
+
+    with pytest.raises(KeyboardInterrupt), interrupts_noted():
+        work()
+    assert "Traceback" not in capsys.readouterr().err
 
 
 def test_ignored_interrupts_stay_ignored():

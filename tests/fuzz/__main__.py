@@ -145,8 +145,8 @@ def alone(rng: Random, folder: Path) -> str:
 
 
 ONE_BY_ONE: dict[str, Callable[[Random, Path], str]] = {
-    "kills": partial(kills.case, sign=signal.SIGKILL),
-    "interrupts": partial(kills.case, sign=signal.SIGINT),
+    "kills": partial(kills.case, sign=signal.SIGKILL, forked=True),
+    "interrupts": partial(kills.case, sign=signal.SIGINT, forked=True),
     "alone": alone,
     "studies": partial(study_kills.case, forked=True),
 }

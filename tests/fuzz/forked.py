@@ -6,6 +6,7 @@ import os
 import signal
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Sequence
 from pathlib import Path
@@ -21,14 +22,23 @@ class Forked:
         The command, without its program.
     errors
         File that takes what it says of errors.
+    folder, temporary
+        Where it works, and where its temporary files go; as here unless given.
     """
 
-    def __init__(self, words: Sequence[str], errors: Path) -> None:
+    def __init__(
+        self, words: Sequence[str], errors: Path, folder: Path | None = None,
+        temporary: Path | None = None,
+    ) -> None:  # fmt: skip
         self.returncode: int | None = None
         self._errors = errors
         sys.stdout.flush()
         self.pid = os.fork()
         if not self.pid:
+            if folder is not None:
+                os.chdir(folder)
+            if temporary is not None:
+                os.environ["TMPDIR"], tempfile.tempdir = str(temporary), None
             _run(words, errors)
 
     def __enter__(self) -> Forked:
@@ -45,10 +55,14 @@ class Forked:
             self.returncode = os.waitstatus_to_exitcode(status) if pid else None
         return self.returncode
 
+    def send_signal(self, sign: signal.Signals) -> None:
+        """Send it a signal, unless it has ended."""
+        if self.poll() is None:
+            os.kill(self.pid, sign)
+
     def kill(self) -> None:
         """End it."""
-        if self.poll() is None:
-            os.kill(self.pid, signal.SIGKILL)
+        self.send_signal(signal.SIGKILL)
 
     def communicate(self, timeout: float) -> tuple[str, str]:
         """Wait for its end, and return what it said."""

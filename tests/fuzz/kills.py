@@ -12,6 +12,7 @@ from random import Random
 
 from bywire.core.scratch import PREFIX, UNFINISHED
 from bywire.report.result_folder import earlier_files
+from fuzz.forked import Forked
 from fuzz.judge import judged
 
 WRITERS = {
@@ -27,6 +28,13 @@ WRITERS = {
     "stability": ["study", "stability", "--out", "{out}"],
 }  # fmt: skip
 _LONGEST = 120.0
+_FORKED = 0.9  # of the commands
+_LATEST = {True: 1.5, False: 6.0}  # s after which they are ended: copies of this process are loaded
+
+
+def started(words: list[str], folder: Path, temporary: Path) -> Forked:
+    """Start a command in a copy of this process."""
+    return Forked(words, folder / "errors", folder, temporary)
 
 
 def command(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.Popen[str]:
@@ -37,8 +45,13 @@ def command(words: list[str], folder: Path, env: dict[str, str]) -> subprocess.P
     )  # fmt: skip
 
 
-def case(rng: Random, folder: Path, sign: signal.Signals | None = None) -> str:
-    """Write a result, end the writing of another midway, and say what is wrong with the folder."""
+def case(
+    rng: Random, folder: Path, sign: signal.Signals | None = None, forked: bool = False
+) -> str:
+    """Write a result, end the writing of another midway, and say what is wrong with the folder.
+
+    ``forked``: whether most commands are copies of this process, a few times as quick.
+    """
     sign = sign or rng.choice((signal.SIGINT, signal.SIGKILL))
     out, temporary = folder / "out", folder / "tmp"
     temporary.mkdir()
@@ -50,8 +63,11 @@ def case(rng: Random, folder: Path, sign: signal.Signals | None = None) -> str:
         made = judged(_words(names[0], out))  # here, which is quicker
         assert made.status in (0, 1, 2), made.wrong
     before = _listing(out)
-    with command(_words(second, out), folder, env) as process:
-        time.sleep(rng.uniform(0.1, 6.0))
+    forked = forked and rng.random() < _FORKED
+    words = _words(second, out)
+    process: Forked | subprocess.Popen[str]
+    with started(words, folder, temporary) if forked else command(words, folder, env) as process:
+        time.sleep(rng.uniform(0.02 if forked else 0.1, _LATEST[forked]))
         process.send_signal(sign)
         try:
             _, said = process.communicate(timeout=_LONGEST)
@@ -68,7 +84,8 @@ def case(rng: Random, folder: Path, sign: signal.Signals | None = None) -> str:
     wrong = _half(out, before)
     if wrong:
         return f"{second} after {names[0]}, {sign.name}: {wrong}"
-    _finished(command(_words("stribeck", out), folder, env))
+    words = _words("stribeck", out)
+    _finished(started(words, folder, temporary) if forked else command(words, folder, env))
     left = [p.name for p in (*temporary.iterdir(), *out.rglob("*")) if p.name.startswith(PREFIX)]
     return f"{second}: {left} stay after the next run" if left else _half(out, before)
 
@@ -77,7 +94,7 @@ def _words(name: str, out: Path) -> list[str]:
     return [word.format(out=out, name="drum") for word in WRITERS[name]]
 
 
-def _finished(process: subprocess.Popen[str]) -> None:
+def _finished(process: Forked | subprocess.Popen[str]) -> None:
     _, said = process.communicate(timeout=_LONGEST)
     assert process.returncode in (0, 1, 2), said
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import _thread
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -17,6 +18,7 @@ class _Interrupts:
 
     def __init__(self) -> None:
         self.arrived = False
+        self._hook = sys.unraisablehook
         self._is_pending = False
         self._again: threading.Timer | None = None
 
@@ -28,10 +30,21 @@ class _Interrupts:
         self.arrived = True
         self._is_pending = _in_library(frame)
         if self._is_pending:
-            self._again = threading.Timer(_PAUSE, _thread.interrupt_main)
-            self._again.daemon = True
-            self._again.start()
+            self._raise_again()
         raise KeyboardInterrupt
+
+    def swallowed(self, told: sys.UnraisableHookArgs) -> None:
+        """Be the hook for what Python drops, as what is raised while a weak reference ends."""
+        if isinstance(told.exc_value, KeyboardInterrupt):
+            self._is_pending = True
+            self._raise_again()
+        else:
+            self._hook(told)
+
+    def _raise_again(self) -> None:
+        self._again = threading.Timer(_PAUSE, _thread.interrupt_main)
+        self._again.daemon = True
+        self._again.start()
 
     def heard(self) -> None:
         """Raise it no more: somebody acts on it."""
@@ -63,7 +76,8 @@ def interrupts_noted() -> Iterator[Callable[[], bool]]:
     """Yield a function that tells whether Ctrl-C was pressed since the block began.
 
     It raises KeyboardInterrupt, as ever; but CasADi may make an error of its own of what is raised
-    where it calls Python, or nothing at all: then it is raised again until it is heard.
+    where it calls Python, or nothing at all, and Python itself drops what is raised while it tidies
+    up: then it is raised again until it is heard.
     """
     previous = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or not callable(previous):
@@ -72,9 +86,11 @@ def interrupts_noted() -> Iterator[Callable[[], bool]]:
     interrupts = _Interrupts()
     _current.append(interrupts)
     signal.signal(signal.SIGINT, interrupts.handle)
+    hook, sys.unraisablehook = sys.unraisablehook, interrupts.swallowed
     try:
         yield lambda: interrupts.arrived
     finally:
+        sys.unraisablehook = hook
         interrupts.heard()
         _current.remove(interrupts)
         signal.signal(signal.SIGINT, previous)
