@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import casadi as ca
@@ -51,19 +52,24 @@ def stiffness(model: Model, par: ParameterSet, d: Any, exact: bool) -> Any:
 
 
 def gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
-    """Return all overlaps as affine functions of x whose coefficients can be hoisted, shape (n,).
+    """Return all overlaps at a state, see `overlaps`."""
+    return overlaps(model, par)(x, xe)
 
-    Parameters
-    ----------
-    x, xe
-        State, and where geometry is taken, shape (nx,) each.
+
+def overlaps(model: Model, par: ParameterSet) -> Callable[[Any, Any], Any]:
+    """Return all overlaps as affine functions of x whose coefficients can be hoisted.
+
+    Returns
+    -------
+    callable
+        Of the state and of where geometry is taken, shape (nx,) each; gives shape (n,).
 
     Raises
     ------
     SolverError
         When they are not affine in the state.
     """
-    n = x.shape[0]
+    n = len(model.State._fields)
     state, fixed = SX.sym("x_", n), SX.sym("xe_", n)
     groups = model.gap(symbol_tuple(model.State, state), symbol_tuple(model.State, fixed), par)
     gap = column([d for group in groups for d in group])
@@ -71,8 +77,12 @@ def gaps(model: Model, par: ParameterSet, x: Any, xe: Any) -> Any:
         raise SolverError(f"{model.name}: the overlaps of contacts must be affine in the state")
     slope = ca.jacobian(gap, state)
     rest = ca.substitute(gap, state, SX.zeros(n))
-    rest, slope = ca.substitute([rest, slope], [fixed], [xe])
-    return slope @ x + rest
+
+    def at(x: Any, xe: Any) -> Any:
+        moved, steep = ca.substitute([rest, slope], [fixed], [xe])
+        return steep @ x + moved
+
+    return at
 
 
 def violations(model: Model, par: ParameterSet, d: Any, F: Any, exact: bool) -> list[Any]:

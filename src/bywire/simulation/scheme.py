@@ -7,6 +7,7 @@ is nonlinear gets one Newton step. Second order in smooth phases and through sti
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ import casadi as ca
 
 from bywire.core.model import Model
 from bywire.core.parameters import ParameterSet
-from bywire.simulation.contact_set import gaps, stiffness, violations
+from bywire.simulation.contact_set import overlaps, stiffness, violations
 from bywire.simulation.elimination import Reduced, eliminate
 from bywire.simulation.linear_form import Form, forms
 from bywire.simulation.set_valued import Projection, project_exact, project_fast, sliding
@@ -98,9 +99,11 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
-    K = stiffness(model, par, gaps(model, par, y, y), exact)
-    at_y = K @ gaps(model, par, y, y)
-    linear = _linearize(model, par, s, y, K)
+    gaps = overlaps(model, par)
+    closed = gaps(y, y)
+    K = stiffness(model, par, closed, exact)
+    at_y = K @ closed
+    linear = _linearize(model, par, s, y, K, gaps)
     bounds = _bounds(model, par, s, y, at_y)
     jump = column([high - low for low, high in bounds])
     mass = column(model.mass(symbol_tuple(model.State, y), par))
@@ -113,7 +116,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     x = column(
         [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
     )
-    overlap = gaps(model, par, middle, y)
+    overlap = gaps(middle, y)
     contact = K @ overlap
     flow = model.powers(
         symbol_tuple(model.State, middle),
@@ -144,7 +147,9 @@ def _turn(model: Model, start: Any, end: Any) -> Any:
     return turn
 
 
-def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _Linearized:
+def _linearize(
+    model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any, gaps: Callable[[Any, Any], Any]
+) -> _Linearized:
     n = s.x.shape[0]
     x, xe = SX.sym("x_", n), SX.sym("xe_", n)
     force = SX.sym("contact_", K.shape[0])
@@ -154,7 +159,7 @@ def _linearize(model: Model, par: ParameterSet, s: Symbols, y: Any, K: Any) -> _
     variables = ca.vertcat(x, force)
     curved = nonlinear(f, variables)[:n]
     bent = [any(nonlinear(f[i], variables)) for i in range(n)]
-    pressed = K @ gaps(model, par, x, y)
+    pressed = K @ gaps(x, y)
     at = column([y[k] if curved[k] else s.x[k] for k in range(n)])
     pressed = ca.densify(pressed)
     with_contact = ca.substitute(f, force, pressed)

@@ -17,7 +17,7 @@ def column(values: Sequence[Any]) -> Any:
 
 def scalars(vector: Any) -> tuple[Any, ...]:
     """Return the entries of a column."""
-    return tuple(vector[k] for k in range(vector.shape[0]))
+    return tuple(ca.vertsplit(vector)) if vector.shape[0] else ()
 
 
 def symbol_tuple(tuple_type: type, vector: Any) -> Any:
@@ -42,7 +42,8 @@ def nonlinear(expression: Any, variables: Any) -> list[bool]:
 
 def _jumping(expression: Any, variables: Any) -> set[int]:
     """Return the variables that an expression jumps with: no derivative of any order tells."""
-    others = [each for each in ca.symvar(expression) if not depends(each, variables)]
+    known = {each.element_hash() for each in ca.symvar(variables)}
+    others = [each for each in ca.symvar(expression) if each.element_hash() not in known]
     function = ca.Function("jumps", [variables, ca.vertcat(*others)], [ca.densify(expression)])
     codes = range(function.n_instructions())
     if not any(function.instruction_id(k) in _JUMPS for k in codes):
