@@ -194,5 +194,5 @@ def held(slip: Slip, ground: Surface, par: Parameters) -> Rising:
             ground.D * ops.sin(theta), magic_rising(math.pi - theta, ground)
         )
     peak = burckhardt_peak(ground)
-    mu = burckhardt(ops.fmax(slip, peak), ground)
+    mu = ops.where(slip > peak, burckhardt(slip, ground), burckhardt(peak, ground))
     return Rising(mu, ops.where(slip > peak, burckhardt_rising(mu, ground), peak))

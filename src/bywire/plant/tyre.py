@@ -130,7 +130,8 @@ def force_over_load(
     size = ops.where(slides > 0, u.mu_max, ops.fmin(held, u.mu_max))
     elastic = ops.where(x.u < 0, -size, size)
     slow = ops.fmin(ops.fabs(u.v) / par.v_low, 1.0)
-    damping = par.c_t * (u.v - u.v_wheel) * 0.5 * (1.0 + ops.cos(math.pi * slow))
+    faded = par.c_t * (u.v - u.v_wheel) * 0.5 * (1.0 + ops.cos(math.pi * slow))
+    damping = ops.where(slow < 1.0, faded, 0.0)  # a kernel's branch: most of a stop is fast
     return ops.clip(elastic + (1.0 - slides) * damping, -u.mu_max, u.mu_max)
 
 

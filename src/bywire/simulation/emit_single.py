@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bywire.simulation.branches import branch, branched
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
     PLAN,
@@ -69,6 +70,18 @@ def emit_single(stages: Stages) -> str:
     def block(order: list[int]) -> list[str]:
         return branching_statements(graph, order, name, "const double ")
 
+    def substep(order: list[int]) -> list[str]:
+        left, arms = branched(graph, order, frozenset(pass_roots))
+        lines: list[str] = []
+        while left:
+            at = next((k for k, node in enumerate(left) if node in arms), len(left))
+            lines += block(left[:at])
+            if at < len(left):
+                first, last = (substep(each) for each in arms[left[at]])
+                lines += branch(graph, left[at], (first, last), name)
+            left = left[at + 1 :]
+        return lines
+
     ticks = []
     for k, roots in enumerate(stages.ticks):
         lines = block(needed(graph, roots, lambda n: level[n] == 0))
@@ -104,7 +117,7 @@ def emit_single(stages: Stages) -> str:
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(block(mode.first), 6)}
       {indented(_mode_change(mode, graph, name), 6)}
-      {indented(block(mode.rest), 6)}
+      {indented(substep(mode.rest), 6)}
       if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
         {indented(_repeat(layout) + ahead, 8)}
       }} else {{

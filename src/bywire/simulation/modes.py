@@ -72,8 +72,8 @@ def modes(graph: Graph, roots: Sequence[Node], level: Levels) -> Modes:
     first = needed(graph, atoms, lambda n: level[n] < 2)
     early = frozenset(first)
     values = [n for n in order if n in deciding and n not in early and not _is_truth(graph, n)]
-    saved = sum(_cost(graph, n) for n in values if level[n] == 2) - 2.0 * len(atoms)
-    if saved < _WORTH_MODE * sum(_cost(graph, n) for n in substep):
+    saved = sum(cost(graph, n) for n in values if level[n] == 2) - 2.0 * len(atoms)
+    if saved < _WORTH_MODE * sum(cost(graph, n) for n in substep):
         return Modes([], [], [], substep)
     late = frozenset(values)
     return Modes(first, atoms, values, [n for n in substep if n not in early and n not in late])
@@ -83,7 +83,8 @@ def _is_truth(graph: Graph, node: Node) -> bool:
     return graph.nodes[node].op in _TRUTHS
 
 
-def _cost(graph: Graph, node: Node) -> float:
+def cost(graph: Graph, node: Node) -> float:
+    """Return about how long an operation takes, a product being 1."""
     return _COST.get(graph.nodes[node].op, 1.0)
 
 
@@ -110,7 +111,7 @@ def _poor_atoms(
     """Return truth values from which too little follows."""
     worth: dict[Node, float] = {}
     for node in order:
-        price = 0.0 if graph.nodes[node].op in _FREE else _cost(graph, node)
+        price = 0.0 if graph.nodes[node].op in _FREE else cost(graph, node)
         for atom in deciding.get(node, ()):
             worth[atom] = worth.get(atom, 0.0) + price
     return {atom for atom, value in worth.items() if value < _WORTH_ATOM}
