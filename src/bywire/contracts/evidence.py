@@ -8,6 +8,7 @@ import re
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -107,16 +108,23 @@ def place_of(subject: Any) -> Place:
         return Place(subject.__file__ or subject.__name__, 0)
     subject = inspect.unwrap(subject) if callable(subject) else type(subject)
     try:
-        return Place(inspect.getsourcefile(subject) or "?", inspect.getsourcelines(subject)[1])
+        return Place(inspect.getsourcefile(subject) or "?", _source(subject)[1])
     except (OSError, TypeError):
         return Place(getattr(subject, "__module__", "?"), 0)
+
+
+@lru_cache(maxsize=1024)
+def _source(subject: Any) -> tuple[list[str], int]:
+    """Return the lines of a function or class; for a class its whole file is parsed."""
+    return inspect.getsourcelines(subject)
 
 
 def field_place(cls: type[Any], name: str) -> Place:
     """Return the line on which a class declares a field, else that of the class."""
     at = place_of(cls)
+    declaring: Any = cls
     try:
-        lines, first = inspect.getsourcelines(cls)
+        lines, first = _source(declaring)
     except (OSError, TypeError):
         return at
     wanted = re.compile(rf"\s+{re.escape(name)}\s*:")

@@ -7,6 +7,7 @@ import itertools
 import math
 import typing
 from collections.abc import Callable, Iterator, Mapping
+from functools import lru_cache
 from typing import Any
 
 import casadi as ca
@@ -75,7 +76,9 @@ class Sampler:
         self.annotations = dict(annotations)
         self.choices = choices
         self._rng = np.random.default_rng(seed)
-        self._known = {k: v for a in annotations for k, v in numbers(a, annotations[a]).items()}
+        each = {name: numbers(name, annotation) for name, annotation in annotations.items()}
+        self._known = {k: number for known in each.values() for k, number in known.items()}
+        self._of = {name: tuple(known.values()) for name, known in each.items()}
 
     def sample(self) -> Arguments:
         """Return one sample of all arguments, as floats."""
@@ -94,7 +97,7 @@ class Sampler:
         if is_parameters(annotation):
             return self._parameters(name, annotation)
         if is_signals(annotation):
-            return annotation(*(self._draw(n) for n in numbers(name, annotation).values()))
+            return annotation(*(self._draw(n) for n in self._of[name]))
         return self._draw(self._known[name])
 
     def _parameters(self, name: str, cls: type[ParameterSet]) -> ParameterSet:
@@ -128,6 +131,7 @@ class Sampler:
         return number.low + (number.nominal - number.low) * 10 ** self._rng.uniform(-0.3, 0.3)
 
 
+@lru_cache(maxsize=4096)
 def is_table(cls: type[ParameterSet], name: str) -> bool:
     """Tell whether the leaf of a parameter class is a table."""
     *groups, last = name.split(".")
