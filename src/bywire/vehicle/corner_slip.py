@@ -118,7 +118,12 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         rules, out = abs_rules.output(rules, view, par.T_s, par.rules)  # type: ignore[assignment]
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
-    return m._replace(M_left=left, abs=out.lowered)
+    # Near standstill slip tells of a car that rocks on its tyre: the motors would follow it
+    # against a wedge that the standing disc holds. What was left stays, unless less is demanded.
+    holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
+    kept = ops.fmin(before.M_left, m.M_most)
+    left = ops.where(holds > 0.5, kept, left)
+    return m._replace(M_left=left, abs=ops.where(left < m.M_most, 1.0, 0.0))
 
 
 def _measured(r: Readings, m: Any, par: Parameters) -> Any:

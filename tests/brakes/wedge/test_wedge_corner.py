@@ -76,6 +76,16 @@ def test_slip_control_stands_over_the_moment_control(panic):
     assert np.abs(left - left[0]).max() < 1e-6 * float(run["E_body"][0])
 
 
+def test_motors_rest_where_the_wheel_stands(panic):
+    # The sensor shows the tyre's moment then, and the car rocks: neither moves the motors much.
+    run = panic.recording
+    stands = run.sel(time=slice(float(run["time"][run["Omega"] == 0].min()), None))
+    assert float(abs(stands["i_1"]).max()) < 11.0
+    assert float(abs(stands["i_2"]).max()) < 11.0
+    assert float(abs(stands["M_set"] - stands["M_set"][0]).max()) < 1e-9
+    assert float(abs(stands["theta_ref"] - stands["theta_ref"][0]).max()) < 0.05
+
+
 def test_without_it_the_wheel_locks_and_slides_as_far_as_the_trial_says():
     given = {"ecu.abs": "off", "options.duration": "8 s"}
     result = bywire.run("corner-panic", given, estimate_error=False)

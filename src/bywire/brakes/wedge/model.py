@@ -218,10 +218,10 @@ class WedgeBrake(Assembly[WedgeParameters, control.Memory]):
         return (Task("moment", T.T_slow, self._moment), position)
 
     def _moment(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
-        return control.moment_tick(_readings(x, par), m, u, par)
+        return control.moment_tick(readings(x, par), m, u, par)
 
     def _position(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
-        return control.position_tick(_readings(x, par), m, u, par)
+        return control.position_tick(readings(x, par), m, u, par)
 
     def _current(self, x: Any, m: control.Memory, u: control.Stimulus, par: Par) -> control.Memory:
         return control.current_tick(m, u, par)
@@ -250,7 +250,8 @@ def state_at(x: float, par: Par) -> Any:
     )
 
 
-def _readings(x: Any, par: Par) -> control.Readings:
+def readings(x: Any, par: Par) -> control.Readings:
+    """Return what the controllers see at a tick."""
     return control.Readings(
         theta_1=shaft_encoder.reading(x.theta_1, par.encoder),
         theta_2=shaft_encoder.reading(x.theta_2, par.encoder),

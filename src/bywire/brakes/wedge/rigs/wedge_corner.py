@@ -11,7 +11,7 @@ from typing import Any, ClassVar, Self
 from bywire.brakes.wedge import control
 from bywire.brakes.wedge.elements import wedge_caliper
 from bywire.brakes.wedge.laws import moment_control
-from bywire.brakes.wedge.model import WedgeBrake, state_at
+from bywire.brakes.wedge.model import WedgeBrake, readings, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import memory_at
 from bywire.core import ops
@@ -91,7 +91,7 @@ class WedgeCorner(HotCorner[WedgeCornerParameters, Any], WedgeBrake):
 
     def _moment(self, x: Any, m: Any, u: control.Stimulus, par: Any) -> Any:
         left = u if par.ecu.abs == "off" else u._replace(M_set=m.M_left)
-        return super()._moment(x, m, left, par)
+        return super()._moment(x, _contact_tracked(x, m, par), left, par)
 
     def rest(self, par: Any) -> tuple[Any, Any]:
         """Return the vehicle standing, the brake parked."""
@@ -109,6 +109,20 @@ def _slip(x: Any, m: Any, u: control.Stimulus, par: WedgeCornerParameters) -> An
         ops.where((m.mode - moment_control.MOMENT) ** 2 < 0.25, 1.0, 0.0),
     )  # fmt: skip
     return corner_slip.tick(seen, m, u.M_set, par.ecu)
+
+
+def _contact_tracked(x: Any, m: Any, par: WedgeCornerParameters) -> Any:
+    """Return the memory with the angle of contact as the measured moment tells it.
+
+    While the wheel turns. Once it stands the moment is believed from the angle: from where it was,
+    or the motors would push by what the believed stiffness is off, against a wedge that rests.
+    """
+    law, seen = par.control.moment, readings(x, par)
+    measured = ops.where(seen.Omega < 0, -1.0, 1.0) * seen.M
+    contact = m.direction * 0.5 * (seen.theta_1 + seen.theta_2) - measured / law.slope_hat
+    turns = ops.where(ops.fabs(seen.Omega) < law.Omega_still, 0.0, 1.0)
+    braked = ops.where((m.mode - moment_control.MOMENT) ** 2 < 0.25, turns, 0.0)
+    return m._replace(theta_c=ops.where(braked > 0.5, contact, m.theta_c))
 
 
 def at_speed(
