@@ -18,9 +18,9 @@ from bywire.core.scratch import process_folder, scratch_folder
 from bywire.core.signals import Signal, signals_of
 from bywire.export.exported import Exported
 from bywire.export.initial_values import start_source
-from bywire.export.interface import interface
+from bywire.export.interface import Interface, interface
 from bywire.export.model_header import model_header
-from bywire.export.variables import finite_range
+from bywire.export.variables import finite_range, parameter_variables
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT
 from bywire.simulation.run import sampled_stimulus
 
@@ -46,7 +46,7 @@ def module_files(
     """
     start, reads = start_source(made)
     faces = interface(made, "brake", reads)
-    description = json.dumps(_description(made, name, bool(start), reads), indent=1)
+    description = json.dumps(_description(made, name, bool(start), faces), indent=1)
     return {
         f"{name}.wasm": _compiled(made.kernel, model_header(made, faces, start, name), further),
         f"{name}.json": description.encode(),
@@ -88,15 +88,14 @@ def _compiled(kernel: str, header: str, further: Mapping[str, str]) -> bytes:
 
 
 def _description(
-    made: Exported, name: str, begins_anywhere: bool, reads: frozenset[int]
+    made: Exported, name: str, begins_anywhere: bool, faces: Interface
 ) -> dict[str, Any]:
     """Return what the loader, and who uses it, must know of a run."""
     schedule, par = made.schedule, made.run.par
     count = made.program.sizes.parameters  # all: the loader fills the kernel's whole vector
-    faces = interface(made, "brake", frozenset(range(count)))
-    used = {each.name for each in interface(made, "brake", reads).of("parameter")}
+    used = {each.name for each in faces.of("parameter")}
     parameters = []
-    for each in faces.of("parameter"):
+    for each in parameter_variables(made, frozenset(range(count)), frozenset()):
         low, high = (None, None) if each.leaf is None else finite_range(each.leaf)
         parameters.append({
             "name": each.name, "unit": each.unit, "start": each.start, "low": low, "high": high,
