@@ -77,7 +77,7 @@ def test_each_case_is_as_if_it_were_alone_for_every_family(rows):
 def test_c_gives_the_bits_of_python_on_any_samples(family, monkeypatch):
     random, compiled = np.random.default_rng(5), 0
     every: set[str] = set()
-    for _ in range(80):
+    for _ in range(60):
         few, setting = _drawn(random, family)
         settings = [setting] * few["y"].values.shape[0]
         by_c = evaluate_cases(family, few, settings)
@@ -90,7 +90,7 @@ def test_c_gives_the_bits_of_python_on_any_samples(family, monkeypatch):
             notes = [figure.told(k) for k in range(len(settings))]
             assert [by_c[name].told(k) for k in range(len(settings))] == notes
             every |= {note.split()[0] for note in notes if note}
-    assert compiled > 40  # the others have samples that define nothing
+    assert compiled > 30  # the others have samples that define nothing
     assert len(every) >= {"step_response": 6, "extremes": 1}.get(family, 2)
 
 

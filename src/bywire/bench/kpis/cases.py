@@ -46,7 +46,8 @@ class FamilyJudge:
 
         ``rows``: signals of shape (cases, time); ``options``: of each case, of one structure.
         """
-        known = {id(chosen): self.settings(chosen) for chosen in options}  # mostly of one
+        distinct = {id(chosen): chosen for chosen in options}  # mostly one
+        known = {number: self.settings(chosen) for number, chosen in distinct.items()}
         each = [known[id(chosen)] for chosen in options]
         given = [evaluate_cases(name, rows, [s[name] for s in each]) for name in each[0]]
         return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
