@@ -36,7 +36,8 @@ CHECKS = {
     "layers": ["lint-imports"],
     "tests": [*PYTEST, *BY_FILE, "--assert=plain", "-m", "not trust"],
 }
-AGAIN = {"tests": ["pytest", "-q", "--last-failed", "--last-failed-no-failures", "none"]}
+LAST = ["--last-failed", "--last-failed-no-failures", "none"]
+AGAIN = {"tests": ["pytest", "-q", *LAST, "-m", "not trust"]}
 TYPES = ["mypy"]  # on one core alone, for most of a minute: beside the others
 TRUST = {"trust": [*PYTEST, "--dist", "worksteal", "-m", "trust"]}
 

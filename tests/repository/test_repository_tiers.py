@@ -49,6 +49,15 @@ def test_recipe_holds_the_lints_that_tests_rely_on() -> None:
     assert ["lint-imports"] in TIERS
 
 
+def test_what_failed_runs_again_with_rewritten_assertions() -> None:
+    """They tell the values; the whole tier is run without them, in less time."""
+    (title, again), (*_, last) = *TASKS["AGAIN"].items(), TASKS["CHECKS"]
+    assert title == last
+    assert "--assert=plain" in TASKS["CHECKS"][title]
+    assert "--assert=plain" not in again
+    assert "--last-failed" in again
+
+
 def test_every_published_study_can_be_made_again() -> None:
     published = {path.stem for path in (ROOT / "docs" / "trust").glob("*.json")}
     assert published == set(TASKS["STUDIES"])
