@@ -28,7 +28,8 @@ def test_step_falls_on_a_tick_and_on_a_row(settle):
     plain, odd = braking(math.ceil(settle * 1e3 - 1e-9) * 1e-3), braking(settle)
     assert 0.0 in odd.recording["time"].values
     for name in ("dead_time", "rise_time", "overshoot"):
-        assert odd.kpi(name).value == plain.kpi(name).value
+        # Times count from another start, whose last digit is another one.
+        assert odd.kpi(name).value == pytest.approx(plain.kpi(name).value, rel=1e-13)
 
 
 @pytest.mark.parametrize("record", ["0.2 ms", "5 ms"])
