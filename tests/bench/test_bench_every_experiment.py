@@ -44,10 +44,7 @@ LARGE = (
 )  # fmt: skip
 """kernels in lanes that no other test needs, and long runs; other experiments of the same models
 have their figures computed in the same way, and all that are computed by families are left"""
-WARNED = {
-    "release": ["retracted stop"],  # its port is not modeled
-    "corner-panic": ["the current limit of 20 A was reached at t = 3.7"],  # once the wheel stands
-}
+WARNED = {"release": ["retracted stop"]}  # its port is not modeled
 STEP = '[stimulus]\nkind = "step"\nstart = "0 {0}"\nend = "1 {0}"\nt_step = "0.1 s"\n'
 
 
