@@ -119,7 +119,7 @@ def tick(r: Readings, m: Any, M_set: float, par: Parameters) -> Any:
         m = m._replace(**{f"{name}_x": value for name, value in rules._asdict().items()})
     left = ops.fmax(k * out.p, ops.fmin(par.M_least, m.M_most))
     # Near standstill slip tells of a car that rocks on its tyre: the motors would follow it
-    # against a wedge that the standing disc holds. What was left stays, unless less is demanded.
+    # against a brake that the standing disc holds. What was left stays, unless less is demanded.
     holds = ops.where(m.v_hat < par.vehicle_speed.v_still, before.abs, 0.0)
     kept = ops.fmin(before.M_left, m.M_most)
     left = ops.where(holds > 0.5, kept, left)
