@@ -16,6 +16,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
+from bywire.core.interrupts import interrupts_deferred
 from bywire.core.scratch import replacing
 from bywire.data.file_format import Column, FileFormat, ReadOptions, no_progress
 from bywire.data.format_registry import head_of
@@ -52,7 +53,8 @@ def write_recording(recording: xr.Dataset, path: str | Path) -> Path:
     path = Path(path)
     encoding = {str(name): {"zlib": True, "complevel": 1} for name in recording.data_vars}
     try:
-        with replacing(path) as fresh:
+        # Ctrl-C within xarray's locks would leave one locked, on which the closing waits for ever.
+        with replacing(path) as fresh, interrupts_deferred():
             recording.to_netcdf(fresh, engine="netcdf4", encoding=encoding)
     except (OSError, RuntimeError, ValueError) as error:  # RuntimeError: from the HDF library
         reason = getattr(error, "strerror", None) or str(error)

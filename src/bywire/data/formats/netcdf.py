@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from bywire.core.errors import FileError
+from bywire.core.interrupts import interrupts_deferred
 from bywire.data.file_format import Column, FileFormat, Progress, ReadOptions
 
 if TYPE_CHECKING:
@@ -81,7 +82,8 @@ def _write(dataset: xr.Dataset, path: Path, progress: Progress) -> None:
     names = [*dataset.data_vars, *dataset.coords]
     packed = {"zlib": True, "complevel": 1, "_FillValue": None}
     progress(f"writing {path.name}", 0.0)
-    dataset.to_netcdf(path, engine="netcdf4", encoding={str(name): packed for name in names})
+    with interrupts_deferred():  # within xarray's locks, Ctrl-C would leave one locked
+        dataset.to_netcdf(path, engine="netcdf4", encoding={str(name): packed for name in names})
     progress(f"writing {path.name}", 1.0)
 
 
