@@ -159,7 +159,7 @@ class HydraulicBrake(Assembly[Parameters, Memory]):
         return ((-gears - per_force * seal.F_p, gears + per_force * seal.F_n),)
 
     def power(self, w):
-        """Return the powers that no part gives; the reaction holds friction and cup seal."""
+        """Return the powers that no part gives: what the supply gives, what the friction takes."""
         return {
             "E_source": w.m.v * w.motor.x.i,
             "E_friction": -w.reaction[0] * w.shaft.x.omega,

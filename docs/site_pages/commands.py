@@ -6,15 +6,13 @@ import re
 from collections.abc import Iterator
 from typing import Any
 
-from typer.main import get_command
-
-from bywire.cli.app import app
+from bywire.cli.app import program
 from site_pages.markdown import plain, table_lines
 
 
 def commands() -> dict[str, Any]:
     """Return what a user types -> the command, subcommands in the place of their group."""
-    return dict(_leaves("bywire", get_command(app)))
+    return dict(_leaves("bywire", program()))
 
 
 def _leaves(words: str, command: Any) -> Iterator[tuple[str, Any]]:

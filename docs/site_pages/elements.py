@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import importlib.util
 import inspect
 import pkgutil
 import typing
@@ -25,11 +26,9 @@ def modules() -> dict[str, dict[str, ModuleType]]:
     rooms = {"Elements": _inside(plant), "Control laws": _inside(control)}
     for brake in brakes().values():
         for folder, title in _ROOMS.items():
-            try:
-                package = importlib.import_module(f"{brake.module}.{folder}")
-            except ModuleNotFoundError:
-                continue
-            rooms[f"{title} of the {brake.name}"] = _inside(package)
+            name = f"{brake.module}.{folder}"
+            if importlib.util.find_spec(name) is not None:
+                rooms[f"{title} of the {brake.name}"] = _inside(importlib.import_module(name))
     return rooms
 
 

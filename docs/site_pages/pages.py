@@ -70,10 +70,12 @@ def _write(path: Path, text: str) -> None:
 
 
 def _digest() -> str:
-    """Return a digest of the package's sources and of these modules."""
+    """Return a digest of all that these pages are made of."""
     digest = hashlib.sha256()
-    for folder in (ROOT / "src", Path(__file__).parent):
-        for path in sorted(p for p in folder.rglob("*") if p.is_file() and p.suffix != ".pyc"):
-            digest.update(path.relative_to(ROOT).as_posix().encode())
-            digest.update(path.read_bytes())
+    folders = (ROOT / "src", Path(__file__).parent, ROOT / "benches", ROOT / "studies")
+    inside = (p for folder in folders for p in folder.rglob("*") if p.suffix != ".pyc")
+    single = (ROOT / "CHANGELOG.md", ROOT / "examples" / "emb_caliper" / "README.md")
+    for path in sorted({*(p for p in inside if p.is_file()), *single}):
+        digest.update(path.relative_to(ROOT).as_posix().encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()

@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.main import get_command
 
 import bywire
 from bywire import authoring
 from bywire.bench.kpis.registry import definitions
-from bywire.cli.app import app
+from bywire.cli.app import program
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.parameters import leaf_fields
 
@@ -104,7 +103,7 @@ def parsed(words: list[str]) -> None:
     """Parse a command line as it would be started, and start nothing."""
     if words[0] == "--system":
         words = words[2:]
-    command: Any = get_command(app)
+    command: Any = program()
     while hasattr(command, "commands") and words and words[0] in command.commands:
         command, words = command.commands[words[0]], words[1:]
     if words != ["--install-completion"]:
