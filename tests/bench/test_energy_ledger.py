@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from bywire.api.run import energy_table, run
+from bywire.api.run import run
+from bywire.api.run_sections import energy_table
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers, role_attributes
 from bywire.core.signals import Role

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bywire.report.decimation import COLUMNS, decimate, phases
+from bywire.report.decimation import COLUMNS, decimate, lasting_phases, phases
 
 
 def test_single_sample_peaks_survive() -> None:
@@ -73,6 +73,19 @@ def test_phases_too_short_to_see_become_columns_of_the_right_share() -> None:
     assert sum(end - start for start, end in spans) == pytest.approx(30.0, abs=0.3)
 
 
+def test_phases_that_follow_closely_are_one_with_its_share() -> None:
+    """As under dither: 60 short ones a second, then one that lasts."""
+    time = np.linspace(0.0, 10.0, 100_001)
+    dithered = (time < 4.0) & (np.mod(60.0 * time, 1.0) < 0.25)
+    again, lasting = lasting_phases(time, dithered | (time >= 6.0) & (time < 8.0))
+    assert (again.start, again.end) == pytest.approx((0.0, 4.0), abs=0.02)
+    assert again.share == pytest.approx(0.25, abs=0.01)
+    assert (lasting.start, lasting.end, lasting.share) == pytest.approx((6.0, 8.0, 1.0))
+    apart = lasting_phases(time, (time < 1.0) | (time >= 2.0))
+    assert [each.share for each in apart] == pytest.approx([1.0, 1.0])
+
+
 @pytest.mark.parametrize("count", [0, 1])
 def test_nothing_lasts_in_less_than_two_samples(count: int) -> None:
-    assert phases(np.zeros(count), np.ones(count, dtype=bool)) == []
+    for spans in (phases, lasting_phases):
+        assert spans(np.zeros(count), np.ones(count, dtype=bool)) == []

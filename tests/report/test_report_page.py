@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
+import json
 import re
 from collections import Counter
 from functools import partial
@@ -115,9 +118,13 @@ def test_page_says_what_it_was_given(page: str) -> None:
     assert '<a href="#section-2">Plant</a>' in page
 
 
-def test_page_loads_nothing_and_runs_nothing(page: str) -> None:
+def test_page_loads_nothing_and_runs_its_zoom_alone(page: str) -> None:
     checker = parsed(page)
-    assert not {"script", "link", "iframe", "object"} & {tag for tag, _ in checker.tags}
+    assert not {"link", "iframe", "object"} & {tag for tag, _ in checker.tags}
+    (script,) = re.findall(r"<script>(.*?)</script>", page, re.DOTALL)
+    digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    assert f"default-src 'none'; script-src 'sha256-{digest}';" in page
+    assert "script" not in page_html("t", "s", [Section("Text", [Paragraph("no figure")])])
     for _, attributes in checker.tags:
         for name in ("src", "href", "xlink:href", "data", "srcset"):
             assert (attributes.get(name) or "#").startswith(("#", "data:image/png;base64,"))
@@ -125,6 +132,17 @@ def test_page_loads_nothing_and_runs_nothing(page: str) -> None:
     assert "http://" not in page
     assert "https://" not in page
     assert "@import" not in page
+
+
+def test_a_figure_says_where_its_axes_lie_and_what_they_span() -> None:
+    figure = Figure()
+    axes = figure.add_axes((0.1, 0.2, 0.5, 0.6))
+    axes.set(xlim=(2.0, 4.0), ylim=(1.0, 1e3), yscale="log")
+    (html,) = inline_figures([(figure, "axes")])
+    said = parsed(html).tags[0][1]["data-axes"]
+    assert json.loads(said or "") == [
+        {"box": [0.1, 0.2, 0.6, 0.8], "x": [2.0, 4.0, False], "y": [1.0, 1e3, True]}
+    ]
 
 
 def test_hostile_text_is_only_text(recording: xr.Dataset) -> None:
@@ -139,7 +157,8 @@ def test_hostile_text_is_only_text(recording: xr.Dataset) -> None:
     )
     checker = parsed(html)
     assert (checker.open, checker.faults) == ([], [])
-    assert not {"script", "img"} & {tag for tag, _ in checker.tags}
+    tags = [tag for tag, _ in checker.tags]
+    assert (tags.count("script"), tags.count("img")) == (1, 0)
     assert not re.search(r"[\x00-\x09\x0b-\x1f\u202e]", html)
     assert "alert(1)" in checker.text
 
@@ -170,8 +189,9 @@ def test_figures_beyond_the_budget_become_pixels_largest_first(recording: xr.Dat
     vector = inline_figures(figures)
     assert [html[:4] for html in vector] == ["<svg", "<svg"]
     mixed = inline_figures(figures, budget=sum(map(len, vector)) - 1)
-    assert [html[:4] for html in mixed] == ["<svg", "<img"]
-    assert 'alt="large"' in mixed[1]
+    assert ["data:image/png" in html for html in mixed] == [False, True]
+    assert 'aria-label="large"' in mixed[1]
+    assert 'viewBox="0 0 320 160"' in mixed[1]
     assert mixed == inline_figures(figures, budget=sum(map(len, vector)) - 1)
 
 

@@ -9,7 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
-from bywire.api.run_remarks import remarks
+from bywire.api.run_remarks import remarks, unexpected
+from bywire.api.run_sections import energy, how_it_was_made, outcome
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
@@ -18,13 +19,11 @@ from bywire.bench.requirements import Verdict
 from bywire.bench.result import Result
 from bywire.bench.result_folder import kpi_record, verdict_record
 from bywire.bench.running import Progress
-from bywire.core.catalog import PARAMETER_SETS
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import (
     Attachment,
     Banner,
     Block,
-    Details,
     Document,
     FigureBlock,
     Listing,
@@ -33,17 +32,12 @@ from bywire.report.document import (
     TableBlock,
     recording_file,
 )
-from bywire.report.parameter_rows import parameter_rows
-from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.tables import KpiRow, kpi_table
 from bywire.report.wording import amount, measured_amount
 
 if TYPE_CHECKING:
     from bywire.api.run_over import BenchRange
     from bywire.report.bench_figures import Shown
-
-RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
-"""attributes of a recording that say how it was made"""
-
 
 @dataclass(frozen=True)
 class BenchResult(Result, Answer):
@@ -89,20 +83,22 @@ class BenchResult(Result, Answer):
         return ledgers
 
     def document(self) -> Document:
-        """Return key figures, verdicts, figures, energy, and how it was made."""
+        """Return verdict and changes, figures, key figures, energy, and how it was made."""
         bench = self.bench
         table = TableBlock(kpi_table(self.rows))
         said = [*remarks(self), *self._unplayed()]
         notes: list[Block] = [Paragraph(f"Warning: {text}.") for text in self.warnings]
-        notes += [Listing(said)] if said else []
+        beside = [*unexpected(self), *self._unplayed()]  # the page has a table of changes
+        notes += [Listing(beside)] if beside else []
         return Document(
             bench.name or bench.experiment,
             f"{bench.definition.summary}; parameter set {bench.parameters}",
             sections=lambda: [
-                Section("Key figures", [*notes, table]),
+                outcome(self, self.rows, notes),
                 Section("Figures", self._figures()),
-                *self._energy(),
-                self._made(),
+                Section("Key figures", [table]),
+                *energy(self.ledgers()),
+                how_it_was_made(self, self._step_errors()),
             ],
             brief=[*([Listing(said)] if said else []), *([table] if self.kpis else [])],
             data={**self._data(), "remarks": said},
@@ -136,42 +132,6 @@ class BenchResult(Result, Answer):
 
         shown: list[Shown] = bench_figures(self)
         return [FigureBlock(each.figure, each.caption, each.name) for each in shown]
-
-    def _energy(self) -> list[Section]:
-        """Return the books of every run that keeps any."""
-        blocks: list[Block] = []
-        for label, books in self.ledgers().items():
-            blocks += [Paragraph(f"{label}, from time zero on:"), TableBlock(energy_table(books))]
-        return [Section("Energy", blocks)] if blocks else []
-
-    def _made(self) -> Section:
-        bench, cited = self.bench, PARAMETER_SETS.find(self.bench.parameters)
-        attrs = next(iter(self.recordings.values())).attrs if self.recordings else {}
-        kept = "; ".join(f"{key} {attrs[key]}" for key in RECORDED if key in attrs)
-        options = parameter_table(parameter_rows(bench.chosen_options))
-        parameters = parameter_table(parameter_rows(bench.par, cited.values))
-        return Section(
-            "How it was made",
-            [
-                Paragraph(f"Source of the parameters: {cited.source}."),
-                Paragraph(f"{kept}."),
-                *self._signal_errors(),
-                Details("Options of the experiment", [TableBlock(options)]),
-                Details("All parameters", [TableBlock(parameters)]),
-            ],
-        )
-
-    def _signal_errors(self) -> list[Details]:
-        """Return how far each recorded signal is off, where that was estimated."""
-        rows = [
-            (label, name, *(amount(error[key], error["unit"], 2) for key in ("rms", "max")))
-            for label, signals in self._step_errors().items()
-            for name, error in signals.items()
-        ]
-        if not rows:
-            return []
-        table = text_table(["run", "signal", "rms", "largest"], rows)
-        return [Details("Error of recorded signals from the step", [TableBlock(table)])]
 
     def _step_errors(self) -> dict[str, dict[str, dict[str, Any]]]:
         """Return the error from the step of every signal, by run and name."""
@@ -333,17 +293,3 @@ def _remark(verdict: Verdict) -> str:
         f"requirement not met: {verdict.kpi} is {amount(verdict.value, verdict.unit)}{wanted}"
         + (f" ({verdict.note})" if verdict.note else "")
     )
-
-
-def energy_table(books: Ledger) -> Table:
-    """Return a ledger as a table: place, energy, share of what was turned over."""
-    total = books.turnover
-
-    def row(side: str, label: str, energy: float) -> tuple[str, str, str, str]:
-        share = f"{100.0 * energy / total:.3g} %" if total > 0 else "-"
-        return side, label, amount(energy, "J"), share
-
-    rows = [row("from", posting.label, posting.energy) for posting in books.sources]
-    rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
-    rows.append(row("", "closing error", books.closing_error))
-    return text_table(["", "place", "energy", "share of what was given"], rows)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import math
 
+from bywire.api.run_changes import parameter_changes
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.result import Result
-from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.parameters import leaf_fields
-from bywire.report.tables import value_text
 from bywire.report.wording import amount
 
 _MOST = {"share_stuck": 0.5, "share_sat_current": 0.1, "share_sat_duty": 0.1}
@@ -22,7 +20,12 @@ def remarks(result: Result) -> list[str]:
     A run is remarkable that is stuck more than half of its time, at a limit more than a tenth of
     it, or that ends off its set point by more than a twentieth of the step.
     """
-    return [*_faults(result), *_changes(result), *_shares(result), *_set_point(result)]
+    return [*_changes(result), *unexpected(result)]
+
+
+def unexpected(result: Result) -> list[str]:
+    """Return the same without what was changed."""
+    return [*_faults(result), *_shares(result), *_set_point(result)]
 
 
 def _faults(result: Result) -> list[str]:
@@ -42,18 +45,13 @@ def _faults(result: Result) -> list[str]:
 
 
 def _changes(result: Result) -> list[str]:
-    bench = result.bench
-    cited, par = PARAMETER_SETS.find(bench.parameters).parameters().flat(), bench.par.flat()
-    leaves = leaf_fields(type(bench.par))
-    units = {name: leaves[name].unit.symbol if name in leaves else "1" for name in par}
-    texts = []
-    for name in (name for name in par if par[name] != cited[name]):
-        now, before = (value_text(each[name], units[name]) for each in (par, cited))
-        texts.append(f"{name} = {now} (was {before})")
+    texts = [
+        f"{each.name} = {each.now} (was {each.before})" for each in parameter_changes(result.bench)
+    ]
     if not texts:
         return []
     more = f" and {len(texts) - _SHOWN} more" if len(texts) > _SHOWN else ""
-    return [f"changed from {bench.parameters}: {', '.join(texts[:_SHOWN])}{more}"]
+    return [f"changed from {result.bench.parameters}: {', '.join(texts[:_SHOWN])}{more}"]
 
 
 def _shares(result: Result) -> list[str]:

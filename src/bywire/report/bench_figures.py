@@ -93,7 +93,8 @@ def _time_traces(result: Result) -> list[Shown]:
         Shown(
             f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
             time_traces(recording),
-            f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck.",
+            f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck; "
+            "faintly: again and again.",
         )
         for label, recording in result.recordings.items()
         if "time" in recording.dims

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -71,8 +73,6 @@ def phases(
     list
         Start and end of every span [s], ascending, without overlap.
     """
-    if len(time) < 2:
-        return []
     spans = _spans(time, active)
     if len(spans) <= columns // 2:
         return spans
@@ -83,6 +83,44 @@ def phases(
     )
     edges = np.linspace(time[0], time[-1], columns + 1)
     return _spans(edges, np.append(share >= 0.5, False))
+
+
+@dataclass(frozen=True)
+class Phase:
+    """A time over which a mode is active, or active now and again.
+
+    ``start``, ``end``: times [s]; ``share``: of that time in which it is active, 1 where it lasts.
+    """
+
+    start: float
+    end: float
+    share: float
+
+
+def lasting_phases(
+    time: Array, active: NDArray[np.bool_], columns: int = COLUMNS, near: int = 16
+) -> list[Phase]:
+    """Return the time spans in which a mode is active, those that follow closely as one.
+
+    Parameters
+    ----------
+    time, active, columns
+        As in `phases`.
+    near
+        Pixel columns between two spans that are too few to see them apart.
+    """
+    spans = _spans(time, active)
+    if not spans:
+        return []
+    starts, ends = np.array(spans).T
+    gap = near * float(time[-1] - time[0]) / columns
+    first = np.concatenate(([0], 1 + np.flatnonzero(starts[1:] - ends[:-1] >= gap)))
+    last = np.concatenate((first[1:] - 1, [len(spans) - 1]))
+    lasting = np.add.reduceat(ends - starts, first)
+    return [
+        Phase(float(starts[a]), float(ends[b]), float(sum_ / (ends[b] - starts[a])))
+        for a, b, sum_ in zip(first, last, lasting, strict=True)
+    ]
 
 
 def _columns(x: Array, columns: int) -> IntArray:
@@ -100,6 +138,8 @@ def _first_of_each(column: IntArray, key: Array) -> IntArray:
 
 
 def _spans(time: Array, active: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    if len(time) < 2:
+        return []
     padded = np.concatenate([[False], active, [False]]).astype(np.int8)
     change = np.diff(padded)
     starts = np.flatnonzero(change == 1)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import base64
+import json
 import re
+import struct
 from collections.abc import Sequence
 from html import escape
 
@@ -43,7 +45,26 @@ def _svg(figure: Figure, text: str, prefix: str) -> str:
     kept = " ".join(re.findall(r'(?:viewBox|font-family)="[^"]*"', head))
     body = re.sub(r"<[^>]*>", lambda tag: _tag(tag[0], prefix), body)
     body = re.sub(r"\s*\n\s*", "\n", body)
-    return f'<svg {kept} role="img" aria-label="{_attribute(text)}">{body}'
+    return f'<svg {kept} role="img" aria-label="{_attribute(text)}"{_axes(figure)}>{body}'
+
+
+def _axes(figure: Figure) -> str:
+    """Return an attribute that says where axes lie, as shares of the figure, and what they span."""
+    known = [
+        {
+            "box": [round(float(each), 5) for each in axes.get_position().extents],
+            "x": _span(axes.get_xlim(), axes.get_xscale()),
+            "y": _span(axes.get_ylim(), axes.get_yscale()),
+        }
+        for axes in figure.axes
+        if {axes.get_xscale(), axes.get_yscale()} <= {"linear", "log"} and axes.axison
+    ]
+    text = json.dumps(known, separators=(",", ":"))
+    return f' data-axes="{escape(text, quote=True)}"' if known else ""
+
+
+def _span(limits: tuple[float, float], scale: str) -> list[float | bool]:
+    return [*(float(f"{each:.8g}") for each in limits), scale == "log"]
 
 
 def _tag(tag: str, prefix: str) -> str:
@@ -55,8 +76,14 @@ def _tag(tag: str, prefix: str) -> str:
 
 
 def _png(figure: Figure, text: str) -> str:
-    data = base64.b64encode(figure_bytes(figure, "png")).decode("ascii")
-    return f'<img src="data:image/png;base64,{data}" alt="{_attribute(text)}">'
+    content = figure_bytes(figure, "png")
+    width, height = struct.unpack(">II", content[16:24])  # of the header
+    data = base64.b64encode(content).decode("ascii")
+    return (
+        f'<svg viewBox="0 0 {width} {height}" role="img" aria-label="{_attribute(text)}"'
+        f"{_axes(figure)}>"
+        f'<image width="{width}" height="{height}" href="data:image/png;base64,{data}"/></svg>'
+    )
 
 
 def _attribute(text: str) -> str:

@@ -1,9 +1,12 @@
-"""One self-contained HTML file: no script, nothing loaded from elsewhere, all text escaped."""
+"""One self-contained HTML file: nothing loaded from elsewhere, all text escaped.
+
+Its only script lets readers zoom figures; without it nothing is missing.
+"""
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from itertools import count
@@ -23,10 +26,12 @@ from bywire.report.document import (
 )
 from bywire.report.files import write_bytes
 from bywire.report.inline_figure import inline_figures
+from bywire.report.policy import admitted
 from bywire.report.result_folder import listed
 from bywire.report.tables import Cell, Column, Table
 from bywire.report.wording import clean
 
+_MANY = 7  # columns from which a table may be wider than text
 _MARKS = {"good": "✓ ", "bad": "✗ ", "open": "? ", "none": ""}
 
 
@@ -71,9 +76,9 @@ def page_html(
 ) -> str:  # fmt: skip
     """Return a report as one HTML page; see :func:`write_page`."""
     numbered = _numbered(sections)
-    style = files("bywire.report").joinpath("page.css").read_text(encoding="utf-8")
+    style, script = _file("page.css"), _file("zoom.js") if numbered.has_figures else ""
     parts = [
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{_POLICY}\n'
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n{_policy(script)}\n'
         f"{listed(names)}"
         '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{_text(title)}</title>\n<style>\n{style}</style>\n</head>\n<body>",
@@ -82,7 +87,9 @@ def page_html(
         _contents(sections) if len(sections) > 2 else "",
         "</header>\n<main>",
         *(_section(section, k, numbered) for k, section in enumerate(sections, 1)),
-        f"</main>\n<footer>bywire {_text(__version__)}</footer>\n</body>\n</html>\n",
+        f"</main>\n<footer>bywire {_text(__version__)}</footer>",
+        f"<script>{script}</script>" if script else "",
+        "</body>\n</html>\n",
     ]
     return "\n".join(part for part in parts if part)
 
@@ -100,24 +107,32 @@ def fragment_html(document: Document, notes: Sequence[str] = ()) -> str:
     return '<div class="bywire">\n' + "\n".join(part for part in parts if part) + "\n</div>"
 
 
-# The browser itself then refuses scripts and anything from elsewhere.
-_POLICY = (
-    '<meta http-equiv="Content-Security-Policy" '
-    "content=\"default-src 'none'; style-src 'unsafe-inline'; img-src data:\">"
-)
+def _policy(script: str) -> str:
+    """Return what has the browser itself refuse other scripts and anything from elsewhere."""
+    scripts = f"script-src {admitted(script)}; " if script else ""
+    return (
+        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; '
+        f"{scripts}style-src 'unsafe-inline'; img-src data:; base-uri 'none'; "
+        "form-action 'none'\">"
+    )
+
+
+def _file(name: str) -> str:
+    return files("bywire.report").joinpath(name).read_text(encoding="utf-8")
 
 
 def _numbered(sections: Sequence[Section]) -> _Numbered:
     blocks = [block for section in sections for block in flat_blocks(section.blocks)]
     shown = [(b.figure, b.caption) for b in blocks if isinstance(b, FigureBlock)]
-    return _Numbered(iter(inline_figures(shown)))
+    return _Numbered(inline_figures(shown))
 
 
 class _Numbered:
     """Hands out the figures in their order, and the numbers of figures and tables."""
 
-    def __init__(self, figures: Iterator[str]) -> None:
-        self.figures = figures
+    def __init__(self, figures: Sequence[str]) -> None:
+        self.figures = iter(figures)
+        self.has_figures = bool(figures)
         self.figure_numbers = count(1)
         self.table_numbers = count(1)
 
@@ -177,8 +192,9 @@ def table_html(table: Table) -> str:
         + "</tr>"
         for row in table.rows
     )
+    wide = " wide" if len(table.columns) >= _MANY else ""
     return (
-        f'<div class="scroll"><table>\n<thead><tr>{heading}</tr></thead>\n'
+        f'<div class="scroll{wide}"><table>\n<thead><tr>{heading}</tr></thead>\n'
         f"<tbody>\n{body}\n</tbody>\n</table></div>"
     )
 

@@ -38,6 +38,7 @@ BLACK = "#1A1A1A"
 GRAY = "#7F7F7F"
 PALE = "#DDDDDD"
 SHADE = "#CBD8E6"
+SHADE_AGAIN = "#E9EFF5"
 SEQUENCE = (BLUE, VERMILLION, GREEN, PURPLE, SKY, ORANGE, BLACK)
 """colors of lines without a meaning of their own, in order"""
 

@@ -12,7 +12,7 @@ from bywire.core.errors import ParameterError
 from bywire.core.units import convert
 from bywire.report import style
 from bywire.report.channel import Channel, channel
-from bywire.report.decimation import phases
+from bywire.report.decimation import lasting_phases, phases
 from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
 from bywire.report.step_marks import StepLimits, draw_limits
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.5
 """share of a limit from which its lines are drawn"""
+_LASTING = 0.9  # share of a phase above which its short breaks do not count
 FAULTS = "faults"
 """variable that counts the faults that are there: a bar along the lower edge shows them"""
 
@@ -39,7 +40,8 @@ def time_traces(
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
-    Phases in which all that has dry friction sticks are shaded; saturation is a bar along the
+    Phases in which all that has dry friction sticks are shaded, more faintly those in which it does
+    so again and again, as under dither; saturation is a bar along the
     upper edge.
 
     Parameters
@@ -161,13 +163,28 @@ def _draw_traces(
 
 
 def _shade_stuck(axes: Axes, recording: xr.Dataset, variable: str, *, named: bool) -> None:
-    spans = _spans(recording, variable)
-    if spans:
+    if variable not in recording.data_vars:
+        return
+    mode = channel(recording, variable)
+    scale, _ = style.time_scale(mode.time)
+    for is_lasting in (True, False):
+        found = [
+            each for each in lasting_phases(mode.time, mode.values > 0.5)
+            if (each.share > _LASTING) == is_lasting
+        ]  # fmt: skip
+        if not found:
+            continue
+        label = style.plain(mode.label)
+        if not is_lasting:
+            lasting = sum(each.share * (each.end - each.start) for each in found)
+            share = lasting / sum(each.end - each.start for each in found)
+            label += f" again and again, {100 * share:.2g} % of the time"
         axes.broken_barh(
-            spans, (0.0, 1.0), transform=axes.get_xaxis_transform(), facecolor=style.SHADE,
-            alpha=0.7, linewidth=0, zorder=0.4,
-            label=style.plain(channel(recording, variable).label) if named else None,
-        )
+            [(scale * each.start, scale * (each.end - each.start)) for each in found], (0.0, 1.0),
+            transform=axes.get_xaxis_transform(), zorder=0.4, linewidth=0,
+            facecolor=style.SHADE if is_lasting else style.SHADE_AGAIN,
+            alpha=0.7, label=label if named else None,
+        )  # fmt: skip
 
 
 def _mark_saturation(axes: Axes, panel: Panel, recording: xr.Dataset) -> None:

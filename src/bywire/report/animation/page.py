@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import base64
-import hashlib
 import json
 from html import escape
 from importlib.resources import files
@@ -12,6 +10,7 @@ from string import Template
 import numpy as np
 
 from bywire.report.animation.scene import Frames, Scene
+from bywire.report.policy import admitted
 
 _DIGITS = 4
 _KEYS = ("x", "y", "turn", "stretch")
@@ -31,7 +30,7 @@ def scene_page(scene: Scene, title: str, summary: str) -> str:
     script, style = (folder.joinpath(name).read_text() for name in ("player.js", "player.css"))
     page = Template(folder.joinpath("player.html").read_text())
     return page.substitute(
-        policy=f"default-src 'none'; script-src {_digest(script)}; style-src {_digest(style)}",
+        policy=f"default-src 'none'; script-src {admitted(script)}; style-src {admitted(style)}",
         title=escape(title), summary=escape(summary), style=style, script=script,
         width=f"{scene.width:g}", height=f"{scene.height:g}", drawing=scene.drawing,
         data=json.dumps(_numbers(scene), separators=(",", ":")).replace("<", "\\u003c"),
@@ -55,7 +54,3 @@ def _numbers(scene: Scene) -> dict[str, object]:
 def _plain(values: Frames) -> object:
     rounded = np.round(values, _DIGITS) + 0.0  # no -0.0
     return rounded.tolist()
-
-
-def _digest(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

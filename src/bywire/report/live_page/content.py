@@ -32,6 +32,7 @@ from bywire.export.wasm.module import module_files
 from bywire.report.live_page.dependence import dependence
 from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
+from bywire.report.policy import admitted
 from bywire.report.wording import unit_text
 
 if TYPE_CHECKING:
@@ -80,8 +81,9 @@ def page_text(
     library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"
     script = '"use strict";\n' + "\n".join(map(_text, _SCRIPTS))
     policy = (
-        f"default-src 'none'; script-src {_hashed(library)} {_hashed(script)} 'wasm-unsafe-eval'; "
-        f"style-src {_hashed(style)}; worker-src blob:; base-uri 'none'; form-action 'none'"
+        f"default-src 'none'; script-src {admitted(library)} {admitted(script)} "
+        "'wasm-unsafe-eval'; "
+        f"style-src {admitted(style)}; worker-src blob:; base-uri 'none'; form-action 'none'"
     )
     return Template(_text("page.html")).substitute(
         policy=policy, title=escape(name), summary=escape(_summary(made)),
@@ -205,10 +207,6 @@ def _footer(made: Exported) -> str:
 def _block(key: str, value: Any) -> str:
     text = json.dumps(value, allow_nan=False).replace("<", "\\u003c")
     return f'<script type="application/json" id="{key}">{text}</script>'
-
-
-def _hashed(text: str) -> str:
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
 
 
 def _text(name: str) -> str:

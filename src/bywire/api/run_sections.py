@@ -1,0 +1,99 @@
+"""Sections of a run's report: the outcome first, then books of energy and how it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from bywire.api.run_changes import change_table, option_changes, parameter_changes
+from bywire.bench.energy_ledger import Ledger
+from bywire.bench.result import Result
+from bywire.core.catalog import PARAMETER_SETS
+from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
+from bywire.report.parameter_rows import parameter_rows
+from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
+from bywire.report.wording import amount
+
+RECORDED = ("bywire_version", "parameter_hash", "step", "engine", "status", "seed")
+"""attributes of a recording that say how it was made"""
+
+
+def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> Section:
+    """Return what was required, what was changed, and what else to know before looking on.
+
+    ``rows``: key figures beside their requirements; ``notes``: warnings and remarks.
+    """
+    bench = result.bench
+    blocks: list[Block] = []
+    if judged := [row for row in rows if row.limit]:
+        blocks.append(TableBlock(kpi_table(judged), "What was required."))
+    changes = parameter_changes(bench) + option_changes(bench)
+    if changes:
+        blocks.append(TableBlock(change_table(changes), "What was changed."))
+    else:
+        blocks.append(
+            Paragraph(
+                f"Nothing was changed: all parameters are those of {bench.parameters}, all "
+                f"options those of {bench.experiment}."
+            )
+        )
+    return Section("Outcome", [*blocks, *notes])
+
+
+def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:
+    """Return the books of every run that keeps any, by label."""
+    blocks: list[Block] = []
+    for label, books in ledgers.items():
+        blocks += [Paragraph(f"{label}, from time zero on:"), TableBlock(energy_table(books))]
+    return [Section("Energy", blocks)] if blocks else []
+
+
+def how_it_was_made(
+    result: Result, errors: Mapping[str, Mapping[str, Mapping[str, Any]]]
+) -> Section:
+    """Return source, program and all values.
+
+    ``errors``: of every recorded signal from the step, by run and name.
+    """
+    bench, cited = result.bench, PARAMETER_SETS.find(result.bench.parameters)
+    attrs = next(iter(result.recordings.values())).attrs if result.recordings else {}
+    kept = "; ".join(f"{key} {attrs[key]}" for key in RECORDED if key in attrs)
+    options = parameter_table(parameter_rows(bench.chosen_options))
+    parameters = parameter_table(parameter_rows(bench.par, cited.values))
+    return Section(
+        "How it was made",
+        [
+            Paragraph(f"Source of the parameters: {cited.source}."),
+            Paragraph(f"{kept}."),
+            *_signal_errors(errors),
+            Details("Options of the experiment", [TableBlock(options)]),
+            Details("All parameters", [TableBlock(parameters)]),
+        ],
+    )
+
+
+def energy_table(books: Ledger) -> Table:
+    """Return a ledger as a table: place, energy, share of what was turned over."""
+    total = books.turnover
+
+    def row(side: str, label: str, energy: float) -> tuple[str, str, str, str]:
+        share = f"{100.0 * energy / total:.3g} %" if total > 0 else "-"
+        return side, label, amount(energy, "J"), share
+
+    rows = [row("from", posting.label, posting.energy) for posting in books.sources]
+    rows += [row("to", posting.label, posting.energy) for posting in books.sinks]
+    rows.append(row("", "closing error", books.closing_error))
+    return text_table(["", "place", "energy", "share of what was given"], rows)
+
+
+def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[Details]:
+    """Return how far each recorded signal is off, where that was estimated."""
+    rows = [
+        (label, name, *(amount(error[key], error["unit"], 2) for key in ("rms", "max")))
+        for label, signals in errors.items()
+        for name, error in signals.items()
+    ]
+    if not rows:
+        return []
+    table = text_table(["run", "signal", "rms", "largest"], rows)
+    return [Details("Error of recorded signals from the step", [TableBlock(table)])]

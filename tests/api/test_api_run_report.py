@@ -1,0 +1,30 @@
+"""The report of a run: verdict and changes first, figures before tables."""
+
+from __future__ import annotations
+
+import bywire
+
+QUICK = {"options.duration": "40 ms", "options.settle": "10 ms"}
+
+
+def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables():
+    result = bywire.run(
+        "hard-braking",
+        {**QUICK, "motor.R_m": "0.5 ohm", "requirements.overshoot": "<= 15 %"},
+        estimate_error=False,
+    )
+    titles = [section.title for section in result.document().page]
+    assert titles == ["Outcome", "Figures", "Key figures", "Energy", "How it was made"]
+    required, changed = [block.table for block in result.document().page[0].blocks[:2]]
+    assert [row[0].text for row in required.rows] == ["overshoot"]
+    assert [[cell.text for cell in row[:3]] for row in changed.rows] == [
+        ["motor.R_m", "0.5 Ω", "0.35 Ω"],
+        ["options.duration", "0.04 s", "1.2 s"],
+        ["options.settle", "0.01 s", "1 s"],
+    ]
+
+
+def test_a_run_of_the_cited_set_says_that_nothing_was_changed():
+    result = bywire.run("stribeck", estimate_error=False)
+    (said,) = [block.text for block in result.document().page[0].blocks]
+    assert said.startswith("Nothing was changed: all parameters are those of dardanelli2010")
