@@ -133,6 +133,13 @@ function take(link) {
   describe();
 }
 
+/* Without this a browser leaves the page for a file that is dropped on it, however large it is. */
+addEventListener("dragover", (event) => event.preventDefault());
+addEventListener("drop", (event) => {
+  event.preventDefault();
+  complain("the page takes no files: its values are set above, or by its link; bywire run takes bench files");
+});
+
 const rows = parameterPanel(place("parameters"), parameters, chosen, changed, complain);
 const plots = curves(place("curves"), panels);
 const again = () => run && plots.draw(run, kept, values);

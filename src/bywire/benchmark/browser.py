@@ -1,0 +1,44 @@
+"""A browser without a window, in which pages of benches are tried: the system's own Chromium."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from bywire.core.errors import RunError
+
+_NAMES = ("chromium", "chromium-browser", "google-chrome")
+
+
+@contextmanager
+def browser() -> Iterator[Any]:
+    """Open a browser, and close it at the end.
+
+    Yields
+    ------
+    playwright.sync_api.Browser
+        The system's Chromium; none is ever downloaded.
+
+    Raises
+    ------
+    RunError
+        Where there is none, it does not start, or nothing drives it.
+    """
+    try:
+        from playwright.sync_api import Error, sync_playwright
+    except ImportError:
+        raise RunError("playwright drives the browser: pip install playwright") from None
+    path = next(filter(None, map(shutil.which, _NAMES)), None)
+    if path is None:
+        raise RunError("no Chromium: install the package chromium")
+    with sync_playwright() as driver:
+        try:
+            opened = driver.chromium.launch(executable_path=path)
+        except Error as error:
+            raise RunError(f"{path} does not start: {str(error).splitlines()[0]}") from None
+        try:
+            yield opened
+        finally:
+            opened.close()

@@ -1,0 +1,189 @@
+"""Pages in a real browser: what moving a slider gives, what links do, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from page_benches import BENCHES, VARIED
+
+import bywire
+from bywire.benchmark.browser import browser
+from bywire.core.errors import RunError
+
+DAILY = 3  # positions of sliders
+READY = "() => run !== null && !busy"
+MOVE = """(shares) => {
+  run = null;
+  for (const [name, share] of Object.entries(shares)) {
+    const slider = rows.get(name).row.querySelector("input[type=range]");
+    slider.value = share;
+    slider.dispatchEvent(new Event("input"));
+  }
+}"""
+GIVEN = """() => ({
+  time: Array.from(run.time), changes: changes(), rows: place("figures").tBodies[0].rows.length,
+  signals: Object.fromEntries(Object.entries(run.signals).map(([n, c]) => [n, Array.from(c)])),
+})"""
+SAID = '() => place("message").hidden ? "" : place("message").textContent'
+
+
+class Tab:
+    """A page in the browser, with all that it said and asked for."""
+
+    def __init__(self, opened: Any, file: Path) -> None:
+        self.file, self.noise = file, list[str]()
+        self.page = opened.new_page(viewport={"width": 1280, "height": 800})
+        self.page.on("console", lambda said: self.noise.append(f"console: {said.text}"))
+        self.page.on("pageerror", lambda error: self.noise.append(f"error: {error}"))
+        self.page.on("dialog", lambda dialog: self.noise.append(f"dialog: {dialog.message}"))
+        self.page.on("request", self._asked)
+
+    def _asked(self, request: Any) -> None:
+        if not request.url.startswith((self.file.as_uri(), "blob:")):
+            self.noise.append(f"request: {request.url}")
+
+    def open(self, link: str = "") -> None:
+        """Open the page anew and wait for its first run."""
+        self.page.goto("about:blank")
+        self.page.goto(self.file.as_uri() + link)
+        self.page.wait_for_function(READY)
+
+    def moved(self, shares: dict[str, int]) -> dict[str, Any]:
+        """Return the run after sliders were moved, to shares of their way in thousandths."""
+        self.page.evaluate(MOVE, shares)
+        self.page.wait_for_function(READY)
+        given: dict[str, Any] = self.page.evaluate(GIVEN)
+        return given
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    try:
+        opening = browser()
+        opened = opening.__enter__()
+    except RunError as error:
+        pytest.skip(str(error))
+    yield opened
+    opening.__exit__(None, None, None)
+
+
+@pytest.fixture(scope="module", params=sorted(BENCHES))
+def tab(request: pytest.FixtureRequest, chromium: Any, tmp_path_factory: Any) -> Iterator[Tab]:
+    name = str(request.param)
+    file = tmp_path_factory.mktemp("pages") / f"{name}.html"
+    bywire.page(BENCHES[name], file, vary=VARIED[name])
+    made = Tab(chromium, file)
+    made.open()
+    yield made
+    made.page.close()
+
+
+def agrees(tab: Tab, count: int) -> None:
+    """Check runs at random positions of the chosen sliders against the bench."""
+    name, rng = tab.file.stem, np.random.default_rng(11)
+    for _ in range(count):
+        shares = {n: int(rng.integers(300, 700)) for n in VARIED[name]}
+        given = tab.moved(shares)
+        assert given["changes"].keys() == shares.keys()
+        recording = bywire.run(BENCHES[name].with_overrides(given["changes"])).recording
+        np.testing.assert_allclose(given["time"], recording["time"], atol=1e-12)
+        for signal, values in given["signals"].items():
+            wanted = recording[signal].values
+            scale = max(np.abs(wanted).max(), 1e-300)
+            assert np.abs(np.array(values) - wanted).max() <= 1e-9 * scale, signal
+    assert not tab.noise
+    assert not tab.page.evaluate(SAID)
+
+
+def test_sliders_give_what_the_bench_gives(tab):
+    agrees(tab, DAILY)
+
+
+@pytest.mark.trust
+def test_a_hundred_positions_of_sliders_give_what_the_bench_gives(tab):
+    agrees(tab, 100)
+
+
+def test_a_link_restores_what_was_moved(tab):
+    given = tab.moved({name: 417 for name in VARIED[tab.file.stem]})
+    tab.open(tab.page.evaluate("() => location.hash"))
+    again = tab.page.evaluate(GIVEN)
+    assert again["changes"] == given["changes"]  # to the last bit
+    assert again["signals"] == given["signals"]
+    assert not tab.noise
+
+
+@pytest.mark.parametrize(
+    ("link", "text"),
+    [
+        ("bench=0123&{name}=0.5", "another version"),
+        ("bench={digest}&{name}=-1e300", "is not admissible"),
+        ("bench={digest}&{name}=<img src=x onerror=alert(1)>", "is not admissible"),
+        ("bench={digest}&__proto__=1", "no parameter here"),
+        ("bench={digest}&%3Cscript%3Ealert(1)%3C/script%3E=1", "no parameter here"),
+    ],
+)
+def test_hostile_links_say_so_and_do_nothing_else(tab, link, text):
+    name = VARIED[tab.file.stem][0]
+    tab.open("#" + link.format(digest=tab.page.evaluate("() => digest"), name=name))
+    assert text in tab.page.evaluate(SAID)
+    assert tab.page.evaluate("() => changes()") == {}
+    assert tab.page.evaluate("() => document.querySelectorAll('#message *').length") == 0
+    assert not tab.noise
+
+
+def test_a_value_typed_in_is_taken_or_refused_in_words(tab):
+    tab.open()
+    name = VARIED[tab.file.stem][0]
+    field = tab.page.locator(f"[id='p-{name}']")
+    field.fill("-7")
+    field.press("Enter")
+    assert "is not admissible" in tab.page.evaluate(SAID)
+    assert field.get_attribute("aria-invalid") == "true"
+    field.fill("0,31")
+    field.press("Enter")
+    tab.page.wait_for_function(READY)
+    assert list(tab.page.evaluate("() => changes()")) == [name]
+    assert not tab.page.evaluate(SAID)
+
+
+def test_what_a_page_may_not_do_is_blocked_and_seen(tab):
+    tab.open()
+    tab.page.evaluate("() => fetch('https://example.org/').catch(() => undefined)")
+    inline = """() => {
+      const script = document.createElement("script");
+      script.textContent = "run = null";
+      document.body.append(script);
+    }"""
+    tab.page.evaluate(inline)
+    assert tab.page.evaluate("() => run !== null")
+    assert any("connect" in said for said in tab.noise)
+    assert any("inline script" in said for said in tab.noise)
+    tab.noise.clear()
+
+
+def test_a_file_that_is_dropped_is_not_read(tab):
+    tab.open()
+    drop = """() => {
+      const moved = new DataTransfer();
+      moved.items.add(new File(["[bench]"], "huge.toml"));
+      const event = new DragEvent("drop", { dataTransfer: moved, cancelable: true, bubbles: true });
+      document.body.dispatchEvent(event);
+      return event.defaultPrevented;
+    }"""
+    assert tab.page.evaluate(drop)
+    assert "takes no files" in tab.page.evaluate(SAID)
+    assert not tab.noise
+
+
+def test_a_browser_without_webassembly_is_told_so(tab, chromium):
+    context = chromium.new_context()
+    context.add_init_script("delete globalThis.WebAssembly")
+    page = context.new_page()
+    page.goto(tab.file.as_uri())
+    assert "no WebAssembly" in page.evaluate(SAID)
+    context.close()
