@@ -49,6 +49,7 @@ MOTORCYCLE: list[tuple[dict[str, Any], Counts]] = [
     ({"ecu.dither.waveform": "square"}, (239, 644, 136, (131,))),
     ({"ecu.dither.waveform": "triangle"}, (239, 644, 136, (136,))),
     ({"caliper.fluid_heat": "warming"}, (247, 652, 136, (131,))),
+    ({"piston.law": "sticking"}, (341, 741, 146, (131,))),
     ({"motor_heat.law": "lumped"}, (283, 688, 147, (131,))),
     ({"ecu.derating.law": "current"}, (239, 644, 136, (175,))),
     ({"drive.mode": "pedal"}, (239, 644, 136, (160,))),

@@ -257,7 +257,8 @@ def _part(model: Any, par: Any, at: Point, predicted: Array, h: float, cap: int)
 def _contacts(model: Any, par: Any, x: Array) -> tuple[tuple[tuple[int, ...], ...], Array]:
     """Return the active sets of all groups at a state, and their stiffness, block diagonal."""
     state = model.State(*map(float, x))
-    groups = list(zip(model.compliance(par), model.gap(state, state, par), strict=True))
+    every = zip(model.compliance(par), model.gap(state, state, par), strict=True)
+    groups = [(C, d) for C, d in every if C]
     sets = [solve_contacts(C, np.array(d, dtype=float)) for C, d in groups]
     n, at = sum(len(d) for _, d in groups), 0
     K = np.zeros((n, n))

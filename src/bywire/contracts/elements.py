@@ -101,7 +101,7 @@ def functions(module: ModuleType) -> dict[str, Callable[..., Any]]:
         if inspect.isfunction(value)
         and value.__module__ == module.__name__
         and not name.startswith("_")
-        and name != "watch"  # reads recordings
+        and name not in ("watch", "exists")  # reads recordings; reads choices
     }
 
 

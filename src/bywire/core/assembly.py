@@ -136,7 +136,9 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         each: dict[str, tuple[float, ...]] = {}
         left = iter(contact) if contact is not None else repeat(_NAN)
         for part in contacts(type(self)):
-            each[part.name] = tuple(islice(left, len(part.element.Forces._fields)))
+            count = sum(part.group_sizes(par))
+            unknown = (_NAN,) * len(part.element.Forces._fields)  # where a choice leaves them out
+            each[part.name] = tuple(islice(left, count)) or unknown
         fields = {"x": x, "xe": x, "memory": memory, "par": par, "shared": self.shared}
         w: Self = object.__new__(_at_an_instant(type(self)))
         vars(w).update(vars(self) | {"_instant": Instant(**fields | {"contact": each} | more)})
@@ -172,17 +174,19 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         return self.friction(self.at(x, memory, par, contact, xe=xe))
 
     def compliance(self, par: ParT) -> tuple[Matrix, ...]:
-        """Return a compliance matrix per contact group."""
+        """Return a compliance matrix per contact group, an empty one where it is left out."""
         state = self.State._make(_NAN for _ in self.State._fields)
         w = self._unwired(state, self._nothing(), par, None)
         groups: list[Matrix] = []
         for part in contacts(type(self)):
-            wired = _wired(w, part)
-            if part.has("matrix"):
+            wired, sizes = _wired(w, part), part.group_sizes(par)
+            if not any(sizes):
+                groups += ((),) * len(sizes)
+            elif part.has("matrix"):
                 groups.append(wired.call(part.element.matrix))
             else:
                 compliance = wired.call(part.function("compliance"))
-                groups += (((compliance,),),) * len(part.element.Forces._fields)
+                groups += (((compliance,),),) * len(sizes)
         return tuple(groups)
 
     def gap(self, x: Any, xe: Any, par: ParT) -> tuple[tuple[float, ...], ...]:
@@ -190,6 +194,10 @@ class Assembly(Model, Generic[ParT, MemoryT]):
         w = self.at(x, self._nothing(), par, xe=xe)
         groups: list[tuple[float, ...]] = []
         for part in contacts(type(self)):
+            sizes = part.group_sizes(par)
+            if not any(sizes):
+                groups += ((),) * len(sizes)
+                continue
             overlaps = _row(_wired(w, part).call(part.function("overlaps")))
             groups += (overlaps,) if part.has("matrix") else ((each,) for each in overlaps)
         return tuple(groups)

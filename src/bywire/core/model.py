@@ -125,7 +125,10 @@ class Model(Protocol):
         return ()
 
     def compliance(self, par: Any) -> tuple[Matrix, ...]:
-        """Return one positive definite compliance matrix per contact group."""
+        """Return one positive definite compliance matrix per contact group.
+
+        An empty one where a choice leaves the group out: it has no overlaps and no forces then.
+        """
         return ()
 
     def gap(self, x: Any, xe: Any, par: Any) -> tuple[tuple[float, ...], ...]:

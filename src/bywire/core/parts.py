@@ -252,6 +252,36 @@ class Part(Generic[X, U, F, P]):
             )
         return Signal("J", power.label, role=power.role)
 
+    def group_sizes(self, par: Any) -> tuple[int, ...]:
+        """Return how many forces each of its contact groups has, 0 where a choice leaves them out.
+
+        Those of an element with ``exists(par)`` are there only where that says so.
+        """
+        if not self.has("Forces"):
+            return ()
+        count = len(self.element.Forces._fields)
+        sizes = (count,) if self.has("matrix") else (1,) * count
+        there = not self.has("exists") or self.element.exists(self.parameters(par))
+        return sizes if there else (0,) * len(sizes)
+
+    def parameters(self, par: Any) -> Any:
+        """Return its parameters, of those of the assembly.
+
+        Raises
+        ------
+        ModelError
+            When there are none where it looks for them.
+        """
+        value = par
+        for name in self.path.split("."):
+            value = getattr(value, name, None)
+        if value is None:
+            raise ModelError(
+                f"{self.where}: the parameters have no {self.path!r}: say where they stand, "
+                f"Part({self.kind}, par='...')"
+            )
+        return value
+
     def state_at(self, instant: Instant, fixed: tuple[str, ...] | None) -> Any:
         """Return its state; ``fixed`` are those taken value-only, None for all."""
         if not self.has("State"):

@@ -48,15 +48,7 @@ class Wired(Generic[X, U, F, P]):
         """Parameters."""
         if self._varied is not None:
             return self._varied  # type: ignore[no-any-return]
-        value = self._instant.par
-        for name in self._part.path.split("."):
-            value = getattr(value, name, None)
-        if value is None:
-            raise ModelError(
-                f"{self._part.where}: the parameters have no {self._part.path!r}: say where they "
-                f"stand, Part({self._part.kind}, par='...')"
-            )
-        return value  # type: ignore[no-any-return]
+        return self._part.parameters(self._instant.par)  # type: ignore[no-any-return]
 
     def vary(self, **values: Any) -> None:
         """Let some of its parameters follow the state: what they are at this instant, by name.

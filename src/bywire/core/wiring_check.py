@@ -61,7 +61,7 @@ class _Operands:
         self.contact = tuple(
             each
             for part in model.parts.values()
-            if part.has("Forces")
+            if any(part.group_sizes(par))
             for each in self.tuple(part.element.Forces)
         )
         mass = self.evaluated("mass", model.mass, self.state, self.par)

@@ -28,6 +28,8 @@ def _groups(model: Model, par: ParameterSet, exact: bool) -> list[tuple[Any, sli
     matrices, groups, at = model.compliance(par), [], 0
     rarely = model.usually_open or (False,) * len(matrices)
     for C, rare in zip(matrices, rarely, strict=True):
+        if not C:
+            continue
         rows = SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C)))
         groups.append((rows, slice(at, at + len(C)), rare and not exact))
         at += len(C)

@@ -103,9 +103,8 @@ def _function(name: str, arguments: list[Any], results: list[Any]) -> Any:
 
 def _compliance(model: Model, par: ParameterSet) -> Any:
     """Return the compliances of all groups, block by block, shape (n, n)."""
-    blocks = [
-        SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))) for C in model.compliance(par)
-    ]
+    groups = [C for C in model.compliance(par) if C]
+    blocks = [SX(ca.vertcat(*(ca.horzcat(*map(SX, row)) for row in C))) for C in groups]
     return ca.densify(ca.diagcat(*blocks)) if blocks else SX(0, 0)
 
 

@@ -57,8 +57,6 @@ def _check_equations(model: Model, par: ParameterSet) -> None:
     x = symbol_tuple(model.State, SX.sym("x", len(model.State._fields)))
     m = symbol_tuple(model.Memory, SX.sym("m", len(model.Memory._fields)))
     sizes = [len(C) for C in _evaluated(model, "compliance", symbolic)]
-    if 0 in sizes:
-        raise ModelError(f"{model.name}: compliance has an empty contact group: leave it out")
     contact = scalars(SX.sym("F", sum(sizes)))
     _sized(model, "mass", _evaluated(model, "mass", x, symbolic), len(x), "one factor per state")
     balance = _evaluated(model, "balance", x, x, m, symbolic, contact)

@@ -29,7 +29,7 @@ def contact_jacobians(model: Model, par: ParameterSet, x: Any, m: Any, p: Any) -
 
     Where the balance is not linear in the contact forces, closed at each of ``LOADS``.
     """
-    groups = model.compliance(par)
+    groups = [C for C in model.compliance(par) if C]
     K = ca.diagcat(*(_stiffness(C) for C in groups)) if groups else SX(0, 0)
     force = SX.sym("contact_", K.shape[0])
     state = symbol_tuple(model.State, x)

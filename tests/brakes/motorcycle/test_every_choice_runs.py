@@ -33,6 +33,7 @@ CHOICES: dict[str, dict[str, Any]] = {
         "table": {"caliper.p_table": PRESSURES, "caliper.V_table": VOLUMES},
     },
     "caliper.leak": {"leaking": {"caliper.G_leak": 1e-13}},
+    "piston.law": {"sticking": {"piston.F_fr": 60.0, "piston.rollback": 0.5}},
     "fluid.air": {"entrained": {"fluid.V_air": 2e-8}, "caliper": {"fluid.V_air": 2e-8}},
     "port.law": {"dead-stroke": {}, "leaking": {"port.G_port": 1e-13}},
     "pressure_sensor.place": {"mid-pipeline": {}},

@@ -15,6 +15,7 @@ from bywire.bench.experiment import as_run
 from bywire.bench.recording import record
 from bywire.bench.running import run
 from bywire.brakes.motorcycle.case import case_from_rest
+from bywire.core.errors import ParameterError
 from bywire.simulation.run import simulate
 
 HOLD = {"p_from": "37 bar", "p_to": "37.0001 bar", "duration": "4 s"}
@@ -158,6 +159,47 @@ def test_pads_that_were_knocked_back_take_the_volume_of_their_gap():
     further = par.caliper.A_pd * 0.3e-3 / par.master_cylinder.A_mc
     assert far - near == pytest.approx(further, rel=0.02)
     assert further == pytest.approx(1e-3, rel=0.01)
+
+
+@pytest.mark.parametrize("rollback", [0.0, 0.6])
+def test_a_stuck_piston_keeps_its_friction_over_its_area_on_the_pads(rollback):
+    """The line is empty but for what the seals hold, 1.37 bar; a rolled-back seal leaves less."""
+    seized = {"set": {"piston.rollback": f"{rollback}"}, "onset": -9.0}
+    recording = held(
+        seized, {"fault": "piston.stuck", "value": "60 N", "onset": -9.0},
+        {"fault": "battery.lost", "onset": ONSET},
+    )  # fmt: skip
+    p, p_mc, q = (recording[name].values for name in ("p_pd", "p_mc", "q"))
+    assert p_mc[-1] == pytest.approx(1.37e5, abs=0.01e5)
+    assert p[-1] - p_mc[-1] == pytest.approx((1.0 - rollback) * 2e5, abs=100.0)
+    assert not np.ptp(p[-500:])  # it stands exactly, not nearly
+    # Fluid flows only where the friction is overcome, line and all.
+    beyond = np.where(q > 0, p_mc - p - 2e5, np.where(q < 0, p - p_mc - (1.0 - rollback) * 2e5, 0))
+    assert (beyond >= -1e-9 * 37e5).all()
+
+
+def test_the_friction_of_a_stuck_piston_takes_its_force_times_its_way():
+    """The way is what the pads' pressure says of their spring."""
+    recording = held(
+        {"set": {"ecu.dither.waveform": "off"}, "onset": -9.0},
+        {"fault": "piston.stuck", "onset": -9.0}, p_from="1 bar", p_to="20 bar", duration="1 s",
+    )  # fmt: skip
+    pads = Bench("hard-braking", "dardanelli2010").par.caliper
+    p = recording["p_pd"].values
+    way = np.abs(np.diff(p)).sum() * pads.A_pd / pads.K_pd
+    taken = np.ptp(recording["E_piston"].values)
+    assert taken == pytest.approx(60.0 * way, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "beside"),
+    [("caliper.leak", "leaking", {}), ("caliper.fluid_heat", "warming", {}),
+     ("fluid.air", "caliper", {"fluid.V_air": 1e-8})],
+)  # fmt: skip
+def test_a_stuck_piston_is_refused_beside_what_feels_the_fluid_in_the_caliper(name, value, beside):
+    par = Bench("hard-braking", "dardanelli2010").par
+    with pytest.raises(ParameterError, match=rf"piston\.law = 'sticking' does not go with {name}"):
+        par.replace({"piston.law": "sticking", name: value, **beside})
 
 
 def test_a_jammed_screw_holds_what_there_is():

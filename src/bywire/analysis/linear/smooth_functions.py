@@ -63,7 +63,7 @@ def _build(model: Model, par: ParameterSet) -> SmoothFunctions:
         renewed = ca.vertcat(*task.tick(at, held, stimulus, symbolic))
         parts = [ca.jacobian(renewed, by) for by in (x, m, u)]
         ticks.append(ca.Function(f"tick_{k}", [x, m, u, p], parts))
-    groups = model.compliance(symbolic)
+    groups = [C for C in model.compliance(symbolic) if C]
     gap = _column([d for group in model.gap(at, at, symbolic) for d in group])
     matrices = [ca.SX(ca.vertcat(*(ca.horzcat(*row) for row in C))) for C in groups]
     return SmoothFunctions(

@@ -138,7 +138,7 @@ def contact_forces(model: Model, x: Any, par: Any) -> tuple[float, ...]:
             before = F.copy()
             for k in range(d.size):
                 F[k] = max(0.0, F[k] + (d[k] - C[k] @ F) / C[k, k])
-            if np.max(np.abs(F - before)) <= _SETTLED * np.max(F, initial=0.0):
+            if np.max(np.abs(F - before), initial=0.0) <= _SETTLED * np.max(F, initial=0.0):
                 break
         else:
             raise ParameterError(f"{model.name}: the contacts do not settle at this state")

@@ -20,13 +20,14 @@ def nonlinear_system(point: Point) -> Any:
     import control
 
     model, par = point.model, point.par
-    groups = [_inverses(np.array(C, dtype=float)) for C in model.compliance(par)]
+    groups = [_inverses(np.array(C, dtype=float)) for C in model.compliance(par) if C]
     State, Memory = cast(Any, model.State), cast(Any, model.Memory)
 
     def rates(t: float, x: Array, u: Array, params: Any) -> list[float]:
         at, held = State(*x.tolist()), Memory(*u.tolist())
         contact: list[float] = []
-        for known, overlaps in zip(groups, model.gap(at, at, par), strict=True):
+        gaps = (group for group in model.gap(at, at, par) if group)
+        for known, overlaps in zip(groups, gaps, strict=True):
             contact += _forces(known, np.array(overlaps))
         force = model.balance(at, at, held, par, tuple(contact))
         return [f / m for f, m in zip(force, model.mass(at, par), strict=True)]

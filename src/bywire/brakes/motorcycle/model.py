@@ -31,6 +31,7 @@ from bywire.plant import (
     master_cylinder,
     motor_heat,
     pipeline,
+    piston_friction,
     pressure_sensor,
     reservoir_port,
     seal_friction,
@@ -53,7 +54,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     Stimulus: ClassVar = ecu.Stimulus
     frictions: ClassVar[tuple[str, ...]] = ("omega",)
     limits: ClassVar[tuple[str, ...]] = ("p_mc",)
-    shared: ClassVar[tuple[str, ...]] = ("fluid",)
+    shared: ClassVar[tuple[str, ...]] = ("fluid", "pipeline", "caliper")
 
     E_source = Integral("J", "energy from battery or source", role=Role("source", "source"))
     supply = Part(battery_supply, loss="E_supply")
@@ -66,6 +67,10 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
     line = Part(pipeline, par="pipeline", output=("q", "Re"), loss="E_pipeline")
     pads = Part(caliper, par="caliper", state={"p": "p_pd"})
     stop = Part(end_stop, work="W_stop", loss="E_stop", rarely=True)
+    piston = Part(piston_friction)
+    E_piston = Integral(
+        "J", "loss of the caliper piston's friction", role=Role("sink", "caliper piston")
+    )
     port = Part(reservoir_port)
     E_port = Integral(
         "J", "energy out through port and leak, less that of fluid that warms",
@@ -114,7 +119,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         "q_makeup", "stuck", "at_stop", "sat_current", "sat_duty", "P_gear", "P_el", "E_source",
         "E_supply", "E_copper", "E_gear", "E_seal", "E_damping", "E_pipeline", "E_stop", "E_port",
         "E_stored", "W_shaft", "t_stuck", "T_winding", "T_housing", "derated", "E_warming",
-        "E_winding", "E_housing", "E_motor_air",
+        "E_winding", "E_housing", "E_motor_air", "E_piston",
     )  # fmt: skip
 
     def wire(self, w: Self) -> None:
@@ -132,8 +137,12 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
         cylinder = w.chamber.par
         w.stop.u = end_stop.Input(piston.x, piston.v, cylinder.x_rest, cylinder.x_end)
         w.port.u = reservoir_port.Input(piston.x - cylinder.x_rest, w.chamber.x.p)
-        w.line.u = pipeline.Input(w.chamber.x.p, w.pads.x.p)
-        q = pipeline.output(w.line.u, w.line.par, w.par.fluid).q
+        w.piston.u = piston_friction.Input(w.chamber.x.p, w.pads.x.p)
+        p_caliper = w.piston.call(piston_friction.fluid_pressure)
+        w.line.u = pipeline.Input(w.chamber.x.p, p_caliper)
+        sticks = w.piston.par.law == "sticking"
+        through = pipeline.output(w.line.u, w.line.par, w.par.fluid)
+        q = piston_friction.flow(w.piston.f) if sticks else through.q
         w.pads.u = caliper.Input(q)
         leak = _port_conductance(w) * w.chamber.x.p
         w.chamber.u = master_cylinder.Input(piston.x, piston.v, q + leak)
@@ -179,6 +188,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
             "E_copper": w.heat.u.P,
             "E_gear": gear + loss,
             "E_seal": seal,
+            "E_piston": w.piston.call(piston_friction.power_loss),
             "E_port": port - brake_fluid.convected_power(makeup, w.chamber.x.p, w.par.fluid),
             "W_shaft": w.torque * w.gear.x.omega,
             "t_stuck": ops.where(w.gear.x.omega == 0, 1.0, 0.0),
@@ -204,6 +214,7 @@ class MotorcycleBrake(Assembly[MotorcycleParameters, ecu.Memory]):
             "E_warming": w.flow.E_motor_air if cold else w.flow.E_copper,
             "E_winding": w.flow.E_motor_air if cold else heat.winding,
             "E_housing": w.flow.E_motor_air if cold else heat.housing,
+            "E_piston": 0.0 if w.piston.par.law == "off" else w.flow.E_piston,
         }
 
     def tasks(self, par: Par) -> tuple[Task, ...]:
@@ -273,7 +284,9 @@ def _port_conductance(w: MotorcycleBrake) -> float:
 def _gauge(w: MotorcycleBrake) -> float:
     """Return the pressure [Pa] where the sensor sits."""
     if w.pressure_sensor.par.place == "mid-pipeline":
-        return 0.5 * (w.chamber.xe.p + w.pads.xe.p)
+        ends = piston_friction.Input(w.chamber.xe.p, w.pads.xe.p)
+        far = piston_friction.fluid_pressure(ends, w.piston.par, w.par.caliper)
+        return 0.5 * (w.chamber.xe.p + far)
     return w.chamber.xe.p
 
 

@@ -33,6 +33,7 @@ from bywire.plant import (
     motor_heat,
     pedal,
     pipeline,
+    piston_friction,
     pressure_sensor,
     reservoir_port,
     seal_friction,
@@ -112,6 +113,7 @@ class MotorcycleParameters(ParameterSet):
     fluid: brake_fluid.Parameters
     pipeline: pipeline.Parameters
     caliper: caliper.Parameters
+    piston: piston_friction.Parameters
     pressure_sensor: pressure_sensor.Parameters
     current_sensor: current_sensor.Parameters
     anti_alias: anti_alias_filter.Parameters
@@ -134,5 +136,22 @@ class MotorcycleParameters(ParameterSet):
             raise ValueError(
                 f"fluid.V_air = {self.fluid.V_air:g} m**3 must be less than the chamber's volume "
                 f"where pressure begins to build up, {room:g} m**3"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _sticks_on_fluid_alone(self) -> MotorcycleParameters:
+        """What leaks, warms or bubbles in the caliper feels the fluid, not what the pads return."""
+        beside = {
+            "caliper.leak": self.caliper.leak == "leaking",
+            "caliper.fluid_heat": self.caliper.fluid_heat == "warming",
+            "fluid.air": self.fluid.air == "caliper",
+        }
+        clashing = [name for name, there in beside.items() if there]
+        if self.piston.law == "sticking" and clashing:
+            value = self.value(clashing[0])
+            raise ValueError(
+                f"piston.law = 'sticking' does not go with {clashing[0]} = {value!r}: the fluid's "
+                "pressure is then another than the pads', and no state of its own; take one of both"
             )
         return self

@@ -120,4 +120,4 @@ def test_refuses_other_choices() -> None:
 def test_indices_follow_the_model() -> None:
     text = indices(parameters())
     assert text.startswith("enum { P_supply_V_bat, P_supply_R_bat,")
-    assert "O_E_motor_air, O_COUNT };" in text
+    assert "O_E_piston, O_COUNT };" in text

@@ -25,6 +25,7 @@ SUBJECT = Subject(
         "fluid.air": ("none",),
         "caliper.law": ("linear",),
         "caliper.fluid_heat": ("off",),
+        "piston.law": ("off",),
         "pressure_sensor.place": ("master-cylinder",),
         "adc.law": ("quantized",),
         "ecu.derating.law": ("off",),

@@ -425,6 +425,7 @@ static void record(const Plant *k, const Saved *z, double *o)
     o[O_W_shaft] = e[E_W_shaft], o[O_t_stuck] = e[E_t_stuck], o[O_derated] = 0.0;
     o[O_T_winding] = o[O_T_housing] = p[P_motor_heat_T_a]; /* a motor that stays cold */
     o[O_E_warming] = o[O_E_winding] = o[O_E_housing] = o[O_E_motor_air] = 0.0;
+    o[O_E_piston] = 0.0; /* one that does not stick */
     o[O_E_stored] = 0.5 * (k->L * i * i + k->J * om * om + k->k_stop * (near * near + far * far))
                     + chamber * density(k, p_mc) + k->pads * density(k, p_pd);
 }

@@ -104,9 +104,8 @@ def rates(z: Any, duty: Any, par: Any, width: float) -> tuple[Any, ...]:
     memory = zeros(Memory)._replace(duty=duty)
     contact = tuple(
         ops.fmax(gap / compliance, 0.0)
-        for (gap,), ((compliance,),) in zip(
-            model.gap(x, x, par), model.compliance(par), strict=True
-        )
+        for gaps, matrix in zip(model.gap(x, x, par), model.compliance(par), strict=True)
+        for gap, (compliance,) in zip(gaps, matrix, strict=True)
     )
     smooth = model.balance(x, x, memory, par, contact)
     ((low, high),) = model.bounds(x, x, memory, par, contact)

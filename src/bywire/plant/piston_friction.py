@@ -1,0 +1,127 @@
+"""Friction between the caliper's piston and its seal: pressure that moves no pad.
+
+A piston without mass whose friction depends on its speed would chatter. Here the flow is what is
+set-valued: fluid moves the piston in where the line's pressure exceeds that of the pads by more
+than the friction takes, and out where it falls below it by more; in between the piston stands and
+nothing flows. Both flows are one-sided contact forces, whose compliance is the line's resistance.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, NamedTuple
+
+from annotated_types import Ge
+
+from bywire.core import ops
+from bywire.core.faults import ParameterFault
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Force, Weight
+from bywire.core.signals import FlowResistance, Power, Signal
+from bywire.plant import brake_fluid
+from bywire.plant import caliper as pads
+from bywire.plant import pipeline as line
+
+Pressure = Annotated[float, Signal("Pa", "pressure", 1e5)]
+Flow = Annotated[float, Signal("m**3/s", "flow into the caliper", 1e-6)]
+
+
+class Parameters(ParameterSet):
+    """Coulomb friction of a piston, and the elasticity of its seal.
+
+    ``law``: ``"sticking"``; ``"off"``, for a piston that follows its fluid.
+    """
+
+    law: Literal["off", "sticking"]
+    """whether the piston sticks"""
+    F_fr: Force
+    """friction force on the piston"""
+    rollback: Weight
+    """share of it by which the deformed seal pulls the piston back; 0 for a seized one"""
+
+
+FAULTS = (
+    ParameterFault("stuck", "the piston sticks in its seal, by the friction force",
+                   replaced="F_fr", value=60.0, with_it={"law": "sticking"}),
+)  # fmt: skip
+
+
+class Input(NamedTuple):
+    """Pressures at the two ends of what resists: line and piston."""
+
+    p_line: Annotated[float, Signal("Pa", "pressure where the line begins", 2e6)]
+    p_pads: Annotated[float, Signal("Pa", "pressure that the pads return", 2e6)]
+
+
+class Forces(NamedTuple):
+    """Flows, both >= 0: they solve the same complementarity as forces of contacts."""
+
+    inward: Annotated[float, Signal("m**3/s", "flow that moves the piston in", 1e-6), Ge(0)]
+    outward: Annotated[float, Signal("m**3/s", "flow that moves the piston out", 1e-6), Ge(0)]
+
+
+class Overlaps(NamedTuple):
+    """What is left of the pressures' difference once the friction is overcome."""
+
+    inward: Annotated[float, Signal("Pa", "pressure beyond friction, inward", 1e5)]
+    outward: Annotated[float, Signal("Pa", "pressure beyond friction, outward", 1e5)]
+
+
+class Thresholds(NamedTuple):
+    """Differences of pressure that the friction takes."""
+
+    inward: Annotated[float, Signal("Pa", "friction over area, inward", 1e5)]
+    outward: Annotated[float, Signal("Pa", "friction over area, outward", 1e5)]
+
+
+def exists(par: Parameters) -> bool:
+    """Tell whether there are contacts: only where a piston sticks."""
+    return par.law == "sticking"
+
+
+def thresholds(par: Parameters, caliper: pads.Parameters) -> Thresholds:
+    r"""Return what the friction takes of the pressure, :math:`F_{fr}/A`, less roll-back outward."""
+    taken = par.F_fr / caliper.A_pd
+    return Thresholds(inward=taken, outward=(1.0 - par.rollback) * taken)
+
+
+def overlaps(u: Input, par: Parameters, caliper: pads.Parameters) -> Overlaps:
+    """Return what drives the flows of a piston that sticks."""
+    taken = thresholds(par, caliper)
+    return Overlaps(
+        inward=u.p_line - u.p_pads - taken.inward,
+        outward=u.p_pads - u.p_line - taken.outward,
+    )
+
+
+def compliance(pipeline: line.Parameters, fluid: brake_fluid.Parameters) -> FlowResistance:
+    """Return what a flow takes of the pressure: the resistance of the line."""
+    return line.resistance(pipeline, fluid)
+
+
+def flow(f: Forces) -> Flow:
+    """Return the flow into the caliper, whose piston sticks."""
+    return f.inward - f.outward
+
+
+def fluid_pressure(u: Input, par: Parameters, caliper: pads.Parameters) -> Pressure:
+    """Return the pressure in the caliper: that of the pads, and what the friction holds beside."""
+    if par.law == "off":
+        return u.p_pads
+    taken = thresholds(par, caliper)
+    return u.p_pads + ops.clip(u.p_line - u.p_pads, -taken.outward, taken.inward)
+
+
+def power_loss(
+    u: Input, f: Forces, par: Parameters, caliper: pads.Parameters, fluid: brake_fluid.Parameters
+) -> Power:
+    """Return the heat of the friction, with the compression energy that the fluid gives up, >= 0.
+
+    It is what the flow brings at the fluid's pressure less what arrives at that of the pads.
+    """
+    if par.law == "off":
+        return 0.0
+    taken, h = thresholds(par, caliper), brake_fluid.flow_energy
+    p = u.p_pads
+    return f.inward * (h(p + taken.inward, fluid) - h(p, fluid)) + f.outward * (
+        h(p, fluid) - h(p - taken.outward, fluid)
+    )
