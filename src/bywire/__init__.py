@@ -57,6 +57,7 @@ if TYPE_CHECKING:
     from bywire.data.netcdf import read_recording, write_recording
     from bywire.data.writing import write_measurement
     from bywire.identification.fitting.question import Question
+    from bywire.server.serving import serve
     from bywire.simulation.ensemble import Ensemble
     from bywire.simulation.run import Run, Trajectory, simulate
     from bywire.simulation.sensitivity import Sensitivity, simulate_with_sensitivities
@@ -119,6 +120,7 @@ _HOMES = {
     "new": "api.new",
     "NewBrake": "api.new",
     "run": "api.run",
+    "serve": "server.serving",
     "simulate": "simulation.run",
     "simulate_ensemble": "bench.ensemble",
     "simulate_with_sensitivities": "simulation.sensitivity",
@@ -182,6 +184,7 @@ __all__ = [
     "run",
     "run_faults",
     "run_study",
+    "serve",
     "simulate",
     "simulate_ensemble",
     "simulate_with_sensitivities",

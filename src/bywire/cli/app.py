@@ -30,6 +30,7 @@ from bywire.cli.loop_commands import (
 )
 from bywire.cli.output import result
 from bywire.cli.page_command import page_command
+from bywire.cli.serve_command import serve_command
 from bywire.cli.sizing_commands import design_command, study_command
 from bywire.cli.study_commands import study_app
 
@@ -44,6 +45,7 @@ app.command("list")(list_command)
 app.command("run")(run)
 app.command("compare")(compare)
 app.command("page")(page_command)
+app.command("serve")(serve_command)
 app.command("reproduce")(reproduce_command)
 app.command("benchmark")(benchmark_command)
 app.command("linearize")(linearize_command)

@@ -26,7 +26,7 @@ function describe() {
     }).join(", ")}`
     : "as in the bench";
   place("reset").disabled = count === 0;
-  history.replaceState(null, "", count ? `#${linkOf(digest, made)}` : location.pathname);
+  history.replaceState(null, "", count ? `#${linkOf(digest, made)}` : location.pathname + location.search);
 }
 
 /* Key figures beside those of the runs that were kept, and whether they are as required. */

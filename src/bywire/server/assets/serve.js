@@ -1,0 +1,216 @@
+/* Forms begin jobs, dropped files become measurements, and the list of jobs is kept up to date. */
+"use strict";
+
+const place = (id) => document.getElementById(id);
+const states = new Map();
+let pause = 0, reports = 0;
+
+function complain(text) {
+  place("message").textContent = text;
+  place("message").hidden = !text;
+  if (text) place("message").scrollIntoView({ block: "nearest" });
+}
+
+async function ask(address, method = "GET", body = undefined) {
+  const headers = body === undefined ? {} : { "Content-Type": "application/json" };
+  let answer;
+  try {
+    answer = await fetch(address, { method, headers, body: body && JSON.stringify(body) });
+  } catch {
+    throw new Error("the server does not answer: was it ended? Start bywire serve again");
+  }
+  const said = await answer.json().catch(() => ({ error: `status ${answer.status}` }));
+  if (!answer.ok) throw new Error(said.error);
+  return said;
+}
+
+const element = (name, text = "", attributes = {}) =>
+  Object.assign(document.createElement(name), { textContent: text }, attributes);
+
+/* Forms */
+
+function valueOf(field) {
+  if (field.type === "checkbox") return field.checked;
+  if (field.multiple) return [...field.selectedOptions].map(({ value }) => value).join("\n");
+  return field.value;
+}
+
+async function begin(event) {
+  event.preventDefault();
+  const form = event.target;
+  const fields = [...form.elements].filter(({ name }) => name);
+  const asked = Object.fromEntries(fields.map((field) => [field.name, valueOf(field)]));
+  const button = form.querySelector("button[type=submit]");
+  button.disabled = true;
+  try {
+    await ask("/api/jobs", "POST", { task: form.dataset.task, form: asked });
+    complain("");
+    await refresh();
+    place("jobs-title").scrollIntoView({ block: "nearest" });
+  } catch (error) {
+    complain(error.message);
+  }
+  button.disabled = false;
+}
+
+/* Measurement files */
+
+function sent(file, bar) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest();
+    request.open("PUT", `/api/measurements/${encodeURIComponent(file.name)}`);
+    request.upload.onprogress = ({ loaded, total }) => { bar.value = total ? loaded / total : 0; };
+    request.onerror = () => reject(new Error(`${file.name} was not taken: was the server ended?`));
+    request.onload = () => {
+      let said = {};
+      try { said = JSON.parse(request.responseText); } catch { /* told by the status */ }
+      if (request.status === 201) resolve(said.file);
+      else reject(new Error(said.error ?? `status ${request.status}`));
+    };
+    request.send(file);
+  });
+}
+
+async function take(drop, file) {
+  const most = Number(document.body.dataset.largest), bar = drop.querySelector(".sent");
+  if (file.size > most) {
+    complain(`${file.name} has ${Math.ceil(file.size / 1e6)} MB, and ${Math.floor(most / 1e6)} MB are taken: copy `
+      + "it into the folder that is served, or make it smaller with bywire convert");
+    return;
+  }
+  bar.hidden = false;
+  try {
+    const name = await sent(file, bar), select = drop.querySelector("select");
+    select.append(element("option", name, { value: name, selected: true }));
+    complain("");
+    place("spoken").textContent = `${name} is there`;
+  } catch (error) {
+    complain(error.message);
+  }
+  bar.hidden = true;
+}
+
+function arm(drop) {
+  const upload = drop.querySelector(".upload");
+  upload.addEventListener("change", async () => {
+    for (const file of upload.files) await take(drop, file);
+    upload.value = "";
+  });
+  for (const kind of ["dragenter", "dragover"]) {
+    drop.addEventListener(kind, (event) => { event.preventDefault(); drop.classList.add("over"); });
+  }
+  drop.addEventListener("dragleave", () => drop.classList.remove("over"));
+  drop.addEventListener("drop", async (event) => {
+    event.preventDefault();
+    drop.classList.remove("over");
+    for (const file of event.dataTransfer.files) await take(drop, file);
+  });
+}
+
+/* Jobs */
+
+const isActive = ({ state }) => state === "waiting" || state === "running";
+
+function outcome(job) {
+  if (job.state === "done" && job.holds === false) return "done, and something required does not hold";
+  return job.state;
+}
+
+function linkTo(address, text) {
+  return element("a", text, { href: address.split("/").map(encodeURIComponent).join("/").replace(/^file/, "/file") });
+}
+
+function shown(job) {
+  const item = element("li"), tools = element("p", "", { className: "tools" });
+  item.dataset.number = job.number;
+  item.className = job.state === "done" ? (job.holds === false ? "missed" : "held") : job.state;
+  item.append(element("p", `${job.title}: ${job.subject} (${outcome(job)})`));
+  if (job.headline) item.append(element("p", job.headline));
+  if (job.message) item.append(element("p", job.message));
+  if (job.said.length) {
+    const details = element("details");
+    details.append(element("summary", job.said.length === 1 ? "1 remark" : `${job.said.length} remarks`));
+    details.append(...job.said.map((text) => element("p", text)));
+    item.append(details);
+  }
+  if (isActive(job)) {
+    const bar = element("progress", "", { max: 1 });
+    if (job.share > 0) bar.value = job.share;
+    bar.setAttribute("aria-label", `progress of job ${job.number}`);
+    item.append(bar, element("p", job.label));
+    const button = element("button", "cancel", { type: "button" });
+    button.setAttribute("aria-label", `cancel ${job.title} of ${job.subject}`);
+    button.addEventListener("click", () => cancel(job, button));
+    tools.append(button);
+  }
+  if (job.report) tools.append(linkTo(`file/${job.report}`, "report"));
+  if (tools.children.length) item.append(tools);
+  return item;
+}
+
+async function cancel(job, button) {
+  button.disabled = true;
+  try {
+    await ask(`/api/jobs/${job.number}/cancel`, "POST", {});
+  } catch (error) {
+    complain(error.message);
+  }
+  await refresh();
+}
+
+/* An item is made anew only when it changes: a button that has the focus keeps it. */
+function update(job) {
+  const said = JSON.stringify(job), old = place("jobs").querySelector(`[data-number="${job.number}"]`);
+  if (states.get(job.number)?.said === said && old) return old;
+  const known = states.get(job.number);
+  const item = old && known && isActive(job) && known.state === job.state && known.report === job.report ? old : shown(job);
+  if (item === old) {
+    const bar = item.querySelector("progress");
+    if (job.share > 0) bar.value = job.share;
+    bar.nextElementSibling.textContent = job.label;
+  } else if (known && known.state !== job.state && !isActive(job)) {
+    place("spoken").textContent = `${job.title} of ${job.subject}: ${outcome(job)}`;
+  }
+  states.set(job.number, { said, state: job.state, report: job.report });
+  if (old && item !== old) old.replaceWith(item);
+  return item;
+}
+
+function showStudy(jobs) {
+  const frame = place("study-report"), study = document.querySelector('[data-task="study"] [name="study"]');
+  const job = jobs.find((each) => each.task === "study" && each.subject === study?.value);
+  if (!frame || !job) return;
+  if (job.label) place("study-progress").textContent = `${job.label}: ${Math.round(100 * job.share)} %, ${job.state}`;
+  const count = job.reports + (job.state === "done" && job.report ? 1 : 0);
+  if (count !== reports) {
+    reports = count;
+    frame.hidden = false;
+    frame.src = frame.dataset.address;
+  }
+}
+
+async function refresh() {
+  clearTimeout(pause);
+  let jobs = [];
+  try {
+    jobs = (await ask("/api/jobs")).jobs;
+    const items = jobs.map(update), list = place("jobs");
+    if (items.some((item, k) => list.children[k] !== item)) list.replaceChildren(...items);
+    place("no-jobs").hidden = jobs.length > 0;
+    showStudy(jobs);
+  } catch (error) {
+    complain(error.message);
+  }
+  pause = setTimeout(refresh, jobs.some(isActive) ? 500 : 4000);
+}
+
+document.querySelectorAll("form.task").forEach((form) => form.addEventListener("submit", begin));
+document.querySelectorAll(".drop").forEach(arm);
+// A file that misses its place must not be opened instead of the page.
+for (const kind of ["dragover", "drop"]) addEventListener(kind, (event) => event.preventDefault());
+place("live-case")?.addEventListener("change", ({ target }) => {
+  const address = `${target.dataset.address}&case=${encodeURIComponent(target.value)}`;
+  place("live").src = address;
+  place("live-link").href = address;
+});
+refresh();

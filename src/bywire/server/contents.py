@@ -1,0 +1,107 @@
+"""What a folder has: bench files, studies, results, measurements."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from bywire.core.errors import FileError
+from bywire.data.format_registry import FORMATS
+from bywire.data.toml_file import LARGEST, read_toml
+from bywire.server.place import Place
+
+_DEEP, _MOST = 4, 5000  # folders in folders, and files, that are looked at
+_LEFT_OUT = ("node_modules", "__pycache__", "venv", "chunks")
+REPORT = ".html"
+
+
+@dataclass
+class Contents:
+    """What a folder has, as paths in it.
+
+    Parameters
+    ----------
+    benches
+        Bench files, with their experiment.
+    studies
+        Study files, with their bench.
+    reports
+        Pages of results, the latest first.
+    measurements
+        Files of measurement formats.
+    maps
+        Other TOML files: what the columns of measurements mean.
+    is_whole
+        Whether everything was looked at.
+    """
+
+    benches: dict[str, str] = field(default_factory=dict)
+    studies: dict[str, str] = field(default_factory=dict)
+    reports: list[str] = field(default_factory=list)
+    measurements: list[str] = field(default_factory=list)
+    maps: list[str] = field(default_factory=list)
+    is_whole: bool = True
+
+
+def endings() -> tuple[str, ...]:
+    """Return the endings of measurement files."""
+    return tuple(
+        dict.fromkeys(ending for kind in FORMATS.all().values() for ending in kind.endings)
+    )
+
+
+def contents(place: Place) -> Contents:
+    """Return what a folder has; hidden files and links that lead out are no part of it."""
+    there, ages, known = Contents(), dict[str, float](), endings()
+    for count, path in enumerate(_files(place.root, _DEEP)):
+        if count >= _MOST:
+            there.is_whole = False
+            break
+        name, suffix = place.named(path), path.suffix.lower()
+        if suffix == ".toml":
+            _note_toml(there, path, name)
+        elif suffix == REPORT:
+            ages[name] = path.stat().st_mtime
+        elif suffix in known and not _is_result(path):
+            there.measurements.append(name)
+    there.reports = sorted(ages, key=lambda name: -ages[name])
+    return there
+
+
+def _is_result(path: Path) -> bool:
+    """Return whether a recording lies beside the record of a result."""
+    return path.suffix.lower() == ".nc" and any(path.parent.glob("*.json"))
+
+
+def _files(folder: Path, depth: int) -> Iterator[Path]:
+    """Yield the plain files of a folder and those in it, in the order of their names."""
+    try:
+        with os.scandir(folder) as entries:
+            sorted_entries = sorted(entries, key=lambda entry: entry.name)
+    except OSError:
+        return
+    for entry in sorted_entries:
+        if entry.name.startswith(".") or entry.is_symlink():
+            continue
+        if entry.is_file():
+            yield Path(entry.path)
+        elif depth and entry.is_dir() and entry.name not in _LEFT_OUT:
+            yield from _files(Path(entry.path), depth - 1)
+
+
+def _note_toml(there: Contents, path: Path, name: str) -> None:
+    try:
+        if path.stat().st_size > LARGEST:
+            return
+        content: dict[str, Any] = read_toml(path, "file")
+    except (FileError, OSError):
+        return
+    if isinstance(content.get("experiment"), str):
+        there.benches[name] = content["experiment"]
+    elif isinstance(content.get("vary"), dict) and isinstance(content.get("bench"), str):
+        there.studies[name] = content["bench"]
+    else:
+        there.maps.append(name)

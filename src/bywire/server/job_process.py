@@ -1,0 +1,118 @@
+"""What runs in the process of a job: one call of a public function, told line by line.
+
+The order comes as a line of JSON on standard input: ``{task, asked, folder, out, systems}``.
+Answers go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``, and
+at last one of ``{done}``, ``{error}`` and ``{cancelled}``. When the server is gone, its end of
+standard input is closed, and this process ends with all that it started.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bywire.core.errors import BywireError
+from bywire.core.interrupts import interrupt_heard, interrupts_noted
+from bywire.server.telling import begin_to_tell, tell
+
+_PAUSE = 0.1  # s between two words on progress
+
+def main() -> None:
+    """Compute what is asked for."""
+    begin_to_tell()
+    with contextlib.suppress(OSError):  # of this machine's memory, this is what may be taken back
+        Path("/proc/self/oom_score_adj").write_text("900")
+    with interrupts_noted() as was_interrupted:
+        try:
+            line = sys.stdin.buffer.readline()
+            threading.Thread(target=_end_with_the_server, daemon=True).start()
+            _compute(json.loads(line))
+        except KeyboardInterrupt as stop:
+            interrupt_heard()
+            tell(cancelled=" ".join(map(str, stop.args)))
+        except Exception as error:
+            if was_interrupted():
+                tell(cancelled="")
+            else:
+                tell(error=_explained(error))
+    os._exit(0)  # without a tidying up, as commands do
+
+
+def _end_with_the_server() -> None:
+    while sys.stdin.buffer.read(4096):
+        pass
+    if hasattr(os, "killpg"):
+        os.killpg(os.getpgid(0), signal.SIGKILL)
+    os._exit(1)
+
+
+def _explained(error: Exception) -> str:
+    from bywire.core.brake import foreign_line
+
+    if isinstance(error, BywireError):
+        return str(error)
+    if isinstance(error, OSError):
+        place = f"{error.filename}: " if error.filename else ""
+        return f"{place}{error.strerror or error}: check that it is there and that there is room"
+    if line := foreign_line(error):
+        return line
+    traceback.print_exception(error)
+    return (
+        f"{type(error).__name__}: this is a defect of bywire; please report it with the lines that "
+        "the server printed"
+    )
+
+
+def _compute(order: Mapping[str, Any]) -> None:
+    from bywire.core.brake import load_system
+    from bywire.core.callers import command_line
+    from bywire.report.answer import AnswerWarning, leave_out_descriptions, write_document
+    from bywire.server.task_registry import tasks
+
+    leave_out_descriptions()
+    os.chdir(order["folder"])
+    task, out = tasks()[order["task"]], Path(order["out"])
+    with warnings.catch_warnings(record=True) as caught, command_line():
+        warnings.simplefilter("always")
+        for path in order["systems"]:
+            load_system(path)
+        answer = task.compute(order["asked"], out, _Words())
+        if getattr(answer, "status", "") == "interrupted":
+            raise KeyboardInterrupt
+        document = answer.document()
+        files = [] if task.is_file else write_document(document, out)
+        others = [str(w.message) for w in caught if not issubclass(w.category, AnswerWarning)]
+        said = [*others, *answer.warnings, *answer.notes, *answer.failures, *document.remarks]
+        tell(done={
+            "page": document.page_name if document.is_paged and files else "",
+            "holds": answer.holds, "said": list(dict.fromkeys(said)),
+            "headline": document.banner.text if document.banner is not None else "",
+        })  # fmt: skip
+
+
+class _Words:
+    """Progress, told now and then."""
+
+    def __init__(self) -> None:
+        self._last, self._next = ("", -1.0), 0.0
+
+    def __call__(self, label: str, share: float) -> None:
+        """Tell it, where something has changed."""
+        now, word = time.monotonic(), (label, round(float(share), 3))
+        if word != self._last and (now > self._next or label != self._last[0] or share >= 1.0):
+            self._last, self._next = word, now + _PAUSE
+            tell(progress=list(word))
+
+
+if __name__ == "__main__":
+    main()

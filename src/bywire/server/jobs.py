@@ -1,0 +1,223 @@
+"""Jobs: what is computed in processes of their own, with progress, and how each ends."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import signal
+import subprocess
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from bywire.core.brake import loaded_files
+from bywire.server.job_group import interrupt, kill, started
+from bywire.server.place import Place
+from bywire.server.refusal import RefusedError
+from bywire.server.task import Task
+
+TOGETHER = 2
+"""jobs that compute at the same time; further ones wait"""
+MOST = 100
+"""jobs that wait or compute; more are refused"""
+_KEPT = 200  # jobs that are remembered
+_PATIENCE = 5.0  # s that a job has to end after it was asked to
+_ENDED = ("done", "failed", "cancelled")
+
+
+@dataclass(eq=False)
+class Job:
+    """Something that is computed.
+
+    Parameters
+    ----------
+    number
+        By which it is called.
+    task, asked
+        What is computed.
+    out
+        Folder, or file, of its result.
+    """
+
+    number: int
+    task: Task
+    asked: Mapping[str, Any]
+    out: Path
+    state: Literal["waiting", "running", "done", "failed", "cancelled"] = "waiting"
+    progress: tuple[str, float] = ("", 0.0)
+    message: str = ""
+    reports: int = 0
+    result: Mapping[str, Any] = field(default_factory=dict)
+    ended: threading.Event = field(default_factory=threading.Event)
+    process: subprocess.Popen[bytes] | None = None
+    is_unwanted: bool = False
+
+    def shown(self, place: Place) -> dict[str, Any]:
+        """Return what pages are told of it."""
+        is_inside = not self.task.is_file
+        page = "report.html" if self.reports else ""
+        page = str(self.result.get("page", page))
+        label, share = self.progress
+        return {
+            "number": self.number, "task": self.task.name, "title": self.task.title,
+            "subject": str(self.asked[self.task.subject]), "state": self.state, "label": label,
+            "share": share, "message": self.message, "reports": self.reports,
+            "said": list(self.result.get("said", ())), "holds": self.result.get("holds"),
+            "headline": self.result.get("headline", ""),
+            "folder": place.named(self.out) if is_inside else "",
+            "report": f"{place.named(self.out)}/{page}" if is_inside and page else "",
+        }  # fmt: skip
+
+
+class Jobs:
+    """The jobs of a server.
+
+    Parameters
+    ----------
+    place
+        The folder that is served, which their paths start from.
+    """
+
+    def __init__(self, place: Place) -> None:
+        self._place = place
+        self._jobs: dict[int, Job] = {}
+        self._lock = threading.Lock()
+        self._turn = threading.Semaphore(TOGETHER)
+        self._is_open = True
+
+    def start(self, task: Task, asked: Mapping[str, Any], out: Path | None = None) -> Job:
+        """Begin with a job, or have it wait for its turn.
+
+        Raises
+        ------
+        RefusedError
+            With status 409 where its folder is another job's, 429 for too many, 503 at the end.
+        """
+        with self._lock:
+            active = [each for each in self._jobs.values() if each.state not in _ENDED]
+            if not self._is_open:
+                raise RefusedError(503, "the server is ending")
+            if len(active) >= MOST:
+                raise RefusedError(429, f"{MOST} jobs wait already: cancel some, or wait")
+            out = out or self._folder(task, asked)
+            if any(each.out == out for each in active):
+                raise RefusedError(409, f"{task.stem(asked)} is being computed: wait, or cancel it")
+            job = Job(max(self._jobs, default=0) + 1, task, asked, out)
+            self._jobs[job.number] = job
+            over = len(self._jobs) - _KEPT
+            for old in [each for each in self._jobs.values() if each.ended.is_set()][:max(over, 0)]:
+                del self._jobs[old.number]
+        threading.Thread(target=self._run, args=(job,), daemon=True).start()
+        return job
+
+    def all(self) -> list[Job]:
+        """Return all jobs, the latest first."""
+        with self._lock:
+            return sorted(self._jobs.values(), key=lambda job: -job.number)
+
+    def find(self, number: str) -> Job:
+        """Return a job.
+
+        Raises
+        ------
+        RefusedError
+            With status 404 where there is none.
+        """
+        with self._lock:
+            job = self._jobs.get(int(number)) if number.isdecimal() and len(number) < 9 else None
+        if job is None:
+            raise RefusedError(404, f"there is no job {number[:20]!r}: see the list of jobs")
+        return job
+
+    def cancel(self, job: Job) -> None:
+        """End a job; what it finished of a study stays."""
+        with self._lock:
+            job.is_unwanted = True
+            process = job.process
+        if process is not None:
+            interrupt(process)
+            watch = threading.Timer(_PATIENCE, kill, [process])
+            watch.daemon = True
+            watch.start()
+
+    def close(self) -> None:
+        """End all jobs, and wait until they have ended."""
+        with self._lock:
+            self._is_open = False
+        left = [job for job in self.all() if not job.ended.is_set()]
+        for job in left:
+            self.cancel(job)
+        for job in left:
+            job.ended.wait(2.0 * _PATIENCE)
+
+    def _folder(self, task: Task, asked: Mapping[str, Any]) -> Path:
+        stem = task.stem(asked)
+        if task.is_kept:
+            return self._place.same_folder(stem)
+        return self._place.fresh_folder(f"{task.name}-{stem}")
+
+    def _run(self, job: Job) -> None:
+        with self._turn:
+            try:
+                self._compute(job)
+            except OSError as error:
+                job.state, job.message = "failed", f"it cannot be started: {error}"
+            finally:
+                with contextlib.suppress(OSError):  # there is a result
+                    job.out.rmdir()
+                job.ended.set()
+
+    def _compute(self, job: Job) -> None:
+        with self._lock:
+            if job.is_unwanted:
+                job.state = "cancelled"
+                return
+            job.state, job.process = "running", started()
+        order = {
+            "task": job.task.name, "asked": dict(job.asked), "folder": str(self._place.root),
+            "out": str(job.out), "systems": list(loaded_files()),
+        }  # fmt: skip
+        process = job.process
+        assert process.stdin is not None
+        assert process.stdout is not None
+        with contextlib.suppress(OSError):  # it has ended, which the answer will show
+            process.stdin.write(json.dumps(order).encode() + b"\n")
+            process.stdin.flush()
+        last: dict[str, Any] = {}
+        for line in process.stdout:
+            last = self._hear(job, json.loads(line)) or last
+        status = process.wait()
+        process.stdin.close()
+        process.stdout.close()
+        _end(job, last, status)
+
+    @staticmethod
+    def _hear(job: Job, said: dict[str, Any]) -> dict[str, Any]:
+        """Take note of a word of the process; return its last one."""
+        if "progress" in said:
+            label, share = said["progress"]
+            job.progress = (str(label), float(share))
+            return {}
+        if "report" in said:
+            job.reports += 1
+            return {}
+        return said
+
+
+def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
+    """Say how a job has ended."""
+    if "done" in last:
+        job.result, job.state = last["done"], "done"
+    elif "error" in last:
+        job.message, job.state = str(last["error"]), "failed"
+    elif job.is_unwanted or "cancelled" in last:
+        job.message, job.state = str(last.get("cancelled", "")), "cancelled"
+    else:
+        how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
+        job.message, job.state = (
+            f"its process ended by {how}, perhaps for want of memory: ask for less, or run the "
+            f"command 'bywire {job.task.name}' in a terminal",
+            "failed",
+        )

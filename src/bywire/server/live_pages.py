@@ -1,0 +1,95 @@
+"""Live pages of benches: made when somebody wants them, and kept until their bench changes."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from bywire.core.errors import FileError
+from bywire.data.toml_file import read_toml
+from bywire.server.jobs import Job, Jobs
+from bywire.server.place import Place
+from bywire.server.refusal import RefusedError
+from bywire.server.task import is_file_name
+from bywire.server.task_registry import tasks
+
+
+class LivePages:
+    """The live pages of a server.
+
+    Parameters
+    ----------
+    place, jobs
+        What is served, and who makes them.
+    scratch
+        Folder in which they are kept.
+    """
+
+    def __init__(self, place: Place, jobs: Jobs, scratch: Path) -> None:
+        self._place, self._jobs, self._scratch = place, jobs, scratch
+        self._made: dict[str, Job] = {}
+        self._lock = threading.Lock()
+
+    def file(self, bench: str, case: str) -> Path:
+        """Return the file of a bench's live page, which is made where there is none yet.
+
+        Raises
+        ------
+        InputError
+            For a bench file that is none.
+        RefusedError
+            With status 422 and what is wrong where it cannot be made.
+        """
+        task = tasks()["page"]
+        asked = task.read({"bench": bench, "case": case}, self._place)
+        key = hashlib.sha256("\n".join(self._state(asked)).encode()).hexdigest()[:32]
+        with self._lock:
+            job = self._made.get(key)
+            if job is None or (job.ended.is_set() and job.state != "done"):
+                job = self._jobs.start(task, asked, self._scratch / f"{key}.html")
+                self._made[key] = job
+        job.ended.wait()
+        if job.state != "done":
+            raise RefusedError(422, job.message or "the page was cancelled: load it again")
+        return job.out
+
+    def _state(self, asked: dict[str, Any]) -> Iterator[str]:
+        """Yield what the page is made of: the bench file, and files that stand in it."""
+        yield from (asked["bench"], asked["case"])
+        if not is_file_name(asked["bench"]):
+            return
+        file = self._place.root / asked["bench"]
+        content = read_toml(file, "bench file")
+        yield repr(content)
+        for text in _texts(content):
+            if len(text) < 1000 and "\0" not in text and (file.parent / text).is_file():
+                status = (file.parent / text).stat()
+                yield f"{text} {status.st_mtime_ns} {status.st_size}"
+
+
+def _texts(content: Any) -> Iterator[str]:
+    if isinstance(content, str):
+        yield content
+    elif isinstance(content, (dict, list)):
+        for each in content.values() if isinstance(content, dict) else content:
+            yield from _texts(each)
+
+
+def experiments() -> dict[str, str]:
+    """Return what each experiment is, by its name.
+
+    Raises
+    ------
+    FileError
+        When no index of them can be made.
+    """
+    from bywire.api.overview import overview
+
+    try:
+        every: dict[str, str] = dict(overview().things["experiments"])
+    except OSError as error:
+        raise FileError(f"experiments cannot be listed: {error}") from None
+    return every

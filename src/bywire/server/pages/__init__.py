@@ -1,0 +1,1 @@
+"""The pages of `bywire serve`, one file each, in one frame."""

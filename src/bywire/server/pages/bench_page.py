@@ -1,0 +1,58 @@
+"""A bench: its live page, and what needs Python."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from urllib.parse import quote
+
+from bywire.server.contents import Contents
+from bywire.server.pages.frame import form, frame, link, section, text
+from bywire.server.task_registry import tasks
+
+
+def bench_page(
+    bench: str, summary: str, cases: Sequence[str], there: Contents, largest: int
+) -> str:
+    """Return the page of a bench.
+
+    Parameters
+    ----------
+    bench
+        Its file, or the name of an experiment.
+    summary
+        What it tests.
+    cases
+        Its runs.
+    there
+        What the folder has.
+    largest
+        Bytes that a file may have that is dropped.
+    """
+    given = {"bench": bench}
+    body = [
+        section("Live page", "live", _live(bench, cases)),
+        section("Run with Python", "run", form(tasks()["run"], there, given)),
+        section("Replay a measurement", "replay", form(tasks()["replay"], there, given)),
+    ]
+    if bench in there.benches:
+        body.append(f"<p>{link(f'/file/{bench}', 'The bench file')}</p>")
+    return frame(bench, summary, body, largest=largest)
+
+
+def _live(bench: str, cases: Sequence[str]) -> str:
+    if not cases:
+        return "<p>This experiment computes a characteristic without any run: run it.</p>"
+    address = f"/live?of={quote(bench, safe='')}"
+    first = f"{address}&case={quote(cases[0], safe='')}" if len(cases) > 1 else address
+    choice = ""
+    if len(cases) > 1:
+        options = "".join(f'<option value="{text(c)}">{text(c)}</option>' for c in cases)
+        choice = (
+            f'<p class="field"><label for="live-case">Run</label> <select id="live-case" '
+            f'data-address="{text(address)}">{options}</select></p>\n'
+        )
+    return (
+        f'{choice}<iframe id="live" title="Live page of {text(bench)}" src="{text(first)}">'
+        f'</iframe>\n<p><a id="live-link" href="{text(first)}">The live page by itself</a>: it is '
+        "made when it is first opened, which takes a while.</p>"
+    )

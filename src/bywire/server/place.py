@@ -1,0 +1,168 @@
+"""The folder that is served, which no path leads out of."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePosixPath
+
+from bywire.core.errors import FileError
+from bywire.server.refusal import RefusedError
+
+RESULTS, MEASUREMENTS = "results", "measurements"
+_LONGEST = 100  # characters of the name of a file that was dropped
+_PLAIN = re.compile(r"[^A-Za-z0-9._-]+")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder and what is in it.
+
+    Parameters
+    ----------
+    root
+        The folder, resolved.
+    """
+
+    root: Path
+
+    def inside(self, text: str) -> Path:
+        """Return the path that a text names in the folder, whether or not anything is there.
+
+        Hidden files are no part of what is served, and links that lead out lead nowhere.
+
+        Raises
+        ------
+        RefusedError
+            With status 404 for any other path.
+        """
+        parts = PurePosixPath(text).parts
+        is_plain = parts and not any(each.startswith(".") or "\\" in each for each in parts)
+        if not is_plain or text.startswith("/") or "\0" in text or os.path.isabs(text):
+            raise self.unknown(text)
+        try:
+            path = (self.root / text).resolve()
+        except (OSError, RuntimeError, ValueError):  # a circle of links
+            raise self.unknown(text) from None
+        if not path.is_relative_to(self.root):
+            raise self.unknown(text)
+        return path
+
+    def file(self, text: str) -> Path:
+        """Return the file that a text names.
+
+        Raises
+        ------
+        RefusedError
+            With status 404 where there is none.
+        """
+        path = self.inside(text)
+        if not path.is_file():
+            raise self.unknown(text)
+        return path
+
+    def unknown(self, text: str) -> RefusedError:
+        """Return what is said of a path that is not served."""
+        shown = text if len(text) <= _LONGEST else f"{text[:_LONGEST]}..."
+        return RefusedError(
+            404, f"there is no {shown!r} in the folder that is served: the start page lists it"
+        )
+
+    def named(self, path: Path) -> str:
+        """Return how links call a path of the folder."""
+        return path.relative_to(self.root).as_posix()
+
+    def fresh_folder(self, stem: str) -> Path:
+        """Return a new folder for a result.
+
+        Raises
+        ------
+        FileError
+            When it cannot be made.
+        """
+        parent = self._made(RESULTS)
+        for number in range(1, 10_000):
+            folder = parent / f"{stem}-{number}"
+            try:
+                folder.mkdir()
+            except FileExistsError:
+                continue
+            except OSError as error:
+                raise _unwritable(folder, error) from None
+            return folder
+        raise FileError(f"{parent} holds 9,999 results of {stem}: move them elsewhere")
+
+    def same_folder(self, stem: str) -> Path:
+        """Return the one folder of a result that is gone on with."""
+        self._made(RESULTS)
+        return self.inside(f"{RESULTS}/{stem}")
+
+    def fresh_file(self, name: str) -> Path:
+        """Return where a measurement of a name is kept; nothing that is there is replaced."""
+        parent, plain = self._made(MEASUREMENTS), Path(safe_name(name))
+        for number in range(1, 10_000):
+            path = parent / (plain.name if number == 1 else f"{plain.stem}-{number}{plain.suffix}")
+            if not os.path.lexists(path):
+                return path
+        raise FileError(f"{parent} holds 9,999 files named {plain.name}: move them elsewhere")
+
+    def _made(self, name: str) -> Path:
+        folder = self.inside(name)
+        try:
+            folder.mkdir(exist_ok=True)
+        except OSError as error:
+            raise _unwritable(folder, error) from None
+        return folder
+
+
+def safe_name(name: str) -> str:
+    """Return a name that is a file's in one folder, and nothing else on any system.
+
+    Examples
+    --------
+    >>> safe_name("../../Fahrt 7 (naß).csv")
+    'Fahrt-7-na.csv'
+    >>> safe_name(".csv"), safe_name("con.csv")
+    ('measurement.csv', 'measurement-con.csv')
+    """
+    last = re.split(r"[/\\]", name)[-1]
+    stem, dot, ending = last.rpartition(".")
+    plain = _PLAIN.sub("-", stem if dot else last).strip("-._")[:_LONGEST] or "measurement"
+    if re.fullmatch(r"(?i)(con|prn|aux|nul|(com|lpt)\d)(\..*)?", plain):  # devices of Windows
+        plain = f"measurement-{plain}"
+    return f"{plain}.{_PLAIN.sub('', ending)}" if dot and _PLAIN.sub("", ending) else plain
+
+
+def place_of(folder: Path) -> Place:
+    """Return the folder to serve.
+
+    Raises
+    ------
+    FileError
+        When it is no folder.
+    """
+    if not folder.is_dir():
+        raise FileError(f"{folder} is no folder: name the one to serve with --folder")
+    return Place(folder.resolve())
+
+
+def require_inside(place: Place, settings: Mapping[str, str], keys: tuple[str, ...]) -> None:
+    """Refuse settings that name a file outside of the folder.
+
+    Raises
+    ------
+    RefusedError
+        With status 404.
+    """
+    for key, value in settings.items():
+        if key.rpartition(".")[2] in keys:
+            place.file(value)
+
+
+def _unwritable(path: Path, error: OSError) -> FileError:
+    return FileError(
+        f"cannot make {path}: {error.strerror or error}: make room there, or serve a folder that "
+        "you may write to"
+    )

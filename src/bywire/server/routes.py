@@ -1,0 +1,208 @@
+"""Which request is answered by what."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from importlib.resources import files
+from pathlib import Path
+from typing import Final
+
+from bywire.bench import bench_file
+from bywire.core.errors import ParameterError, quoted, unknown_name
+from bywire.server.contents import contents
+from bywire.server.exchange import LIVE, SANDBOX, Reply, Request, page, plain
+from bywire.server.live_pages import experiments
+from bywire.server.pages.bench_page import bench_page
+from bywire.server.pages.index_page import index_page
+from bywire.server.pages.study_page import study_page
+from bywire.server.pages.task_page import PAGES, task_page
+from bywire.server.place import RESULTS, Place
+from bywire.server.refusal import RefusedError
+from bywire.server.service import Service
+from bywire.server.studies import how_far
+from bywire.server.task import is_file_name
+from bywire.server.task_registry import tasks
+from bywire.server.uploads import uploaded
+
+Route = Callable[[Service, Request, str], Reply]
+
+_KINDS: Final = {
+    ".html": "text/html; charset=utf-8", ".png": "image/png",
+    ".json": "application/json", ".toml": "text/plain; charset=utf-8",
+}  # fmt: skip
+_ASSETS: Final = {
+    "page.css": ("bywire.report", "page.css", "text/css; charset=utf-8"),
+    "serve.css": ("bywire.server", "assets/serve.css", "text/css; charset=utf-8"),
+    "serve.js": ("bywire.server", "assets/serve.js", "text/javascript; charset=utf-8"),
+}
+
+
+def answer(service: Service, request: Request) -> Reply:
+    """Return the answer to a request of somebody who may ask.
+
+    Raises
+    ------
+    RefusedError
+        With status 404 for an unknown path, 405 for a method that it does not have; what routes
+        refuse.
+    InputError
+        For what does not fit.
+    """
+    method = "GET" if request.method == "HEAD" else request.method
+    for first, route in _ROUTES.items():
+        if request.path == first or (first.endswith("/") and request.path.startswith(first)):
+            if method not in route:
+                raise RefusedError(
+                    405, f"{request.method} is not answered here: use {', '.join(route)}"
+                )
+            if first == "/" and request.path != "/":
+                continue
+            return route[method](service, request, request.path.removeprefix(first))
+    raise RefusedError(
+        404, f"there is no page {quoted(request.path)}: the start page leads to all"
+    )
+
+
+def _index(service: Service, request: Request, rest: str) -> Reply:
+    del request, rest
+    place = service.place
+    with service.reading:
+        known = experiments()
+    text = index_page(place.root.name or str(place.root), contents(place), known, service.largest)
+    return page(text)
+
+
+def _bench(service: Service, request: Request, rest: str) -> Reply:
+    del rest
+    name = _subject(request)
+    with service.reading:
+        bench = bench_file.read(_path_of(service.place, name), {})
+        cases = [case.label for case in bench.cases()]
+        summary = f"{bench.definition.summary}; parameters {bench.parameters}"
+    text = bench_page(name, summary, cases, contents(service.place), service.largest)
+    return page(text)
+
+
+def _live(service: Service, request: Request, rest: str) -> Reply:
+    del rest
+    name = _subject(request)
+    with service.reading:
+        _path_of(service.place, name)
+    return Reply(service.live_pages.file(name, request.query.get("case", "")), policy=LIVE)
+
+
+def _task(service: Service, request: Request, rest: str) -> Reply:
+    del request
+    if rest not in PAGES:
+        raise RefusedError(404, f"there is no task {quoted(rest)}: known are {', '.join(PAGES)}")
+    with service.reading:
+        return page(task_page(tasks()[rest], contents(service.place), service.largest))
+
+
+def _study(service: Service, request: Request, rest: str) -> Reply:
+    del rest
+    name, there = _subject(request), contents(service.place)
+    service.place.file(name)
+    if name not in there.studies:
+        raise ParameterError(f"{name} is no study file: it has no bench and section [vary]")
+    folder = f"{RESULTS}/{Path(name).stem}"
+    said = how_far(service.place.root / folder)
+    text = study_page(name, there.studies[name], f"{folder}/report.html", said, there,
+                      service.largest)  # fmt: skip
+    return page(text)
+
+
+def _file(service: Service, request: Request, rest: str) -> Reply:
+    del request
+    path = service.place.file(rest)
+    kind = _KINDS.get(path.suffix.lower())
+    if kind is None:
+        saved = {"Content-Disposition": "attachment"}
+        return Reply(path, "application/octet-stream", policy=SANDBOX, headers=saved)
+    return Reply(path, kind, policy=SANDBOX)
+
+
+def _asset(service: Service, request: Request, rest: str) -> Reply:
+    del service, request
+    if rest not in _ASSETS:
+        raise RefusedError(404, f"there is no {quoted(rest)}")
+    package, name, kind = _ASSETS[rest]
+    return Reply(files(package).joinpath(name).read_bytes(), kind)
+
+
+def _all_jobs(service: Service, request: Request, rest: str) -> Reply:
+    del request, rest
+    return plain({"jobs": [job.shown(service.place) for job in service.jobs.all()]})
+
+
+def _begin(service: Service, request: Request, rest: str) -> Reply:
+    del rest
+    said = request.form()
+    name, form = said.get("task"), said.get("form")
+    known = [each.name for each in tasks().values() if not each.is_file]
+    if not isinstance(name, str) or name not in known:
+        raise unknown_name("task", str(name), known)
+    if not isinstance(form, dict):
+        raise ParameterError("the form has no fields: use the page's button")
+    task = tasks()[name]
+    with service.reading:
+        asked = task.read(form, service.place)
+        if asked.get("bench"):
+            _path_of(service.place, asked["bench"])
+    return plain(service.jobs.start(task, asked).shown(service.place), 201)
+
+
+def _job(service: Service, request: Request, rest: str) -> Reply:
+    del request
+    return plain(service.jobs.find(rest).shown(service.place))
+
+
+def _cancel(service: Service, request: Request, rest: str) -> Reply:
+    number, slash, word = rest.partition("/")
+    if not slash or word != "cancel":
+        raise RefusedError(404, f"there is no {quoted(request.path)}: jobs take /cancel")
+    job = service.jobs.find(number)
+    service.jobs.cancel(job)
+    return plain(job.shown(service.place))
+
+
+def _upload(service: Service, request: Request, rest: str) -> Reply:
+    path = uploaded(service.place, request, rest, service.largest)
+    return plain({"file": service.place.named(path)}, 201)
+
+
+def _subject(request: Request) -> str:
+    name = request.query.get("of", "")
+    if not name:
+        raise ParameterError("the address names nothing: follow the links of the start page")
+    return name
+
+
+def _path_of(place: Place, bench: str) -> Path:
+    """Return what `bench_file.read` takes of a bench: a file of the folder, or an experiment."""
+    if is_file_name(bench):
+        return place.file(bench)
+    known = experiments()
+    if bench not in known:
+        raise unknown_name("experiment", bench, known)
+    return Path(bench)
+
+
+_ROUTES: Final[dict[str, dict[str, Route]]] = {
+    "/bench": {"GET": _bench},
+    "/live": {"GET": _live},
+    "/study": {"GET": _study},
+    "/task/": {"GET": _task},
+    "/file/": {"GET": _file},
+    "/assets/": {"GET": _asset},
+    "/api/jobs": {"GET": _all_jobs, "POST": _begin},
+    "/api/jobs/": {"GET": _job, "POST": _cancel},
+    "/api/measurements/": {"PUT": _upload},
+    "/": {"GET": _index},
+}
+
+
+def addresses() -> Iterator[tuple[str, str]]:
+    """Yield the method and path of everything that is answered."""
+    for path, methods in _ROUTES.items():
+        yield from ((method, path) for method in methods)

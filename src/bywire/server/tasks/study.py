@@ -1,0 +1,71 @@
+"""A study of many cases, whose report is written as chunks come."""
+
+from __future__ import annotations
+
+import time
+import warnings
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from bywire.core.errors import BywireError, ParameterError, quoted
+from bywire.core.typing import Progress
+from bywire.report.answer import Answer
+from bywire.server.task import Field, Task
+from bywire.server.telling import tell
+
+_PAUSE = 5.0  # s of computing between two reports, and in a report's own time five times that
+_SHARE = 5.0
+
+
+class _Reports:
+    """Writes what a study shows so far, now and then: between its chunks, which go on after it."""
+
+    def __init__(self, folder: Path, progress: Progress) -> None:
+        self._folder, self._progress = folder, progress
+        self._next = time.monotonic() + _PAUSE
+
+    def __call__(self, label: str, share: float) -> None:
+        """Be the progress of the study."""
+        self._progress(label, share)
+        if share < 1.0 and time.monotonic() > self._next:
+            begin = time.monotonic()
+            self._write()
+            took = time.monotonic() - begin
+            self._next = time.monotonic() + max(_PAUSE, _SHARE * took)
+            self._progress(label, share)
+
+    def _write(self) -> None:
+        from bywire.api.run_study import study_report
+
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            try:
+                study_report(self._folder).write(self._folder)
+            except BywireError:  # too few cases yet; the last report says what is wrong
+                return
+        tell(report=True)
+
+
+def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
+    from bywire.api.run_study import run_study
+
+    return run_study(asked["study"], out, asked["set"], cases=_cases(asked["cases"]),
+                     progress=_Reports(out, progress))  # fmt: skip
+
+
+def _cases(text: str) -> int | None:
+    if text and (not text.isdecimal() or len(text) > 9):
+        raise ParameterError(f"cases = {quoted(text)}: a whole number is wanted")
+    return int(text) if text else None
+
+
+TASK = Task(
+    "study", "Run the study", "Run, or go on",
+    (
+        Field("study", "Study", "file", is_required=True),
+        Field("cases", "Cases", hint="those of the file by default; more extend the study"),
+        Field("set", "Changes", "changes", "motor.R_m=0.4 ohm, one in a line"),
+    ),
+    _compute, subject="study", is_kept=True,
+)  # fmt: skip

@@ -1,0 +1,177 @@
+"""Who may ask, and what for: each refusal has its status and one message."""
+
+from __future__ import annotations
+
+import socket
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from bywire.core.errors import FileError, ParameterError, UnknownNameError
+from bywire.server.address import HERE, NAMES
+from bywire.server.place import safe_name
+from bywire.server.routes import addresses
+from bywire.server.serving import opened
+
+
+def test_the_link_gives_a_cookie_and_leads_on_without_the_token(visit):
+    link = visit.server.link.partition("/?")[2]
+    welcome = visit("GET", f"/bench?of=curve.toml&{link}", token="")
+    assert welcome.status == 303
+    assert welcome.headers["Location"] == "/bench?of=curve.toml"
+    cookie = welcome.headers["Set-Cookie"]
+    assert cookie.endswith("; Path=/; HttpOnly; SameSite=Strict")
+    page = visit("GET", "/", token="", Cookie=cookie.partition(";")[0])
+    assert page.status == 200
+    assert b"curve.toml" in page.body
+    assert visit("GET", f"//evil.example/?{link}", token="").headers["Location"][:2] != "//"
+
+
+@pytest.mark.parametrize(("method", "path"), sorted(addresses()))
+def test_nothing_is_answered_without_the_token(visit, method, path):
+    for token, word in ("", "missing"), ("x" * 43, "a new one is made"), ("\xe4", "token"):
+        answer = visit(method, path, token=token)
+        assert answer.status == 401
+        assert word.encode() in answer.body
+        assert b"curve" not in answer.body
+
+
+@pytest.mark.parametrize(
+    ("headers", "status"),
+    [
+        ({"Host": "evil.example"}, 421),
+        ({"Host": f"{HERE}:1"}, 421),
+        ({"Origin": "http://evil.example"}, 403),
+        ({"Origin": "null"}, 403),
+        ({"Origin": f"http://{NAMES[1]}:1"}, 403),
+        ({"Sec_Fetch_Site": "same-site", "Sec_Fetch_Mode": "no-cors"}, 403),
+        ({"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "cors"}, 403),
+        ({"Sec_Fetch_Site": "cross-site", "Sec_Fetch_Mode": "navigate"}, 200),
+        ({"Sec_Fetch_Site": "same-origin", "Sec_Fetch_Mode": "cors"}, 200),
+    ],
+)
+def test_pages_of_other_sites_are_refused(visit, headers, status):
+    assert visit("GET", "/api/jobs", **headers).status == status
+    here = f"{HERE}:{visit.server.port}"
+    assert visit("GET", "/api/jobs", Host=here, Origin=f"http://{here}").status == 200
+
+
+def test_every_answer_has_a_policy(visit):
+    for path in "/", "/nowhere", "/api/jobs", "/assets/serve.js":
+        headers = visit("GET", path).headers
+        policy = headers["Content-Security-Policy"]
+        assert policy.startswith("default-src 'none'; script-src 'self'")
+        assert headers["X-Content-Type-Options"] == "nosniff"
+        assert headers["Cache-Control"] == "no-store"
+    page = visit("GET", "/").body
+    assert b"<style" not in page
+    assert b"<script>" not in page
+    assert b"http" not in page.replace(b"xhttp", b"")
+    # What the folder holds may run its scripts, but as nobody: without cookies and network.
+    policy = visit("GET", "/file/page.html").headers["Content-Security-Policy"]
+    assert policy.startswith("sandbox allow-scripts allow-downloads; default-src 'none'")
+    assert "allow-same-origin" not in policy
+
+
+@pytest.mark.parametrize(
+    "path",
+    ["../outside/secret.csv", "%2e%2e/%2e%2e/etc/passwd", "/etc/passwd", "out.csv",
+     "way/secret.csv", ".hidden.toml", "results/../../x", "..%5cx", "curve.toml%00", "",
+     "none.html", "way"],
+)  # fmt: skip
+def test_no_path_leads_out_of_the_folder(visit, path):
+    answer = visit("GET", f"/file/{path}")
+    assert answer.status == 404
+    assert b"secret" not in answer.body.replace(b"secret.csv", b"")
+    assert visit.begin("replay", bench="curve.toml", measurement=path or "x").status == 404
+    changed = visit.begin("run", bench="curve.toml", set=f"options.trace={path or 'x'}")
+    assert changed.status == 404
+    assert visit("GET", "/file/curve.toml").status == 200
+
+
+def test_what_is_not_there_and_what_is_not_taken(visit):
+    assert visit("GET", "/nowhere").status == 404
+    assert visit("GET", "/assets/../serving.py").status == 404
+    assert visit("DELETE", "/file/curve.toml").status == 405
+    assert visit("POST", "/").status == 405
+    assert visit("GET", "/bench?of=bad.toml").status == 400
+    assert b"sett" in visit("GET", "/bench?of=bad.toml").body
+    assert visit("GET", "/bench?of=hard-brakin").status == 400
+    assert b"hard-braking" in visit("GET", "/bench?of=hard-brakin").body
+    assert visit("GET", "/bench").status == 400
+    assert visit("POST", "/api/jobs", "{}", Content_Type="text/plain").status == 415
+    assert visit("POST", "/api/jobs", {"x": "y" * 200_000}).status == 413
+    assert visit("POST", "/api/jobs", "[", Content_Type="application/json").status == 400
+    assert visit.begin("page", bench="curve.toml").status == 400
+    assert visit.begin("run", bench="curve.toml", shell="x").status == 400
+    assert visit.begin("run", bench="").status == 400
+    assert visit("GET", "/api/jobs/99").status == 404
+    assert visit("POST", "/api/jobs/99/cancel", {}).status == 404
+
+
+def test_files_that_are_dropped(visit):
+    large = visit("PUT", "/api/measurements/a.csv", b"", Content_Length=str(2_000_000_000))
+    assert large.status == 413
+    assert "2,000.0 MB, and 3.0 MB are taken" in large.object["error"]
+    assert visit("PUT", "/api/measurements/a.toml", b"x").status == 415
+    assert visit("PUT", "/api/measurements/a.csv", b"").status == 400
+    assert visit("PUT", "/api/measurements/a.csv", iter([b"x"])).status == 411
+    first = visit("PUT", "/api/measurements/..%2f..%2fa%20b.csv", b"first")
+    assert (first.status, first.object) == (201, {"file": "measurements/a-b.csv"})
+    second = visit("PUT", "/api/measurements/a%20b.csv", b"second")
+    assert second.object == {"file": "measurements/a-b-2.csv"}
+    kept = visit.folder / "measurements"
+    assert (kept / "a-b.csv").read_bytes() == b"first"
+    assert sorted(path.name for path in kept.iterdir()) == ["a-b-2.csv", "a-b.csv"]
+
+
+def test_a_file_that_does_not_come_to_its_end_is_not_kept(visit):
+    port, token = visit.server.port, visit.server.service.token
+    head = (
+        f"PUT /api/measurements/torn.csv HTTP/1.1\r\nHost: {HERE}:{port}\r\n"
+        f"Cookie: bywire-{port}={token}\r\nContent-Length: 9\r\n\r\n"
+    )
+    with socket.create_connection((HERE, port)) as torn:
+        torn.sendall(head.encode() + b"half")
+        torn.shutdown(socket.SHUT_WR)
+        said = torn.recv(10_000)
+    assert b"400" in said.splitlines()[0]
+    kept = visit.folder / "measurements"
+    assert not [path for path in kept.iterdir() if "torn" in path.name or path.name[0] == "."]
+
+
+def test_two_who_ask_at_once_are_both_answered(visit):
+    """One that sends its body slowly does not keep the other waiting."""
+    port, token = visit.server.port, visit.server.service.token
+    with socket.create_connection((HERE, port)) as slow, ThreadPoolExecutor(4) as pool:
+        slow.sendall(
+            f"PUT /api/measurements/s.csv HTTP/1.1\r\nHost: {HERE}:{port}\r\n"
+            f"Cookie: bywire-{port}={token}\r\nContent-Length: 2\r\n\r\nx".encode()
+        )
+        paths = ["/", "/api/jobs", "/task/design", "/"]
+        assert [a.status for a in pool.map(lambda p: visit("GET", p), paths)] == [200] * 4
+        slow.sendall(b"y")
+        assert b"201" in slow.recv(10_000).splitlines()[0]
+
+
+def test_names_are_harmless():
+    assert safe_name("C:\\data\\..\\run 07.mf4") == "run-07.mf4"
+    assert safe_name("-rf.csv") == "rf.csv"
+    assert safe_name("a\0b\n.csv") == "a-b.csv"
+    assert len(safe_name("x" * 999 + ".csv")) < 120
+
+
+def test_a_port_and_a_folder_that_do_not_do(visit, tmp_path):
+    cases = [
+        ({"port": visit.server.port}, ParameterError, "--port 0|port=0|port 0"),
+        ({"port": 65536}, ParameterError, "0 to 65535"),
+        ({"folder": tmp_path / "none"}, FileError, "is no folder"),
+        ({"subject": "none.toml"}, FileError, "is no file"),
+        ({"subject": "hard-brakin"}, UnknownNameError, "hard-braking"),
+        ({"subject": visit.folder / "curve.toml"}, FileError, "is not in"),
+    ]
+    for given, error, text in cases:
+        with pytest.raises(error, match=text), opened(**{"folder": tmp_path, "port": 0, **given}):
+            pass
+    assert list(Path(tmp_path).iterdir()) == []

@@ -1,0 +1,142 @@
+"""What forms ask reaches the public functions, and pages are made once."""
+
+from __future__ import annotations
+
+import inspect
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import bywire
+from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.server.jobs import Job, Jobs
+from bywire.server.live_pages import LivePages
+from bywire.server.pages.frame import form
+from bywire.server.place import Place
+from bywire.server.refusal import RefusedError
+from bywire.server.task_registry import tasks
+from bywire.server.tasks import study
+
+FUNCTIONS = {
+    "page": "page.page", "run": "run.run", "replay": "replay.replay", "design": "design.design",
+    "identify": "identify.identify", "study": "run_study.run_study",
+}  # fmt: skip
+FILLED = {
+    "lines": "a=1\n b=2 \n\n", "changes": "motor.R_m = 0.4 ohm\n", "flag": True, "text": "3",
+    "file": "x.csv", "files": "x.csv\n", "bench": "b.toml",
+}  # fmt: skip
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Place:
+    for name in "x.csv", "b.toml":
+        (tmp_path / name).write_text('experiment = "stribeck"\n')
+    return Place(tmp_path.resolve())
+
+
+def test_every_task_has_a_function():
+    assert set(FUNCTIONS) == set(tasks())
+
+
+@pytest.mark.parametrize("name", FUNCTIONS)
+def test_every_field_reaches_the_function(name, place, monkeypatch):
+    module, _, function = FUNCTIONS[name].partition(".")
+    home = import_module(f"bywire.api.{module}")
+    signature, calls = inspect.signature(getattr(home, function)), []
+
+    def called(*args: Any, **kwargs: Any) -> None:
+        calls.append(signature.bind(*args, **kwargs).arguments)
+
+    monkeypatch.setattr(home, function, called)
+    task = tasks()[name]
+    filled = {field.name: FILLED[field.kind] for field in task.fields}
+    task.compute(task.read(filled, place), place.root / "out", lambda *_: None)
+    empty = {field.name: filled[field.name] for field in task.fields if field.is_required}
+    task.compute(task.read(empty, place), place.root / "out", lambda *_: None)
+    full, least = ({k: repr(v) for k, v in given.items() if k != "progress"} for given in calls)
+    # A field that is filled in changes what the function is given, each one for itself.
+    for field in task.fields:
+        if not field.is_required:
+            task.compute(task.read({**empty, field.name: filled[field.name]}, place),
+                         place.root / "out", lambda *_: None)  # fmt: skip
+            given = {k: repr(v) for k, v in calls[-1].items() if k != "progress"}
+            assert given != least, field.name
+    assert full != least
+
+
+def test_forms_are_checked(place):
+    task = tasks()["identify"]
+    for given, text in ({"method": ""}, "Method"), ({"method": 1}, "a text"), (
+        {"method": "m", "measurements": "x.csv\ny.csv"}, "y.csv",
+    ):  # fmt: skip
+        with pytest.raises((ParameterError, RefusedError), match=text):
+            task.read(given, place)
+    with pytest.raises(UnknownNameError, match="metod"):
+        task.read({"metod": "x"}, place)
+    with pytest.raises(ParameterError, match="whole number"):
+        task.compute(task.read({"method": "m", "starts": "1.5"}, place), place.root, print)
+
+
+def test_forms_escape_what_the_folder_has(place):
+    from bywire.server.contents import contents
+
+    (place.root / '"><script>.csv').write_text("x")
+    text = form(tasks()["replay"], contents(place), {"bench": '"><script>'})
+    assert "<script>" not in text
+    assert "&quot;&gt;&lt;script&gt;.csv" in text
+
+
+class QuickJobs(Jobs):
+    """Jobs that end at once."""
+
+    started, state = 0, "done"
+
+    def start(self, task, asked, out=None):
+        type(self).started += 1
+        job = Job(self.started, task, asked, out, self.state, message="seeded")
+        job.ended.set()
+        return job
+
+
+def test_live_pages_are_made_again_when_their_bench_changes(place, tmp_path):
+    jobs = QuickJobs(place)
+    pages = LivePages(place, jobs, tmp_path)
+    text = (place.root / "b.toml").read_text() + 'name = "x.csv"\n'
+    (place.root / "b.toml").write_text(text)
+    first = pages.file("b.toml", "")
+    assert pages.file("b.toml", "") == first
+    assert jobs.started == 1
+    assert pages.file("b.toml", "second") != first
+    (place.root / "x.csv").write_text("a file that the bench names")
+    changed = pages.file("b.toml", "")
+    (place.root / "b.toml").write_text(text + "\n[set]\n\"motor.R_m\" = 1\n")
+    assert len({first, changed, pages.file("b.toml", "")}) == 3
+    QuickJobs.state = "failed"
+    with pytest.raises(RefusedError, match="seeded"):
+        pages.file("b.toml", "third")
+
+
+def test_a_study_reports_now_and_then_what_there_is(monkeypatch, tmp_path):
+    written, told = [], []
+
+    class Report:
+        def write(self, folder):
+            written.append(folder)
+
+    monkeypatch.setattr("bywire.api.run_study.study_report", lambda _: Report())
+    monkeypatch.setattr(study, "tell", lambda **said: told.append(said))
+    clock = [0.0]
+    monkeypatch.setattr(study.time, "monotonic", lambda: clock[0])
+    reports = study._Reports(tmp_path, lambda *_: None)
+    for second in range(20):
+        clock[0] = float(second)
+        reports("16 cases", second / 20)
+    reports("16 cases", 1.0)
+    assert len(written) == len(told) == 3
+    assert set(written) == {tmp_path}
+
+
+def test_the_function_is_public():
+    assert bywire.serve.__module__ == "bywire.server.serving"
