@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bywire.simulation.branches import branch, branched
+from bywire.simulation.branches import Arm, branch, branched
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
 
@@ -24,11 +24,11 @@ def test_only_what_one_arm_alone_needs_stands_in_it() -> None:
     order = needed(graph, [nodes["total"]], lambda _: False)
     left, arms = branched(graph, order, {nodes["total"]})
     (first, last) = arms[nodes["chosen"]]
-    assert {nodes["alone"], nodes["arm"]} <= set(first)
+    assert {nodes["alone"], nodes["arm"]} <= set(first.nodes)
     assert nodes["shared"] in left
-    assert last == []
-    assert sorted([*left, *first]) == sorted(order)
-    assert first == [node for node in order if node in first]
+    assert last == Arm()
+    assert sorted([*left, *first.nodes]) == sorted(order)
+    assert list(first.nodes) == [node for node in order if node in first.nodes]
 
 
 def test_what_is_read_elsewhere_or_cheap_stays_outside() -> None:
@@ -39,11 +39,39 @@ def test_what_is_read_elsewhere_or_cheap_stays_outside() -> None:
     assert arms == {}
 
 
+def test_selections_by_one_condition_share_what_their_arms_need() -> None:
+    graph = Graph()
+    x, y = graph.leaf("x", 0), graph.leaf("x", 1)
+    truth = graph.apply("lt", x, y)
+    sine = graph.apply("sin", graph.apply("sqrt", graph.apply("fabs", y)))
+    first = graph.apply("if_else_zero", truth, graph.apply("add", sine, y))
+    # The second arm needs the sine too, and what follows from the first selection.
+    arm = graph.apply("mul", graph.apply("sub", sine, x), first)
+    second = graph.apply("if_else_zero", truth, arm)
+    total = graph.apply("add", first, second)
+    order = needed(graph, [total], lambda _: False)
+    left, arms = branched(graph, order, {total})
+    assert sine not in left
+    (early, _), (late, _) = arms[first], arms[second]
+    assert sine in early.nodes
+    assert sine in early.kept
+    assert late.taken == (sine,)
+    assert arm in late.nodes
+    assert sorted([*left, *early.nodes, *late.nodes]) == sorted(order)
+    # Read from outside, it cannot stand in an arm.
+    left, arms = branched(graph, order, {total, sine})
+    assert sine in left
+
+
 def test_text_assigns_in_both_arms() -> None:
     graph, nodes = selection()
-    lines = branch(graph, nodes["chosen"], (["const double a = 1.0;"], []), lambda n: f"v{n}")
+    both = Arm(kept=(7,)), Arm(taken=(8,))
+    computed = ["const double a = 1.0;"], ["const double b = 2.0;"]
+    lines = branch(graph, nodes["chosen"], both, computed, lambda n: f"v{n}")
     name = f"v{nodes['chosen']}"
-    assert lines[0] == f"double {name};"
-    assert [line for line in lines if f"{name} = " in line] == [
+    assert lines[:2] == ["double kept_v7 = 0.0;", f"double {name};"]
+    assert [line for line in lines if f" {name} = " in line] == [
         f"  {name} = v{nodes['arm']};", f"  {name} = v1;"
     ]  # fmt: skip
+    assert lines.index("  kept_v7 = v7;") < lines.index("} else {")
+    assert lines.index("  const double v8 = kept_v8;") > lines.index("} else {")

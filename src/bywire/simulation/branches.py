@@ -1,12 +1,15 @@
 """Branches in a single run's kernel: what one arm of a selection alone needs stands inside it.
 
 A selection computes both arms. Where only one of them needs costly functions, such as the curve of
-a tyre that slides, the processor skips them while the other arm holds. The values are the same.
+a tyre that slides, the processor skips them while the other arm holds. Selections by one condition
+share what their arms need together: the first computes it, the others take it over. The values are
+the same.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 from bywire.simulation.expressions import COSTLY, Namer, as_number, condition
 from bywire.simulation.graph import Graph
@@ -17,10 +20,32 @@ _WORTH = 45.0  # of operations: a costly function and a little of what leads to 
 _SELECTIONS = ("if_else_zero", "select")
 
 
+@dataclass(frozen=True)
+class Arm:
+    """What an arm of a selection needs alone.
+
+    Parameters
+    ----------
+    nodes
+        What is computed in it, in order.
+    kept
+        Those of them that a later selection by the same condition takes over.
+    taken
+        What it takes over from earlier ones.
+    """
+
+    nodes: tuple[Node, ...] = ()
+    kept: tuple[Node, ...] = ()
+    taken: tuple[Node, ...] = ()
+
+
+Arms = tuple[Arm, Arm]
+
+
 def branched(
     graph: Graph, order: Sequence[Node], kept: Collection[Node]
-) -> tuple[list[Node], dict[Node, tuple[list[Node], list[Node]]]]:
-    """Take out of an order what single arms of its selections alone need.
+) -> tuple[list[Node], dict[Node, Arms]]:
+    """Take out of an order what the arms of its selections alone need.
 
     Parameters
     ----------
@@ -34,46 +59,128 @@ def branched(
     Returns
     -------
     tuple
-        The order without them; and by selection, what its two arms need, in order.
+        The order without them; and by selection, what its two arms need.
     """
     users: dict[Node, list[Node]] = {}
     for node in order:
         for argument in graph.arguments(node):
             users.setdefault(argument, []).append(node)
     inside: set[Node] = set()
-    arms: dict[Node, tuple[list[Node], list[Node]]] = {}
+    fixed = set(kept)
+    arms: dict[Node, Arms] = {}
     for node in reversed(order):  # the outermost first
-        if node in inside or graph.nodes[node].op not in _SELECTIONS:
+        if node in inside or node in arms or graph.nodes[node].op not in _SELECTIONS:
             continue
-        cones = [_cone(graph, node, arm, users, kept) for arm in graph.arguments(node)[1:]]
-        worth = [_worth(graph, cone) for cone in cones]
-        if any(worth):
-            chosen = [cone if pays else set() for cone, pays in zip(cones, worth, strict=True)]
+        truth = graph.nodes[node].args[0]
+        alike = [
+            n for n in order
+            if n not in inside and n not in arms and graph.nodes[n].op in _SELECTIONS
+            and graph.nodes[n].args[0] == truth
+        ]  # fmt: skip
+        if len(alike) > 1 and (together := _together(graph, order, alike, users, fixed)):
+            arms.update(together)
+            fixed.update(together)  # they stay where the first of them computes for all
+            inside.update(n for each in together.values() for arm in each for n in arm.nodes)
+            continue
+        cones = [_cone(graph, (node,), place, users, fixed) for place in (1, 2)]
+        chosen = [cone if worth(graph, cone) else set[Node]() for cone in cones]
+        if any(chosen):
             inside.update(*chosen)
-            first, last = chosen if len(chosen) == 2 else (chosen[0], set[Node]())
-            arms[node] = [n for n in order if n in first], [n for n in order if n in last]
+            first, last = (Arm(tuple(n for n in order if n in cone)) for cone in chosen)
+            arms[node] = first, last
     return [node for node in order if node not in inside], arms
 
 
-def _worth(graph: Graph, cone: Collection[Node]) -> bool:
+def _together(
+    graph: Graph, order: Sequence[Node], selections: Sequence[Node],
+    users: Mapping[Node, Sequence[Node]], kept: Collection[Node],
+) -> dict[Node, Arms]:  # fmt: skip
+    """Return the arms of selections by one condition; none where they share nothing costly."""
+    pinned = {*kept, *selections}
+    cones, pays = [], False
+    for place in (1, 2):
+        cone = _cone(graph, selections, place, users, pinned)
+        alone = (_cone(graph, (node,), place, users, pinned) for node in selections)
+        pays |= worth(graph, cone - set().union(*alone))
+        cones.append(cone if worth(graph, cone) else set[Node]())
+    if not pays:
+        return {}
+    shared: dict[Node, list[Arm]] = {node: [] for node in selections}
+    for place, cone in enumerate(cones, 1):
+        left = set(cone)
+        computed: dict[Node, set[Node]] = {}
+        read: dict[Node, set[Node]] = {}
+        for node in selections:
+            needs = _needs(graph, _arm(graph, node, place), cone)
+            computed[node] = needs & left
+            read[node] = _read(graph, node, place, computed[node], cone) - computed[node]
+            left -= needs
+        for node in selections:
+            later = set().union(*(read[n] for n in selections if n != node))
+            shared[node].append(Arm(*(
+                tuple(n for n in order if n in part)
+                for part in (computed[node], computed[node] & later, read[node])
+            )))  # fmt: skip
+    return {node: (first, last) for node, (first, last) in shared.items() if first or last}
+
+
+def _arm(graph: Graph, selection: Node, place: int) -> Node | None:
+    args = graph.nodes[selection].args
+    return args[place] if place < len(args) else None
+
+
+def _needs(graph: Graph, end: Node | None, cone: Collection[Node]) -> set[Node]:
+    """Return what of a cone a value needs."""
+    needs: set[Node] = set()
+    stack = [] if end is None else [end]
+    while stack:
+        node = stack.pop()
+        if node in cone and node not in needs:
+            needs.add(node)
+            stack.extend(graph.arguments(node))
+    return needs
+
+
+def _read(
+    graph: Graph, selection: Node, place: int, computed: Collection[Node], cone: Collection[Node]
+) -> set[Node]:
+    """Return what of a cone the text of an arm names: truth values name what they compare."""
+    end = _arm(graph, selection, place)
+    stack = [a for node in computed for a in graph.arguments(node)]
+    stack += [] if end is None else [end]
+    named: set[Node] = set()
+    while stack:
+        node = stack.pop()
+        if graph.is_boolean(node):
+            stack.extend(graph.arguments(node))
+        elif node in cone:
+            named.add(node)
+    return named
+
+
+def worth(graph: Graph, cone: Collection[Node]) -> bool:
+    """Return whether nodes cost more than the test of whether they are needed."""
     if not any(graph.nodes[node].op in COSTLY for node in cone):
         return False
     return sum(cost(graph, node) for node in cone) > _WORTH
 
 
 def _cone(
-    graph: Graph, selection: Node, arm: Node, users: Mapping[Node, Sequence[Node]],
+    graph: Graph, selections: Sequence[Node], place: int, users: Mapping[Node, Sequence[Node]],
     kept: Collection[Node],
 ) -> set[Node]:  # fmt: skip
-    """Return what the arm of a selection needs and nothing else does."""
-    if users.get(arm, ()) != [selection] or graph.arguments(selection).count(arm) != 1:
-        return set()
+    """Return what one arm of selections needs and nothing else does."""
+    ends: dict[Node, set[Node]] = {}
+    for selection in selections:
+        arm = _arm(graph, selection, place)
+        if arm is not None and graph.arguments(selection).count(arm) == 1:
+            ends.setdefault(arm, set()).add(selection)
     cone: set[Node] = set()
-    candidates = {arm}
+    candidates = set(ends)
     while candidates:
         node = max(candidates)  # arguments have lower numbers than who reads them
         candidates.discard(node)
-        readers = set(users.get(node, ())) - {selection} if node == arm else set(users[node])
+        readers = set(users.get(node, ())) - ends.get(node, set())
         if node in kept or not graph.arguments(node) or not readers <= cone:
             continue
         cone.add(node)
@@ -82,12 +189,18 @@ def _cone(
 
 
 def branch(
-    graph: Graph, node: Node, arms: tuple[Sequence[str], Sequence[str]], name: Namer
+    graph: Graph, node: Node, arms: Arms, lines: tuple[Sequence[str], Sequence[str]], name: Namer
 ) -> list[str]:
-    """Return the statements of a selection whose arms need statements of their own."""
+    """Return the statements of a selection whose arms need statements of their own: ``lines``."""
     truth, value, *other = graph.nodes[node].args
     ends = (as_number(graph, value, name), as_number(graph, other[0], name) if other else "0.0")
-    first, last = ([*(f"  {line}" for line in lines), f"  {name(node)} = {end};"]
-                   for lines, end in zip(arms, ends, strict=True))  # fmt: skip
+    texts = []
+    for arm, computed, end in zip(arms, lines, ends, strict=True):
+        taken = [f"const double {name(n)} = kept_{name(n)};" for n in arm.taken]
+        kept = [f"kept_{name(n)} = {name(n)};" for n in arm.kept]
+        text = [*taken, *computed, *kept, f"{name(node)} = {end};"]
+        texts.append([f"  {line}" for line in text])
+    kept_ones = [f"double kept_{name(n)} = 0.0;" for arm in arms for n in arm.kept]
     test = condition(graph, truth, name)
-    return [f"double {name(node)};", f"if ({test}) {{", *first, "} else {", *last, "}"]
+    declared = [*kept_ones, f"double {name(node)};"]
+    return [*declared, f"if ({test}) {{", *texts[0], "} else {", *texts[1], "}"]

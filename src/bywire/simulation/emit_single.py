@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+
 from bywire.simulation.branches import branch, branched
 from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.emission import (
@@ -21,6 +23,7 @@ from bywire.simulation.graph import Graph
 from bywire.simulation.layout import Layout
 from bywire.simulation.modes import Modes, modes
 from bywire.simulation.operation import Node
+from bywire.simulation.remembered import Remembered, declarations, remembered, renewal
 from bywire.simulation.stages import STATE, Stages
 
 SIGNATURE = """void bw_run(const double *restrict p, double h, const double *restrict u,
@@ -67,18 +70,30 @@ def emit_single(stages: Stages) -> str:
         if level[node] == 1 and node not in mode.values
     ]
 
-    def block(order: list[int]) -> list[str]:
+    def block(order: Sequence[Node]) -> list[str]:
         return branching_statements(graph, order, name, "const double ")
 
-    def substep(order: list[int]) -> list[str]:
-        left, arms = branched(graph, order, frozenset(pass_roots))
+    lead, groups, rest = remembered(graph, mode.rest, pass_roots, carried, level)
+
+    def renewed(k: int, group: Remembered) -> list[str]:
+        kept = frozenset(group.read)
+        lines = [
+            line
+            for node in group.values
+            for line in statements(graph, [node], name, "" if node in kept else "const double ")
+        ]
+        return renewal(graph, k, group, lines, name)
+
+    def substep(order: Sequence[Node], kept: Collection[Node]) -> list[str]:
+        left, arms = branched(graph, order, kept)
         lines: list[str] = []
         while left:
             at = next((k for k, node in enumerate(left) if node in arms), len(left))
             lines += block(left[:at])
             if at < len(left):
-                first, last = (substep(each) for each in arms[left[at]])
-                lines += branch(graph, left[at], (first, last), name)
+                both = arms[left[at]]
+                first, last = (substep(arm.nodes, {*kept, *arm.kept}) for arm in both)
+                lines += branch(graph, left[at], both, (first, last), name)
             left = left[at + 1 :]
         return lines
 
@@ -100,6 +115,7 @@ def emit_single(stages: Stages) -> str:
   {indented(_loads(layout), 2)}
   {indented(block(hoisted), 2)}
   {indented(_mode_state(mode, name), 2)}
+  {indented(declarations(groups, name), 2)}
   {indented([f"double {each}" for each in ahead], 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
     const double *restrict uk = u + (f / stim) * {leaf_count(stages, "u")};
@@ -117,7 +133,9 @@ def emit_single(stages: Stages) -> str:
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(block(mode.first), 6)}
       {indented(_mode_change(mode, graph, name), 6)}
-      {indented(substep(mode.rest), 6)}
+      {indented(block(lead), 6)}
+      {indented([line for k, each in enumerate(groups) for line in renewed(k, each)], 6)}
+      {indented(substep(rest, frozenset(pass_roots)), 6)}
       if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
         {indented(_repeat(layout) + ahead, 8)}
       }} else {{

@@ -143,7 +143,20 @@ def _mul(graph: Graph, a: Node, b: Node) -> Node | None:
             return other
         if value == -1.0:
             return graph.apply("neg", other)
-    return _gathered(graph, "mul", a, b) or _distributed(graph, a, b)
+    return _of_a_tie(graph, a, b) or _gathered(graph, "mul", a, b) or _distributed(graph, a, b)
+
+
+def _of_a_tie(graph: Graph, a: Node, b: Node) -> Node | None:
+    """Turn (x <= y)/((x <= y) + (y <= x)) into 0, 1/2 or 1: slopes of extremes need no division."""
+    for factor, other in ((a, b), (b, a)):
+        if graph.nodes[factor].op != "le" or graph.nodes[other].op != "inv":
+            continue
+        total = graph.nodes[graph.nodes[other].args[0]]
+        back = graph.intern(Operation("le", graph.nodes[factor].args[::-1]))
+        if total.op == "add" and sorted(total.args) == sorted((factor, back)):
+            tie = Operation("select", (back, graph.constant(0.5), graph.constant(1.0)))
+            return graph.apply("if_else_zero", factor, graph.intern(tie))
+    return None
 
 
 def _distributed(graph: Graph, a: Node, b: Node) -> Node | None:
