@@ -235,7 +235,7 @@ def watch(t: Array, x: State, par: Parameters) -> list[str]:
     if par.law == "off":
         return []
     boils = "the brake fluid passes the boiling point of {} fluid, {},".format
-    vapor = ": what vapor does to the lever's travel is not modeled"
+    vapor = ": vapor takes stroke, which is not simulated here"
     wet, fresh, most = (shown(T, "K") for T in (par.T_wet, par.T_boil, par.T_most))
     return [
         *first(t, x.T_fluid > par.T_wet, boils("wet", wet), vapor),

@@ -22,9 +22,11 @@ HOLD = {"p_from": "37 bar", "p_to": "37.0001 bar", "duration": "4 s"}
 ONSET = 1.5
 
 
-def held(*faults, **options):
+def held(*faults, changes=None, **options):
     """Return the recording of full braking with faults."""
-    bench = Bench("hard-braking", "dardanelli2010", options={**HOLD, **options}, faults=faults)
+    bench = Bench(
+        "hard-braking", "dardanelli2010", changes or {}, options={**HOLD, **options}, faults=faults
+    )
     recording = run(bench).recording
     books = actuator_ledger(recording)
     assert abs(books.closing_error) < 1e-6 * books.turnover
@@ -147,6 +149,26 @@ def test_air_takes_the_stroke_beyond_an_eighth_of_a_milliliter(name, volume, rea
     assert bar(recording)[-100:].mean() == pytest.approx(reached, abs=0.2)
     at_stop = bool(recording["at_stop"][-1] > 0)
     assert at_stop == (reached < 36.9)
+
+
+@pytest.mark.parametrize(
+    ("water", "T", "reached"),
+    [(0.037, "155 degC", 37.0), (0.037, "156.1 degC", 37.0), (0.037, "156.35 degC", 36.4),
+     (0.037, "168 degC", 0.6), (0.0, "168 degC", 37.0), (0.0, "231.35 degC", 36.4)],
+)  # fmt: skip
+def test_boiling_fluid_takes_the_stroke_as_its_vapor_as_air_does(water, T, reached):
+    """0.1 ml per kelvin beyond 155 degC wet, 230 degC dry: 0.123 ml are the cliff, 1.28 ml all."""
+    recording = held(
+        {"fault": "fluid.vapor", "value": T, "onset": -9.0}, changes={"vapor.water": water},
+        p_from="0.01 bar", p_to="37 bar",
+    )  # fmt: skip
+    assert bar(recording)[-100:].mean() == pytest.approx(reached, abs=0.2)
+    assert bool(recording["at_stop"][-1] > 0) == (reached < 36.9)
+
+
+def test_fluid_hotter_than_its_law_holds_is_refused():
+    with pytest.raises(ParameterError, match=r"fluid\.vapor at 327 degC is beyond 300 degC"):
+        failed("fluid.vapor", "327 degC")
 
 
 def test_pads_that_were_knocked_back_take_the_volume_of_their_gap():

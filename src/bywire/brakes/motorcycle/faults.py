@@ -6,8 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from bywire.brakes.motorcycle.model import MotorcycleBrake
+from bywire.core.errors import ParameterError
 from bywire.core.faults import Channel, Channels, Fault
-from bywire.plant import current_sensor, pressure_sensor
+from bywire.core.units import shown
+from bywire.plant import current_sensor, fluid_vapor, pressure_sensor
 
 _GAP_PRESSURE = 2e3  # Pa, that closes a gap: little, and no volume without any
 NAME = MotorcycleBrake.name
@@ -55,7 +57,19 @@ def _knocked_back(par: Any, gap: float) -> Mapping[str, Any]:
     }
 
 
+def _boiling(par: Any, T: float) -> Mapping[str, Any]:
+    """Return the vapor of fluid at a temperature [K] as gas in line and caliper."""
+    if not 0.0 < T <= par.vapor.T_most:
+        raise ParameterError(
+            f"fluid.vapor at {shown(T, 'K')} is beyond {shown(par.vapor.T_most, 'K')} "
+            "(vapor.T_most), up to which the law of its vapor holds: take a cooler fluid"
+        )
+    return {"fluid.air": "caliper", "fluid.V_air": fluid_vapor.volume(T, par.vapor)}
+
+
 FAULTS = (
+    Fault("fluid.vapor", "the fluid in the caliper boils, by its temperature", _boiling, NAME,
+          "K", 433.15),
     Fault("battery.lost", "battery lost, the bridge opens: no current", _source("current-source"),
           NAME),
     Fault("battery.shorted", "battery lost, the bridge shorts the motor", _source("voltage-source"),

@@ -28,6 +28,7 @@ from bywire.plant import (
     current_sensor,
     dc_motor,
     end_stop,
+    fluid_vapor,
     h_bridge,
     master_cylinder,
     motor_heat,
@@ -111,6 +112,7 @@ class MotorcycleParameters(ParameterSet):
     stop: end_stop.Parameters
     port: reservoir_port.Parameters
     fluid: brake_fluid.Parameters
+    vapor: fluid_vapor.Parameters
     pipeline: pipeline.Parameters
     caliper: caliper.Parameters
     piston: piston_friction.Parameters

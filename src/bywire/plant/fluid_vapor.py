@@ -1,0 +1,82 @@
+"""Vapor in brake fluid that boils: bubbles beyond its boiling point, which falls with its water."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from annotated_types import Ge
+from pydantic import Field, model_validator
+
+from bywire.core import ops
+from bywire.core.parameters import ParameterSet
+from bywire.core.quantities import Temperature, Unit, Volume
+from bywire.core.signals import Signal
+from bywire.core.units import shown
+
+Share = Annotated[float, Unit("1", 0.03), Field(ge=0, lt=1, allow_inf_nan=False)]
+Growth = Annotated[float, Unit("1/K", 0.02), Field(ge=0, allow_inf_nan=False)]
+Kelvin = Annotated[float, Signal("K", "temperature of the fluid", 430.0), Ge(0)]
+
+
+class Parameters(ParameterSet):
+    """Boiling points as FMVSS 116 tests them, at atmospheric pressure, and how fluid boils."""
+
+    water: Share
+    """share of water in the fluid, by mass"""
+    T_dry: Temperature
+    """boiling point of fluid without water"""
+    T_wet: Temperature
+    """boiling point with ``water_wet``"""
+    water_wet: Annotated[float, Unit("1", 0.037), Field(gt=0, lt=1, allow_inf_nan=False)]
+    """share of water in wet fluid, up to which these numbers hold"""
+    V: Volume
+    """volume of the fluid that is as hot"""
+    growth: Growth
+    """vapor per volume of that fluid and kelvin beyond its boiling point, at ambient pressure"""
+    T_most: Temperature
+    """temperature of the fluid up to which these numbers hold"""
+
+    @model_validator(mode="after")
+    def _boils_within_its_range(self) -> Parameters:
+        if not self.T_wet <= self.T_dry < self.T_most:
+            raise ValueError(
+                f"T_wet = {shown(self.T_wet, 'K')}, T_dry = {shown(self.T_dry, 'K')} and "
+                f"T_most = {shown(self.T_most, 'K')} must rise: water lowers the boiling point"
+            )
+        if self.water > self.water_wet:
+            raise ValueError(
+                f"water = {self.water:g} is beyond water_wet = {self.water_wet:g}, up to which the "
+                "boiling point is known: give less, or the point of wetter fluid as T_wet"
+            )
+        return self
+
+
+def boiling_point(par: Parameters) -> Annotated[float, Signal("K", "boiling point", 430.0)]:
+    r"""Return the boiling point of fluid with some water.
+
+    .. math:: T_b = T_{dry} - (T_{dry} - T_{wet})\, w / w_{wet}
+
+    Notes
+    -----
+    A straight line between the two points that are tested; in truth the first water costs most.
+
+    References
+    ----------
+    49 CFR 571.116 (FMVSS 116): DOT 4 boils at 230 degC at least when dry, 155 degC when wet.
+    """
+    return par.T_dry - (par.T_dry - par.T_wet) * (par.water / par.water_wet)
+
+
+def volume(T: Kelvin, par: Parameters) -> Annotated[float, Signal("m**3", "vapor", 1e-7)]:
+    r"""Return the volume of the vapor at ambient pressure.
+
+    .. math:: V_{vapor} = \gamma V \max(T - T_b, 0)
+
+    Under pressure it yields as a gas does (`brake_fluid`, air in line and caliper).
+
+    Notes
+    -----
+    By its heat alone a fluid of 2.3 kJ/(kg K) boils away the water of 10 ml of vapor per kelvin and
+    5 ml; how much of it forms before the fluid is pushed back or cools is the growth's matter.
+    """
+    return par.growth * par.V * ops.fmax(T - boiling_point(par), 0.0)
