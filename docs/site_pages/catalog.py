@@ -20,8 +20,9 @@ from bywire.core.model import ASSEMBLIES
 from bywire.identification.fitting.question import BENCH_METHODS
 from bywire.identification.method import METHODS
 from bywire.life.declaration import LIVES
+from bywire.report.schematic.blocks import schematic_blocks
 from bywire.synthesis.study import STUDIES
-from site_pages.markdown import plain, section_lines, table_lines
+from site_pages.markdown import block_lines, plain, section_lines, table_lines
 
 
 @dataclass(frozen=True)
@@ -110,6 +111,14 @@ def faults_page() -> str:
 
 
 def brakes_page() -> str:
-    """Return the page of the brakes that come with bywire."""
+    """Return the page of the brakes that come with bywire, with the schematics of what they run."""
     rows = ([f"`{brake.name}`", plain(brake.summary)] for brake in brakes().values())
-    return "\n".join(["# Brakes", "", *table_lines(["brake", "what it is"], rows)])
+    lines = ["# Brakes", "", *table_lines(["brake", "what it is"], rows)]
+    main = {cited.assembly: name for name, cited in reversed(PARAMETER_SETS.all().items())}
+    for brake in brakes().values():
+        lines += [f"## {plain(brake.name)}", "", plain(brake.summary), ""]
+        for name, model in ASSEMBLIES.all().items():
+            if model.__module__.startswith(f"{brake.module}.") and name in main:
+                par = PARAMETER_SETS.find(main[name]).parameters()
+                lines += [f"### {plain(name)}", "", *block_lines(schematic_blocks(model(), par))]
+    return "\n".join(lines)

@@ -10,6 +10,7 @@ from bywire.report.document import (
     Block,
     Details,
     Document,
+    Drawing,
     FigureBlock,
     Listing,
     Paragraph,
@@ -45,9 +46,13 @@ def section_lines(
     lines: list[str] = []
     for section in sections:
         lines += ["#" * level + " " + plain(section.title), ""]
-        for block in section.blocks:
-            lines += _block(block, figures)
+        lines += block_lines(section.blocks, figures)
     return lines
+
+
+def block_lines(blocks: Iterable[Block], figures: Path | None = None) -> list[str]:
+    """Return blocks without a heading; see `section_lines`."""
+    return [line for block in blocks for line in _block(block, figures)]
 
 
 def document_page(document: Document, figures: Path | None = None) -> str:
@@ -68,6 +73,8 @@ def _block(block: Block, figures: Path | None) -> Iterator[str]:
         case TableBlock(table, caption):
             yield from ([f"*{plain(caption)}*", ""] if caption else [])
             yield from _table(table)
+        case Drawing(source, caption):
+            yield from ("```{raw} html", source(), "```", "", f"*{plain(caption)}*", "")
         case FigureBlock() if figures is not None:
             yield from _figure(block, figures)
         case Details(title, blocks):

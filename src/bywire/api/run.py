@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
 from bywire.api.run_remarks import remarks, unexpected
-from bywire.api.run_sections import energy, how_it_was_made, outcome
+from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
@@ -98,6 +98,7 @@ class BenchResult(Result, Answer):
                 Section("Figures", self._figures()),
                 Section("Key figures", [table]),
                 *energy(self.ledgers()),
+                *schematic_section(self.bench),
                 how_it_was_made(self, self._step_errors()),
             ],
             brief=[*([Listing(said)] if said else []), *([table] if self.kpis else [])],

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from bywire.api.run_changes import change_table, option_changes, parameter_changes
+from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
 from bywire.bench.result import Result
 from bywire.core.catalog import PARAMETER_SETS
+from bywire.core.model import ASSEMBLIES
 from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
 from bywire.report.parameter_rows import parameter_rows
+from bywire.report.schematic.blocks import schematic_blocks
 from bywire.report.tables import KpiRow, Table, kpi_table, parameter_table, text_table
 from bywire.report.wording import amount
 
@@ -46,6 +50,16 @@ def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:
     for label, books in ledgers.items():
         blocks += [Paragraph(f"{label}, from time zero on:"), TableBlock(energy_table(books))]
     return [Section("Energy", blocks)] if blocks else []
+
+
+def schematic_section(bench: Bench) -> list[Section]:
+    """Return the brake as parts and wires, where its model is made of such."""
+    case = next(iter(replace(bench, faults=()).cases()), None)  # without what bends its signals
+    model, par = (ASSEMBLIES.find(bench.system)(), bench.par) if case is None else (
+        case.model, case.par
+    )  # fmt: skip
+    blocks = schematic_blocks(model, par)
+    return [Section("Schematic", blocks)] if blocks else []
 
 
 def how_it_was_made(

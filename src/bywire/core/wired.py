@@ -97,7 +97,7 @@ class Wired(Generic[X, U, F, P]):
             raise ModelError(
                 f"{self._part.where}: {line()} assigns its input a second time: wire it once"
             )
-        self._input = value
+        self._input = self._instant.marked(f"{self._part.name}.u", value)
         self._instant.note(f"{self._part.name}.u")
 
     def call(self, function: Callable[..., Any], **more: Any) -> Any:
@@ -140,6 +140,9 @@ class Instant:
         Contact forces by part.
     lines
         File and line in which every wire and input was set, where that is wanted.
+    mark
+        ``mark(name, value)``: what takes the place of every wire and input as it is set, where
+        connections are followed.
     """
 
     x: Any
@@ -154,6 +157,11 @@ class Instant:
     wires: dict[str, Any] = field(default_factory=dict)
     parts: dict[str, Wired[Any, Any, Any, Any]] = field(default_factory=dict)
     lines: dict[str, str] | None = None
+    mark: Callable[[str, Any], Any] | None = None
+
+    def marked(self, name: str, value: Any) -> Any:
+        """Return a wire or an input as it is kept."""
+        return value if self.mark is None else self.mark(name, value)
 
     def note(self, name: str) -> None:
         """Remember where a signal was set."""

@@ -47,7 +47,7 @@ class Wire(_Named):
         instant = instant_of(instance, self.where)
         if self.name in instant.wires:
             raise ModelError(f"{self.where}: {line()} sets it a second time: set a wire once")
-        instant.wires[self.name] = value
+        instant.wires[self.name] = instant.marked(self.name, value)
         instant.note(self.name)
 
 

@@ -58,6 +58,22 @@ class FigureBlock:
 
 
 @dataclass(frozen=True)
+class Drawing:
+    """A drawing that takes the colors of the page it stands in, with its caption.
+
+    Parameters
+    ----------
+    source
+        What makes it: an SVG element as text, with its own description and all text escaped.
+    caption
+        What it shows.
+    """
+
+    source: Callable[[], str]
+    caption: str
+
+
+@dataclass(frozen=True)
 class TableBlock:
     """A table, with a caption that the page numbers.
 
@@ -83,7 +99,7 @@ class Details:
     blocks: Sequence[Flat]
 
 
-Flat = Paragraph | Listing | FigureBlock | TableBlock
+Flat = Paragraph | Listing | FigureBlock | Drawing | TableBlock
 Block = Flat | Details
 
 

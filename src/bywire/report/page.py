@@ -18,6 +18,7 @@ from bywire.report.document import (
     Block,
     Details,
     Document,
+    Drawing,
     FigureBlock,
     Listing,
     Paragraph,
@@ -124,15 +125,16 @@ def _file(name: str) -> str:
 def _numbered(sections: Sequence[Section]) -> _Numbered:
     blocks = [block for section in sections for block in flat_blocks(section.blocks)]
     shown = [(b.figure, b.caption) for b in blocks if isinstance(b, FigureBlock)]
-    return _Numbered(inline_figures(shown))
+    is_zoomed = any(isinstance(b, FigureBlock | Drawing) for b in blocks)
+    return _Numbered(inline_figures(shown), is_zoomed)
 
 
 class _Numbered:
     """Hands out the figures in their order, and the numbers of figures and tables."""
 
-    def __init__(self, figures: Sequence[str]) -> None:
+    def __init__(self, figures: Sequence[str], has_figures: bool) -> None:
         self.figures = iter(figures)
-        self.has_figures = bool(figures)
+        self.has_figures = has_figures
         self.figure_numbers = count(1)
         self.table_numbers = count(1)
 
@@ -173,6 +175,10 @@ def _block(block: Block, numbered: _Numbered) -> str:
     if isinstance(block, FigureBlock):
         caption = f"Figure {next(numbered.figure_numbers)}. {_text(block.caption)}"
         return f"<figure>\n{next(numbered.figures)}\n<figcaption>{caption}</figcaption>\n</figure>"
+    if isinstance(block, Drawing):
+        caption = f"Figure {next(numbered.figure_numbers)}. {_text(block.caption)}"
+        drawing = f"{block.source()}\n<figcaption>{caption}</figcaption>"
+        return f'<figure class="wide">\n{drawing}\n</figure>'
     caption = ""
     if block.caption:
         number = next(numbered.table_numbers)

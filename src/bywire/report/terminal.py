@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 import textwrap
 
-from bywire.report.document import Document, FigureBlock, Flat, Listing, Paragraph
+from bywire.report.document import Document, Drawing, FigureBlock, Flat, Listing, Paragraph
 from bywire.report.tables import Table
 
 WIDTH = 100
@@ -19,7 +19,8 @@ LONGEST_WORD = 40
 
 def terminal_text(document: Document) -> str:
     """Return what a terminal shows of a document; figures are left out."""
-    texts = [_text(block) for block in document.brief if not isinstance(block, FigureBlock)]
+    shown = (each for each in document.brief if not isinstance(each, FigureBlock | Drawing))
+    texts = [_text(block) for block in shown]
     return "\n".join(text for text in texts if text is not None)
 
 
@@ -31,7 +32,7 @@ def _text(block: str | Flat) -> str:
     if isinstance(block, Listing):
         lines = [_bullet(text) for text in block.texts]
         return "\n".join([block.title, *lines] if block.title else lines)
-    assert not isinstance(block, FigureBlock)
+    assert not isinstance(block, FigureBlock | Drawing)
     text = table_text(block.table, block.width or shutil.get_terminal_size().columns)
     return f"{block.title}\n{text}" if block.title else text
 

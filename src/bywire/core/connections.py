@@ -1,0 +1,239 @@
+"""Which part feels which, read off an assembly's own equations: nothing is declared a second time.
+
+``wire`` and the tasks are run once on numbers that remember how they are computed; wires and inputs
+are marked as they are set. What a value is computed from, up to the next mark, is what it is
+connected to.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+from bywire.core.assembly import Assembly
+from bywire.core.traced import Traced
+from bywire.core.wired import instant_of
+
+Kind = Literal["part", "wire", "task", "stimulus"]
+FRICTION = "friction"
+"""what the port is called at which a part feels the dry friction on its state"""
+
+
+class Node(NamedTuple):
+    """A part, a wire, a task of the ECU, or the stimulus of the bench, by its name there."""
+
+    kind: Kind
+    name: str
+
+
+STIMULUS = Node("stimulus", "demand")
+"""what the bench or a driver asks for"""
+
+
+@dataclass(frozen=True)
+class Connection:
+    """What a node gives to another one.
+
+    ``port``: input of a part, signal that a task reads; empty where the target is a wire.
+    """
+
+    source: Node
+    target: Node
+    port: str = ""
+
+
+@dataclass(frozen=True)
+class Network:
+    """An assembly as parts and wires.
+
+    Parameters
+    ----------
+    name
+        Of the assembly.
+    nodes
+        Parts, wires and tasks in the order in which they are declared, the stimulus first where
+        a task reads it.
+    labels
+        What each is: the kind of a part's element, what a wire carries.
+    ports
+        What each part and task feels, by node, in order; nothing for wires.
+    connections
+        Each once, in the order of their targets.
+    """
+
+    name: str
+    nodes: tuple[Node, ...]
+    labels: dict[Node, str]
+    ports: dict[Node, tuple[str, ...]]
+    connections: tuple[Connection, ...]
+
+    def sources(self, node: Node, port: str = "") -> list[Node]:
+        """Return what a node is connected to at one of its ports."""
+        return [c.source for c in self.connections if (c.target, c.port) == (node, port)]
+
+
+def network(model: Assembly[Any, Any], par: Any) -> Network:
+    """Return the parts of an assembly and what connects them.
+
+    Parameters
+    ----------
+    model
+        An assembly.
+    par
+        Parameters, whose choices say which equations hold.
+    """
+    trace = _Trace(model, par)
+    ports: dict[Node, tuple[str, ...]] = {}
+    connections: dict[Connection, None] = {}
+
+    def connect(target: Node, port: str, values: Any) -> None:
+        for source in trace.sources(values):
+            if source != target:
+                connections[Connection(source, target, port)] = None
+
+    for task, read in trace.ticks.items():
+        ports[task] = tuple(read)
+        for signal, source in read.items():
+            connections[Connection(source, task, signal)] = None
+    for name, value in trace.wires.items():
+        connect(Node("wire", name), "", value)
+    for name, part in model.parts.items():
+        node, inputs = Node("part", name), trace.inputs.get(name)
+        ports[node] = () if inputs is None else tuple(part.element.Input._fields)
+        for port, value in zip(ports[node], inputs or (), strict=True):
+            connect(node, port, value)
+    for state, bounds in zip(model.frictions, trace.frictions, strict=False):
+        node = trace.owners[state]
+        if any(source != node for source in trace.sources(bounds)):
+            ports[node] = tuple(dict.fromkeys((*ports[node], FRICTION)))
+            connect(node, FRICTION, bounds)
+    found = tuple(connections)
+    return Network(str(model.name), trace.nodes(found), trace.labels(), ports, found)
+
+
+class _Trace:
+    """An assembly's equations, run once on traced numbers."""
+
+    def __init__(self, model: Assembly[Any, Any], par: Any) -> None:
+        self.model = model
+        self._marks: dict[int, tuple[Node, Any]] = {}
+        self._kept: list[Traced] = []  # a mark is known by its object, which must live on
+        self.owners = {
+            part.state_name(state): Node("part", part.name)
+            for part in model.parts.values() if part.has("State")
+            for state in part.element.State._fields
+        }  # fmt: skip
+        paths = [part.path for part in model.parts.values()]
+        self._paths = {
+            part.path: Node("part", part.name)
+            for part in model.parts.values() if paths.count(part.path) == 1
+        }  # fmt: skip
+        self._par = par.with_leaves({name: Traced(None, f".{name}") for name in par.leaves()})
+        self._state = model.State._make(Traced(None, name) for name in model.State._fields)
+        self._memory = model.Memory._make(Traced(None, f"m.{k}") for k in model.Memory._fields)
+        self.fields: dict[str, Node] = {}
+        ticks = list(self._ticks(par))
+        self.ticks = {
+            node: read | {k: self.fields[k] for k in model.Memory._fields
+                          if k in held and self.fields.get(k, node) != node}
+            for node, read, held in ticks
+        }  # fmt: skip
+        contact: tuple[Any, ...] = tuple(
+            Traced(None, f"contact.{part.name}")
+            for part in model.parts.values() if part.has("Forces")
+            for _ in part.element.Forces._fields
+        )  # fmt: skip
+        w = model.at(self._state, self._memory, self._par, contact, mark=self._mark)
+        wires = instant_of(w, "wire").wires
+        self.wires = {name: self._marks[id(value)][1] for name, value in wires.items()}
+        inputs = {name: vars(getattr(w, name))["_input"] for name in model.parts}
+        self.inputs = {
+            name: tuple(self._marks[id(each)][1] for each in value)
+            for name, value in inputs.items() if value is not None
+        }  # fmt: skip
+        self.frictions = model.friction(w)
+
+    def _mark(self, name: str, value: Any) -> Any:
+        """Return a value that is known by the wire or input that carries it."""
+        part = name.removesuffix(".u")
+        node = Node("wire", name) if part == name else Node("part", part)
+        if node.kind == "wire":
+            return self._marked(node, value)
+        return value._make(self._marked(node, each) for each in value)
+
+    def _marked(self, node: Node, value: Any) -> Traced:
+        marked = Traced(lambda same: same, value)
+        self._marks[id(marked)] = (node, value)
+        self._kept.append(marked)
+        return marked
+
+    def _ticks(self, par: Any) -> Iterator[tuple[Node, dict[str, Node], set[str]]]:
+        """Yield tasks, the signals that they read with their sources, and the memory they use."""
+        stimulus = self.model.Stimulus._make(
+            Traced(None, f"u.{k}") for k in self.model.Stimulus._fields
+        )
+        for task in self.model.tasks(par):
+            node = Node("task", task.name)
+            after = task.tick(self._state, self._memory, stimulus, self._par)
+            changed = {
+                name: value for name, value in after._asdict().items()
+                if value is not getattr(self._memory, name)
+            }  # fmt: skip
+            self.fields |= dict.fromkeys(changed, node)
+            leaves = {str(each) for each in _leaves(tuple(changed.values()), {})}
+            read = {name: self.owners[name] for name in self.model.State._fields if name in leaves}
+            read |= {k: STIMULUS for k in stimulus._fields if f"u.{k}" in leaves}
+            yield node, read, {name.removeprefix("m.") for name in leaves if name[:2] == "m."}
+
+    def sources(self, values: Any) -> list[Node]:
+        """Return the nodes that a value follows from, each once."""
+        nodes = [self._node(each) for each in _leaves(values, self._marks)]
+        return list(dict.fromkeys(node for node in nodes if node is not None))
+
+    def _node(self, leaf: str | Node) -> Node | None:
+        if isinstance(leaf, Node):
+            return leaf
+        kind, _, name = leaf.partition(".")
+        if kind == "m" and name:
+            return self.fields.get(name)
+        if kind == "contact" and name:
+            return Node("part", name)
+        if leaf.startswith("."):
+            groups = name.split(".")
+            paths = (".".join(groups[:n]) for n in range(len(groups), 0, -1))
+            return next((self._paths[path] for path in paths if path in self._paths), None)
+        return self.owners.get(leaf)
+
+    def nodes(self, connections: Iterable[Connection]) -> tuple[Node, ...]:
+        """Return all nodes, the stimulus where anything is connected to it."""
+        asked = [STIMULUS] if any(c.source == STIMULUS for c in connections) else []
+        parts = (Node("part", name) for name in self.model.parts)
+        return (*asked, *self.ticks, *(Node("wire", name) for name in self.wires), *parts)
+
+    def labels(self) -> dict[Node, str]:
+        """Return what every node is, in words."""
+        cls = type(self.model)
+        labels = {Node("wire", name): getattr(cls, name).signal.label for name in self.wires}
+        labels |= {
+            Node("part", name): part.kind.replace("_", " ")
+            for name, part in self.model.parts.items()
+        }  # fmt: skip
+        return labels | {STIMULUS: "of the bench"} | dict.fromkeys(self.ticks, "task of the ECU")
+
+
+def _leaves(values: Any, marks: dict[int, tuple[Node, Any]]) -> Iterator[str | Node]:
+    """Yield the given names, and the marks, that values are computed from."""
+    waiting, seen = [values], set()
+    while waiting:
+        each = waiting.pop()
+        if isinstance(each, tuple):
+            waiting += each
+        elif isinstance(each, Traced) and id(each) not in seen:
+            seen.add(id(each))
+            if id(each) in marks:
+                yield marks[id(each)][0]
+            elif each.operation is None:
+                yield each.inputs[0]
+            else:
+                waiting += each.inputs

@@ -1,0 +1,1 @@
+"""A model drawn as boxes and wires, from its own equations."""
