@@ -99,7 +99,7 @@ def running(visit, number: int) -> jobs.Job:
 
 @posix
 @pytest.mark.usefixtures("standin")
-def test_cancelled_and_killed_jobs_leave_nothing(visit):
+def test_canceled_and_killed_jobs_leave_nothing(visit):
     """The server goes on, whatever becomes of a job's process."""
     before = set((visit.folder / "results").glob("*"))
     numbers = [visit.begin("run", bench="curve.toml").object["number"] for _ in range(3)]
@@ -109,12 +109,12 @@ def test_cancelled_and_killed_jobs_leave_nothing(visit):
     assert waiting["state"] == "waiting"
     for number in numbers[2], numbers[0]:
         assert visit("POST", f"/api/jobs/{number}/cancel", {}).status == 200
-    assert visit.ended(numbers[0])["state"] == "cancelled"
+    assert visit.ended(numbers[0])["state"] == "canceled"
     os.killpg(killed.process.pid, signal.SIGKILL)
     ended = visit.ended(numbers[1])
     assert ended["state"] == "failed"
     assert "SIGKILL" in ended["message"]
-    assert visit.ended(numbers[2])["state"] == "cancelled"
+    assert visit.ended(numbers[2])["state"] == "canceled"
     assert set((visit.folder / "results").glob("*")) == before
     done = visit.ended(visit.begin("run", bench="curve.toml", set="a=b").object["number"])
     assert (done["state"], done["share"], done["holds"]) == ("done", 0.5, True)
@@ -132,7 +132,7 @@ def test_a_study_is_computed_once_at_a_time(visit):
     assert second.status == 409
     assert "being computed" in second.object["error"]
     visit("POST", f"/api/jobs/{begun.object['number']}/cancel", {})
-    assert visit.ended(begun.object["number"])["state"] == "cancelled"
+    assert visit.ended(begun.object["number"])["state"] == "canceled"
 
 
 def test_what_does_not_fit_is_told_in_one_message(capsys):

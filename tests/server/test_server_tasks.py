@@ -11,11 +11,14 @@ import pytest
 
 import bywire
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.server.contents import Contents, contents
 from bywire.server.jobs import Job, Jobs
 from bywire.server.live_pages import LivePages
+from bywire.server.pages.bench_page import bench_page
 from bywire.server.pages.frame import form
 from bywire.server.place import Place
 from bywire.server.refusal import RefusedError
+from bywire.server.shown_bench import shown_bench
 from bywire.server.task_registry import tasks
 from bywire.server.tasks import study
 
@@ -24,8 +27,9 @@ FUNCTIONS = {
     "identify": "identify.identify", "study": "run_study.run_study",
 }  # fmt: skip
 FILLED = {
-    "lines": "a=1\n b=2 \n\n", "changes": "motor.R_m = 0.4 ohm\n", "flag": True, "text": "3",
-    "file": "x.csv", "files": "x.csv\n", "bench": "b.toml",
+    "lines": "a=1\n b=2 \n\n", "pairs": "a = 1\n", "names": "a\nb=2 bar", "flag": True,
+    "changes": "motor.R_m = 0.4 ohm\n", "text": "3", "file": "x.csv",
+    "files": "x.csv\n", "bench": "b.toml",
 }  # fmt: skip
 
 
@@ -80,8 +84,6 @@ def test_forms_are_checked(place):
 
 
 def test_forms_escape_what_the_folder_has(place):
-    from bywire.server.contents import contents
-
     (place.root / '"><script>.csv').write_text("x")
     text = form(tasks()["replay"], contents(place), {"bench": '"><script>'})
     assert "<script>" not in text
@@ -136,6 +138,39 @@ def test_a_study_reports_now_and_then_what_there_is(monkeypatch, tmp_path):
     reports("16 cases", 1.0)
     assert len(written) == len(told) == 3
     assert set(written) == {tmp_path}
+
+
+def test_a_page_of_a_bench_simulates_nothing(monkeypatch):
+    def refused(*_: Any, **__: Any) -> None:
+        raise AssertionError("simulated")
+
+    monkeypatch.setattr("bywire.simulation.run.simulate", refused)
+    monkeypatch.setattr("bywire.bench.running.run_of", refused)
+    stops = shown_bench(Path("repeated-stops"), "repeated-stops")
+    assert len(stops.cases) == 2
+    driven = shown_bench(Path("open-loop"), "open-loop")
+    assert "[stimulus]" in driven.trouble
+    page = bench_page(driven, Contents(), 1)
+    assert "iframe" not in page
+    assert 'data-task="replay"' in page
+    assert '<select id="live-case"' in bench_page(stops, Contents(), 1)
+
+
+def test_a_folder_is_listed_by_what_its_files_are(place):
+    (place.root / "study.toml").write_text('bench = "b.toml"\n[vary]\n"motor.R_m" = "+-5 %"\n')
+    (place.root / "map.toml").write_text("[columns]\n")
+    (place.root / "broken.toml").write_text("[")
+    result = place.root / "results" / "run-b-1"
+    result.mkdir(parents=True)
+    for name in "run.nc", "result.json", "report.html":
+        (result / name).write_text("{}")
+    (place.root / "rig.nc").write_text("x")
+    there = contents(place)
+    assert there.benches == {"b.toml": "stribeck"}
+    assert there.studies == {"study.toml": "b.toml"}
+    assert there.maps == ["map.toml"]
+    assert there.reports == ["results/run-b-1/report.html"]
+    assert there.measurements == ["rig.nc", "x.csv"]
 
 
 def test_the_function_is_public():

@@ -18,6 +18,8 @@ PAGES = (
     "frame-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 """policy of the server's own pages"""
+REFUSAL = "default-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
+"""policy of what is refused, which a frame of a page may show"""
 LIVE = "frame-ancestors 'self'"
 """policy of live pages beside the strict one that stands in each"""
 SANDBOX = (

@@ -16,7 +16,7 @@ from urllib.parse import parse_qsl, unquote, urlsplit
 from bywire.core.errors import BywireError
 from bywire.core.version import __version__
 from bywire.server import guard
-from bywire.server.exchange import PAGES, Reply, Request
+from bywire.server.exchange import REFUSAL, Reply, Request
 from bywire.server.pages.refusal_page import refusal_page
 from bywire.server.refusal import RefusedError
 from bywire.server.routes import answer
@@ -111,8 +111,8 @@ class Handler(BaseHTTPRequestHandler):
     def _refused(self, status: int, text: str) -> Reply:
         if self.path.startswith("/api/"):
             body = json.dumps({"error": text}).encode()
-            return Reply(body, "application/json", status)
-        return Reply(refusal_page(status, text).encode(), status=status)
+            return Reply(body, "application/json", status, REFUSAL)
+        return Reply(refusal_page(status, text).encode(), status=status, policy=REFUSAL)
 
     def _send(self, reply: Reply) -> None:
         body = reply.body
@@ -146,7 +146,7 @@ class Handler(BaseHTTPRequestHandler):
         self.send_response(code)
         for name, value in {
             **_HEADERS, "Content-Type": "text/html; charset=utf-8", "Connection": "close",
-            "Content-Length": str(len(body)), "Content-Security-Policy": PAGES,
+            "Content-Length": str(len(body)), "Content-Security-Policy": REFUSAL,
         }.items():  # fmt: skip
             self.send_header(name, value)
         self.end_headers()

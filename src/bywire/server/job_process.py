@@ -2,12 +2,13 @@
 
 The order comes as a line of JSON on standard input: ``{task, asked, folder, out, systems}``.
 Answers go as such lines to standard output: ``{progress: [label, share]}``, ``{report: true}``, and
-at last one of ``{done}``, ``{error}`` and ``{cancelled}``. When the server is gone, its end of
+at last one of ``{done}``, ``{error}`` and ``{canceled}``. When the server is gone, its end of
 standard input is closed, and this process ends with all that it started.
 """
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import json
 import os
@@ -27,8 +28,11 @@ from bywire.server.telling import begin_to_tell, tell
 
 _PAUSE = 0.1  # s between two words on progress
 
+
 def main() -> None:
     """Compute what is asked for."""
+    # As commands do: what was registered for the end is done, and Python does not tidy up further.
+    atexit.register(os._exit, 0)
     begin_to_tell()
     with contextlib.suppress(OSError):  # of this machine's memory, this is what may be taken back
         Path("/proc/self/oom_score_adj").write_text("900")
@@ -39,13 +43,12 @@ def main() -> None:
             _compute(json.loads(line))
         except KeyboardInterrupt as stop:
             interrupt_heard()
-            tell(cancelled=" ".join(map(str, stop.args)))
+            tell(canceled=" ".join(map(str, stop.args)))
         except Exception as error:
             if was_interrupted():
-                tell(cancelled="")
+                tell(canceled="")
             else:
                 tell(error=_explained(error))
-    os._exit(0)  # without a tidying up, as commands do
 
 
 def _end_with_the_server() -> None:

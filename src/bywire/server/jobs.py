@@ -24,7 +24,7 @@ MOST = 100
 """jobs that wait or compute; more are refused"""
 _KEPT = 200  # jobs that are remembered
 _PATIENCE = 5.0  # s that a job has to end after it was asked to
-_ENDED = ("done", "failed", "cancelled")
+_ENDED = ("done", "failed", "canceled")
 
 
 @dataclass(eq=False)
@@ -45,7 +45,7 @@ class Job:
     task: Task
     asked: Mapping[str, Any]
     out: Path
-    state: Literal["waiting", "running", "done", "failed", "cancelled"] = "waiting"
+    state: Literal["waiting", "running", "done", "failed", "canceled"] = "waiting"
     progress: tuple[str, float] = ("", 0.0)
     message: str = ""
     reports: int = 0
@@ -172,7 +172,7 @@ class Jobs:
     def _compute(self, job: Job) -> None:
         with self._lock:
             if job.is_unwanted:
-                job.state = "cancelled"
+                job.state = "canceled"
                 return
             job.state, job.process = "running", started()
         order = {
@@ -212,8 +212,8 @@ def _end(job: Job, last: Mapping[str, Any], status: int) -> None:
         job.result, job.state = last["done"], "done"
     elif "error" in last:
         job.message, job.state = str(last["error"]), "failed"
-    elif job.is_unwanted or "cancelled" in last:
-        job.message, job.state = str(last.get("cancelled", "")), "cancelled"
+    elif job.is_unwanted or "canceled" in last:
+        job.message, job.state = str(last.get("canceled", "")), "canceled"
     else:
         how = f"signal {signal.Signals(-status).name}" if status < 0 else f"status {status}"
         job.message, job.state = (

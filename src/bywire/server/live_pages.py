@@ -53,7 +53,7 @@ class LivePages:
                 self._made[key] = job
         job.ended.wait()
         if job.state != "done":
-            raise RefusedError(422, job.message or "the page was cancelled: load it again")
+            raise RefusedError(422, job.message or "the page was canceled: load it again")
         return job.out
 
     def _state(self, asked: dict[str, Any]) -> Iterator[str]:

@@ -7,7 +7,6 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
-from bywire.bench import bench_file
 from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.server.contents import contents
 from bywire.server.exchange import LIVE, SANDBOX, Reply, Request, page, plain
@@ -19,6 +18,7 @@ from bywire.server.pages.task_page import PAGES, task_page
 from bywire.server.place import RESULTS, Place
 from bywire.server.refusal import RefusedError
 from bywire.server.service import Service
+from bywire.server.shown_bench import shown_bench
 from bywire.server.studies import how_far
 from bywire.server.task import is_file_name
 from bywire.server.task_registry import tasks
@@ -76,11 +76,8 @@ def _bench(service: Service, request: Request, rest: str) -> Reply:
     del rest
     name = _subject(request)
     with service.reading:
-        bench = bench_file.read(_path_of(service.place, name), {})
-        cases = [case.label for case in bench.cases()]
-        summary = f"{bench.definition.summary}; parameters {bench.parameters}"
-    text = bench_page(name, summary, cases, contents(service.place), service.largest)
-    return page(text)
+        shown = shown_bench(_path_of(service.place, name), name)
+    return page(bench_page(shown, contents(service.place), service.largest))
 
 
 def _live(service: Service, request: Request, rest: str) -> Reply:

@@ -9,12 +9,15 @@ from typing import Any, Literal
 
 from bywire.bench.bench_text import PATHS
 from bywire.core.errors import ParameterError, quoted, unknown_name
-from bywire.core.pairs import changes
+from bywire.core.pairs import changes, named
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.server.place import Place, require_inside
 
 _LONGEST = 20_000  # characters of a field
+
+
+Kind = Literal["text", "lines", "pairs", "changes", "names", "flag", "file", "files", "bench"]
 
 
 @dataclass(frozen=True)
@@ -26,8 +29,9 @@ class Field:
     name, label
         Of the field, and what stands beside it.
     kind
-        A ``text``, ``lines`` of text, ``changes`` (lines of ``KEY=VALUE``), a ``flag``, a ``file``
-        or ``files`` of the folder, a ``bench`` (a file of the folder, or an experiment).
+        A ``text``, ``lines`` of text, ``pairs`` (lines of ``KEY=VALUE``), ``changes`` (such pairs,
+        of which some name files), ``names`` (lines of ``NAME`` or ``NAME=TEXT``), a ``flag``, a
+        ``file`` or ``files`` of the folder, a ``bench`` (a file of it, or an experiment).
     hint
         An example, or what it is left out for.
     choices
@@ -38,7 +42,7 @@ class Field:
 
     name: str
     label: str
-    kind: Literal["text", "lines", "changes", "flag", "file", "files", "bench"] = "text"
+    kind: Kind = "text"
     hint: str = ""
     choices: Callable[[], Sequence[str]] | None = None
     is_required: bool = False
@@ -71,9 +75,11 @@ class Field:
     def _checked(self, lines: list[str], text: str, place: Place) -> Any:
         if self.kind == "lines":
             return lines
-        if self.kind == "changes":
-            values = changes(lines)
-            require_inside(place, values, PATHS)
+        if self.kind == "names":
+            return named(lines, self.label)
+        if self.kind in ("pairs", "changes"):
+            values = changes(lines, self.label)
+            require_inside(place, values if self.kind == "changes" else {}, PATHS)
             return values
         if self.kind == "files":
             return [place.named(place.file(line)) for line in lines]

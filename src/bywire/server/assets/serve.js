@@ -116,16 +116,15 @@ function outcome(job) {
   return job.state;
 }
 
-function linkTo(address, text) {
-  return element("a", text, { href: address.split("/").map(encodeURIComponent).join("/").replace(/^file/, "/file") });
-}
+const linkTo = (path, text) =>
+  element("a", text, { href: `/${path.split("/").map(encodeURIComponent).join("/")}` });
 
 function shown(job) {
   const item = element("li"), tools = element("p", "", { className: "tools" });
   item.dataset.number = job.number;
   item.className = job.state === "done" ? (job.holds === false ? "missed" : "held") : job.state;
   item.append(element("p", `${job.title}: ${job.subject} (${outcome(job)})`));
-  if (job.headline) item.append(element("p", job.headline));
+  if (job.headline && job.headline !== job.state) item.append(element("p", job.headline));
   if (job.message) item.append(element("p", job.message));
   if (job.said.length) {
     const details = element("details");
@@ -143,7 +142,11 @@ function shown(job) {
     button.addEventListener("click", () => cancel(job, button));
     tools.append(button);
   }
-  if (job.report) tools.append(linkTo(`file/${job.report}`, "report"));
+  if (job.report) {
+    const link = linkTo(`file/${job.report}`, "report");
+    link.setAttribute("aria-label", `report of ${job.title}, ${job.subject}`);
+    tools.append(link);
+  }
   if (tools.children.length) item.append(tools);
   return item;
 }

@@ -2,47 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from urllib.parse import quote
 
 from bywire.server.contents import Contents
 from bywire.server.pages.frame import form, frame, link, section, text
+from bywire.server.shown_bench import ShownBench
 from bywire.server.task_registry import tasks
 
 
-def bench_page(
-    bench: str, summary: str, cases: Sequence[str], there: Contents, largest: int
-) -> str:
+def bench_page(bench: ShownBench, there: Contents, largest: int) -> str:
     """Return the page of a bench.
 
     Parameters
     ----------
     bench
-        Its file, or the name of an experiment.
-    summary
-        What it tests.
-    cases
-        Its runs.
+        What is said of it.
     there
         What the folder has.
     largest
         Bytes that a file may have that is dropped.
     """
-    given = {"bench": bench}
+    given = {"bench": bench.name}
     body = [
-        section("Live page", "live", _live(bench, cases)),
+        section("Live page", "live", _live(bench)),
         section("Run with Python", "run", form(tasks()["run"], there, given)),
         section("Replay a measurement", "replay", form(tasks()["replay"], there, given)),
     ]
-    if bench in there.benches:
-        body.append(f"<p>{link(f'/file/{bench}', 'The bench file')}</p>")
-    return frame(bench, summary, body, largest=largest)
+    if bench.name in there.benches:
+        body.append(f"<p>{link(f'/file/{bench.name}', 'The bench file')}</p>")
+    return frame(bench.name, bench.summary, body, largest=largest)
 
 
-def _live(bench: str, cases: Sequence[str]) -> str:
+def _live(bench: ShownBench) -> str:
+    if bench.trouble:
+        return f"<p>{text(bench.trouble)}</p>"
+    cases = bench.cases
     if not cases:
         return "<p>This experiment computes a characteristic without any run: run it.</p>"
-    address = f"/live?of={quote(bench, safe='')}"
+    address = f"/live?of={quote(bench.name, safe='')}"
     first = f"{address}&case={quote(cases[0], safe='')}" if len(cases) > 1 else address
     choice = ""
     if len(cases) > 1:
@@ -52,7 +49,7 @@ def _live(bench: str, cases: Sequence[str]) -> str:
             f'data-address="{text(address)}">{options}</select></p>\n'
         )
     return (
-        f'{choice}<iframe id="live" title="Live page of {text(bench)}" src="{text(first)}">'
+        f'{choice}<iframe id="live" title="Live page of {text(bench.name)}" src="{text(first)}">'
         f'</iframe>\n<p><a id="live-link" href="{text(first)}">The live page by itself</a>: it is '
         "made when it is first opened, which takes a while.</p>"
     )

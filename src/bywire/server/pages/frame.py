@@ -133,7 +133,7 @@ def _row(task: Task, field: Field, there: Contents) -> str:
 
 
 def _entry(field: Field, there: Contents, attributes: str) -> str:
-    if field.kind in ("lines", "changes"):
+    if field.kind in ("lines", "pairs", "changes", "names"):
         return f'<textarea rows="2" spellcheck="false" {attributes}></textarea>'
     if field.choices is not None:
         return f"<select {attributes}>{_options(field.choices())}</select>"

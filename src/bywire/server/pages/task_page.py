@@ -17,5 +17,5 @@ PAGES = tuple(_SAYS)
 def task_page(task: Task, there: Contents, largest: int) -> str:
     """Return the page of a task; what it is given stands in `bench_page`."""
     inner = form(task, there, {}, open_fields=4)
-    return frame(task.title, _SAYS[task.name], [section(task.title, task.name, inner)],
+    return frame(task.title, _SAYS[task.name], [section("What is asked", task.name, inner)],
                  largest=largest)  # fmt: skip

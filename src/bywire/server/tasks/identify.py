@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from bywire.core.errors import ParameterError, quoted
-from bywire.core.pairs import changes, named
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.server.task import Field, Task
@@ -33,10 +32,8 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     from bywire.identification.fitting.question import Question
 
     question = Question(
-        asked["bench"] or None, changes(asked["inputs"], "--input"),
-        named(asked["outputs"], "--output"), named(asked["unknowns"], "--unknown"),
-        changes(asked["priors"], "--prior"), asked["states"], asked["case"],
-        asked["holdout"] or None, asked["loss"],
+        asked["bench"] or None, asked["inputs"], asked["outputs"], asked["unknowns"],
+        asked["priors"], asked["states"], asked["case"], asked["holdout"] or None, asked["loss"],
     )  # fmt: skip
     starts, seed = _whole(asked["starts"], "starts", 16), _whole(asked["seed"], "seed", 1)
     assert starts is not None
@@ -44,7 +41,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
     return identify(
         asked["method"], asked["measurements"], asked["parameters"], asked["set"],
         question=question, mapping=asked["mapping"] or None,
-        options=changes(asked["options"], "--option"), starts=max(starts, 1), seed=seed,
+        options=asked["options"], starts=max(starts, 1), seed=seed,
         synthetic=_whole(asked["synthetic"], "synthetic", None), folder=out, progress=progress,
     )  # fmt: skip
 
@@ -57,15 +54,15 @@ TASK = Task(
         Field("synthetic", "Simulated measurement instead", hint="its seed, for instance 1"),
         Field("mapping", "What the columns mean", "file", "a TOML file"),
         Field("bench", "Bench", "bench", "for methods of any bench"),
-        Field("inputs", "What drives the model", "lines", "STIMULUS=SIGNAL, one in a line"),
-        Field("outputs", "What is measured", "lines", "p_mc=0.02 bar, with its noise or without"),
-        Field("unknowns", "What is searched", "lines", "motor.R_m=0.1..1 ohm, one in a line"),
-        Field("priors", "What is known of it", "lines", "motor.R_m=0.35 +- 0.02 ohm"),
+        Field("inputs", "What drives the model", "pairs", "STIMULUS=SIGNAL, one in a line"),
+        Field("outputs", "What is measured", "names", "p_mc=0.02 bar, with its noise or without"),
+        Field("unknowns", "What is searched", "names", "motor.R_m=0.1..1 ohm, one in a line"),
+        Field("priors", "What is known of it", "pairs", "motor.R_m=0.35 +- 0.02 ohm"),
         Field("states", "Unknown initial values", "lines", "omega, one in a line"),
         Field("holdout", "Measurement for validation", "file"),
         Field("loss", "Loss", choices=lambda: ("", "linear", "soft_l1", "huber", "cauchy")),
         Field("case", "Run", hint="the first by default"),
-        Field("options", "Options of the method", "lines", "KEY=VALUE, one in a line"),
+        Field("options", "Options of the method", "changes", "KEY=VALUE, one in a line"),
         Field("starts", "Starts of the search", hint="16"),
         Field("seed", "Seed of the starts", hint="1"),
         Field("parameters", "Parameter set", hint="the method's own by default"),

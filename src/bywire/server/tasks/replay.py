@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from bywire.core.pairs import changes
 from bywire.core.typing import Progress
 from bywire.report.answer import Answer
 from bywire.server.task import Field, Task
@@ -17,7 +16,7 @@ def _compute(asked: Mapping[str, Any], out: Path, progress: Progress) -> Answer:
 
     return replay(
         asked["measurement"], asked["bench"], asked["set"], mapping=asked["mapping"] or None,
-        inputs=changes(asked["inputs"], "--input"), outputs=asked["outputs"], case=asked["case"],
+        inputs=asked["inputs"], outputs=asked["outputs"], case=asked["case"],
         tolerances=asked["tolerances"], segments="auto" if asked["segments"] else "",
         track=asked["track"], progress=progress,
     )  # fmt: skip
@@ -28,7 +27,7 @@ TASK = Task(
     (
         Field("bench", "Bench", "bench", is_required=True),
         Field("measurement", "Measurement", "file", is_required=True),
-        Field("inputs", "What drives the model", "lines",
+        Field("inputs", "What drives the model", "pairs",
               "STIMULUS=SIGNAL, one in a line; by default signals of the same name"),
         Field("outputs", "What is compared", "lines", "p_mc, one in a line; by default all"),
         Field("tolerances", "Tolerances", "lines", "nrmse <= 5 %, one in a line"),
