@@ -176,15 +176,6 @@ def test_wheels_alone_do_not_tell_the_speed_where_both_slip():
     assert off(kept) < 0.1 < off(lost)
 
 
-def test_a_step_of_half_the_length_changes_a_stop_by_less_than_a_centimeter():
-    for changes in (WET, {**OFF, **WET}):
-        at = [
-            stopped({**changes, "simulation.step": step}).kpi("stopping_distance").value
-            for step in ("40 us", "20 us")
-        ]
-        assert abs(at[0] - at[1]) < 0.01
-
-
 def test_a_stop_on_tyres_that_follow_the_magic_formula():
     steep = {f"vehicle.{end}_tyre.curve": "magic-formula" for end in ("front", "rear")}
     given = {**OFF, **WET, **steep, "vehicle.body.CdA": "0", "vehicle.body.load": "rigid"}
