@@ -20,7 +20,8 @@ from bywire.core.version import __version__ as __version__
 if TYPE_CHECKING:
     from bywire.api.agreement import agreement
     from bywire.api.check import Check, check
-    from bywire.api.compare import Comparison, compare
+    from bywire.api.compare import compare
+    from bywire.api.comparison import Comparison
     from bywire.api.convert import Conversion, convert
     from bywire.api.describe import describe
     from bywire.api.design import design
@@ -76,7 +77,7 @@ _HOMES = {
     "export_controller": "api.export_controller",
     "Check": "api.check",
     "check": "api.check",
-    "Comparison": "api.compare",
+    "Comparison": "api.comparison",
     "compare": "api.compare",
     "Question": "identification.fitting.question",
     "Identification": "api.identification",

@@ -164,7 +164,7 @@ def test_curves_lie_in_the_brakes_panels_with_what_differs_in_the_legend(folders
 def test_one_page_and_one_record(folders, tmp_path):
     bywire.compare(*folders).write(tmp_path / "out")
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
-        "report.html", "overlay.png", "compare.json",
+        "report.html", "overlay.png", "difference.png", "compare.json",
     }  # fmt: skip
     record = json.loads((tmp_path / "out" / "compare.json").read_text(encoding="utf-8"))
     assert [each["label"] for each in record["runs"]] == ["base", "warm"]

@@ -62,6 +62,7 @@ def overlaid_panels(
     *,
     step: tuple[str, StepLimits] | None = None,
     scale: Scale | None = None,
+    skipped: int = 0,
 ) -> Figure:
     """Draw the signals that all recordings share, in the panels of the first one's brake.
 
@@ -76,6 +77,8 @@ def overlaid_panels(
         Signal, and the step by which it is judged: its band and limit are drawn.
     scale
         The range that they belong to: a scale then stands in the legend's place.
+    skipped
+        Colors left to other recordings, those of an earlier figure.
 
     Raises
     ------
@@ -89,7 +92,7 @@ def overlaid_panels(
             f"the {len(recordings)} recordings share no signal over time that moves: there is "
             "nothing to lay on top of each other"
         )
-    looks = _looks(list(recordings), scale)
+    looks = _looks(list(recordings), scale, skipped)
     heights = [panel.height for panel, _ in present]
     figure, rows = style.new_figure(0.6 + 1.2 * sum(heights), heights)
     for axes, (panel, traces) in zip(rows, present, strict=True):
@@ -152,13 +155,13 @@ def _present(recordings: Sequence[xr.Dataset], panels: Sequence[Panel]) -> Chose
     return chosen
 
 
-def _looks(labels: Sequence[str], scale: Scale | None) -> list[_Look]:
+def _looks(labels: Sequence[str], scale: Scale | None, skipped: int) -> list[_Look]:
     if scale is not None:
         return [_Look(n, value_color(scale.values, k), "-") for k, n in enumerate(labels)]
     palette = style.SEQUENCE
     return [
         _Look(n, palette[k % len(palette)], _DASHES[k // len(palette) % len(_DASHES)])
-        for k, n in enumerate(labels)
+        for k, n in enumerate(labels, skipped)
     ]
 
 

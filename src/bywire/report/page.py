@@ -208,7 +208,7 @@ def table_html(table: Table) -> str:
 def _table_cell(cell: Cell, column: Column) -> str:
     text = escape(_MARKS[cell.verdict] + cell.text).replace("\n", "<br>")
     if cell.verdict != "none":
-        return f'<td class="{cell.verdict}">{text}</td>'
+        return f'<td class="{cell.verdict}{" number" * column.numeric}">{text}</td>'
     return f"<td{_number_class(column)}>{text}</td>"
 
 
