@@ -46,13 +46,18 @@ def _apply(name: str, *args: Any) -> Any:
     operation = getattr(special, "_bywire_op", None)
     if operation is not None:
         return operation(name, *args)
-    if type(special).__module__.startswith("casadi"):
+    if is_symbol(special):
         import casadi
 
         return getattr(casadi, _CASADI.get(name, name))(*args)
     if name in _SINGLES and isinstance(special, np.float32):
         return _SINGLES[name](*args)
     return getattr(np, name)(*args)
+
+
+def is_symbol(value: Any) -> bool:
+    """Return whether a value is a symbol, of which nobody can ask whether it is in range."""
+    return type(value).__module__.startswith("casadi")
 
 
 def exp(x: float) -> float:

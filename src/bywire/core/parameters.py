@@ -27,6 +27,9 @@ from bywire.core.units import Written
 T = TypeVar("T", bound="ParameterSet")
 
 
+_OBJECTS = "_carries_objects"  # in the dictionary of a set whose leaves need not be numbers
+
+
 class ParameterSet(BaseModel):
     """Base of all parameter sets: immutable, no unknown keys, no silent defaults."""
 
@@ -53,8 +56,11 @@ class ParameterSet(BaseModel):
     def replace(self, values: Mapping[str, Any]) -> Self:
         """Return a copy with other values at dotted names; groups that hold them are validated.
 
-        It is the set itself where it has these numbers and choices.
+        It is the set itself where it has these numbers and choices. Of a set that carries other
+        objects than numbers (`with_leaves`) nothing is validated.
         """
+        if _OBJECTS in self.__dict__:
+            return cast(Self, _as_given(self, "", values))
         if all(self._has(name, value) for name, value in values.items()):
             return self
         made = _validated(type(self), _fields(self), values)
@@ -121,7 +127,7 @@ class ParameterSet(BaseModel):
         The objects (symbols, quantities with units) are not validated: for evaluating
         equations, not for building parameter sets.
         """
-        return cast(Self, _rebuilt(self, "", values))
+        return cast(Self, _with_objects(_rebuilt(self, "", values)))
 
 
 @cache
@@ -231,6 +237,21 @@ def _rebuilt(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> Para
         else:
             fields[name] = values[dotted] if _is_number(value) else value
     return type(node).model_construct(**fields)
+
+
+def _as_given(node: ParameterSet, prefix: str, values: Mapping[str, Any]) -> ParameterSet:
+    """Return a set of objects with others at dotted names."""
+    fields: dict[str, Any] = {
+        name: _as_given(value, f"{prefix}{name}.", values)
+        if isinstance(value, ParameterSet) else values.get(prefix + name, value)
+        for name, value in _fields(node).items()
+    }  # fmt: skip
+    return _with_objects(type(node).model_construct(**fields))
+
+
+def _with_objects(made: ParameterSet) -> ParameterSet:
+    made.__dict__[_OBJECTS] = True
+    return made
 
 
 def _require_known(cls: type[ParameterSet], name: str) -> None:

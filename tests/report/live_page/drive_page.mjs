@@ -4,9 +4,9 @@ import { runInThisContext } from "node:vm";
 const [page, scripts, task] = process.argv.slice(2);
 const text = readFileSync(page, "utf8");
 const block = (id) => JSON.parse(text.match(new RegExp(`id="${id}">(.*?)</script>`, "s"))[1]);
-for (const name of ["values.js", "figures.js"]) runInThisContext(readFileSync(`${scripts}/${name}`, "utf8"));
+for (const name of ["values.js", "figures.js", "loops.js", "margins.js"]) runInThisContext(readFileSync(`${scripts}/${name}`, "utf8"));
 runInThisContext(block("loader"));
-const { description, digest, judged, keep, text: file } = block("bench");
+const { description, digest, judged, keep, loops, text: file } = block("bench");
 const parameters = description.parameters.filter(({ used }) => used);
 const brake = await runInThisContext("load")(Buffer.from(block("kernel"), "base64"), description);
 const call = (name, ...given) => runInThisContext(name)(...given);
@@ -16,6 +16,10 @@ const tries = {
     const signals = Object.fromEntries(Object.entries(made.signals).map(([n, c]) => [n, Array.from(c)]));
     const figures = judged && call("keyFigures", brake.exports, made.time, made.signals, judged.families);
     return { time: Array.from(made.time), signals, figures };
+  },
+  loops({ changes }) {
+    brake.run(changes);
+    return loops.map((loop) => call("loopAt", brake.exports, loop));
   },
   link: ({ changes }) => call("changesOf", call("linkOf", digest, changes), digest, parameters),
   hostile: ({ link }) => call("changesOf", link.replace("DIGEST", digest), digest, parameters),

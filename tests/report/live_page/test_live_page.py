@@ -7,26 +7,17 @@ import hashlib
 import json
 import math
 import re
-import shutil
-import subprocess
 import tomllib
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from page_benches import BENCHES, VARIED
+from page_benches import BENCHES, VARIED, needs_node, tried
 
 import bywire
 from bywire.bench.bench_file import read
 from bywire.core.errors import ParameterError, UnknownNameError
-from bywire.report import live_page
 from bywire.report.live_page.dependence import dependence
-
-NODE = shutil.which("node")
-DRIVER = Path(__file__).with_name("drive_page.mjs")
-SCRIPTS = Path(live_page.__file__).parent
-needs_node = pytest.mark.skipif(NODE is None, reason="no node runs the scripts of pages")
 
 
 @pytest.fixture(scope="module", params=sorted(BENCHES))
@@ -44,16 +35,6 @@ def block(page: bywire.BenchPage, key: str) -> Any:
     match = re.search(rf'id="{key}">(.*?)</script>', page.file.read_text(), re.DOTALL)
     assert match
     return json.loads(match[1])
-
-
-def tried(page: bywire.BenchPage, folder: Path, *tasks: dict[str, Any]) -> list[dict[str, Any]]:
-    """Return what the page's scripts answer."""
-    task = folder / "task.json"
-    task.write_text(json.dumps(tasks))
-    call = [str(NODE), str(DRIVER), str(page.file), str(SCRIPTS), str(task)]
-    subprocess.run(call, check=True, timeout=120)
-    answers: list[dict[str, Any]] = json.loads(Path(f"{task}.out").read_text())
-    return answers
 
 
 def used(page: bywire.BenchPage) -> dict[str, dict[str, Any]]:

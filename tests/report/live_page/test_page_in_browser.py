@@ -108,6 +108,13 @@ def test_a_hundred_positions_of_sliders_give_what_the_bench_gives(tab):
     agrees(tab, 100)
 
 
+def test_loops_are_drawn_when_sliders_rest(tab):
+    tab.moved({VARIED[tab.file.stem][0]: 450})
+    tab.page.wait_for_function("() => place('loops').textContent.includes('phase margin')")
+    assert tab.page.locator("#loops canvas").count() == 2  # gain and phase
+    assert not tab.noise
+
+
 def test_a_link_restores_what_was_moved(tab):
     given = tab.moved({name: 417 for name in VARIED[tab.file.stem]})
     tab.open(tab.page.evaluate("() => location.hash"))

@@ -159,6 +159,18 @@ def _stiffness(
     return block_diag(*blocks) if blocks else np.zeros((0, 0))
 
 
+def closed_contacts(model: Model, par: ParameterSet, state: NamedTuple) -> list[int]:
+    """Return which contacts are closed at a state, all groups in a row.
+
+    Raises
+    ------
+    ParameterError
+        When one just touches.
+    """
+    K = _stiffness(model, smooth_functions(model, par), state, vector(par))
+    return np.flatnonzero(K.diagonal()).tolist()
+
+
 def _active(C: Array, d: Array) -> tuple[float, Array, Array]:
     """Return what the closed contacts of a group leave: the subset whose least slack is largest.
 

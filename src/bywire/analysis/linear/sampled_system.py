@@ -104,7 +104,7 @@ def sampled_system(
     state, memory, stimulus = point
     plant = linearize(model, par, state, memory, inputs=model.Memory._fields, outputs=outputs)
     kept = [name for name in plant.live if name not in locked]
-    frame, every = _frames([task.period for task in tasks])
+    frame, every = frames_of([task.period for task in tasks])
     at = zeros(cast(Any, model.Stimulus)) if stimulus is None else stimulus
     moving = plant.reduced(kept, held=bool(locked))
     return SampledSystem(
@@ -116,7 +116,7 @@ def sampled_system(
     )
 
 
-def _frames(periods: Sequence[float]) -> tuple[float, list[int]]:
+def frames_of(periods: Sequence[float]) -> tuple[float, list[int]]:
     """Return the longest time that divides all periods, and how often each holds it."""
     # 0.2 ms and 1 ms are no multiples as floats: the nearest ratios of whole numbers are.
     exact = [Fraction(period).limit_denominator(10**9) for period in periods]

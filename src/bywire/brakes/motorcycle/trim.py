@@ -99,7 +99,7 @@ def holding_current(p: float, par: Par) -> float:
 
 
 def state_at(p: float, par: Par, current: float | None = None) -> Any:
-    """Return the state at rest at a pressure [Pa]; see `resting_at`.
+    """Return the state at rest at a pressure [Pa]; see `resting_at`. Symbols are not checked.
 
     Parameters
     ----------
@@ -112,7 +112,7 @@ def state_at(p: float, par: Par, current: float | None = None) -> Any:
         When the piston would have to stand beyond its end stop, or the pressure is negative.
     """
     x = par.master_cylinder.x_rest if p == 0 else travel_at(p, par)
-    if not (p >= 0 and x <= par.master_cylinder.x_end):
+    if not ops.is_symbol(x) and not (p >= 0 and x <= par.master_cylinder.x_end):
         limit = math.floor(highest_pressure(par) / 1e3) / 100.0
         raise ParameterError(
             f"a start at rest at {p / 1e5:g} bar is not admissible: it must be >= 0 bar and "

@@ -2,12 +2,13 @@
 
 const read = (id) => JSON.parse(document.getElementById(id).textContent);
 const bench = read("bench");
-const { description, digest, panels, chosen, judged } = bench;
+const { description, digest, panels, chosen, judged, loops } = bench;
+const REST = 150; // ms without a move, after which loops are computed: sliders come first
 const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
 const place = (id) => document.getElementById(id);
-let run = null, busy = false, wanted = null, number = 0;
+let run = null, busy = false, wanted = null, number = 0, resting = 0;
 
 function complain(text) {
   place("message").textContent = text;
@@ -54,6 +55,7 @@ function judge() {
 /* One run at a time: what was asked for meanwhile replaces what waited. */
 function ask() {
   wanted = { ...values };
+  clearTimeout(resting);
   if (busy) return;
   busy = true;
   number += 1;
@@ -62,7 +64,8 @@ function ask() {
   wanted = null;
 }
 
-function answered({ data: { error, time, signals, figures, settled } }) {
+function answered({ data: { error, time, signals, figures, settled, loops: computed } }) {
+  if (computed) return views.forEach((view, k) => view.draw(computed[k]));
   busy = false;
   if (error) {
     complain(error);
@@ -73,6 +76,7 @@ function answered({ data: { error, time, signals, figures, settled } }) {
     place("keep").disabled = place("csv").disabled = false;
     judge();
     plots.draw(run, kept, values);
+    if (loops.length) resting = setTimeout(() => worker.postMessage({ isAboutLoops: true }), REST);
   }
   if (wanted) ask();
 }
@@ -142,10 +146,14 @@ addEventListener("drop", (event) => {
 
 const rows = parameterPanel(place("parameters"), parameters, chosen, changed, complain);
 const plots = curves(place("curves"), panels);
-const again = () => run && plots.draw(run, kept, values);
+const views = loops.map((loop) => bodeView(place("loops"), loop));
+const again = () => {
+  if (run) plots.draw(run, kept, values);
+  views.forEach((view) => view.draw());
+};
 new ResizeObserver(again).observe(place("curves"));
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => {
-  plots.forget();
+  for (const each of [plots, ...views]) each.forget();
   again();
 });
 let worker;
@@ -157,7 +165,7 @@ if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
   worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
   worker.addEventListener("message", answered);
   worker.addEventListener("error", (event) => complain(`the bench does not run: ${event.message}`));
-  worker.postMessage({ bytes, given: { description, judged, keep: bench.keep } });
+  worker.postMessage({ bytes, given: { description, judged, loops, keep: bench.keep } });
   take(location.hash.slice(1));
   ask();
   addEventListener("hashchange", () => {

@@ -30,15 +30,18 @@ from bywire.core.version import __version__
 from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
 from bywire.report.live_page.dependence import dependence
+from bywire.report.live_page.loops import loops_of, told
 from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.policy import admitted
 from bywire.report.wording import unit_text
+from bywire.simulation.c_runtime import SCALAR
 
 if TYPE_CHECKING:
     import xarray as xr
 
-_SCRIPTS = ("values.js", "controls.js", "curves.js", "bench.js")
+_SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
+_WORKER = ("figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
 
 
@@ -67,15 +70,18 @@ def page_text(
     name = made.bench.name or made.bench.experiment
     families = _settings(made) or ()
     further = {entry_of(each): source_of(FAMILIES.find(each).path) for each in families}
+    loops = loops_of(made)
+    further |= {loop.entry: f"{SCALAR}\n{loop.text}" for loop in loops}
     module = module_files(made, _NAME, further)
     data = _data(made, json.loads(module[f"{_NAME}.json"]), panels, result, chosen)
+    data["loops"] = [told(loop) for loop in loops]
     digest = hashlib.sha256(module[f"{_NAME}.wasm"] + json.dumps(data).encode()).hexdigest()[:16]
     data["digest"] = digest
     data["description"]["name"] = "".join(c if c.isalnum() else "_" for c in name)
     loader = module["bywire.mjs"].decode().replace("export async function", "async function")
     blocks = {
         "bench": data, "kernel": base64.b64encode(module[f"{_NAME}.wasm"]).decode(),
-        "loader": loader, "worker": f"{_text('figures.js')}\n{_text('worker.js')}",
+        "loader": loader, "worker": "\n".join(map(_text, _WORKER)),
     }  # fmt: skip
     style = _text("uplot/uPlot.min.css") + _text("live.css")
     library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"

@@ -1,11 +1,13 @@
-/* Runs and judges the bench beside the page, which stays alive meanwhile; loader and figures above. */
+/* Runs and judges the bench beside the page, which stays alive meanwhile; loader, figures and loops above. */
 let loaded; // promised with the first message: the next ones may come before it is there
 let bench;
-self.onmessage = async ({ data: { bytes, given, values, number } }) => {
+self.onmessage = async ({ data: { bytes, given, values, number, isAboutLoops } }) => {
   try {
     bench ??= given;
     loaded ??= load(bytes, bench.description);
     const brake = await loaded;
+    if (isAboutLoops) // with the parameters of the last run, which still stand in the module
+      self.postMessage({ loops: bench.loops.map((loop) => loopAt(brake.exports, loop)) });
     if (!values) return;
     const { settled, ...made } = brake.run(values);
     const { time, signals } = recordingOf(made, bench.description.settle, bench.keep);

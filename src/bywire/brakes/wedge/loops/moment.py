@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import cast
 
 from bywire.analysis.loop import Loop, Point, Quantity
@@ -13,6 +12,7 @@ from bywire.brakes.wedge.loops.causes import CAUSES, DRIVE_LIMITS
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import force_for, memory_at, travel_for
+from bywire.core import ops
 from bywire.core.errors import ParameterError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import zeros
@@ -39,7 +39,7 @@ def point(par: ParameterSet, value: float) -> Point:
     _require_braking(value, closed)
     x = travel_for(force_for(value, closed), closed)
     _require_reachable(value, x, closed)
-    turning = math.copysign(1.0, closed.flywheel.Omega_0)
+    turning = ops.where(closed.flywheel.Omega_0 < 0, -1.0, 1.0)
     x *= turning
     memory = memory_at(x, closed)._replace(mode=moment_control.MOMENT, M_set=value, M_meas=value)
     state = state_at(x, closed)._replace(y_M=turning * value)
@@ -52,7 +52,7 @@ def _require_braking(value: float, par: WedgeParameters) -> None:
             f"moment = {value:g} N*m is no operating point: it must be > 0 N*m, counted against "
             "the disc's rotation whatever its direction"
         )
-    if par.flywheel.Omega_0 == 0.0:
+    if not ops.is_symbol(par.flywheel.Omega_0) and par.flywheel.Omega_0 == 0.0:
         raise ParameterError(
             "flywheel.Omega_0 = 0 rad/s: a standing disc has no braking moment to control; set it "
             "to the speed at which the loop works"
@@ -60,6 +60,8 @@ def _require_braking(value: float, par: WedgeParameters) -> None:
 
 
 def _require_reachable(value: float, x: float, par: WedgeParameters) -> None:
+    if ops.is_symbol(x):
+        return
     if not x < par.wedge.x_stop:
         raise ParameterError(
             f"moment = {value:g} N*m needs {x * 1e3:.3g} mm of wedge travel: it must be below "

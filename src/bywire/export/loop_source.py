@@ -1,0 +1,139 @@
+"""C text of a loop's linear model: rates of the plant and laws of the controllers by parameters."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import casadi as ca
+
+from bywire.analysis.linear.linearize import closed_contacts
+from bywire.analysis.linear.sampled_system import frames_of
+from bywire.analysis.linear.smooth_functions import smooth_functions
+from bywire.analysis.loop import Loop, Point
+from bywire.core.errors import BywireError
+from bywire.core.parameters import ParameterSet
+from bywire.simulation.emission import indented, leaf_namer, statements
+from bywire.simulation.expressions import as_number, needed
+from bywire.simulation.graph import Graph
+from bywire.simulation.symbols import SX, column, scalars
+
+_NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeError)
+
+
+@dataclass(frozen=True)
+class LoopSource:
+    """The linear model of a loop as it is sampled, at one operating point, for any parameters.
+
+    Parameters
+    ----------
+    loop
+        The loop.
+    entry, text
+        Name and C text of ``void entry(const double *p, double *out)``, which writes what is not
+        zero of: how clearly each contact is closed or open [m], then row by row A (n, n) and
+        B (n, nm) of the plant, and of each task the memory's Jacobians by states (nm, n) and by
+        memory (nm, nm).
+    states, memory
+        Names, in the order of rows and columns.
+    contacts
+        How many there are.
+    every, frame
+        Frames per tick of each task, and the length of a frame [s].
+    """
+
+    loop: Loop
+    entry: str
+    text: str
+    states: tuple[str, ...]
+    memory: tuple[str, ...]
+    contacts: int
+    every: tuple[int, ...]
+    frame: float
+
+    @property
+    def size(self) -> int:
+        """Numbers that the function writes."""
+        n, m = len(self.states), len(self.memory)
+        return self.contacts + (n + m) * (n + m * len(self.every))
+
+
+def loop_source(loop: Loop, par: ParameterSet) -> LoopSource | None:
+    """Return a loop's linear model in C, at the loop's usual operating point.
+
+    None for an analog loop, and where the point or the structure cannot follow symbols.
+    """
+    names = par.leaves()
+    p = SX.sym("p", len(names))
+    symbolic = par.with_leaves(dict(zip(names, scalars(p), strict=True)))
+    try:
+        at = loop.point(loop.smooth(par), loop.at.default)
+        moving = loop.point(loop.smooth(symbolic), loop.at.default)
+        if loop.analog or at.par.leaves().keys() != names.keys():
+            return None
+        results = _jacobians(loop, at, moving)
+        function = ca.Function("loop", [p], results)
+    except _NOT_SYMBOLIC:
+        return None
+    frame, every = frames_of([task.period for task in at.model.tasks(at.par)])
+    kept = tuple(name for name in at.model.State._fields if name not in loop.locked)
+    entry = f"bw_loop_{loop.name.replace('-', '_')}"
+    text = _in_c(entry, function)
+    contacts = results[0].shape[0]
+    return LoopSource(
+        loop, entry, text, kept, at.model.Memory._fields, contacts, tuple(every), frame
+    )
+
+
+def _jacobians(loop: Loop, at: Point, moving: Point) -> list[Any]:
+    """Return the rows of what the C writes, over symbolic parameters."""
+    model, functions = at.model, smooth_functions(at.model, at.par)
+    p = column([moving.par.value(name) for name in at.par.leaves()])
+    x, m, u = (column(list(each)) for each in (moving.state, moving.memory, moving.stimulus))
+    *matrices, gaps = _tuple(functions.contacts(x, p))
+    closed = closed_contacts(model, at.par, at.state)
+    K, slack, first = SX(gaps.shape[0], gaps.shape[0]), [], 0
+    for C in matrices:
+        last = first + C.shape[0]
+        inside = [k - first for k in closed if first <= k < last]
+        block = SX(C.shape[0], C.shape[0])
+        if inside:
+            block[inside, inside] = ca.inv(C[inside, inside])
+        d = gaps[first:last]
+        force = ca.mtimes(block, d)
+        left = ca.mtimes(C, force) - d
+        slack += [C[k, k] * force[k] if k in inside else left[k] for k in range(C.shape[0])]
+        K[first:last, first:last] = block
+        first = last
+    nothing, free = SX.zeros(len(model.frictions)), SX.ones(len(model.frictions))
+    A, B, *_ = functions.plant(x, m, p, K, nothing, free)
+    kept = [k for k, name in enumerate(model.State._fields) if name not in loop.locked]
+    rows = [column(slack), _by_rows(A[kept, kept]), _by_rows(B[kept, :])]
+    for tick in functions.ticks:
+        M_x, M_m, _ = tick(x, m, u, p)
+        rows += [_by_rows(M_x[:, kept]), _by_rows(M_m)]
+    return rows
+
+
+def _in_c(entry: str, function: ca.Function) -> str:
+    """Return the C of a function of parameters; what is zero is not written."""
+    graph = Graph()
+    results = graph.add_function(
+        function, [[graph.leaf("p", k) for k in range(function.nnz_in(0))]]
+    )
+    nodes = [node for result in results for node in result]
+    zero = graph.constant(0.0)
+    targets = {at: node for at, node in enumerate(nodes) if node != zero}
+    name = leaf_namer(graph, lambda kind, k: f"{kind}[{k}]", lambda node: f"v{node}")
+    order = needed(graph, list(targets.values()), lambda _: False)
+    lines = statements(graph, order, name, "const double ")
+    lines += [f"out[{at}] = {as_number(graph, node, name)};" for at, node in targets.items()]
+    return f"void {entry}(const double *p, double *out) {{\n  {indented(lines, 2)}\n}}\n"
+
+
+def _by_rows(matrix: Any) -> Any:
+    return ca.densify(ca.vec(ca.densify(matrix).T))
+
+
+def _tuple(values: Any) -> tuple[Any, ...]:
+    return values if isinstance(values, tuple) else (values,)

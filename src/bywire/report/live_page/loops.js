@@ -1,0 +1,199 @@
+/* Loops as they are sampled, from the Jacobians that the module computes: response and margins. The
+ * definitions are those of bywire.margins. Matrices are arrays of rows. */
+
+const TOUCH = 1e-12; // m, below which a contact counts as neither closed nor open
+const LOWEST = 1e-2, NYQUIST = 0.998, POINTS = 2000; // Hz, share of half the sampling frequency
+const ON_BORDER = 1e-6; // growth in a sample that still counts as an integrator
+
+const zeros = (rows, columns) => Array.from({ length: rows }, () => new Float64Array(columns));
+const eye = (n) => zeros(n, n).map((row, k) => ((row[k] = 1), row));
+const plus = (X, Y) => X.map((row, i) => row.map((value, j) => value + Y[i][j]));
+const beside = (X, Y) => X.map((row, i) => Float64Array.of(...row, ...Y[i]));
+
+function times(X, Y) {
+  const product = zeros(X.length, Y[0].length);
+  X.forEach((row, i) => row.forEach((value, k) => {
+    if (value !== 0) for (let j = 0; j < Y[k].length; ++j) product[i][j] += value * Y[k][j];
+  }));
+  return product;
+}
+
+/** Return powers of two by which rows are divided and columns multiplied to be of like size. */
+function scales(X) {
+  const scale = new Float64Array(X.length).fill(1);
+  for (let isDone = false, round = 0; !isDone && round < 50; ++round) {
+    isDone = true;
+    X.forEach((row, i) => {
+      let inRow = 0, inColumn = 0;
+      for (let j = 0; j < X.length; ++j) {
+        if (j === i) continue;
+        inRow += Math.abs(row[j]) * scale[j] / scale[i];
+        inColumn += Math.abs(X[j][i]) * scale[i] / scale[j];
+      }
+      if (inRow === 0 || inColumn === 0) return;
+      const by = 2 ** Math.round(0.5 * Math.log2(inRow / inColumn));
+      if (by !== 1) (scale[i] *= by), (isDone = false);
+    });
+  }
+  return scale;
+}
+
+const scaled = (X, scale) => X.map((row, i) => row.map((value, j) => value * scale[j] / scale[i]));
+
+/** Return the exponential: halved until it is small, by its series, and squared again. */
+function exponential(X) {
+  const scale = scales(X), balanced = scaled(X, scale);
+  const size = Math.max(...balanced.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
+  const halvings = Math.max(0, Math.ceil(Math.log2(size)) + 2);
+  const small = balanced.map((row) => row.map((value) => value * 2 ** -halvings));
+  let sum = eye(X.length);
+  for (let k = 16; k > 0; --k)
+    sum = plus(eye(X.length), times(small, sum).map((row) => row.map((value) => value / k)));
+  for (let k = 0; k < halvings; ++k) sum = times(sum, sum);
+  return scaled(sum, scale.map((value) => 1 / value));
+}
+
+/** Return the Jacobians of a loop at parameters that lie in the module; null where it has no point. */
+function jacobiansOf({ memory, room, parameters, ...functions }, { entry, size, contacts, states, held, every }) {
+  const begin = (room() + 15) & ~15, missing = begin + 8 * size - memory.buffer.byteLength;
+  if (missing > 0) memory.grow(Math.ceil(missing / 65536));
+  const numbers = new Float64Array(memory.buffer, begin, size).fill(0);
+  functions[entry](parameters(), begin);
+  if (!numbers.every(Number.isFinite) || numbers.subarray(0, contacts).some((slack) => slack < TOUCH)) return null;
+  let at = contacts;
+  const next = (rows, columns) =>
+    Array.from({ length: rows }, () => numbers.slice(at, (at += columns)));
+  const A = next(states, states), B = next(states, held);
+  return { A, B, ticks: every.map(() => ({ X: next(held, states), M: next(held, held) })) };
+}
+
+/** Return what tasks at the same instant make of memory X x + M m + U u, in a row. */
+const after = ({ X, M, U }, tick) => ({
+  X: plus(tick.X, times(tick.M, X)), M: times(tick.M, M), U: times(tick.M, U),
+});
+
+/** Return the first instant's ticks with the cut in place of what is read there, and what comes back. */
+function cutOpen({ A, ticks }, { cut, held, every }) {
+  const n = A.length, column = cut.at;
+  let now = { X: zeros(held, n), M: eye(held), U: zeros(held, 1) };
+  const back = new Float64Array(n + held);
+  if (cut.isState) back[column] = 1;
+  const reads = ({ X }) => X.some((row) => row[column] !== 0);
+  const writes = ({ X, M }) => X[column].some((value) => value !== 0)
+    || M[column].some((value, k) => value !== (k === column ? 1 : 0));
+  const owners = ticks.flatMap((tick, k) => ((cut.isState ? reads : writes)(tick) ? [k] : []));
+  if (owners.length !== 1 || every[owners[0]] !== every.reduce(leastCommon)) return null;
+  ticks.forEach((tick, k) => {
+    if (k !== owners[0]) return (now = after(now, tick));
+    if (cut.isState) {
+      const rest = tick.X.map((row) => row.map((value, j) => (j === column ? 0 : value)));
+      now = after(now, { X: rest, M: tick.M });
+      now.U = plus(now.U, tick.X.map((row) => [row[column]]));
+    } else {
+      now = after(now, tick);
+      back.set(now.X[column]);
+      back.set(now.M[column], n);
+      [now.X, now.M, now.U].forEach((rows) => rows[column].fill(0));
+      now.U[column][0] = 1;
+    }
+  });
+  return { now, back };
+}
+
+const divisor = (a, b) => (b ? divisor(b, a % b) : a);
+const leastCommon = (a, b) => a / divisor(a, b) * b;
+
+/** Return the loop gain as a sampled model, the cut its input and (with a minus) its output. */
+function gainOf(found, loop) {
+  const opened = cutOpen(found, loop);
+  if (!opened) return null;
+  const { states: n, held: m, every, frame } = loop, common = every.reduce(leastCommon);
+  const W = zeros(n + m, n + m);
+  found.A.forEach((row, i) => { W[i].set(row.map((value) => value * frame)); });
+  found.B.forEach((row, i) => { W[i].set(row.map((value) => value * frame), n); });
+  const whole = exponential(W);
+  const A = whole.slice(0, n).map((row) => row.slice(0, n)), B = whole.slice(0, n).map((row) => row.slice(n));
+  let F = eye(n + m), G = zeros(n + m, 1);
+  for (let f = 0; f < common; ++f) {
+    let now = opened.now;
+    if (f > 0) {
+      now = { X: zeros(m, n), M: eye(m), U: zeros(m, 1) };
+      found.ticks.forEach((tick, k) => { if (f % every[k] === 0) now = after(now, tick); });
+    }
+    const step = [...beside(plus(A, times(B, now.X)), times(B, now.M)), ...beside(now.X, now.M)];
+    F = times(step, F);
+    G = plus(times(step, G), [...times(B, now.U), ...now.U]);
+  }
+  return effective(F, G.map(([value]) => value), opened.back.map((value) => -value), common * frame);
+}
+
+/** Return a model with only what its input reaches and its output sees, states of like size. */
+function effective(A, B, C, period) {
+  const spread = (from, next) => {
+    const reached = Array.from(from, (value) => value !== 0);
+    for (let round = 0; round < A.length; ++round)
+      A.forEach((_, i) => { reached[i] ||= A.some((__, j) => reached[j] && next(i, j) !== 0); });
+    return reached;
+  };
+  const forward = spread(B, (i, j) => A[i][j]), backward = spread(C, (i, j) => A[j][i]);
+  const kept = A.flatMap((_, k) => (forward[k] && backward[k] ? [k] : []));
+  const small = kept.map((i) => kept.map((j) => A[i][j])), scale = scales(small);
+  return {
+    A: scaled(small, scale), B: kept.map((k, i) => B[k] / scale[i]), C: kept.map((k, i) => C[k] * scale[i]), period,
+  };
+}
+
+/** Return the response C (z - A)^-1 B at a frequency [Hz], by elimination with the largest pivots. */
+function responseAt({ A, B, C, period }, frequency) {
+  const n = A.length, angle = 2 * Math.PI * frequency * period;
+  const re = A.map((row, i) => Float64Array.of(...row.map((value) => -value), B[i]));
+  const im = A.map(() => new Float64Array(n + 1));
+  for (let i = 0; i < n; ++i) (re[i][i] += Math.cos(angle)), (im[i][i] = Math.sin(angle));
+  for (let k = 0; k < n; ++k) {
+    let best = k, largest = 0;
+    for (let i = k; i < n; ++i) {
+      const square = re[i][k] * re[i][k] + im[i][k] * im[i][k];
+      if (square > largest) [best, largest] = [i, square];
+    }
+    [re[k], re[best]] = [re[best], re[k]];
+    [im[k], im[best]] = [im[best], im[k]];
+    const a = re[k], b = im[k], size = a[k] * a[k] + b[k] * b[k];
+    for (let i = k + 1; i < n; ++i) {
+      const c = re[i], d = im[i];
+      if (c[k] === 0 && d[k] === 0) continue;
+      const x = (c[k] * a[k] + d[k] * b[k]) / size, y = (d[k] * a[k] - c[k] * b[k]) / size;
+      for (let j = k + 1; j <= n; ++j) {
+        c[j] -= x * a[j] - y * b[j];
+        d[j] -= x * b[j] + y * a[j];
+      }
+    }
+  }
+  let real = 0, imaginary = 0;
+  for (let k = n - 1; k >= 0; --k) {
+    const a = re[k], b = im[k];
+    for (let j = k + 1; j < n; ++j) {
+      a[n] -= a[j] * re[j][n] - b[j] * im[j][n];
+      b[n] -= a[j] * im[j][n] + b[j] * re[j][n];
+    }
+    const size = a[k] * a[k] + b[k] * b[k], x = (a[n] * a[k] + b[n] * b[k]) / size;
+    b[n] = (b[n] * a[k] - a[n] * b[k]) / size;
+    a[n] = x;
+    real += C[k] * a[n];
+    imaginary += C[k] * b[n];
+  }
+  return [real, imaginary];
+}
+
+/** Return the closed loop's growth in a sample: the root of a high power's size. */
+function growthOf({ A, B, C }) {
+  let X = A.map((row, i) => Float64Array.from(row, (value, j) => value - B[i] * C[j])), total = 0, power = 1;
+  for (let k = 0; k < 40; ++k) {
+    const size = Math.max(...X.map((row) => row.reduce((sum, value) => sum + Math.abs(value), 0)));
+    if (size === 0) return 0;
+    total += Math.log(size) / power;
+    X = X.map((row) => row.map((value) => value / size));
+    X = times(X, X);
+    power *= 2;
+  }
+  return Math.exp(total);
+}
