@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import http.client
 import json
+import subprocess
+import sys
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -11,12 +13,23 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from bywire.server import jobs
 from bywire.server.address import HERE
 from bywire.server.guard import cookie_name
 from bywire.server.serving import Opened, opened
 
 LARGEST = 3_000_000
 CURVE = 'experiment = "stribeck"\nparameters = "dardanelli2010"\n'
+
+STANDIN = """
+import json, sys, time
+order = json.loads(sys.stdin.readline())
+print(json.dumps({"progress": ["halfway", 0.5]}), flush=True)
+if order["asked"]["set"]:
+    print(json.dumps({"done": {"page": "report.html", "holds": True}}), flush=True)
+else:
+    time.sleep(60)
+"""
 
 
 class Answer(NamedTuple):
@@ -81,3 +94,16 @@ def visit(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Visitor]:
         server.server.shutdown()
         thread.join()
     assert not [path.name for path in folder.iterdir() if path.name.startswith(".bywire-")]
+
+
+@pytest.fixture
+def standin(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have jobs be processes that only speak as a job's does: they take no time to start."""
+
+    def started() -> subprocess.Popen[bytes]:
+        return subprocess.Popen(
+            [sys.executable, "-S", "-E", "-c", STANDIN], start_new_session=True,
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        )  # fmt: skip
+
+    monkeypatch.setattr(jobs, "started", started)

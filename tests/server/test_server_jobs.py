@@ -25,28 +25,6 @@ from undrawn import drawn, undrawn_unless_asked
 
 __all__ = ["drawn", "undrawn_unless_asked"]
 posix = pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-STANDIN = """
-import json, sys, time
-order = json.loads(sys.stdin.readline())
-print(json.dumps({"progress": ["halfway", 0.5]}), flush=True)
-if order["asked"]["set"]:
-    print(json.dumps({"done": {"page": "report.html", "holds": True}}), flush=True)
-else:
-    time.sleep(60)
-"""
-
-
-@pytest.fixture
-def standin(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Have jobs be processes that only speak as a job's does: they take no time to start."""
-
-    def started() -> subprocess.Popen[bytes]:
-        return subprocess.Popen(
-            [sys.executable, "-S", "-E", "-c", STANDIN], start_new_session=True,
-            stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        )  # fmt: skip
-
-    monkeypatch.setattr(jobs, "started", started)
 
 
 def test_a_run_is_computed_in_a_process_of_its_own(visit):
