@@ -1,11 +1,13 @@
-"""Size of the brake's page."""
+"""Size of the brake's page, and how quickly it follows a slider."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from bywire.api.page import page
+from bywire.benchmark.page_latency import page_latency
 from bywire.benchmark.page_size import page_size
+from bywire.benchmark.result import Result
 from bywire.benchmark.suite import Part
 
 
@@ -14,4 +16,9 @@ def _written(path: Path) -> tuple[int, int]:
     return made.size, made.compressed
 
 
-PART = Part("motorcycle page", lambda: page_size("page.size_kb", _written, 75.0))
+def _measured() -> list[Result]:
+    size = page_size("page.size_kb", _written, 75.0)
+    return size + page_latency("page.latency_ms", _written)
+
+
+PART = Part("motorcycle page", _measured)
