@@ -144,6 +144,19 @@ def test_a_file_that_does_not_come_to_its_end_is_not_kept(visit):
     assert not [path for path in kept.iterdir() if "torn" in path.name or path.name[0] == "."]
 
 
+def test_a_body_that_nobody_reads_is_no_further_request(visit):
+    port, token = visit.server.port, visit.server.service.token
+    first = f"Host: {HERE}:{port}\r\nCookie: bywire-{port}={token}\r\n"
+    second = f"GET /api/jobs HTTP/1.1\r\n{first}\r\n"
+    with socket.create_connection((HERE, port)) as asking:
+        asking.sendall(
+            f"GET /assets/serve.css HTTP/1.1\r\n{first}Content-Length: {len(second)}\r\n\r\n"
+            f"{second}".encode()
+        )
+        said = b"".join(iter(lambda: asking.recv(100_000), b""))
+    assert said.count(b"HTTP/1.1") == 1
+
+
 def test_two_who_ask_at_once_are_both_answered(visit):
     """One that sends its body slowly does not keep the other waiting."""
     port, token = visit.server.port, visit.server.service.token

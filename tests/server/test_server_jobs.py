@@ -85,6 +85,11 @@ def test_canceled_and_killed_jobs_leave_nothing(visit):
     killed = running(visit, numbers[1])
     waiting = visit("GET", f"/api/jobs/{numbers[2]}").object
     assert waiting["state"] == "waiting"
+    page = visit.server.service.jobs.start(
+        tasks()["page"], {"bench": "curve.toml", "set": "x"}, visit.folder / "page-1.html"
+    )
+    assert page.ended.wait(30)  # it takes no turn
+    assert page.state == "done"
     for number in numbers[2], numbers[0]:
         assert visit("POST", f"/api/jobs/{number}/cancel", {}).status == 200
     assert visit.ended(numbers[0])["state"] == "canceled"

@@ -79,7 +79,7 @@ class Handler(BaseHTTPRequestHandler):
         request = Request(
             self.command, unquote(address.path), query, self.headers, self._body(), self._length()
         )
-        if "token" in query:
+        if "token" in query and self.command in ("GET", "HEAD"):
             return self._welcomed(request.path, port)
         return answer(self.service, request)
 
@@ -118,8 +118,8 @@ class Handler(BaseHTTPRequestHandler):
         body = reply.body
         size = body.stat().st_size if isinstance(body, Path) else len(body)
         self.send_response(reply.status)
-        if self.command not in ("GET", "HEAD"):  # a body may be left that nobody read
-            self.close_connection = True
+        if any(name in self.headers for name in ("Content-Length", "Transfer-Encoding")):
+            self.close_connection = True  # what nobody read of a body is no further request
         headers = {
             **_HEADERS, "Content-Type": reply.kind, "Content-Length": str(size),
             "Content-Security-Policy": reply.policy, **reply.headers,

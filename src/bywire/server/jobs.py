@@ -8,6 +8,7 @@ import signal
 import subprocess
 import threading
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -159,7 +160,8 @@ class Jobs:
         return self._place.fresh_folder(f"{task.name}-{stem}")
 
     def _run(self, job: Job) -> None:
-        with self._turn:
+        # A page that somebody waits for is made at once: two studies would hold it up for hours.
+        with nullcontext() if job.task.is_file else self._turn:
             try:
                 self._compute(job)
             except OSError as error:
