@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, overload
 
 from bywire.api.run_remarks import remarks, unexpected
-from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section
+from bywire.api.run_sections import energy, how_it_was_made, outcome, schematic_section, source_says
 from bywire.bench import bench_file, running
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger, actuator_ledger, further_ledgers
@@ -95,7 +95,7 @@ class BenchResult(Result, Answer):
             f"{bench.definition.summary}; parameter set {bench.parameters}",
             sections=lambda: [
                 outcome(self, self.rows, notes),
-                Section("Figures", self._figures()),
+                Section("Figures", [*self._figures(), *source_says(self.bench)]),
                 Section("Key figures", [table]),
                 *energy(self.ledgers()),
                 *schematic_section(self.bench),

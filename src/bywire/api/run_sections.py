@@ -10,8 +10,10 @@ from bywire.api.run_changes import change_table, option_changes, parameter_chang
 from bywire.bench.bench import Bench
 from bywire.bench.energy_ledger import Ledger
 from bywire.bench.result import Result
+from bywire.bench.stated import stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
+from bywire.core.signals import signals_of
 from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.schematic.blocks import schematic_blocks
@@ -42,6 +44,21 @@ def outcome(result: Result, rows: Sequence[KpiRow], notes: Sequence[Block]) -> S
             )
         )
     return Section("Outcome", [*blocks, *notes])
+
+
+def source_says(bench: Bench) -> list[Block]:
+    """Return what a source states for the experiment, drawn in green in its figures."""
+    levels = stated_for(bench)
+    if not levels:
+        return []
+    leaves = signals_of(ASSEMBLIES.find(bench.system).Output)
+    rows = [
+        (each.label, each.signal, amount(each.value, leaves[each.signal].unit)
+         if each.signal in leaves else f"{each.value:g}", each.where)
+        for each in levels
+    ]  # fmt: skip
+    table = text_table(("level", "signal", "stated", "where"), rows)
+    return [TableBlock(table, "What the source states for this experiment: green in the figures.")]
 
 
 def energy(ledgers: Mapping[str, Ledger]) -> list[Section]:

@@ -12,6 +12,7 @@ import xarray as xr
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.kpis import sine_sweep
 from bywire.bench.result import Result
+from bywire.bench.stated import stated_for
 from bywire.core.errors import ParameterError
 from bywire.core.registry import Kind, instances
 from bywire.report.bode import Response, bode
@@ -84,6 +85,7 @@ def _step_response(result: Result) -> list[Shown]:
         limits=None if judged is None else judged[1],
         facts=facts,
         smoothing=setting.smoothing,
+        stated=stated_for(result.bench),
     )
     return [Shown("step-response", figure, "Step response with its 2 % band.")]
 
@@ -92,7 +94,7 @@ def _time_traces(result: Result) -> list[Shown]:
     return [
         Shown(
             f"time-traces-{label}" if len(result.recordings) > 1 else "time-traces",
-            time_traces(recording),
+            time_traces(recording, stated=stated_for(result.bench)),
             f"Time traces{f', {label}' if len(result.recordings) > 1 else ''}. Shaded: stuck; "
             "faintly: again and again.",
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, TypeGuard
 
@@ -14,6 +15,7 @@ from bywire.report import style
 from bywire.report.channel import Channel, channel
 from bywire.report.decimation import decimate
 from bywire.report.line_role import Role
+from bywire.report.stated_levels import draw_stated
 from bywire.report.step_marks import StepFacts, StepLimits, draw_limits
 from bywire.report.wording import duration
 
@@ -21,6 +23,8 @@ if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from bywire.bench.stated import StatedLevel
 
 
 def step_response(
@@ -32,6 +36,7 @@ def step_response(
     facts: StepFacts | None = None,
     measured: xr.Dataset | None = None,
     smoothing: float = 0.0,
+    stated: Sequence[StatedLevel] = (),
 ) -> Figure:
     """Draw one variable with its set point, tolerance band, overshoot limit, rise and settling.
 
@@ -50,6 +55,8 @@ def step_response(
     smoothing
         Averaging time [s] of the curve that was judged; that curve is then drawn thin, the raw
         one pale behind it, and the marks sit on it. 0 where the curve itself was judged.
+    stated
+        Levels that a source states; those of the variable are drawn.
     """
     shown = channel(recording, variable)
     figure, (axes,) = style.new_figure(3.3)
@@ -73,6 +80,7 @@ def step_response(
         draw_limits(axes, limits, shown)
     if limits is not None and facts is not None:
         _mark_facts(axes, judged, limits, facts)
+    draw_stated(axes, [each for each in stated if each.signal == variable], shown)
     axes.margins(x=0.0)
     axes.set_xlabel(f"time [{style.time_scale(shown.time)[1]}]")
     axes.set_ylabel(style.channel_label(shown))

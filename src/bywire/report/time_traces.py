@@ -15,12 +15,15 @@ from bywire.report.channel import Channel, channel
 from bywire.report.decimation import lasting_phases, phases
 from bywire.report.line_role import Role
 from bywire.report.panels import Panel, Trace, declared_panels, panels_by_unit
+from bywire.report.stated_levels import draw_stated
 from bywire.report.step_marks import StepLimits, draw_limits
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from bywire.bench.stated import StatedLevel
 
 
 NEAR = 0.5
@@ -37,6 +40,7 @@ def time_traces(
     limits: StepLimits | None = None,
     measured: xr.Dataset | None = None,
     stuck: str = "stuck",
+    stated: Sequence[StatedLevel] = (),
 ) -> Figure:
     """Draw panels of variables over a shared time axis.
 
@@ -61,6 +65,8 @@ def time_traces(
         points are drawn.
     stuck
         Variable that is 1 while shafts and pistons stick.
+    stated
+        Levels that a source states; each is drawn in the first panel that shows its signal.
 
     Raises
     ------
@@ -76,6 +82,7 @@ def time_traces(
             else "the recording has none of the variables that time traces show: energies and "
             "modes alone have no panel"
         )
+    left = list(stated)
     heights = [panel.height for panel, _ in present]
     figure, rows = style.new_figure(0.5 + 1.15 * sum(heights), heights)
     for axes, (panel, traces) in zip(rows, present, strict=True):
@@ -86,6 +93,9 @@ def time_traces(
         _mark_saturation(axes, panel, recording)
         _mark_faults(axes, recording, named=axes is rows[0])
         _mark_limit(axes, panel, recording, first)
+        here = [each for each in left if each.signal in {trace.variable for trace in traces}]
+        draw_stated(axes, here, first)
+        left = [each for each in left if each not in here]
         axes.margins(x=0.0)
         set_ticks(axes, panel, first)
         if not panel.levels:  # a mode's ticks say all that its legend would
