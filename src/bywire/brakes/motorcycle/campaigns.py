@@ -16,7 +16,7 @@ CAMPAIGN = DeclaredCampaign(
         },
         "campaign": {
             "onset": "0.8 s", "spread": "20 ms", "onsets": 8, "healthy": 256,
-            "present": ["fluid.*", "caliper.knocked-back"],
+            "present": ["fluid.*", "caliper.knocked-back", "piston.*"],
             "leave_out": ["pedal_force.*", "i_set.*", "v_set.*"],
         },
         "values": {

@@ -16,7 +16,7 @@ CAMPAIGN = DeclaredCampaign(
             "sensors.a_offset": {"kind": "normal", "sd": "0.1 m/s**2"},
         },
         "campaign": {
-            "onset": "0.8 s", "spread": "0.8 s", "onsets": 4, "healthy": 64,
+            "onset": "0.8 s", "spread": "0.8 s", "onsets": 4, "healthy": 256,
             "present": ["front.disc.*", "rear.disc.*", "front.circuit.*", "rear.circuit.*"],
         },
         "values": {"front.stuck": ["0 bar", "40 bar"], "rear.stuck": ["0 bar", "40 bar"]},

@@ -15,7 +15,7 @@ CAMPAIGN = DeclaredCampaign(
             "motor_2.R_ref": "+-10 %",
         },
         "campaign": {
-            "onset": "0.3 s", "spread": "20 ms", "onsets": 4, "healthy": 128,
+            "onset": "0.3 s", "spread": "20 ms", "onsets": 4, "healthy": 256,
             "present": ["caliper.gap-grown", "caliper.pad-lost", "heart.worn"],
             "leave_out": ["theta_?_set.*", "i_?_set.*"],
         },

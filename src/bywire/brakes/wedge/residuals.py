@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from bywire.brakes.wedge.laws.moment_control import MOMENT
 from bywire.brakes.wedge.model import WedgeBrake
 from bywire.campaigns.lasting import largest_of_the_last, least_of_the_last, mean_of_the_last
 from bywire.campaigns.residual import NEVER, Residual
@@ -20,6 +21,8 @@ NAME = WedgeBrake.name
 Signals = Mapping[str, Array]
 _STEADY = 0.1  # s after which a step of the demand is over
 _AVERAGE = 10e-3  # s, over which contacts and free-play are averaged
+_TURN = 0.1  # s, about a turn of the disc, whose run-out is in the moment
+_IN_MOMENT = 0.2  # s after which the build-up of a moment is over
 
 
 def _steady(signals: Signals, dt: float, values: Array) -> Array:
@@ -42,9 +45,32 @@ def _effort(signals: Signals, par: Any, dt: float) -> Array:
     return _steady(signals, dt, np.maximum(abs(signals["i_1_ref"]), abs(signals["i_2_ref"])))
 
 
+def _in_moment(signals: Signals, dt: float, values: Array) -> Array:
+    """Return a residual where the moment has been controlled for a while, else none."""
+    rows, error = round(_IN_MOMENT / dt), np.abs(signals["mode"] - MOMENT)
+    return np.where(largest_of_the_last(error, rows) < 0.5, values, NEVER)
+
+
+def _stiffness(signals: Signals, par: Any, dt: float) -> Array:
+    """Return the measured moment less that of the angle beyond contact, by the believed slope."""
+    believed = par.control.moment.slope_hat * (np.abs(signals["theta_ref"]) - signals["theta_c"])
+    off = mean_of_the_last(signals["M_meas"] - believed, round(_TURN / dt))
+    return _in_moment(signals, dt, np.abs(off))
+
+
+def _still(signals: Signals, par: Any, dt: float) -> Array:
+    """Return by how little the moment moves in a turn of the disc: nothing where it is stuck."""
+    rows, M = round(_TURN / dt), signals["M_meas"]
+    return _in_moment(signals, dt, least_of_the_last(M, rows) - largest_of_the_last(M, rows))
+
+
 RESIDUALS = (
     Residual("moment-error", "demanded and measured moment", NAME, "N*m", ("M_set", "M_meas"),
              _moment, hold=10e-3),
+    Residual("moment-angle", "measured moment and that of the angle", NAME, "N*m",
+             ("M_meas", "theta_ref", "theta_c", "mode"), _stiffness, hold=10e-3),
+    Residual("still-moment", "ripple of the run-out in the measured moment", NAME, "N*m",
+             ("M_meas", "mode"), _still, hold=5e-3),
     Residual("motor-difference", "demands of both motors", NAME, "A",
              ("i_1_ref", "i_2_ref", "M_set"), _difference, hold=5e-3),
     Residual("effort", "the larger demand of both motors", NAME, "A",

@@ -1,0 +1,53 @@
+"""What the two-wheeler's ECU can compute to see a failure, of its encoders and accelerometer.
+
+A wheel that stands, or whose speed no vehicle could have, is either what slip control has to end
+within a moment, or no truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from bywire.brakes.two_wheeler.model import TwoWheelerByWire
+from bywire.campaigns.lasting import mean_of_the_last
+from bywire.campaigns.residual import NEVER, Residual
+from bywire.core.typing import Array
+
+NAME = TwoWheelerByWire.name
+Signals = Mapping[str, Array]
+_SPAN = 0.1  # s, over which both speeds are compared
+
+
+def _fast(signals: Signals, par: Any, values: Array) -> Array:
+    """Return a residual above the speed below which slip is left to grow, else none."""
+    return np.where(signals["v_hat"] > par.ecu.front_slip.v_fall, values, NEVER)
+
+
+def _slip(side: str) -> Callable[[Signals, Any, float], Array]:
+    """Return the residual of a wheel, "f" or "r": its slip, which control keeps small."""
+
+    def compute(signals: Signals, par: Any, dt: float) -> Array:
+        return _fast(signals, par, np.abs(signals[f"slip_{side}_hat"]))
+
+    return compute
+
+
+def _speed(signals: Signals, par: Any, dt: float) -> Array:
+    """Return by how much the believed speed changes beside what the accelerometer shows."""
+    rows, v = round(_SPAN / dt), signals["v_hat"]
+    lost = np.concatenate((np.broadcast_to(v[:, :1], (len(v), rows)), v[:, :-rows]), axis=1) - v
+    shown = mean_of_the_last(signals["a_hat"], rows) * rows * dt
+    return _fast(signals, par, np.abs(lost - shown))
+
+
+RESIDUALS = (
+    Residual("slip-front", "slip of the front wheel, which control keeps small", NAME, "1",
+             ("slip_f_hat", "v_hat"), _slip("f"), hold=50e-3),
+    Residual("slip-rear", "slip of the rear wheel, which control keeps small", NAME, "1",
+             ("slip_r_hat", "v_hat"), _slip("r"), hold=50e-3),
+    Residual("speed", "speed of the wheels and what the accelerometer shows", NAME, "m/s",
+             ("v_hat", "a_hat"), _speed, hold=5e-3),
+)  # fmt: skip
