@@ -32,6 +32,7 @@ class Forked:
     ) -> None:  # fmt: skip
         self.returncode: int | None = None
         self._errors = errors
+        errors.touch()  # it may be killed before it says anything
         sys.stdout.flush()
         self.pid = os.fork()
         if not self.pid:

@@ -59,13 +59,13 @@ def main() -> None:
     atexit.register(signal.signal, signal.SIGINT, signal.SIG_IGN)
     gc.set_threshold(GARBAGE, *gc.get_threshold()[1:])
     open_streams()
-    with interrupts_noted() as was_interrupted, command(), command_line():
-        try:
+    try:
+        with interrupts_noted() as was_interrupted, command(), command_line():
             status = _status(was_interrupted)
             flush()
-        except KeyboardInterrupt:  # while the last words were said
-            message("interrupted")
-            status = INTERRUPTED
+    except KeyboardInterrupt:  # before the first words, or while the last were said
+        message("interrupted")
+        status = INTERRUPTED
     # In text that is executed, as where a named tuple is made, CPython notes a KeyboardInterrupt as
     # unhandled, and ends ``python -m`` by the signal whatever becomes of it: another resets it.
     namedtuple("Reset", ())

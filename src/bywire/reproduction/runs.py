@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping
+from concurrent.futures import CancelledError, Future
 from typing import Any
 
 import numpy as np
@@ -14,7 +16,7 @@ from bywire.bench.running import Progress, run
 
 
 class Runs:
-    """Bench results, each computed once.
+    """Bench results, each computed once; threads that ask for the same wait for it.
 
     Parameters
     ----------
@@ -24,7 +26,12 @@ class Runs:
 
     def __init__(self, progress: Progress | None = None) -> None:
         self._progress = progress
-        self._known: dict[str, Result] = {}
+        self._known: dict[str, Future[Result]] = {}
+        self._lock, self._stop = threading.Lock(), threading.Event()
+
+    def stop(self) -> None:
+        """Begin no further run: who asks for one, from any thread, gets a CancelledError."""
+        self._stop.set()
 
     def report(self, label: str, share: float) -> None:
         """Tell how far a piece of work is."""
@@ -54,15 +61,28 @@ class Runs:
             When a run fails.
         KeyboardInterrupt
             When the user stopped a run: half a reproduction is none.
+        CancelledError
+            When no further run is to begin.
         """
         bench = Bench(experiment, name, overrides or {}, options or {}, stimulus or {})
         key = repr(bench)
-        if key not in self._known:
-            result = run(bench)
-            if result.status == "interrupted":
-                raise KeyboardInterrupt
-            self._known[key] = result
-        return self._known[key]
+        with self._lock:
+            is_first = key not in self._known
+            result = self._known.setdefault(key, Future())
+        if is_first:
+            try:
+                result.set_result(self._run(bench))
+            except BaseException as error:
+                result.set_exception(error)
+        return result.result()
+
+    def _run(self, bench: Bench) -> Result:
+        if self._stop.is_set():
+            raise CancelledError
+        result = run(bench)
+        if result.status == "interrupted":
+            raise KeyboardInterrupt
+        return result
 
 
 def kpis(result: Result) -> dict[str, float]:
