@@ -166,9 +166,10 @@ def test_boiling_fluid_takes_the_stroke_as_its_vapor_as_air_does(water, T, reach
     assert bool(recording["at_stop"][-1] > 0) == (reached < 36.9)
 
 
-def test_fluid_hotter_than_its_law_holds_is_refused():
-    with pytest.raises(ParameterError, match=r"fluid\.vapor at 327 degC is beyond 300 degC"):
-        failed("fluid.vapor", "327 degC")
+@pytest.mark.parametrize("T", ["327 degC", "-300 degC"])
+def test_fluid_at_a_temperature_beyond_its_law_is_refused(T):
+    with pytest.raises(ParameterError, match=rf"fluid\.vapor at {T} .* <= 300 degC"):
+        failed("fluid.vapor", T)
 
 
 def test_pads_that_were_knocked_back_take_the_volume_of_their_gap():
