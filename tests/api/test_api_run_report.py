@@ -26,6 +26,14 @@ def test_what_was_changed_and_the_verdict_come_first_and_figures_before_tables()
     ]
 
 
+def test_errors_of_temperatures_are_differences():
+    result = bywire.run("hard-braking", QUICK)
+    tables = result.document().page[-1].blocks
+    (errors,) = [b for b in tables if getattr(b, "title", "").startswith("Error of recorded")]
+    rows = {row[1].text: row[2].text for row in errors.blocks[0].table.rows}
+    assert rows["T_winding"] == "0 K"
+
+
 def test_a_run_of_the_cited_set_says_that_nothing_was_changed():
     result = bywire.run("stribeck", estimate_error=False)
     (said,) = [block.text for block in result.document().page[0].blocks]

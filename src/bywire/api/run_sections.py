@@ -14,6 +14,7 @@ from bywire.bench.stated import stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import signals_of
+from bywire.core.units import difference_unit
 from bywire.report.document import Block, Details, Paragraph, Section, TableBlock
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.schematic.blocks import schematic_blocks
@@ -120,9 +121,10 @@ def energy_table(books: Ledger) -> Table:
 def _signal_errors(errors: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> list[Details]:
     """Return how far each recorded signal is off, where that was estimated."""
     rows = [
-        (label, name, *(amount(error[key], error["unit"], 2) for key in ("rms", "max")))
+        (label, name, amount(error["rms"], unit, 2), amount(error["max"], unit, 2))
         for label, signals in errors.items()
         for name, error in signals.items()
+        for unit in (difference_unit(error["unit"]),)
     ]
     if not rows:
         return []

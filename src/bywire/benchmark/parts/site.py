@@ -1,0 +1,67 @@
+"""How long the site of the documentation takes: all of it anew, and again with nothing changed."""
+
+from __future__ import annotations
+
+import importlib.util
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import bywire
+from bywire.benchmark.commands import environment
+from bywire.benchmark.result import Result, at_most
+from bywire.benchmark.suite import Part
+from bywire.core.extras import how_to_install
+
+COLD, WARM = 180.0, 20.0
+"""goals [s]"""
+_LEFT = (".*", "_build", "_generated", "__pycache__", "results", "*.egg-info")
+
+
+def measured(root: Path | None = None) -> list[Result]:
+    """Measure the site in a copy of a clone, where the clone's own site stays as it is.
+
+    ``root``: the clone; by default the one that this package stands in.
+    """
+    root = Path(bywire.__file__).parents[2] if root is None else root
+    if not (root / "docs" / "conf.py").is_file():
+        return _skipped("this is no clone of the repository: the site's sources are not installed")
+    if importlib.util.find_spec("sphinx") is None:
+        return _skipped(f"not installed: {how_to_install('docs')}")
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "clone"
+        shutil.copytree(root, copy, ignore=shutil.ignore_patterns(*_LEFT))
+        seconds = []
+        for _ in range(2):
+            begin = time.perf_counter()
+            done = _made(copy)
+            seconds.append(time.perf_counter() - begin)
+            if done.returncode:
+                last = (done.stderr.strip().splitlines() or ["no message"])[-1]
+                return _skipped(f"exit status {done.returncode}: {last}")
+    cold, warm = seconds
+    return [
+        at_most("docs.build_s", cold, COLD, "s", "the site anew: sources, gallery, live pages"),
+        at_most("docs.rebuild_s", warm, WARM, "s", "the site again, nothing changed"),
+    ]
+
+
+def _made(root: Path) -> subprocess.CompletedProcess[str]:
+    """Make the site as ``tasks.py docs`` does."""
+    options = ("-q", "-W", "-n", "-b", "html", "docs", "docs/_build")
+    return subprocess.run(
+        [sys.executable, "-m", "sphinx", *options], cwd=root, check=False, stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, encoding="utf-8", errors="replace",
+        env={"OMP_NUM_THREADS": "1", **environment()},
+    )  # fmt: skip
+
+
+def _skipped(why: str) -> list[Result]:
+    goals = {"docs.build_s": COLD, "docs.rebuild_s": WARM}
+    return [Result(name, None, "s", f"<= {goal:g}", None, why) for name, goal in goals.items()]
+
+
+PART = Part("site", measured)
