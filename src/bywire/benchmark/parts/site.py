@@ -10,7 +10,6 @@ import tempfile
 import time
 from pathlib import Path
 
-import bywire
 from bywire.benchmark.commands import environment
 from bywire.benchmark.result import Result, at_most
 from bywire.benchmark.suite import Part
@@ -26,7 +25,7 @@ def measured(root: Path | None = None) -> list[Result]:
 
     ``root``: the clone; by default the one that this package stands in.
     """
-    root = Path(bywire.__file__).parents[2] if root is None else root
+    root = Path(__file__).parents[4] if root is None else root
     if not (root / "docs" / "conf.py").is_file():
         return _skipped("this is no clone of the repository: the site's sources are not installed")
     if importlib.util.find_spec("sphinx") is None:
