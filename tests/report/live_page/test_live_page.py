@@ -137,6 +137,13 @@ def test_texts_of_a_bench_cannot_leave_their_place(tmp_path):
     assert len(re.findall(r"<script>", text)) == 2
 
 
+def test_levels_that_a_source_states_stand_in_the_first_panel_of_their_signal(pages):
+    moment, *others = block(pages["wedge"], "bench")["panels"]
+    assert {each["value"] for each in moment["stated"]} >= {200.0, 160.0}
+    assert all("Fig. 7" in each["label"] for each in moment["stated"])
+    assert not any(each["value"] == 200.0 for panel in others for each in panel["stated"])
+
+
 def test_parameters_that_drive_the_run_are_held(pages):
     bench = BENCHES["motorcycle"]
     follow = dependence(bench, 0, ("motor.R_m", "ecu.T_s", "ecu.dither.f_dit"))

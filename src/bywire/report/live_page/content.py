@@ -23,6 +23,7 @@ from bywire.bench.kpis.in_c import entry_of, source_of
 from bywire.bench.kpis.registry import FAMILIES
 from bywire.bench.requirements import limit_of
 from bywire.bench.result import Result
+from bywire.bench.stated import StatedLevel, stated_for
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.quantities import display_unit
 from bywire.core.units import convert
@@ -118,7 +119,7 @@ def _data(
         used |= {each["name"]} if each["used"] else set()
     return {
         "description": description,
-        "panels": [_panel(panel, traces, recording, used) for panel, traces in panels],
+        "panels": _panels(panels, recording, used, stated_for(bench)),
         "chosen": [name for name in chosen if name in used],
         "keep": made.case.keep,
         "text": bench_text(bench),
@@ -168,6 +169,21 @@ def _judged(made: Exported, result: Result, followed: Sequence[str]) -> dict[str
     ]  # fmt: skip
     return {"families": [_family(name, each) for name, each in settings.items()],
             "figures": figures, "followed": list(followed)}  # fmt: skip
+
+
+def _panels(
+    panels: Sequence[tuple[Panel, Sequence[Trace]]], recording: xr.Dataset, used: set[str],
+    stated: Sequence[StatedLevel],
+) -> list[dict[str, Any]]:  # fmt: skip
+    """Return the panels, each level that a source states in the first one that shows its signal."""
+    shown, left = [], list(stated)
+    for panel, traces in panels:
+        names = {trace.variable for trace in traces}
+        here = [each for each in left if each.signal in names]
+        left = [each for each in left if each not in here]
+        levels = [{"label": f"stated: {each.label}", "value": each.value} for each in here]
+        shown.append({**_panel(panel, traces, recording, used), "stated": levels})
+    return shown
 
 
 def _panel(

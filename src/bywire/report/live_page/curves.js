@@ -2,7 +2,7 @@
 
 const HEIGHT = 150; // px of a panel of height 1
 const NEAR = 0.5; // share of a limit from which its lines are drawn
-const DASHES = { "set point": [6, 4], limit: [2, 4] };
+const DASHES = { "set point": [6, 4], limit: [2, 4], stated: [7, 3] };
 
 /** Return the colors of the page as they are: they change with its theme. */
 function palette() {
@@ -15,7 +15,7 @@ function palette() {
 /** Return a signal as it is shown. */
 const converted = (values, quantity) => Array.from(values, (value) => shownOf(value, quantity));
 
-/** Return the lines of a panel: traces of the run, its limit, and first traces of kept runs. */
+/** Return the lines of a panel: traces of the run, its limit, what a source states, and first traces of kept runs. */
 function linesOf(panel, kept, colors) {
   const lines = panel.traces.map(({ label, role }) => ({
     label, stroke: colors[role] ?? colors.third, width: role === "main" ? 2 : 1.5,
@@ -25,10 +25,12 @@ function linesOf(panel, kept, colors) {
   const limits = panel.limit
     ? [1, -1].map(() => ({ label: "limit", stroke: colors.limit, dash: DASHES.limit, points: { show: false } }))
     : [];
+  const stated = panel.stated.map(({ label }) => (
+    { label, stroke: colors.third, width: 1.5, dash: DASHES.stated, points: { show: false } }));
   const others = kept.map(({ name }) => ({
     label: name, stroke: colors.kept, width: 1.5, dash: [8, 3, 2, 3], points: { show: false },
   }));
-  return [{ label: "time" }, ...lines, ...limits, ...others];
+  return [{ label: "time" }, ...lines, ...limits, ...stated, ...others];
 }
 
 /** Return the numbers of a panel's lines, in their order. */
@@ -42,7 +44,8 @@ function numbersOf(panel, run, kept, values) {
     for (const sign of [1, -1])
       limits.push(Array(time.length).fill(largest > NEAR * bound ? sign * bound : null));
   }
-  return [time, ...traces, ...limits, ...kept.map((each) => column(panel.traces[0], each))];
+  const stated = panel.stated.map(({ value }) => Array(time.length).fill(shownOf(value, panel)));
+  return [time, ...traces, ...limits, ...stated, ...kept.map((each) => column(panel.traces[0], each))];
 }
 
 /** Draw a bar along the upper edge while a signal is 1. */
