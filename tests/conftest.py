@@ -1,17 +1,6 @@
-"""For all tests: collections of garbage are rare, and what a process prepares serves the others."""
+"""For all tests: collections of garbage, which look at all that is imported, are rare."""
 
 import gc
-
-import pytest
-
-from shared_kernels import share_kernels
-
-
-def pytest_configure(config: pytest.Config) -> None:
-    """Share kernels between the processes of a run."""
-    run = getattr(config, "workerinput", {}).get("testrunuid")
-    if run:
-        share_kernels(run)
 
 
 def pytest_collection_finish() -> None:
