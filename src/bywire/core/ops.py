@@ -34,6 +34,9 @@ _SINGLES: dict[str, Callable[..., Any]] = {
     "exp": elementary_single.exp,
     "sin": elementary_single.sin,
     "cos": elementary_single.cos,
+    # Of equal zeros the first, as of floats; NumPy's would take one or the other.
+    "fmax": lambda x, y: max(np.float32(x), np.float32(y)),
+    "fmin": lambda x, y: min(np.float32(x), np.float32(y)),
 }
 _CASADI = {"where": "if_else"}
 _PLAIN = (float, int)  # bool is an int

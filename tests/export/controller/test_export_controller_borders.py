@@ -8,7 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from bywire.core import ops
-from bywire.export.controller.borders import Borders, Traced
+from bywire.export.controller.borders import Borders
+from bywire.export.controller.traced import Traced
 
 
 class Memory(NamedTuple):

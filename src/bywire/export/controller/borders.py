@@ -3,71 +3,34 @@
 Random inputs hardly ever meet a limit to the last digit, where ``<`` and ``<=`` differ, nor come
 so close to it that another limit shows. A tick is run on numbers that note every comparison that
 they take part in, and how far its sides are apart. One input is changed until a comparison turns;
-in between the place is sought where it does.
+in between the place is sought where it does. What lies there is where the search goes on: behind
+a limit that is rarely met stand those that are met nowhere else.
 """
 
 from __future__ import annotations
 
 import math
-import sys
-import threading
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-Inputs = tuple[Any, Any, Any]
-"""plant, stimulus and memory of a tick"""
-Margins = dict[tuple[int, ...], float]
-"""how far the sides of comparisons are apart, by the places in the code that lead there"""
-_HALVINGS, _JUMP, _TRIES = 24, 1e-7, 2
-_CONTEXTS = 3
-_AT_ONCE, _ENOUGH, _UNSEEN = 2, 12, 2
-"""comparisons of a change; borders of each that show in the memory, and others, that are kept"""
+from bywire.export.controller.traced import Margins, Place, margins
+from bywire.export.controller.turns import Border, Field, Inputs, Turn, changed, value_of
 
-
-_now = threading.local()
-"""``margins``: of the tick that this thread is in"""
-
-
-class Traced(float):
-    """A float that notes what it is compared with; what is computed of it does so, too."""
-
-    __slots__ = ()
-    __hash__ = float.__hash__
-
-
-def _comparing(name: str) -> Callable[[Traced, Any], Any]:
-    plain = getattr(float, name)
-
-    def compare(self: Traced, other: Any) -> Any:
-        if isinstance(other, (float, int)):
-            frame, places = sys._getframe(1), []
-            while frame.f_code is not _BEGIN and frame.f_back is not None:
-                places.append(frame.f_lasti)
-                frame = frame.f_back
-            _now.margins[tuple(places)] = float(self) - float(other)
-        return plain(self, other)
-
-    return compare
-
-
-def _computing(name: str) -> Callable[..., Any]:
-    plain = getattr(float, name)
-
-    def compute(self: Traced, *others: Any) -> Any:
-        found = plain(self, *others)
-        return Traced(found) if isinstance(found, float) else found
-
-    return compute
-
-
-for _name in ("lt", "le", "gt", "ge", "eq", "ne"):
-    setattr(Traced, f"__{_name}__", _comparing(f"__{_name}__"))
-for _name in ("add", "radd", "sub", "rsub", "mul", "rmul", "truediv", "rtruediv", "neg", "pos",
-              "abs", "pow"):  # fmt: skip
-    setattr(Traced, f"__{_name}__", _computing(f"__{_name}__"))
+_LAW = 3
+"""places, innermost first, that are the same for all who call a law"""
+_TRIES, _CONTEXTS, _NEAR_BY, _SMALL = 4, 40, 3, 1e-6
+_AT_ONCE, _ENOUGH, _UNSEEN, _MET = 2, 6, 2, 2
+"""comparisons of a change; borders of each that are kept, those that do not show in the memory, and
+those whose sides are equal"""
+_BEYOND, _FAR = 1.01, 1e3
+"""how far beyond a border is aimed, and how many times its size an input may become"""
+_ULPS = (1, -1, 2, -2, 3, -3, 5, -5, 8, -8)
+_LATEST = 200
+"""borders from which the search goes on"""
 
 
 class Borders:
@@ -86,8 +49,12 @@ class Borders:
     ) -> None:
         self.tick, self.rng = tick, rng
         self.fields = [(part, name) for part, names in enumerate(used) for name in sorted(names)]
-        self.found: Counter[tuple[int, ...]] = Counter()
-        self.unseen: Counter[tuple[int, ...]] = Counter()
+        self.rows: list[Inputs] = []
+        self.reached: list[tuple[Inputs, int]] = []
+        self.shown: Counter[Place] = Counter()
+        self.met: Counter[Place] = Counter()
+        self.unseen: Counter[Place] = Counter()
+        self.sides: dict[Place, list[Field]] = {}
 
     def near(
         self, rows: Sequence[tuple[Inputs, Any]], wanted: int
@@ -101,140 +68,134 @@ class Borders:
         wanted
             Inputs, about; comparisons that were met rarely come first.
         """
+        self.rows = [inputs for inputs, _ in rows]
+        self.reached = [(inputs, at) for at, inputs in enumerate(self.rows)]
         given = 0
         for _ in range(_TRIES * wanted):
             if given >= wanted or not self.fields:
                 return
-            at, other = (int(k) for k in self.rng.integers(len(rows), size=2))
-            inputs, par = rows[at]
-            part, name = self.fields[int(self.rng.integers(len(self.fields)))]
-            value = self._another(inputs, rows[other][0], part, name)
-            for met in self._turns(inputs, par, part, name, value, rows[other][0]):
-                given += 1
-                yield met, at
+            at = self._any(len(rows))
+            inputs = rows[at][0]
+            if given and self.rng.random() < 0.5:
+                inputs, at = self.reached[-1 - self._any(min(given, _LATEST))]
+            for border in self._turned(inputs, rows[at][1]):
+                for side in (border.above, border.below):
+                    given += 1
+                    self.reached.append((side, at))
+                    yield side, at
 
-    def _another(self, inputs: Inputs, others: Inputs, part: int, name: str) -> float:
+    def _any(self, count: int) -> int:
+        return int(self.rng.integers(count))
+
+    def _another(self, inputs: Inputs, field: Field) -> float:
         """Return another value of an input: that of other inputs, none, or its own changed."""
-        own = float(getattr(inputs[part], name))
-        values = (float(getattr(others[part], name)), 0.0, -own, 3.0 * own)
+        others = self.rows[self._any(len(self.rows))]
+        before = value_of(inputs, field)
+        values = (value_of(others, field), 0.0, -before, 3.0 * before)
         return values[max(int(self.rng.integers(-3, 4)), 0)]
 
-    def _turns(
-        self, inputs: Inputs, par: Any, part: int, name: str, other: float, others: Inputs
-    ) -> Iterator[Inputs]:
-        """Yield the inputs next to the rarest comparisons that turn on the way to a value."""
-        own = float(getattr(inputs[part], name))
-        first, last = (self._margins(inputs, par, part, name, v) for v in (own, other))
-        turning = [
-            key for key in first.keys() & last.keys() if (first[key] > 0.0) != (last[key] > 0.0)
-        ]
-        for key in sorted(turning, key=lambda each: (self.found[each], each))[:_AT_ONCE]:
-            if self.found[key] >= _ENOUGH:
+    def _turned(self, inputs: Inputs, par: Any) -> Iterator[Border]:
+        """Yield borders of the rarest comparisons that turn where an input gets another value."""
+        along = Turn(self.tick, par, (), self.fields[self._any(len(self.fields))])
+        at, to = value_of(inputs, along.field), self._another(inputs, along.field)
+        here, there = (along.margins(inputs, value) for value in (at, to))
+        ends = [(to, there)]
+        ends += [(v, along.margins(inputs, v)) for v in self._aimed((at, here), (to, there))]
+        turning: dict[Place, tuple[float, float]] = {}
+        for value, last in ends:
+            for place in here.keys() & last.keys():
+                if (here[place] > 0.0) != (last[place] > 0.0):
+                    turning.setdefault(place, (value, last[place]))
+        for place in sorted(turning, key=self._rank)[:_AT_ONCE]:
+            if self._rank(place)[0] >= _ENOUGH:
+                return
+            turn = replace(along, place=place)
+            border = turn.border(inputs, (at, here[place]), turning[place])
+            shown = border if turn.is_seen(border) else self._elsewhere(turn, border)
+            if self._is_worth(place[:_LAW], shown):
+                yield self._met(turn, shown) if shown is not None else border
+
+    def _is_worth(self, law: Place, shown: Border | None) -> bool:
+        """Count a border; return whether it is kept."""
+        self.shown[law] += int(shown is not None)
+        self.unseen[law] += int(shown is None)
+        return shown is not None or self.unseen[law] <= _UNSEEN
+
+    def _aimed(
+        self, first: tuple[float, Margins], last: tuple[float, Margins]
+    ) -> Iterator[float]:
+        """Yield a value beyond which the rarest comparison turns that the input has a say in."""
+        (at, here), (to, there) = first, last
+        for place in sorted(here.keys() & there.keys(), key=self._rank):
+            moves = there[place] - here[place]
+            if moves == 0.0 or not math.isfinite(moves):
+                continue
+            value = at - _BEYOND * here[place] * (to - at) / moves
+            if abs(value) <= _FAR * (abs(at) + abs(to)):
+                yield value
                 return
 
-            kept = self._pair(inputs, par, part, name, key, (own, first[key]), (other, last[key]))
-            is_seen = self._is_seen(kept, par)
-            if not is_seen:
-                kept, is_seen = self._elsewhere(kept, par, part, name, key, others)
-            self.found[key] += 1 if is_seen else 0
-            self.unseen[key] += 0 if is_seen else 1
-            if is_seen or self.unseen[key] <= _UNSEEN:
-                yield from kept
+    def _rank(self, place: Place) -> tuple[float, Place]:
+        """Return how well a comparison is known already."""
+        law = place[:_LAW]
+        return self.met[law] + self.shown[law] / 3 + self.unseen[law] / 10, place
 
-    def _pair(
-        self, inputs: Inputs, par: Any, part: int, name: str, key: tuple[int, ...],
-        first: tuple[float, float], last: tuple[float, float],
-    ) -> list[Inputs]:  # fmt: skip
-        """Return inputs on both sides of where a comparison turns."""
+    def _met(self, turn: Turn, border: Border) -> Border:
+        """Return a border with its sides equal, if it can be had by the last digits of inputs.
 
-        def margin(value: float) -> float:
-            return self._margins(inputs, par, part, name, value).get(key, math.nan)
+        The numbers that one input can be may make a side jump over the other.
+        """
+        law = turn.place[:_LAW]
+        if not border.is_met and self.met[law] < _MET:
+            border = next(self._nudged(turn, border), border)
+        self.met[law] += int(border.is_met)
+        return border
 
-        return [_with(inputs, part, name, value) for value in _closed_in(margin, first, last)]
+    def _nudged(self, turn: Turn, border: Border) -> Iterator[Border]:
+        law = turn.place[:_LAW]
+        if law not in self.sides:
+            self.sides[law] = list(self._sides(turn, border.below))
+        for field in self.sides[law]:
+            at = value_of(border.below, field)
+            for ulps in () if field == turn.field else _ULPS:
+                nudged = border.changed(field, at + ulps * math.ulp(at))
+                if turn.is_at(nudged) and turn.is_seen(nudged):
+                    yield nudged
 
-    def _elsewhere(
-        self, pair: list[Inputs], par: Any, part: int, name: str, key: tuple[int, ...],
-        others: Inputs,
-    ) -> tuple[list[Inputs], bool]:  # fmt: skip
+    def _sides(self, turn: Turn, inputs: Inputs) -> Iterator[Field]:
+        """Yield inputs that have a say in a comparison."""
+        before = margins(self.tick, inputs, turn.par).get(turn.place)
+        for field in self.fields:
+            value = value_of(inputs, field) * (1.0 + _SMALL) + _SMALL
+            moved = changed(inputs, [(field, value)])
+            if margins(self.tick, moved, turn.par).get(turn.place) != before:
+                yield field
+
+    def _elsewhere(self, turn: Turn, border: Border) -> Border | None:
         """Return a border of the same comparison that shows, with other inputs changed, if any."""
-        own = [float(getattr(each[part], name)) for each in pair]
-        apart = 1e-3 * (abs(own[0]) + abs(own[1]) + 1e-3)
-        for _ in range(_CONTEXTS):
-            inputs = pair[0]
-            for _ in range(int(self.rng.integers(1, 4))):
-                place, field = self.fields[int(self.rng.integers(len(self.fields)))]
-                if (place, field) != (part, name):
-                    value = self._another(inputs, others, place, field)
-                    inputs = _with(inputs, place, field, value)
-            ends = (own[0], own[1]), (own[0] - apart, own[0] + apart)
-            for low, high in ends:  # where it was, or near by
-                at_low, at_high = (
-                    self._margins(inputs, par, part, name, v).get(key, math.nan)
-                    for v in (low, high)
-                )
-                if (at_low > 0.0) != (at_high > 0.0) and math.isfinite(at_low - at_high):
-                    found = self._pair(
-                        inputs, par, part, name, key, (low, at_low), (high, at_high)
-                    )
-                    if self._is_seen(found, par):
-                        return found, True
-        return pair, False
+        above, below = (value_of(each, turn.field) for each in (border.above, border.below))
+        for count in range(_CONTEXTS):  # the same place: what follows from it may be hidden
+            inputs = border.above
+            if count % 2:
+                inputs = self.reached[self._any(len(self.reached))][0]
+            inputs = changed(inputs, self._changes(inputs, turn.field) if count % 4 < 2 else ())
+            high, low = (changed(inputs, [(turn.field, value)]) for value in (above, below))
+            moved = Border(high, low, border.is_met)
+            if turn.is_seen(moved) and turn.is_at(moved):
+                return moved
+        apart = 1e-3 * (2.0 * abs(above) + 1e-3)
+        for _ in range(_NEAR_BY):  # where other inputs have a say in the comparison
+            inputs = changed(border.above, self._changes(border.above, turn.field))
+            first, last = ((v, turn.margin(inputs, v)) for v in (above - apart, above + apart))
+            if (first[1] > 0.0) != (last[1] > 0.0) and math.isfinite(first[1] - last[1]):
+                moved = turn.border(inputs, first, last)
+                if turn.is_seen(moved):
+                    return moved
+        return None
 
-    def _margins(self, inputs: Inputs, par: Any, part: int, name: str, value: float) -> Margins:
-        x, u, m = _traced(_with(inputs, part, name, value))
-        _now.margins = {}
-        try:
-            with np.errstate(all="ignore"):  # numbers of single precision warn where others raise
-                self.tick(x, m, u, par)
-        except (ArithmeticError, ValueError):
-            return {}
-        found: Margins = _now.margins
-        return found
-
-    def _is_seen(self, pair: Sequence[Inputs], par: Any) -> bool:
-        """Return whether the memory jumps between two inputs next to each other."""
-        try:
-            with np.errstate(all="ignore"):
-                first, last = (list(self.tick(x, m, u, par)) for x, u, m in pair)
-        except (ArithmeticError, ValueError):
-            return False
-        return any(abs(a - b) > _JUMP * (abs(a) + abs(b)) for a, b in zip(first, last, strict=True))
-
-
-_BEGIN = Borders._margins.__code__
-"""above it there is no law any more"""
-
-
-def _with(inputs: Inputs, part: int, name: str, value: float) -> Inputs:
-    changed = list(inputs)
-    changed[part] = inputs[part]._replace(**{name: value})
-    return tuple(changed)
-
-
-def _traced(inputs: Inputs) -> Inputs:
-    return tuple(type(each)(*map(Traced, each)) for each in inputs)
-
-
-def _closed_in(
-    margin: Callable[[float], float], first: tuple[float, float], last: tuple[float, float]
-) -> tuple[float, float]:
-    """Return two values as close to each other as can be, between which a margin turns."""
-    (a, at_a), (b, at_b) = (first, last) if first[1] > 0.0 else (last, first)  # a above, b not
-    for count in range(_HALVINGS):
-        middle = 0.5 * (a + b)
-        if count < 6 and at_a != at_b and math.isfinite(at_a - at_b):
-            middle = b - at_b * (a - b) / (at_a - at_b)
-            if count % 2:  # the straight line ends in a border, the next number is beyond it
-                middle = math.nextafter(middle, a if at_b == 0.0 else b)
-        if not min(a, b) < middle < max(a, b):
-            middle = 0.5 * (a + b)
-        if middle in (a, b):
-            break
-        found = margin(middle)
-        if math.isnan(found):
-            break
-        if found > 0.0:
-            a, at_a = middle, found
-        else:
-            b, at_b = middle, found
-    return a, b
+    def _changes(self, inputs: Inputs, but: Field) -> Iterator[tuple[Field, float]]:
+        """Yield other values of some inputs."""
+        for _ in range(int(self.rng.integers(1, 4))):
+            field = self.fields[self._any(len(self.fields))]
+            if field != but:
+                yield field, self._another(inputs, field)

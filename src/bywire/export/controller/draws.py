@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,8 @@ from bywire.export.controller.program import Program
 
 WILD, CALM, RELATED = tuple(range(10)), (9,) * 20 + tuple(range(10)), (9,) * 5 + (6, 6, 5)
 """kinds of draws: anything, hardly anything unusual, and much that is equal or at a limit"""
+_DRIFTS = -5.0, -1.5
+"""tenths of the usual size, as powers, by which signals drift in a tick"""
 _LEVELS = (0.0, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, -1.0)
 
 
@@ -68,6 +70,28 @@ class Draw:
         names = [n for n in sorted(used) if self.rng.random() < 2.0 / max(len(used), 1)]
         return values._replace(**{
             n: self.number(self.value(signals[n], [])) for n in names
+        })  # fmt: skip
+
+    def alike(self, values: Any, used: set[str]) -> Any:
+        """Return signals of usual size, all of them smaller by about the same factor."""
+        cls: Any = type(values)
+        factor = float(10.0 ** self.rng.uniform(-2.0, 0.5))
+        return values._replace(**{
+            name: self.number(signal.nominal * factor * self.rng.uniform(0.6, 1.4))
+            for name, signal in signals_of(cls).items() if name in used
+        })  # fmt: skip
+
+    def drift(self, cls: Any, used: set[str]) -> dict[str, float]:
+        """Return how far the signals of a NamedTuple move in a tick: some hardly, some at once."""
+        return {
+            name: signal.nominal * float(10.0 ** self.rng.uniform(*_DRIFTS) * self.rng.normal())
+            for name, signal in signals_of(cls).items() if name in used
+        }  # fmt: skip
+
+    def drifted(self, values: Any, drift: Mapping[str, float]) -> Any:
+        """Return signals a tick later."""
+        return values._replace(**{
+            name: self.number(getattr(values, name) + step) for name, step in drift.items()
         })  # fmt: skip
 
     def parameters(self, par: ParameterSet) -> ParameterSet:

@@ -23,6 +23,9 @@ _MOST_AT_BORDERS = 400
 SEGMENT = 40
 """ticks after which a trajectory starts anew"""
 _TRIES = 50
+_KINDS = ("random", "jumping", "smooth")
+"""stretches of vectors, in turns: each drawn anew, few inputs changed at once, all of them drifting
+as those of a plant do, which is where derivatives have their usual size"""
 
 
 @dataclass(frozen=True)
@@ -111,10 +114,14 @@ def _drawn(
     model, number = program.model, draw.number
     start = type(memory)(*map(number, memory))
     for stretch in range(_TRIES * count):
-        is_random, which = stretch % 2 == 0, stretch // 2 % 2
+        kind, which = stretch % len(_KINDS), stretch // len(_KINDS) % 2
         m, x, u = start, *(_nominal(cls, number) for cls in (model.State, model.Stimulus))
+        drifts = [draw.drift(type(each), used[type(each)]) for each in (x, u)]
+        if _KINDS[kind] == "smooth":
+            x, u = draw.alike(x, used[model.State]), draw.alike(u, used[model.Stimulus])
+            m = _at_rest(program, x, u, m, sets[which], number)
         for at in range(SEGMENT):
-            if is_random:
+            if _KINDS[kind] == "random":
                 pool: dict[str, list[float]] = {}
                 draw.kinds = (WILD, CALM, RELATED)[at % 3]
                 m, x, u = (
@@ -127,7 +134,23 @@ def _drawn(
                     break
                 yield step.task.name, (x, u, m, after, which)
                 m = after
-            x, u = draw.moved(x, used[model.State]), draw.moved(u, used[model.Stimulus])
+            if _KINDS[kind] == "smooth":
+                x, u = (draw.drifted(e, drift) for e, drift in zip((x, u), drifts, strict=True))
+            else:
+                x, u = draw.moved(x, used[model.State]), draw.moved(u, used[model.Stimulus])
+
+
+def _at_rest(
+    program: Program, x: Any, u: Any, m: Any, par: ParameterSet, number: Callable[[float], Any]
+) -> Any:
+    """Return the memory behind ticks with unchanged inputs: filters have come to rest."""
+    for _ in range(SEGMENT):
+        for step in program.steps:
+            after = _ticked(step.task, x, m, u, par, number)
+            if after is None:
+                return m
+            m = after
+    return m
 
 
 def _at_borders(
