@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import signal
 import sys
 import time
 from multiprocessing import active_children
+from pathlib import Path
 
 import numpy as np
 import pandas as pd
@@ -16,7 +18,7 @@ from scipy import stats
 
 import bywire
 from bywire.core.errors import FileError, InputError, ParameterError, RunError
-from bywire.studies.executor import Cluster, InProcess, Pool, executor_of
+from bywire.studies.executor import CLUSTER_SETTINGS, Cluster, InProcess, Pool, executor_of
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 from undrawn import undrawn
@@ -99,6 +101,18 @@ def test_who_computes_changes_no_bit_and_ends_at_once_when_nobody_asks_any_more(
     while any(each.exitcode is None for each in workers) and time.monotonic() < until:
         time.sleep(0.01)
     assert {each.exitcode for each in workers} == {-signal.SIGTERM}
+
+
+def test_the_page_says_how_a_cluster_is_best_started():
+    config = pytest.importorskip("dask").config
+    pytest.importorskip("distributed")
+    page = (Path(__file__).parents[2] / "docs/studies.md").read_text(encoding="utf-8")
+    said = dict(re.findall(r"^export (DASK_DISTRIBUTED\w+)=(\w+)$", page, re.M))
+    read = config.collect_env(said)
+    assert len(said) == len(CLUSTER_SETTINGS)
+    for name, value in CLUSTER_SETTINGS.items():
+        assert config.get(name) != value  # there is such a setting, and it is another one
+        assert config.get(name, config=read) == value
 
 
 def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):

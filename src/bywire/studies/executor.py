@@ -27,6 +27,15 @@ _AHEAD = 2  # chunks, or tasks of a cluster, in flight for each worker, so that 
 _SECONDS = 10.0  # to reach a cluster
 _TASK = 0.5  # s that a task of a cluster is to take
 _WORTH = 8  # chunks from which on processes are worth their start
+# What Dask does by the clock: stacks sampled every 10 ms, ticks of 20 ms, memory looked at every
+# 100 ms. A core's worker, scheduler and client take 8 % of a core with it, and 1.4 % with these.
+CLUSTER_SETTINGS = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.admin.tick.interval": "1s",
+    "distributed.worker.memory.monitor-interval": "1s",
+}
+"""configuration of Dask with which scheduler and workers are best started"""
+
 _LOST = "the cluster lost its workers ({}): resume the study when some are there"
 _WHAT = ("studies on a cluster", "cluster")
 
