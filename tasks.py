@@ -26,8 +26,7 @@ LOCKS = {"demo": ["requirements.lock"], "test": ["requirements-dev.lock"]}
 LOCKS["trust"] = LOCKS["test"]
 LOCKS["docs"] = ["requirements-docs.lock"]
 
-# One more than there are cores: tests wait for processes of their own, a tenth of the time.
-PYTEST = ["pytest", "-n", str((os.cpu_count() or 1) + 1), "-q"]
+PYTEST = ["pytest", "-n", "auto", "-q"]  # one process more takes a tenth longer
 # A file's tests share runs and kernels, so one process has them all; the longest files come first.
 BY_FILE = ["--dist", "loadfile", "--no-loadscope-reorder"]
 # Rewritten assertions, which tell their values, cost as much as a hundred tests: what fails is run
@@ -123,7 +122,7 @@ def docs() -> int:
 
 def every(checks: dict[str, list[str]]) -> int:
     """Run commands until one fails, and return its status."""
-    # The processes take all cores already: more threads of the libraries would wait for each other.
+    # One process per core already: more threads of the libraries would wait for each other.
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     for title, check in checks.items():
         print(f"== {title}", flush=True)
