@@ -1,6 +1,10 @@
-"""For all tests: collections of garbage, which look at all that is imported, are rare."""
+"""For all tests: rare collections of garbage, which look at all that is imported; a browser."""
 
 import gc
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
 
 
 def pytest_collection_finish() -> None:
@@ -8,3 +12,18 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(1_000_000, 10, 10)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    """Yield a browser; without one, tests that ask for it say that they are skipped, and why."""
+    from bywire.benchmark.browser import browser
+    from bywire.core.errors import RunError
+
+    try:
+        opening = browser()
+        opened = opening.__enter__()
+    except RunError as error:
+        pytest.skip(str(error))
+    yield opened
+    opening.__exit__(None, None, None)

@@ -3,26 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
-from typing import Any
 
 import pytest
 
-from bywire.benchmark.browser import browser
-from bywire.core.errors import RunError
-
 NEWEST = '() => document.querySelector("#jobs li")?.className'
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    try:
-        opening = browser()
-        opened = opening.__enter__()
-    except RunError as error:
-        pytest.skip(str(error))
-    yield opened
-    opening.__exit__(None, None, None)
 
 
 @pytest.mark.skipif(os.name != "posix", reason="processes of POSIX")

@@ -11,8 +11,6 @@ import pytest
 from page_benches import BENCHES, VARIED
 
 import bywire
-from bywire.benchmark.browser import browser
-from bywire.core.errors import RunError
 
 DAILY = 3  # positions of sliders
 READY = "() => run !== null && !busy"
@@ -58,17 +56,6 @@ class Tab:
         self.page.wait_for_function(READY)
         given: dict[str, Any] = self.page.evaluate(GIVEN)
         return given
-
-
-@pytest.fixture(scope="module")
-def chromium() -> Iterator[Any]:
-    try:
-        opening = browser()
-        opened = opening.__enter__()
-    except RunError as error:
-        pytest.skip(str(error))
-    yield opened
-    opening.__exit__(None, None, None)
 
 
 @pytest.fixture(scope="module", params=sorted(BENCHES))
