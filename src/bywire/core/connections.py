@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 from bywire.core.assembly import Assembly
-from bywire.core.traced import Traced
+from bywire.core.traced import Traced, names_in
 from bywire.core.wired import instant_of
 
 Kind = Literal["part", "wire", "task", "stimulus"]
@@ -181,14 +181,15 @@ class _Trace:
                 if value is not getattr(self._memory, name)
             }  # fmt: skip
             self.fields |= dict.fromkeys(changed, node)
-            leaves = {str(each) for each in _leaves(tuple(changed.values()), {})}
+            leaves = {str(each) for each in names_in(tuple(changed.values()))}
             read = {name: self.owners[name] for name in self.model.State._fields if name in leaves}
             read |= {k: STIMULUS for k in stimulus._fields if f"u.{k}" in leaves}
             yield node, read, {name.removeprefix("m.") for name in leaves if name[:2] == "m."}
 
     def sources(self, values: Any) -> list[Node]:
         """Return the nodes that a value follows from, each once."""
-        nodes = [self._node(each) for each in _leaves(values, self._marks)]
+        marks = {key: node for key, (node, _) in self._marks.items()}
+        nodes = [self._node(each) for each in names_in(values, marks)]
         return list(dict.fromkeys(node for node in nodes if node is not None))
 
     def _node(self, leaf: str | Node) -> Node | None:
@@ -220,20 +221,3 @@ class _Trace:
             for name, part in self.model.parts.items()
         }  # fmt: skip
         return labels | {STIMULUS: "of the bench"} | dict.fromkeys(self.ticks, "task of the ECU")
-
-
-def _leaves(values: Any, marks: dict[int, tuple[Node, Any]]) -> Iterator[str | Node]:
-    """Yield the given names, and the marks, that values are computed from."""
-    waiting, seen = [values], set()
-    while waiting:
-        each = waiting.pop()
-        if isinstance(each, tuple):
-            waiting += each
-        elif isinstance(each, Traced) and id(each) not in seen:
-            seen.add(id(each))
-            if id(each) in marks:
-                yield marks[id(each)][0]
-            elif each.operation is None:
-                yield each.inputs[0]
-            else:
-                waiting += each.inputs

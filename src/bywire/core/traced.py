@@ -53,8 +53,11 @@ for _name in (*_BOTH, "neg", "pos", "abs", "lt", "le", "gt", "ge", "eq", "ne"):
         setattr(Traced, f"__r{_name}__", _backward(_operation))
 
 
-def names_in(values: Any) -> Iterator[str]:
-    """Yield the names that a value, or a tuple of values, is computed from."""
+def names_in(values: Any, marks: Mapping[int, Any] | None = None) -> Iterator[Any]:
+    """Yield the names that a value, or a tuple of values, is computed from.
+
+    ``marks``: by the identity of a traced number, what is yielded of it in place of its names.
+    """
     waiting, seen = [values], set()
     while waiting:
         each = waiting.pop()
@@ -62,7 +65,9 @@ def names_in(values: Any) -> Iterator[str]:
             waiting += each
         elif isinstance(each, Traced) and id(each) not in seen:
             seen.add(id(each))
-            if each.operation is None:
+            if marks and id(each) in marks:
+                yield marks[id(each)]
+            elif each.operation is None:
                 yield each.inputs[0]
             else:
                 waiting += each.inputs
