@@ -81,7 +81,7 @@ def key_figures_of(benches: Sequence[Bench], threads: int | None = None) -> KeyF
         if families is not None:
             if benches[0].definition.beside is not None:
                 rows = inputs_recorded(rows, made.cases, wanted)
-            figures = families.of_cases(rows, options)
+            figures = families.of_cases(rows, options, [run.par for run in group.runs])
             continue
         for j, (k, case) in enumerate(zip(made.places, made.cases, strict=True)):
             recordings[k][case.label] = rows_of_case(benches[k], case, rows, group, j)

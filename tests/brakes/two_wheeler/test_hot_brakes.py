@@ -6,6 +6,7 @@ import pytest
 import bywire
 from bywire.bench.energy_ledger import actuator_ledger, further_ledgers
 from bywire.bench.experiment import as_run
+from bywire.bench.kpis import vehicle_stop
 from bywire.brakes.two_wheeler.case import rolling_case
 from bywire.brakes.two_wheeler.experiments import repeated_stops
 from bywire.brakes.two_wheeler.panels import PANELS
@@ -14,7 +15,6 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import disc_heat
 from bywire.report.time_traces import drawable
 from bywire.simulation.run import simulate
-from bywire.vehicle import stop_figures
 
 SPORT600 = PARAMETER_SETS.find("sport600").parameters()
 OFF = {"ecu.abs": "off", "ecu.lift": "off", "ecu.p_rate": "1e7 bar/s"}
@@ -203,7 +203,7 @@ def test_the_series_is_told_to_the_substep():
     last = repeated_stops.cases(SPORT600, options)[1]
     run = simulate(as_run(last, 1e-5))
     end = float(course["T_disc_f"].values[course["stop"].values == 2.0][-1])
-    still = stop_figures.standstill(run.time, run["v"])
+    still = vehicle_stop.standstill(run.time, run["v"])
     assert np.interp(still, run.time, run["T_disc_f"]) == pytest.approx(end, abs=1e-5)
 
 

@@ -16,6 +16,7 @@ from bywire.bench.kpis.kpi import Kpi, KpiOfCases, Measure
 from bywire.bench.kpis.registry import FAMILIES, Family, evaluate
 from bywire.bench.kpis.samples import signal
 from bywire.bench.rows import Rows
+from bywire.core.parameters import ParameterSet
 
 
 @dataclass(frozen=True)
@@ -30,25 +31,36 @@ class FamilyJudge:
         ``settings(options)``: the ``Setting`` of each family by its name.
     left_out
         Figures of these families that are not given.
+    levels
+        ``levels(run, options)``: what of the settings depends on the parameters of a run, by the
+        family's name and the setting's field; None where nothing does.
     """
 
     settings: Callable[[Any], Mapping[str, Any]]
     left_out: Collection[str] = ()
+    levels: Callable[[xr.Dataset, Any], Mapping[str, Mapping[str, Any]]] | None = None
 
     def __call__(self, recordings: Mapping[str, xr.Dataset], options: Any) -> tuple[Kpi, ...]:
         """Return the key figures of the run."""
         (run,) = recordings.values()
-        given = [evaluate(name, run, each) for name, each in self.settings(options).items()]
+        settings = self._of_run(self.settings(options), run, options)
+        given = [evaluate(name, run, each) for name, each in settings.items()]
         return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
 
-    def of_cases(self, rows: Rows, options: Sequence[Any]) -> tuple[KpiOfCases, ...]:
+    def of_cases(
+        self, rows: Rows, options: Sequence[Any], pars: Sequence[ParameterSet | None] = ()
+    ) -> tuple[KpiOfCases, ...]:
         """Return the key figures of many cases.
 
-        ``rows``: signals of shape (cases, time); ``options``: of each case, of one structure.
+        ``rows``: signals of shape (cases, time); ``options``, ``pars``: of each case, of one
+        structure; parameters are needed where levels depend on them.
         """
         distinct = {id(chosen): chosen for chosen in options}  # mostly one
         known = {number: self.settings(chosen) for number, chosen in distinct.items()}
         each = [known[id(chosen)] for chosen in options]
+        if self.levels is not None:
+            runs = (cast(xr.Dataset, rows.case(k, par=par)) for k, par in enumerate(pars))
+            each = list(map(self._of_run, each, runs, options))
         given = [evaluate_cases(name, rows, [s[name] for s in each]) for name in each[0]]
         return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
 
@@ -57,6 +69,15 @@ class FamilyJudge:
         distinct = {id(chosen): chosen for chosen in options}.values()
         each = {setting for chosen in distinct for setting in self.settings(chosen).values()}
         return {name for setting in each for name in signals_of_setting(setting)}
+
+    def _of_run(
+        self, settings: Mapping[str, Any], run: xr.Dataset, options: Any
+    ) -> Mapping[str, Any]:
+        """Return the settings with what depends on the parameters of a run."""
+        if self.levels is None:
+            return settings
+        levels = self.levels(run, options)
+        return {name: replace(each, **levels.get(name, {})) for name, each in settings.items()}
 
     def _wants(self, name: str) -> bool:
         return name not in self.left_out
@@ -130,6 +151,8 @@ def _together(
     compiled = _in_c(chosen, rows, settings, replace(first, **levels))
     if compiled is not None:
         return compiled
+    if chosen.in_c is not None and chosen.in_c.is_alone_in_python:
+        return None
     data = chosen.select(cast(xr.Dataset, rows), replace(first, **levels))
     if data.defect:
         return None

@@ -9,6 +9,7 @@ Python, of this case.
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -22,7 +23,7 @@ from bywire.core.errors import CompilerError
 from bywire.core.typing import Array
 from bywire.simulation.compiler import find_compiler, load_library
 
-SAMPLES = Path(__file__).with_name("samples.h")
+HEADERS = Path(__file__).parent
 UNSOUND = "not a number, or no rows"
 _FLAGS = ("-O3", "-march=native")  # loops over samples: vectors pay, and sums keep their order
 
@@ -46,6 +47,8 @@ class InC:
         ``note(setting)``: how the samples were treated.
     room
         Numbers that it needs for each sample beside the signals.
+    is_alone_in_python
+        Whether its Python takes a single case, so that without C each is judged for itself.
     """
 
     signals: tuple[str, ...]
@@ -54,6 +57,7 @@ class InC:
     packed: Callable[[Any, int], Array] = lambda setting, cases: np.zeros(1)
     note: Callable[[Any], str] = lambda setting: ""
     room: int = 0
+    is_alone_in_python: bool = False
 
 
 def entry_of(family: str) -> str:
@@ -63,9 +67,11 @@ def entry_of(family: str) -> str:
 
 def source_of(path: Path) -> str:
     """Return the C of a family in one piece."""
-    include = f'#include "{SAMPLES.name}"\n'
-    text = path.read_text(encoding="utf-8")
-    return text.replace(include, SAMPLES.read_text(encoding="utf-8"))
+
+    def included(name: re.Match[str]) -> str:
+        return source_of(HEADERS / name[1])
+
+    return re.sub(r'#include "(\w+\.h)"\n', included, path.read_text(encoding="utf-8"))
 
 
 @cache

@@ -10,7 +10,8 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.kpis import vehicle_stop
+from bywire.bench.kpis.cases import FamilyJudge
 from bywire.brakes.two_wheeler.model import TwoWheelerByWire, at_speed
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import ParameterError
@@ -18,7 +19,7 @@ from bywire.core.quantities import Unit
 from bywire.core.typing import Array
 from bywire.plant import adhesion, road
 from bywire.plant.road import SurfaceName
-from bywire.vehicle import ideal_stop, stop_figures
+from bywire.vehicle import ideal_stop
 from bywire.vehicle.surfaces import laid
 from bywire.vehicle.two_wheeler import VehicleParameters
 
@@ -69,15 +70,22 @@ def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[s
 
 def vehicle_of(run: xr.Dataset) -> VehicleParameters:
     """Return the parameters of the vehicle with which a recording was made."""
+    known = getattr(run, "par", None)
+    if isinstance(known, TwoWheelerParameters):
+        return known.vehicle
     return TwoWheelerParameters.model_validate_json(run.attrs["parameters"]).vehicle
 
 
-def judged_stop(run: xr.Dataset, v_0: float) -> tuple[Kpi, ...]:
-    """Return the key figures of a stop from a speed [m/s]."""
+def _levels(run: xr.Dataset, options: Any) -> dict[str, dict[str, float]]:
+    """Return what a stop from ``options.v_0`` is measured by."""
     par = vehicle_of(run)
-    ideal = ideal_stop.ideal_distance(v_0, par)
     peak = adhesion.peak_slip(road.surface(0.0, par.road), par.front_tyre)
-    return stop_figures.stop_figures(run, stop_figures.Setting(ideal, float(peak)))
+    ideal = ideal_stop.ideal_distance(options.v_0, par)
+    return {"vehicle_stop": {"ideal": ideal, "peak_slip": float(peak)}}
+
+
+JUDGE = FamilyJudge(lambda _: {"vehicle_stop": vehicle_stop.Setting()}, levels=_levels)
+"""the judge of a stop from the speed ``options.v_0``"""
 
 
 def locked_stop(v_0: float, par: TwoWheelerParameters) -> float:

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from bywire.bench.experiment import Case, as_run
+from bywire.bench.kpis import vehicle_stop
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.errors import ParameterError
 from bywire.core.interrupts import interrupts_deferred
@@ -17,7 +18,6 @@ from bywire.core.typing import Array
 from bywire.plant import disc_heat
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import simulate
-from bywire.vehicle import stop_figures
 
 Heat = Mapping[str, disc_heat.State]
 """temperatures of the brakes by their parts"""
@@ -42,7 +42,7 @@ def braked(case: Case) -> dict[str, Array]:
     made = simulate(run, ("v", "x", *TEMPERATURES))
     if made.status == "interrupted":
         raise KeyboardInterrupt
-    end = stop_figures.standstill(made.time, made["v"])
+    end = vehicle_stop.standstill(made.time, made["v"])
     if math.isnan(end):
         raise ParameterError(
             f"{case.label} does not come to a standstill within {case.duration:g} s: its brakes "

@@ -9,9 +9,9 @@ from pydantic import Field
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Kpi
 from bywire.brakes.two_wheeler.case import (
+    JUDGE,
     Demand,
     RidingSpeed,
-    judged_stop,
     on_surface,
     rolling_case,
 )
@@ -68,7 +68,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     return tuple(
         Kpi(f"{kpi.name}_{f:g}Hz", kpi.value, kpi.unit, kpi.definition, kpi.note)
         for f in options.f_n
-        for kpi in judged_stop(recordings[_label(f)], options.v_0)
+        for kpi in JUDGE({"run": recordings[_label(f)]}, options)
         if kpi.name in _SHOWN
     )
 

@@ -17,6 +17,7 @@ import xarray as xr
 from pydantic import Field
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler import stop_series
 from bywire.brakes.two_wheeler.case import RidingSpeed, rolling_case
@@ -29,7 +30,6 @@ from bywire.core.quantities import Duration, Unit, Weight
 from bywire.core.signals import Signal, signals_of
 from bywire.core.typing import Array
 from bywire.plant import brake_disc, disc_heat
-from bywire.vehicle import stop_figures
 from bywire.vehicle.hot_brakes import cold_start
 
 _COURSE = "course-temperatures"
@@ -217,7 +217,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
 def _distance(run: xr.Dataset) -> float:
     """Return the distance of a stop [m]."""
     t = run["time"].values
-    return float(np.interp(stop_figures.standstill(t, run["v"].values), t, run["x"].values))
+    return float(np.interp(vehicle_stop.standstill(t, run["v"].values), t, run["x"].values))
 
 
 def named(options: Options) -> dict[str, str]:

@@ -9,12 +9,14 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.registry import units_of
 from bywire.bench.stimuli.registry import Stimulus
 from bywire.brakes.two_wheeler.case import (
+    JUDGE,
     Course,
     RidingSpeed,
-    judged_stop,
     on_surface,
     rolling_case,
 )
@@ -23,7 +25,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import brake_disc
 from bywire.plant.road import SurfaceName
-from bywire.vehicle import stop_figures
 
 # Built-in ride, our choice: a light pull, a moment's doubt, then all that the hand gives.
 _TIMES = (0.0, 0.25, 0.9, 1.1, 1.3, 1.5, 3.0)  # s
@@ -72,13 +73,13 @@ def _course(values: tuple[float, ...]) -> Course:
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return what was left of the demand, and the key figures of the stop."""
     run = recordings["run"]
-    return (*FIGURES(**_shares(run)), *judged_stop(run, options.v_0))
+    return (*FIGURES(**_shares(run)), *JUDGE(recordings, options))
 
 
 def _shares(run: xr.Dataset) -> dict[str, float]:
     par = TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
     t = run["time"].values
-    end = stop_figures.standstill(t, run["v"].values)
+    end = vehicle_stop.standstill(t, run["v"].values)
     braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
     left, asked = 0.0, 0.0
     shares = {}
@@ -101,7 +102,7 @@ EXPERIMENT = Experiment(
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,
     judge=judge,
-    kpis=FIGURES.units | stop_figures.units(),
+    kpis=FIGURES.units | units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),
     beside=driven,
 )

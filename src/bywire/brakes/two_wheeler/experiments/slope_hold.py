@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler.case import Course, Demand, RidingSpeed, rolling_case, vehicle_of
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
@@ -16,7 +17,6 @@ from bywire.core.quantities import Duration
 from bywire.core.typing import Array
 from bywire.plant import road, two_wheeler_body
 from bywire.plant.road import Gradient
-from bywire.vehicle import stop_figures
 from bywire.vehicle.two_wheeler import VehicleParameters
 
 _CALM = 2.0  # s after the stop
@@ -97,7 +97,7 @@ def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how the vehicle stays, and how it rolls off."""
     run = recordings["run"]
     t, x, v = (run[name].values for name in ("time", "x", "v"))
-    end = stop_figures.standstill(t, v)
+    end = vehicle_stop.standstill(t, v)
     held = (t >= end + _CALM) & (t < options.t_release)
     rolls = (t >= options.t_release + _OPENED) & (t <= options.t_release + _OPENED + _ROLLS)
     stays = math.isfinite(end) and end < options.t_release

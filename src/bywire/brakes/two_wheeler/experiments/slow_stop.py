@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.brakes.two_wheeler.case import Demand, RidingSpeed, rolling_case
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant.road import Gradient
-from bywire.vehicle import stop_figures
 
 _QUIET = 1e-3  # m/s
 _CALM = 2.0  # s after the stop
@@ -62,7 +62,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return how the vehicle comes to rest, and how it stays there."""
     run = recordings["run"]
-    end = stop_figures.standstill(run["time"].values, run["v"].values)
+    end = vehicle_stop.standstill(run["time"].values, run["v"].values)
     if math.isnan(end):
         return FIGURES(**dict.fromkeys(FIGURES.units, math.nan))
     return FIGURES(**_rest(run, end))

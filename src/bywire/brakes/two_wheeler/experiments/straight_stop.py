@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from bywire.bench.experiment import Case, Experiment, Recordings
-from bywire.bench.kpis.kpi import Kpi
+from bywire.bench.experiment import Case, Experiment
+from bywire.bench.kpis.registry import units_of
 from bywire.brakes.two_wheeler.case import (
+    JUDGE,
     Demand,
     RidingSpeed,
-    judged_stop,
     locked_stop,
     on_surface,
     rolling_case,
@@ -16,7 +16,6 @@ from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
 from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import TimeConstant
 from bywire.plant.road import SurfaceName
-from bywire.vehicle import stop_figures
 
 _FROM = 100.0 / 3.6
 
@@ -44,11 +43,6 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
     return (rolling_case(par, options.v_0, demands, duration, changes),)
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the key figures of the stop."""
-    return judged_stop(recordings["run"], options.v_0)
-
-
 EXPERIMENT = Experiment(
     name="straight-stop",
     assembly="two-wheeler-by-wire",
@@ -58,7 +52,7 @@ EXPERIMENT = Experiment(
         v_0=_FROM, p_front=40e5, p_rear=40e5, surface="dry-asphalt", duration=0.0
     ),
     cases=cases,
-    judge=judge,
-    kpis=stop_figures.units(),
+    judge=JUDGE,
+    kpis=units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),
 )

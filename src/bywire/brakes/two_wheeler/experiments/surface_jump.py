@@ -8,11 +8,13 @@ import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.registry import units_of
 from bywire.brakes.two_wheeler.case import (
+    JUDGE,
     Demand,
     RidingSpeed,
-    judged_stop,
     on_surface,
     rolling_case,
     vehicle_of,
@@ -22,7 +24,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration
 from bywire.plant import adhesion, road
 from bywire.plant.road import Distance, SurfaceName
-from bywire.vehicle import stop_figures
 
 _CALM = 1.2  # of the peak's slip
 
@@ -30,7 +31,7 @@ FIGURES = Figures(
     recovery_time=(
         "s",
         "Time from the front wheel's step onto the further surface until its slip stays below "
-        f"{_CALM:g} of the slip of the peak there, above {stop_figures.SLOW:g} m/s.",
+        f"{_CALM:g} of the slip of the peak there, above {vehicle_stop.SLOW:g} m/s.",
     ),
     jump_speed=("m/s", "Speed at that step."),
 )
@@ -69,7 +70,7 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
 def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
     """Return the key figures of the stop, the ideal one on the first surface, and the recovery."""
     run = recordings["run"]
-    return (*FIGURES(**_recovery(run, options)), *judged_stop(run, options.v_0))
+    return (*FIGURES(**_recovery(run, options)), *JUDGE(recordings, options))
 
 
 def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, str]]:
@@ -80,7 +81,7 @@ def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[floa
     k = int(np.argmax(x > options.x_change))
     begin = float(np.interp(options.x_change, x[: k + 1], t[: k + 1]))
     ground = road.surface(options.x_change + 1.0, vehicle_of(run).road)
-    beyond = (t > begin) & (v > stop_figures.SLOW)
+    beyond = (t > begin) & (v > vehicle_stop.SLOW)
     peak = adhesion.peak_slip(ground, vehicle_of(run).front_tyre)
     beyond &= run["slip_f"].values > _CALM * peak
     last = float(t[np.flatnonzero(beyond)[-1]]) if beyond.any() else begin
@@ -103,6 +104,6 @@ EXPERIMENT = Experiment(
     ),
     cases=cases,
     judge=judge,
-    kpis=FIGURES.units | stop_figures.units(),
+    kpis=FIGURES.units | units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),
 )

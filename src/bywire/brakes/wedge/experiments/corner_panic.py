@@ -9,6 +9,7 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.vehicle_stop import SLOW, standstill
 from bywire.brakes.wedge.case import steps
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
@@ -17,7 +18,6 @@ from bywire.core.quantities import Duration, Temperature
 from bywire.plant import adhesion, road
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
-from bywire.vehicle.stop_figures import SLOW, standstill
 from bywire.vehicle.surfaces import laid
 
 FIGURES = Figures(

@@ -13,6 +13,7 @@ import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment, Recordings
 from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.vehicle_stop import standstill
 from bywire.brakes.wedge.case import mean, steps, swing
 from bywire.brakes.wedge.laws.moment_control import SomeMoment
 from bywire.brakes.wedge.rigs.wedge_corner import WedgeCorner, WedgeCornerParameters, at_speed
@@ -20,7 +21,6 @@ from bywire.core.parameters import ParameterSet
 from bywire.core.quantities import Duration, Temperature
 from bywire.plant.road import SurfaceName
 from bywire.vehicle.ideal_stop import RidingSpeed
-from bywire.vehicle.stop_figures import standstill
 from bywire.vehicle.surfaces import laid
 
 _CALM = 1.0  # s from the stop on, in which tyre and brake come to rest
