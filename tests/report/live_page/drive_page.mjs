@@ -4,11 +4,11 @@ import { runInThisContext } from "node:vm";
 const [page, scripts, task] = process.argv.slice(2);
 const text = readFileSync(page, "utf8");
 const block = (id) => JSON.parse(text.match(new RegExp(`id="${id}">(.*?)</script>`, "s"))[1]);
-for (const name of ["values.js", "figures.js", "loops.js", "margins.js"]) runInThisContext(readFileSync(`${scripts}/${name}`, "utf8"));
+for (const name of ["values.js", "unpack.js", "figures.js", "loops.js", "margins.js"]) runInThisContext(readFileSync(`${scripts}/${name}`, "utf8"));
 runInThisContext(block("loader"));
 const { description, digest, judged, keep, loops, text: file } = block("bench");
 const parameters = description.parameters.filter(({ used }) => used);
-const brake = await runInThisContext("load")(Buffer.from(block("kernel"), "base64"), description);
+const brake = await runInThisContext("load")(await runInThisContext("unpacked")(block("kernel")), description);
 const call = (name, ...given) => runInThisContext(name)(...given);
 const tries = {
   run({ changes }) {

@@ -102,6 +102,17 @@ def test_loops_are_drawn_when_sliders_rest(tab):
     assert not tab.noise
 
 
+def test_panels_out_of_sight_follow_when_sliders_rest(tab):
+    tab.open()
+    tab.page.wait_for_timeout(300)
+    panel = "[...document.querySelectorAll('#curves canvas')].at(-2)"
+    assert tab.page.evaluate(f"() => {panel}.getBoundingClientRect().top > 1.5 * innerHeight")
+    before = tab.page.evaluate(f"() => {panel}.toDataURL()")
+    tab.moved({VARIED[tab.file.stem][0]: 350})
+    tab.page.wait_for_function(f"(before) => {panel}.toDataURL() !== before", arg=before)
+    assert not tab.noise
+
+
 def test_a_link_restores_what_was_moved(tab):
     given = tab.moved({name: 417 for name in VARIED[tab.file.stem]})
     tab.open(tab.page.evaluate("() => location.hash"))

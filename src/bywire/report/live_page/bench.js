@@ -3,7 +3,7 @@
 const read = (id) => JSON.parse(document.getElementById(id).textContent);
 const bench = read("bench");
 const { description, digest, panels, chosen, judged, loops } = bench;
-const REST = 150; // ms without a move, after which loops are computed: sliders come first
+const REST = 150; // ms without a move, after which loops and what is out of sight follow: sliders come first
 const parameters = description.parameters.filter(({ used }) => used);
 const values = Object.fromEntries(parameters.map(({ name, start }) => [name, start]));
 const kept = [];
@@ -83,8 +83,8 @@ function answered({ data: { error, time, signals, figures, settled, loops: compu
 
 function changed(name, value) {
   values[name] = value;
+  ask(); // before its description: the worker computes meanwhile
   describe();
-  ask();
 }
 
 function save(name, kind, text) {
@@ -160,12 +160,11 @@ let worker;
 if (typeof WebAssembly === "undefined" || typeof Worker === "undefined") {
   complain("this browser runs no WebAssembly in workers, by which the bench is computed: take a current one");
 } else {
-  const bytes = Uint8Array.from(atob(read("kernel")), (letter) => letter.charCodeAt(0));
   const text = `${read("loader")}\n${read("worker")}`;
   worker = new Worker(URL.createObjectURL(new Blob([text], { type: "text/javascript" })));
   worker.addEventListener("message", answered);
   worker.addEventListener("error", (event) => complain(`the bench does not run: ${event.message}`));
-  worker.postMessage({ bytes, given: { description, judged, loops, keep: bench.keep } });
+  worker.postMessage({ kernel: read("kernel"), given: { description, judged, loops, keep: bench.keep } });
   take(location.hash.slice(1));
   ask();
   addEventListener("hashchange", () => {

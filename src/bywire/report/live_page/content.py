@@ -9,6 +9,8 @@ from __future__ import annotations
 import base64
 import hashlib
 import json
+import re
+import zlib
 from collections.abc import Mapping, Sequence
 from html import escape
 from importlib.resources import files
@@ -42,7 +44,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 _SCRIPTS = ("values.js", "controls.js", "curves.js", "bode.js", "bench.js")
-_WORKER = ("figures.js", "loops.js", "margins.js", "worker.js")
+_WORKER = ("unpack.js", "figures.js", "loops.js", "margins.js", "worker.js")
 _NAME = "run"  # of the module, inside the page
 
 
@@ -81,12 +83,12 @@ def page_text(
     data["description"]["name"] = "".join(c if c.isalnum() else "_" for c in name)
     loader = module["bywire.mjs"].decode().replace("export async function", "async function")
     blocks = {
-        "bench": data, "kernel": base64.b64encode(module[f"{_NAME}.wasm"]).decode(),
-        "loader": loader, "worker": "\n".join(map(_text, _WORKER)),
+        "bench": data, "kernel": _packed(module[f"{_NAME}.wasm"]),
+        "loader": loader, "worker": "\n".join(map(_script, _WORKER)),
     }  # fmt: skip
     style = _text("uplot/uPlot.min.css") + _text("live.css")
     library = f"/* {_text('uplot/LICENSE').strip()} */\n{_text('uplot/uPlot.iife.min.js')}"
-    script = '"use strict";\n' + "\n".join(map(_text, _SCRIPTS))
+    script = '"use strict";\n' + "\n".join(map(_script, _SCRIPTS))
     policy = (
         f"default-src 'none'; script-src {admitted(library)} {admitted(script)} "
         "'wasm-unsafe-eval'; "
@@ -108,15 +110,18 @@ def _data(
     origins = {row.name: row for row in parameter_rows(bench.par, cited)}
     read = [each["name"] for each in description["parameters"] if each["used"]]
     follow = dependence(bench, made.number, read)
-    used = set()
-    for each in description["parameters"]:
+    used = set[str]()
+    kept = ("name", "unit", "start")  # what the loader takes of parameters that nobody moves
+    for k, each in enumerate(description["parameters"]):
+        if not each["used"] or each["name"] in follow.driving:
+            description["parameters"][k] = {"used": False} | {key: each[key] for key in kept}
+            continue
+        used.add(each["name"])
         each |= {**_shown(each["unit"]), "kind": "", "where": ""}
         each["shownUnit"] = unit_text(display_unit(each["unit"]))
         if each["name"] in origins:
             row = origins[each["name"]]
             each |= {"kind": row.kind, "where": row.where}
-        each["used"] &= each["name"] not in follow.driving
-        used |= {each["name"]} if each["used"] else set()
     return {
         "description": description,
         "panels": _panels(panels, recording, used, stated_for(bench)),
@@ -229,8 +234,18 @@ def _footer(made: Exported) -> str:
 
 
 def _block(key: str, value: Any) -> str:
-    text = json.dumps(value, allow_nan=False).replace("<", "\\u003c")
+    text = json.dumps(value, allow_nan=False, separators=(",", ":")).replace("<", "\\u003c")
     return f'<script type="application/json" id="{key}">{text}</script>'
+
+
+def _script(name: str) -> str:
+    """Return a script without the lines that are comments alone: they are for who changes it."""
+    return re.sub(r"^[ \t]*/\*(?:(?!\*/).)*\*/[ \t]*\n", "", _text(name), flags=re.MULTILINE)
+
+
+def _packed(module: bytes) -> str:
+    """Return a module as text; deflated first, for base 64 hides from a server what repeats."""
+    return base64.b64encode(zlib.compress(module, 9)).decode()
 
 
 def _text(name: str) -> str:

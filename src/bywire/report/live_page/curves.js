@@ -12,8 +12,9 @@ function palette() {
     main: color("main"), second: color("second"), third: color("third"), "set point": color("ink"), kept: color("kept") };
 }
 
-/** Return a signal as it is shown. */
-const converted = (values, quantity) => Array.from(values, (value) => shownOf(value, quantity));
+/** Return a signal as it is shown; it is not copied where that is as it is computed. */
+const converted = (values, quantity) =>
+  quantity.factor === 1 && quantity.offset === 0 ? values : values.map((value) => shownOf(value, quantity));
 
 /** Return the lines of a panel: traces of the run, its limit, what a source states, and first traces of kept runs. */
 function linesOf(panel, kept, colors) {
@@ -35,7 +36,7 @@ function linesOf(panel, kept, colors) {
 
 /** Return the numbers of a panel's lines, in their order. */
 function numbersOf(panel, run, kept, values) {
-  const time = Array.from(run.time), column = ({ name }, { signals }) => converted(signals[name], panel);
+  const { time } = run, column = ({ name }, { signals }) => converted(signals[name], panel);
   const traces = panel.traces.map((trace) => column(trace, run));
   const limits = [];
   if (panel.limit) {
@@ -68,11 +69,26 @@ function barOf(panel, runNow, colors) {
 
 /** Make the plots of all panels; `draw(run, kept, values)` shows a run. */
 function curves(place, panels) {
-  let plots = [], shape = "", current = null;
+  let plots = [], shape = "", current = null, waiting = new Map(), later = 0;
+  const inSight = new Set();
+  const observer = new IntersectionObserver((entries) => {
+    for (const { target, isIntersecting } of entries) inSight[isIntersecting ? "add" : "delete"](target);
+    show(inSight);
+  }, { rootMargin: "25%" });
+  /* Draw what waits, of all panels or of some. */
+  function show(figures) {
+    for (const [figure, set] of waiting)
+      if (!figures || figures.has(figure)) {
+        waiting.delete(figure);
+        set();
+      }
+  }
   const width = () => Math.max(280, place.clientWidth);
   function make(kept) {
     const colors = palette();
     plots.forEach((plot) => plot.destroy());
+    observer.disconnect();
+    inSight.clear();
     place.replaceChildren();
     plots = panels.map((panel, k) => {
       const last = k === panels.length - 1, unit = panel.unit && ` [${panel.unit}]`;
@@ -80,6 +96,7 @@ function curves(place, panels) {
         ticks: { stroke: colors.line }, labelFont: "600 11px system-ui, sans-serif" };
       const figure = element("figure", { "aria-label": `${panel.quantity} over time` });
       place.append(figure);
+      observer.observe(figure);
       const names = panel.levels;
       return new uPlot({
         width: width(), height: HEIGHT * panel.height + (last ? 50 : 30),
@@ -100,7 +117,11 @@ function curves(place, panels) {
     const now = `${width()} ${kept.map(({ name }) => name)}`;
     if (now !== shape) make(kept);
     shape = now;
-    plots.forEach((plot, k) => plot.setData(numbersOf(panels[k], run, kept, values)));
+    waiting = new Map(plots.map((plot, k) =>
+      [plot.root.parentElement, () => plot.setData(numbersOf(panels[k], run, kept, values))]));
+    show(inSight); // the others when sliders rest, or they come into sight
+    clearTimeout(later);
+    later = setTimeout(() => show(), REST);
   }
   return { draw, forget: () => { shape = ""; } };
 }
