@@ -7,22 +7,15 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from functools import partial
 from importlib.util import find_spec
 from pathlib import Path
 
-from bywire.bench.ensemble import changed
-from bywire.bench.key_figures import needed
-from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.recording import rows_of_group
-from bywire.bench.side_by_side import rounds
 from bywire.benchmark.commands import environment
+from bywire.benchmark.judging import simulated_and_judged
 from bywire.benchmark.result import Result, at_least, at_most
 from bywire.benchmark.suite import Part
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
-from bywire.simulation.run_group import RunGroup
 from bywire.studies.chunk import computed_chunk
 from bywire.studies.executor import CLUSTER_SETTINGS, Cluster, Executor, Pool
 from bywire.studies.plan import CHUNK, StudyPlan
@@ -62,7 +55,7 @@ def studies() -> list[Result]:
         plan = read_study(path)
         computed_chunk(plan, 0, threads=1)  # the kernel is built
         whole = min(_seconds(plan) for _ in range(_ROUNDS)) / (_CHUNKS * CHUNK)
-        simulated, judged = (min(each) / CHUNK for each in zip(*_parts(plan), strict=True))
+        simulated, judged = simulated_and_judged(plan, _ROUNDS)
         cores = os.cpu_count() or 1
         results = [
             at_most(
@@ -92,26 +85,6 @@ def _seconds(plan: StudyPlan) -> float:
     for chunk in range(_CHUNKS):
         computed_chunk(plan, chunk, threads=1)
     return time.process_time() - begin
-
-
-def _parts(plan: StudyPlan) -> Iterator[tuple[float, float]]:
-    """Yield what the runs of a chunk take, set up beforehand, and then their key figures [s]."""
-    values = plan.values(0)
-    benches = [
-        changed(plan.bench, {name: column[k].item() for name, column in values.items()}, seed=k)
-        for k in range(CHUNK)
-    ]
-    judge, options = plan.bench.definition.judge, [each.chosen_options for each in benches]
-    assert isinstance(judge, FamilyJudge)
-    for _ in range(_ROUNDS):
-        begin = time.process_time()
-        (made,) = rounds(benches, threads=1, signals=partial(needed, judge.signals(options)))
-        computed = time.process_time()
-        group = made.trajectories
-        assert isinstance(group, RunGroup)
-        rows = rows_of_group(group, made.cases[0].settle)
-        judge.of_cases(rows, options)
-        yield computed - begin, time.process_time() - computed
 
 
 def _memory(study: Path, out: Path) -> Result:
