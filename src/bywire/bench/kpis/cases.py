@@ -21,7 +21,7 @@ from bywire.core.parameters import ParameterSet
 
 @dataclass(frozen=True)
 class FamilyJudge:
-    """The judge of an experiment of one run whose key figures all come from families.
+    """The judge of an experiment of one run whose key figures come from families.
 
     Of many cases it judges all at once, of no more signals than it needs.
 
@@ -34,18 +34,25 @@ class FamilyJudge:
     levels
         ``levels(run, options)``: what of the settings depends on the parameters of a run, by the
         family's name and the setting's field; None where nothing does.
+    further
+        ``further(run, options)``: figures of the experiment's own, which come first.
+    further_signals
+        Names of all signals that these look at.
     """
 
     settings: Callable[[Any], Mapping[str, Any]]
     left_out: Collection[str] = ()
     levels: Callable[[xr.Dataset, Any], Mapping[str, Mapping[str, Any]]] | None = None
+    further: Callable[[xr.Dataset, Any], tuple[Kpi, ...]] | None = None
+    further_signals: tuple[str, ...] = ()
 
     def __call__(self, recordings: Mapping[str, xr.Dataset], options: Any) -> tuple[Kpi, ...]:
         """Return the key figures of the run."""
         (run,) = recordings.values()
         settings = self._of_run(self.settings(options), run, options)
         given = [evaluate(name, run, each) for name, each in settings.items()]
-        return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
+        own = () if self.further is None else self.further(run, options)
+        return own + tuple(kpi for each in given for kpi in each.values() if self._wants(kpi.name))
 
     def of_cases(
         self, rows: Rows, options: Sequence[Any], pars: Sequence[ParameterSet | None] = ()
@@ -53,22 +60,27 @@ class FamilyJudge:
         """Return the key figures of many cases.
 
         ``rows``: signals of shape (cases, time); ``options``, ``pars``: of each case, of one
-        structure; parameters are needed where levels depend on them.
+        structure; parameters are needed where levels or further figures depend on them.
         """
         distinct = {id(chosen): chosen for chosen in options}  # mostly one
         known = {number: self.settings(chosen) for number, chosen in distinct.items()}
         each = [known[id(chosen)] for chosen in options]
-        if self.levels is not None:
-            runs = (cast(xr.Dataset, rows.case(k, par=par)) for k, par in enumerate(pars))
+        own: Iterable[KpiOfCases] = ()
+        if self.levels is not None or self.further is not None:
+            runs = [cast(xr.Dataset, rows.case(k, par=par)) for k, par in enumerate(pars)]
             each = list(map(self._of_run, each, runs, options))
+            if self.further is not None:
+                own = of_cases(list(map(self.further, runs, options)))
         given = [evaluate_cases(name, rows, [s[name] for s in each]) for name in each[0]]
-        return tuple(kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
+        wanted = (kpi for kpis in given for kpi in kpis.values() if self._wants(kpi.name))
+        return (*own, *wanted)
 
     def signals(self, options: Sequence[Any]) -> set[str]:
         """Return the names of all signals that it may look at, of cases with these options."""
         distinct = {id(chosen): chosen for chosen in options}.values()
         each = {setting for chosen in distinct for setting in self.settings(chosen).values()}
-        return {name for setting in each for name in signals_of_setting(setting)}
+        named = {name for setting in each for name in signals_of_setting(setting)}
+        return named.union(self.further_signals)
 
     def _of_run(
         self, settings: Mapping[str, Any], run: xr.Dataset, options: Any

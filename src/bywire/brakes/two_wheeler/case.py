@@ -68,12 +68,17 @@ def on_surface(first: SurfaceName, further: SurfaceName | None = None) -> dict[s
     return laid("vehicle.road", first, further)
 
 
-def vehicle_of(run: xr.Dataset) -> VehicleParameters:
-    """Return the parameters of the vehicle with which a recording was made."""
+def parameters_of(run: xr.Dataset) -> TwoWheelerParameters:
+    """Return the parameters with which a recording was made."""
     known = getattr(run, "par", None)
     if isinstance(known, TwoWheelerParameters):
-        return known.vehicle
-    return TwoWheelerParameters.model_validate_json(run.attrs["parameters"]).vehicle
+        return known
+    return TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
+
+
+def vehicle_of(run: xr.Dataset) -> VehicleParameters:
+    """Return the parameters of the vehicle with which a recording was made."""
+    return parameters_of(run).vehicle
 
 
 def _levels(run: xr.Dataset, options: Any) -> dict[str, dict[str, float]]:

@@ -138,7 +138,8 @@ def _settings(made: Exported) -> Mapping[str, Any] | None:
     definition = made.bench.definition
     if not isinstance(definition.judge, FamilyJudge) or definition.finish is not None:
         return None
-    if definition.judge.levels is not None:  # a page has no parameters to compute them from
+    if definition.judge.levels is not None or definition.judge.further is not None:
+        # a page has no Python to compute these
         return None
     settings = definition.judge.settings(made.bench.chosen_options)
     is_whole = all(FAMILIES.find(name).in_c is not None for name in settings)

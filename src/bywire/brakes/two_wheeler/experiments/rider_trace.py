@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.kpis.registry import units_of
@@ -18,6 +19,7 @@ from bywire.brakes.two_wheeler.case import (
     Course,
     RidingSpeed,
     on_surface,
+    parameters_of,
     rolling_case,
 )
 from bywire.brakes.two_wheeler.parameters import TwoWheelerParameters
@@ -70,14 +72,13 @@ def _course(values: tuple[float, ...]) -> Course:
     return lambda t: np.interp(t, _TIMES, values)
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return what was left of the demand, and the key figures of the stop."""
-    run = recordings["run"]
-    return (*FIGURES(**_shares(run)), *JUDGE(recordings, options))
+def what_is_left(run: xr.Dataset, _: Options) -> tuple[Kpi, ...]:
+    """Return what is left of the rider's demand."""
+    return FIGURES(**_shares(run))
 
 
 def _shares(run: xr.Dataset) -> dict[str, float]:
-    par = TwoWheelerParameters.model_validate_json(run.attrs["parameters"])
+    par = parameters_of(run)
     t = run["time"].values
     end = vehicle_stop.standstill(t, run["v"].values)
     braked = (t >= 0.0) & (t <= (end if math.isfinite(end) else math.inf))
@@ -101,7 +102,9 @@ EXPERIMENT = Experiment(
     options=Options,
     defaults=Options(v_0=30.0, surface="wet-asphalt", duration=8.0),
     cases=cases,
-    judge=judge,
+    judge=replace(
+        JUDGE, further=what_is_left, further_signals=("v", "p_f", "p_r", "p_f_set", "p_r_set")
+    ),
     kpis=FIGURES.units | units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),
     beside=driven,

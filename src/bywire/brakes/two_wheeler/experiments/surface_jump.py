@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import vehicle_stop
 from bywire.bench.kpis.kpi import Figures, Kpi
 from bywire.bench.kpis.registry import units_of
@@ -67,10 +68,9 @@ def cases(par: TwoWheelerParameters, options: Options, _: object = None) -> tupl
     return (rolling_case(par, options.v_0, demands, options.duration, changes),)
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the key figures of the stop, the ideal one on the first surface, and the recovery."""
-    run = recordings["run"]
-    return (*FIGURES(**_recovery(run, options)), *JUDGE(recordings, options))
+def recovery(run: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
+    """Return how the front wheel takes the further surface."""
+    return FIGURES(**_recovery(run, options))
 
 
 def _recovery(run: xr.Dataset, options: Options) -> dict[str, float | tuple[float, str]]:
@@ -103,7 +103,7 @@ EXPERIMENT = Experiment(
         duration=6.0,
     ),
     cases=cases,
-    judge=judge,
+    judge=replace(JUDGE, further=recovery, further_signals=("x", "v", "slip_f")),
     kpis=FIGURES.units | units_of("vehicle_stop"),
     figures=("road-marks", "time-traces", "energy-balance"),
 )
