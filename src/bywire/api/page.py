@@ -18,8 +18,6 @@ from bywire.report.document import Document, Listing, Section
 if TYPE_CHECKING:
     from bywire.export.exported import Exported
 
-_FIRST = 6  # parameters that stand first where nobody chose any
-
 
 @dataclass(frozen=True)
 class BenchPage(Answer):
@@ -76,7 +74,8 @@ def page(
     overrides
         Changes of a bench file or experiment, as ``--set`` takes them.
     vary
-        Parameters that stand first in the page; by default those that the bench changes.
+        Parameters that stand first in the page; by default those that the bench changes,
+        else those that its brake declares (`bywire.authoring.Sliders`).
     case
         Which run of the experiment it computes; may be left out where there is but one.
 
@@ -119,8 +118,7 @@ def page(
             raise ParameterError(f"{name} has no effect in this bench: leave it out of vary")
     result = run(bench)
     panels = shown_panels(result.recordings[made.case.label])
-    chosen = vary or [name for name in bench.overrides if name in used] or used[:_FIRST]
-    content = page_text(made, panels, result, chosen).encode()
+    content = page_text(made, panels, result, vary).encode()
     file = write_bytes(out, content)
     return BenchPage(file, made, len(content), len(gzip.compress(content, mtime=0)))
 

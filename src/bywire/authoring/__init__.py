@@ -103,6 +103,7 @@ if TYPE_CHECKING:
     from bywire.report.bench_figures import FigureKind
     from bywire.report.bench_figures import Shown as ShownFigure
     from bywire.report.line_role import Role as LineRole
+    from bywire.report.live_page.sliders import Sliders
     from bywire.report.panels import Panel, Panels, Trace
     from bywire.reproduction.item import Fact, Item, compared, found
     from bywire.reproduction.reproduction import Exhibit, Reproduction, Source
@@ -153,6 +154,7 @@ _HOMES = {
     "bench.kpis.registry": "evaluate units_of",
     "bench.stimuli.registry": "Stimulus",
     "report.bench_figures": "FigureKind Shown:ShownFigure",
+    "report.live_page.sliders": "Sliders",
     "report.panels": "Panel Panels Trace",
     "report.line_role": "Role:LineRole",
     # loops, plants, studies
@@ -213,8 +215,9 @@ __all__ = [
     "Part", "Plant", "PlantPoint", "Point", "Position", "Power", "Pressure", "Problem",
     "Progress", "Quantity", "Recordings", "Reproduction", "Residual", "Resistance", "Result",
     "Role", "RootCause", "RotaryDamping", "Run", "Runs", "Shown", "ShownFigure", "Signal",
-    "SignedCurrent", "Slow", "Source", "SourcePart", "Speed", "Stiffness", "Stimulus", "Study",
-    "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined", "Unit", "Unknown",
+    "SignedCurrent", "Sliders", "Slow", "Source", "SourcePart", "Speed", "Stiffness", "Stimulus",
+    "Study", "Task", "TimeConstant", "Torque", "TorqueConstant", "Trace", "Undefined", "Unit",
+    "Unknown",
     "Voltage", "Volume", "Weight", "Wire", "as_run", "calibrated", "chosen", "closed_loop",
     "compared", "derived", "differentiated", "effort", "estimate", "evaluate", "fixed", "found",
     "hysteresis", "kpis", "lack_of_fit", "linearize", "measure", "measured", "moved_run",

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import bywire as toolkit
+from bywire.report.live_page.sliders import SLIDERS
 from few_starts import few_starts
 from undrawn import undrawn
 
@@ -198,3 +199,9 @@ def test_what_fails_in_it_is_known_and_can_be_put_in(command: Any, tmp_path: Pat
     assert code == 0, err
     kinds = {each["fault"]: each["class"] for each in json.loads(out)["faults"]}
     assert set(kinds) == {"motor.hot", "motor.demagnetized", "bridge.stuck"}
+
+
+def test_what_stands_first_in_its_pages_are_its_parameters(par):
+    shown = SLIDERS.find("emb-caliper").parameters
+    assert shown
+    assert set(shown) <= par.leaves().keys()

@@ -16,8 +16,11 @@ from page_benches import BENCHES, VARIED, needs_node, tried
 
 import bywire
 from bywire.bench.bench_file import read
+from bywire.bench.experiment import EXPERIMENTS
 from bywire.core.errors import ParameterError, UnknownNameError
+from bywire.core.parameters import leaf_fields
 from bywire.report.live_page.dependence import dependence
+from bywire.report.live_page.sliders import SLIDERS, first_sliders
 
 
 @pytest.fixture(scope="module", params=sorted(BENCHES))
@@ -142,6 +145,27 @@ def test_levels_that_a_source_states_stand_in_the_first_panel_of_their_signal(pa
     assert {each["value"] for each in moment["stated"]} >= {200.0, 160.0}
     assert all("Fig. 7" in each["label"] for each in moment["stated"])
     assert not any(each["value"] == 200.0 for panel in others for each in panel["stated"])
+
+
+def test_what_a_brake_declares_stands_first_where_nobody_chose(pages):
+    shown = block(pages["wedge"], "bench")["chosen"]
+    assert shown[0] == "wedge.mu_B"
+    assert shown == list(SLIDERS.find("wedge").parameters)
+    assert block(pages["motorcycle"], "bench")["chosen"] == ["adc.noise"]  # what its bench changes
+
+
+def test_every_declared_slider_is_a_parameter_of_its_assembly():
+    for choice in SLIDERS.all().values():
+        tested = [e.name for e in EXPERIMENTS.all().values() if e.assembly in choice.assemblies]
+        assert {EXPERIMENTS.find(name).assembly for name in tested} == {*choice.assemblies}
+        known = leaf_fields(type(read(tested[0], {}).par))
+        assert set(choice.parameters) <= known.keys(), choice.name
+
+
+def test_without_a_declaration_each_part_gives_its_first_parameter():
+    names = ["a.x", "a.y", "a.z", "b.x", "b.y", "ecu.force.k_p", "ecu.force.k_i"]
+    undeclared = read("corner-stop", {})
+    assert first_sliders(undeclared, names)[:4] == ["a.x", "b.x", "ecu.force.k_p", "a.y"]
 
 
 def test_parameters_that_drive_the_run_are_held(pages):

@@ -34,6 +34,7 @@ from bywire.export.exported import Exported
 from bywire.export.wasm.module import module_files
 from bywire.report.live_page.dependence import dependence
 from bywire.report.live_page.loops import loops_of, told
+from bywire.report.live_page.sliders import first_sliders
 from bywire.report.panels import Panel, Trace
 from bywire.report.parameter_rows import parameter_rows
 from bywire.report.policy import admitted
@@ -63,7 +64,7 @@ def page_text(
     result
         What the bench itself gave: labels and units of signals, definitions of key figures.
     chosen
-        Parameters that stand first.
+        Parameters that stand first; none: the bench's own choice.
 
     Raises
     ------
@@ -110,8 +111,7 @@ def _data(
     origins = {row.name: row for row in parameter_rows(bench.par, cited)}
     read = [each["name"] for each in description["parameters"] if each["used"]]
     follow = dependence(bench, made.number, read)
-    used = set[str]()
-    kept = ("name", "unit", "start")  # what the loader takes of parameters that nobody moves
+    used, kept = set[str](), ("name", "unit", "start")  # kept where nobody moves it
     for k, each in enumerate(description["parameters"]):
         if not each["used"] or each["name"] in follow.driving:
             description["parameters"][k] = {"used": False} | {key: each[key] for key in kept}
@@ -119,9 +119,9 @@ def _data(
         used.add(each["name"])
         each |= {**_shown(each["unit"]), "kind": "", "where": ""}
         each["shownUnit"] = unit_text(display_unit(each["unit"]))
-        if each["name"] in origins:
-            row = origins[each["name"]]
+        if row := origins.get(each["name"]):
             each |= {"kind": row.kind, "where": row.where}
+    chosen = chosen or first_sliders(bench, [name for name in read if name in used])
     return {
         "description": description,
         "panels": _panels(panels, recording, used, stated_for(bench)),

@@ -1,0 +1,67 @@
+"""Parameters that stand first in a page of a bench that changes none: its brake's choice."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+
+from bywire.bench.bench import Bench
+from bywire.core.registry import Kind, instances
+
+_COUNT = 6  # that stand first where no brake chooses
+
+
+@dataclass(frozen=True)
+class Sliders:
+    """Parameters that are worth a slider, for they say most of an assembly.
+
+    Parameters
+    ----------
+    name
+        Of this choice, unlike any other.
+    assemblies
+        Names of the assemblies that it is for.
+    parameters
+        Their names as ``--set`` takes them, what is moved first at the front. Those without effect
+        in a run (of a law that was not chosen) are left out of its page.
+    """
+
+    name: str
+    assemblies: tuple[str, ...]
+    parameters: tuple[str, ...]
+
+
+SLIDERS = Kind("choice of sliders", ("sliders",), instances(Sliders), declared="a Sliders")
+"""every brake's choice of parameters that stand first in its pages"""
+
+
+def first_sliders(bench: Bench, names: Sequence[str]) -> list[str]:
+    """Return the parameters that stand first in a bench's page where nobody chose any.
+
+    Parameters
+    ----------
+    names
+        Parameters that have an effect in the page's run, in the order of the model.
+
+    Returns
+    -------
+    list of str
+        Those that the bench changes; else its brake's choice; else of each part of the model the
+        first, for the first parameters alone may all be of one part.
+    """
+    changed = [name for name in bench.overrides if name in names]
+    assembly = bench.definition.assembly
+    declared = [
+        name for choice in SLIDERS.all().values() if assembly in choice.assemblies
+        for name in choice.parameters if name in names
+    ]  # fmt: skip
+    return changed or declared or list(_part_by_part(names))[:_COUNT]
+
+
+def _part_by_part(names: Sequence[str]) -> Iterator[str]:
+    parts: dict[str, list[str]] = {}
+    for name in names:
+        parts.setdefault(name.rpartition(".")[0], []).append(name)
+    for row in zip_longest(*parts.values()):
+        yield from (name for name in row if name is not None)
