@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
-from bywire.bench.experiment import Case, Experiment, Recordings
+import xarray as xr
+
+from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, step_response
+from bywire.bench.kpis.cases import FamilyJudge
 from bywire.bench.kpis.kpi import Figures, Kpi
-from bywire.bench.kpis.registry import evaluate, units_of
+from bywire.bench.kpis.registry import units_of
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -66,16 +69,19 @@ def step(options: Options) -> step_response.Setting:
     return step_response.Setting("p_mc", 0.0, smoothing=options.smoothing)
 
 
-def judge(recordings: Recordings, options: Options) -> tuple[Kpi, ...]:
-    """Return the step's KPIs, and the static gain."""
-    run = recordings["run"]
-    setting = step(options)
-    kpis = evaluate("step_response", run, setting)
-    kpis |= evaluate("effort", run, effort.Setting())
-    kpis |= evaluate("occupation", run, occupation.Setting())
-    data = step_response.select(run, setting)
-    gain = (data.end - data.start) / options.i_step
-    return (*kpis.values(), *GAIN(static_gain=(gain, data.note)))
+def settings(options: Options) -> dict[str, Any]:
+    """Return what the step is judged by."""
+    return {
+        "step_response": step(options),
+        "effort": effort.Setting(),
+        "occupation": occupation.Setting(),
+    }
+
+
+def gain(run: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
+    """Return the static gain."""
+    data = step_response.select(run, step(options))
+    return GAIN(static_gain=((data.end - data.start) / options.i_step, data.note))
 
 
 EXPERIMENT = Experiment(
@@ -87,7 +93,7 @@ EXPERIMENT = Experiment(
         p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02
     ),
     cases=cases,
-    judge=judge,
+    judge=FamilyJudge(settings, further=gain, further_signals=("p_mc",)),
     kpis={
         **units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
         **GAIN.units,
