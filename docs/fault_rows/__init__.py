@@ -1,0 +1,1 @@
+"""What the specification of faults states beside what the brakes of this package give."""
