@@ -30,6 +30,11 @@ def ratio(seconds: dict[str, list[float]], over: str, under: str) -> float:
     return median(a / b for a, b in zip(seconds[over], seconds[under], strict=True))
 
 
+def least_ratio(seconds: dict[str, list[float]], over: str, under: str) -> float:
+    """Return the ratio of the least seconds of each: what other processes took is in none."""
+    return min(seconds[over]) / min(seconds[under])
+
+
 def timed(work: Callable[[], object]) -> Work:
     """Return work that tells its seconds."""
 
@@ -37,6 +42,17 @@ def timed(work: Callable[[], object]) -> Work:
         begin = time.perf_counter()
         work()
         return time.perf_counter() - begin
+
+    return measured
+
+
+def processor_timed(work: Callable[[], object]) -> Work:
+    """Return work that tells its processor time in seconds, of all its threads together."""
+
+    def measured() -> float:
+        begin = time.process_time()
+        work()
+        return time.process_time() - begin
 
     return measured
 

@@ -19,7 +19,6 @@ from bywire.simulation.compiler import SINGLE, find_compiler, load_library
 from bywire.simulation.native import pointer
 from bywire.simulation.run import Run
 
-THREADS = ("-O2", "-fopenmp")
 WITHOUT_SUMS = ("-DWITHOUT_SUMS",)
 """leaves out the energies, whose outputs then mean nothing: where none of them is recorded"""
 _COUNTERS = 2  # the first one: substeps that did not settle
@@ -68,7 +67,7 @@ class Call:
 
 
 class HandCode:
-    """The compiled library, for one run or for an ensemble of scalar runs on all cores.
+    """The compiled library, for one run or for an ensemble of scalar runs, one by one.
 
     Parameters
     ----------
@@ -77,13 +76,13 @@ class HandCode:
     par
         Any parameter set of the structure that the C covers.
     flags
-        ``SINGLE`` for single runs, ``THREADS`` for ensembles, ``WITHOUT_SUMS`` beside either; on
-        top of the flags that all kernels get, so that code is compared and not settings.
+        ``SINGLE``, with which bywire's own single runs are compiled, and ``WITHOUT_SUMS`` beside
+        it; on top of the flags that all kernels get, so that code is compared and not settings.
 
     Raises
     ------
     CompilerError
-        Without a C compiler, or without its OpenMP when ``THREADS`` asks for it.
+        Without a C compiler.
     """
 
     def __init__(

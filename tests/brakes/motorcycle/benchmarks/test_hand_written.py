@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.brakes.motorcycle.benchmarks.hand_c import OUTPUTS, THREADS, HandWritten, indices
+from bywire.brakes.motorcycle.benchmarks.hand_c import OUTPUTS, HandWritten, indices
 from bywire.brakes.motorcycle.benchmarks.problem import braking_run, hard_braking
 from bywire.brakes.motorcycle.ecu import Stimulus
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import CompilerError
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.run import simulate
 
@@ -98,10 +97,7 @@ def test_repeats_from_the_start() -> None:
 def test_ensemble_equals_single_runs() -> None:
     cases = [parameters({"motor.R_m": R}) for R in (0.3, 0.35, 0.4)]
     run = braking_run(cases[0], hard_braking, 0.02)
-    try:
-        library = HandWritten(cases[0], THREADS)
-    except CompilerError:
-        pytest.skip("the compiler has no OpenMP")
+    library = HandWritten(cases[0])
     together = library.ensemble(run, cases, ("duty", "p_mc"))
     together()
     for k, par in enumerate(cases):

@@ -15,15 +15,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, Call
+from bywire.benchmark.peers.hand_code import WITHOUT_SUMS, Call
 from bywire.brakes.wedge.benchmarks import wedge_brake
 from bywire.brakes.wedge.benchmarks.hand_wedge import SUBJECT, HandWrittenWedge
 from bywire.brakes.wedge.model import WedgeBrake, state_at
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.start import memory_at
 from bywire.core.catalog import parameters
-from bywire.core.errors import CompilerError
-from bywire.simulation.compiler import find_compiler
+from bywire.simulation.compiler import SINGLE, find_compiler
 from bywire.simulation.run import Run, Trajectory, simulate
 
 Array = NDArray[np.float64]
@@ -168,10 +167,7 @@ def test_counting_encoders_differ_by_a_count() -> None:
 def test_ensemble_equals_single_runs() -> None:
     cases = [brake(IDEAL | {"wedge.mu_B": mu}) for mu in (0.3, 0.35, 0.4)]
     run = from_parked({}, PULSE)
-    try:
-        library = HandWrittenWedge(cases[0], (*THREADS, *WITHOUT_SUMS))
-    except CompilerError:
-        pytest.skip("the compiler has no OpenMP")
+    library = HandWrittenWedge(cases[0], (*SINGLE, *WITHOUT_SUMS))
     together = library.ensemble(run, cases, ("y_M", "x"))
     together()
     for k, par in enumerate(cases):

@@ -11,11 +11,20 @@ import numpy as np
 
 from bywire.benchmark.result import Result, at_least, at_most, vector_doubles
 from bywire.benchmark.suite import Part
-from bywire.benchmark.timing import Work, interleaved, kernel, ratio, timed
-from bywire.brakes.motorcycle.benchmarks.hand_c import THREADS, WITHOUT_SUMS, HandWritten
+from bywire.benchmark.timing import (
+    Work,
+    interleaved,
+    kernel,
+    least_ratio,
+    processor_timed,
+    ratio,
+    timed,
+)
+from bywire.brakes.motorcycle.benchmarks.hand_c import WITHOUT_SUMS, HandWritten
 from bywire.brakes.motorcycle.benchmarks.problem import braking_run, hard_braking
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
 from bywire.core.catalog import parameters
+from bywire.simulation.compiler import SINGLE
 from bywire.simulation.ensemble import simulate_ensemble
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.sensitivity import simulate_with_sensitivities
@@ -58,7 +67,11 @@ def single_and_sensitivities(par: MotorcycleParameters) -> list[Result]:
 
 
 def ensemble(par: MotorcycleParameters) -> list[Result]:
-    """Measure 1,024 variations on all cores against scalar C with OpenMP."""
+    """Measure 1,024 variations in lanes against scalar C, a thread each.
+
+    How many threads either side would take is set in different places (OMP_NUM_THREADS holds for
+    OpenMP alone), and both share out whole cases: a core's time is what differs.
+    """
     run = braking_run(par, hard_braking)
     signals = ("p_mc", "i", "stuck")
     draw = np.random.default_rng(0)
@@ -67,17 +80,20 @@ def ensemble(par: MotorcycleParameters) -> list[Result]:
     opponent = _hand_ensemble(run, variations, signals)
     seconds = interleaved(
         {
-            "bywire": timed(partial(simulate_ensemble, run, variations, signals)),
-            "hand": opponent,
+            "bywire": processor_timed(
+                partial(simulate_ensemble, run, variations, signals, threads=1)
+            ),
+            "hand": processor_timed(opponent),
         },
         _ENSEMBLE_ROUNDS,
     )
     width = vector_doubles()
     return [
-        at_least("ensemble.hand_c", ratio(seconds, "hand", "bywire"), 0.7 * width, "times faster",
-                 f"{CASES} variations of {len(VARIED)} parameters, all cores, three signals and no "
-                 f"energies on both sides, over scalar C with OpenMP; "
-                 f"0.7 of the vector width, {width} doubles"),
+        at_least("ensemble.hand_c", least_ratio(seconds, "hand", "bywire"), 0.7 * width,
+                 "times faster",
+                 f"{CASES} variations of {len(VARIED)} parameters, three signals and no energies "
+                 "on both sides, over scalar C with the flags of a single run; least processor "
+                 f"times of a thread each, in turn; 0.7 of the vector width, {width} doubles"),
     ]  # fmt: skip
 
 
@@ -85,7 +101,7 @@ def _hand_ensemble(run: Run, variations: dict[str, np.ndarray], signals: tuple[s
     matrix, names = case_matrix(run, variations), list(run.par.leaves())
     par = cast(MotorcycleParameters, run.par)
     cases = [par.with_leaves(dict(zip(names, column, strict=True))) for column in matrix.T]
-    return HandWritten(par, (*THREADS, *WITHOUT_SUMS)).ensemble(run, cases, signals)
+    return HandWritten(par, (*SINGLE, *WITHOUT_SUMS)).ensemble(run, cases, signals)
 
 
 def _par() -> MotorcycleParameters:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from bywire.benchmark.peers.hand_code import THREADS, WITHOUT_SUMS, HandCode
+from bywire.benchmark.peers.hand_code import WITHOUT_SUMS, HandCode
 from bywire.benchmark.peers.hand_source import Subject
 from bywire.brakes.motorcycle.model import MotorcycleBrake
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters as Par
 from bywire.simulation.compiler import SINGLE
 
-__all__ = ["OUTPUTS", "SUBJECT", "THREADS", "WITHOUT_SUMS", "HandWritten", "indices"]
+__all__ = ["OUTPUTS", "SUBJECT", "WITHOUT_SUMS", "HandWritten", "indices"]
 
 SUBJECT = Subject(
     folder=Path(__file__).parent,

@@ -483,14 +483,13 @@ void hand_run(const double *p, double h, int64_t frames, int64_t steps, const do
     simulate(p, h, frames, steps, u, state, O_COUNT, NULL, rec);
 }
 
-/* The same for many cases on all cores, with one block of p, state and rec per case, a stimulus
+/* The same for many cases, with one block of p, state and rec per case, a stimulus
  * shared by all, and only the selected outputs, width of them. */
 void hand_ensemble(int64_t cases, const double *p, double h, int64_t frames, int64_t steps,
                    const double *u, double *state, int64_t width, const int32_t *selected,
                    double *rec)
 {
     const int64_t length = X_COUNT + M_COUNT + 2, block = (frames + 1) * width;
-#pragma omp parallel for schedule(dynamic)
     for (int64_t c = 0; c < cases; c++)
         simulate(p + c * P_COUNT, h, frames, steps, u, state + c * length, width, selected,
                  rec + c * block);
