@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import socket
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -186,6 +187,7 @@ def test_a_port_and_a_folder_that_do_not_do(visit, tmp_path):
         ({"subject": "none.toml"}, FileError, "is no file"),
         ({"subject": "hard-brakin"}, UnknownNameError, "hard-braking"),
         ({"subject": visit.folder / "curve.toml"}, FileError, "is not in"),
+        ({"subject": visit.folder}, ParameterError, f"or bywire serve {re.escape(str(tmp_path))}$"),
     ]
     for given, error, text in cases:
         with pytest.raises(error, match=text), opened(**{"folder": tmp_path, "port": 0, **given}):

@@ -137,7 +137,8 @@ def _asked(subject: str, folder: str) -> tuple[Place, str]:
     if subject and Path(subject).is_dir():
         if folder and Path(folder).resolve() != Path(subject).resolve():
             raise ParameterError(
-                f"{subject} and --folder {folder} are two folders: leave out one of them"
+                f"{subject} and --folder {folder} are two folders, and but one is served, with all "
+                f"below it: bywire serve {subject}, or bywire serve {folder}"
             )
         return place_of(Path(subject)), ""
     if not is_file_name(subject):
