@@ -12,10 +12,10 @@ from bywire.export.controller.harness import FLAGS, WARNINGS
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors
 
-MANY, FEW, DAILY = 2000, 300, 150
+MANY, MORE, FEW, DAILY = 2000, 500, 300, 150
 LARGE = (*BRAKES, "gains that differ by region")
 CASES = [
-    *((structure, "double", MANY if structure in LARGE else DAILY) for structure in STRUCTURES),
+    *((structure, "double", MORE if structure in LARGE else DAILY) for structure in STRUCTURES),
     *((structure, "single", DAILY) for structure in LARGE),
     *(pytest.param(structure, "double", MANY, marks=pytest.mark.trust) for structure in STRUCTURES),
     *(pytest.param(structure, "single", FEW, marks=pytest.mark.trust) for structure in STRUCTURES),
