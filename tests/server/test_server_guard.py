@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import socket
+import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
@@ -128,6 +129,21 @@ def test_files_that_are_dropped(visit):
     kept = visit.folder / "measurements"
     assert (kept / "a-b.csv").read_bytes() == b"first"
     assert sorted(path.name for path in kept.iterdir()) == ["a-b-2.csv", "a-b.csv"]
+
+
+def test_who_still_sends_what_is_refused_can_read_why(visit):
+    port, token = visit.server.port, visit.server.service.token
+    head = (
+        f"PUT /api/measurements/large.csv HTTP/1.1\r\nHost: {HERE}:{port}\r\n"
+        f"Cookie: bywire-{port}={token}\r\nContent-Length: 2000000000\r\n\r\n"
+    )
+    with socket.create_connection((HERE, port)) as sending:
+        sending.sendall(head.encode())
+        while sending.recv(10_000):
+            pass  # until all is said
+        for _ in range(3):  # a closed connection is noticed by the piece after the next
+            sending.sendall(b"x" * 1000)
+            time.sleep(0.05)
 
 
 def test_a_file_that_does_not_come_to_its_end_is_not_kept(visit):

@@ -5,7 +5,9 @@ from __future__ import annotations
 import contextlib
 import json
 import shutil
+import socket
 import sys
+import time
 import traceback
 from http import HTTPStatus
 from http.server import BaseHTTPRequestHandler
@@ -23,6 +25,7 @@ from bywire.server.routes import answer
 from bywire.server.service import Service
 
 METHODS: Final = ("GET", "HEAD", "POST", "PUT")
+_LINGER: Final = 2.0  # s in which the rest of a refused body is taken and dropped
 _HEADERS: Final = {
     "Cache-Control": "no-store",
     "X-Content-Type-Options": "nosniff",
@@ -45,6 +48,8 @@ class Handler(BaseHTTPRequestHandler):
         reply = self._reply()
         with contextlib.suppress(ConnectionError, TimeoutError):  # who asked has left
             self._send(reply)
+            if self.close_connection:
+                self._linger()
 
     do_HEAD = do_POST = do_PUT = do_GET
     do_DELETE = do_OPTIONS = do_PATCH = do_TRACE = do_CONNECT = do_GET
@@ -135,6 +140,15 @@ class Handler(BaseHTTPRequestHandler):
                 shutil.copyfileobj(stream, self.wfile)
         else:
             self.wfile.write(body)
+
+    def _linger(self) -> None:
+        """Take what still comes of a body: who is cut off while sending never reads the answer."""
+        until = time.monotonic() + _LINGER
+        self.connection.shutdown(socket.SHUT_WR)
+        while (left := until - time.monotonic()) > 0.0:
+            self.connection.settimeout(left)
+            if not self.connection.recv(1 << 16):
+                return
 
     def send_error(
         self, code: int, message: str | None = None, explain: str | None = None
