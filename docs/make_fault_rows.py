@@ -20,7 +20,8 @@ TABLES: dict[str, tuple[Any, ...]] = {
 }
 HEAD = """# Faults: what was stated, and what bywire gives
 
-Stated are figures of independent prototypes of the same equations. Admitted are 10 %, 0.2 bar or
+Stated are figures of prototypes of the same equations; some were bywire's own once, and those rows
+show that nothing has changed. Admitted are 10 %, 0.2 bar or
 10 ms, whichever is larger; what does not agree is left standing, with its reason. Computed by
 `python docs/make_fault_rows.py` and, as a test, by `tests/examples/test_fault_rows.py`; what the
 faults are and how to inject them says [faults.md](faults.md). A dash stands where no figure is
