@@ -174,7 +174,6 @@ class _Expansion:
             if len(a) * len(b) <= _MOST and 1 in (len(a), len(b)):
                 return self._product(a, b)
             return self._separated(node)  # the square of a difference is never negative
-            #return self._separated(node)
         return {node: self._one}
 
     def _separated(self, product: Node) -> Terms:

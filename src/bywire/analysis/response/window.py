@@ -20,6 +20,7 @@ from bywire.simulation.run import Run
 
 _LOWEST = 10  # periods of the lowest frequency in a window of lines: it is rounded to one of them
 _CHOICES = 24  # numbers of periods tried for a window close to the wanted frequency
+_CLOSE = 1e-4  # share that a frequency may be off before a longer window is worth its time
 
 
 def require_measurable(run: Run, sweep: Sweep) -> None:
@@ -76,7 +77,12 @@ def common_interval(run: Run, whole: Sequence[float]) -> float:
 
 
 def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
-    """Return length [s] and periods of the window that comes closest to a frequency [Hz]."""
+    """Return length [s] and periods of a window close to a frequency [Hz].
+
+    What is measured is told of the frequency that the window holds. Windows that come within 1e-4
+    of the wanted one are alike; up to twice as long as the shortest of them, the closest counts.
+    Where none does, the closest of all.
+    """
     common = common_interval(run, sweep.whole)
     least = max(sweep.least, math.ceil(sweep.shortest * f))
     choices = []
@@ -85,7 +91,9 @@ def sine_window(run: Run, f: float, sweep: Sweep) -> tuple[float, int]:
         whole = max(round(f * length), 1)
         # Rounded: of windows that fit alike, the shortest.
         choices.append((round(abs(whole / length / f - 1.0), 9), length, whole))
-    _, length, whole = min(choices)
+    close = [length for off, length, _ in choices if off <= _CLOSE]
+    longest = 2.0 * min(close, default=math.inf)
+    _, length, whole = min(choice for choice in choices if choice[1] <= longest)
     return length, whole
 
 
