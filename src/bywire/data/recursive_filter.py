@@ -54,7 +54,7 @@ def filtered(
 
 def _recursive(a: Array, driven: Array, before: Array) -> Array:
     """Return y of sum a_j y_(k-j) = driven_k in place of the latter; ``before``: y until then."""
-    from scipy.linalg import solve_banded
+    from scipy.linalg.blas import dtbsv
 
     p = a.size - 1
     last = np.repeat(before[None], p, axis=0)
@@ -62,7 +62,9 @@ def _recursive(a: Array, driven: Array, before: Array) -> Array:
         part = driven[begin : begin + _BLOCK]
         for j in range(1, p + 1):
             part[:j] -= a[j] * last[p - j : p - j + len(part)]
-        diagonals = np.repeat(a[: len(part), None], len(part), axis=1)  # of a lower triangle
-        part[:] = solve_banded((len(diagonals) - 1, 0), diagonals, part)
+        band = np.repeat(a[None, : len(part)], len(part), axis=0).T  # of a lower triangle
+        for column in np.ndindex(part.shape[1:]):
+            signal = (slice(None), *column)
+            part[signal] = dtbsv(len(band) - 1, band, part[signal], lower=1, diag=1)
         last = np.concatenate([last, part])[-p:]
     return driven
