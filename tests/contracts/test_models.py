@@ -24,6 +24,7 @@ LONG = {
     ("wedge-corner", "order of the step"),
     ("wedge-brake", "order of the step"),
     ("wedge-corner", "exact rest"),
+    ("wedge-corner", "lanes"),
     ("two-wheeler-by-wire", "lanes"),
 }
 """what takes as long as all else of a model; other models put the contract to the test, tests of

@@ -43,8 +43,10 @@ _PLAIN = (float, int)  # bool is an int
 
 
 def _apply(name: str, *args: Any) -> Any:
-    special = next((a for a in args if not isinstance(a, _PLAIN)), None)
-    if special is None:
+    for special in args:
+        if not isinstance(special, _PLAIN):
+            break
+    else:
         return _FLOATS[name](*args)
     operation = getattr(special, "_bywire_op", None)
     if operation is not None:

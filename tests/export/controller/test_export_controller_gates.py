@@ -61,7 +61,8 @@ def test_vectors_run_every_line(structure: str, tmp_path: Path) -> None:
     )],
 )  # fmt: skip
 def test_vectors_kill_mutants(structure: str, count: int, tmp_path: Path) -> None:
-    name = export_controller(bench_of(structure), tmp_path, vectors=2000).program.name
+    vectors = 2000 if count == MUTANTS else 600
+    name = export_controller(bench_of(structure), tmp_path, vectors=vectors).program.name
     source = tmp_path / f"{name}_ecu.c"
     original = source.read_text()
     objects = []

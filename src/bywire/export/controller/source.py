@@ -6,20 +6,35 @@ import ast
 import inspect
 import types
 from collections import Counter
+from collections.abc import Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from bywire.core.errors import ModelError, place_of
 
+Function = ast.FunctionDef | ast.Lambda
+
 
 @cache
-def _file(name: str) -> tuple[ast.Module, tuple[str, ...]]:
-    text = Path(name).read_text(encoding="utf-8")
-    return ast.parse(text), tuple(text.splitlines())
+def _text(name: str) -> str:
+    return Path(name).read_text(encoding="utf-8")
 
 
-def node_of(function: types.FunctionType) -> ast.FunctionDef | ast.Lambda:
+@cache
+def _functions(name: str) -> Mapping[int, Sequence[Function]]:
+    """Return the functions of a file by the line that their code begins at."""
+    found: dict[int, list[Function]] = {}
+    for node in ast.walk(ast.parse(_text(name))):
+        if isinstance(node, ast.FunctionDef):
+            first = min([node.lineno, *(each.lineno for each in node.decorator_list)])
+            found.setdefault(first, []).append(node)
+        elif isinstance(node, ast.Lambda):
+            found.setdefault(node.lineno, []).append(node)
+    return found
+
+
+def node_of(function: types.FunctionType) -> Function:
     """Return the syntax tree of a function.
 
     Raises
@@ -29,36 +44,32 @@ def node_of(function: types.FunctionType) -> ast.FunctionDef | ast.Lambda:
     """
     code = function.__code__
     try:
-        tree, _ = _file(code.co_filename)
+        here = _functions(code.co_filename).get(code.co_firstlineno, ())
     except OSError:
         raise ModelError(
             f"{place_of(function)}: the ECU cannot be exported as C: the source of "
             f"{function.__qualname__} is not there; put it into a file"
         ) from None
-    matches = [node for node in ast.walk(tree) if _is_at(node, code)]
+    matches = [node for node in here if _is_of(node, code)]
     if len(matches) != 1:
         raise ModelError(
             f"{code.co_filename}, line {code.co_firstlineno}: the ECU cannot be exported as C: "
             f"{len(matches)} functions stand on the line of {function.__qualname__}; give it a "
             "line of its own"
         )
-    return matches[0]  # type: ignore[return-value]
+    return matches[0]
 
 
-def _is_at(node: ast.AST, code: types.CodeType) -> bool:
+def _is_of(node: Function, code: types.CodeType) -> bool:
     if isinstance(node, ast.FunctionDef):
-        first = min([node.lineno, *(each.lineno for each in node.decorator_list)])
-        return first == code.co_firstlineno and node.name == code.co_name
-    if isinstance(node, ast.Lambda):
-        names = [each.arg for each in node.args.args]
-        same = names == list(code.co_varnames[: code.co_argcount])
-        return code.co_name == "<lambda>" and node.lineno == code.co_firstlineno and same
-    return False
+        return node.name == code.co_name
+    names = [each.arg for each in node.args.args]
+    return code.co_name == "<lambda>" and names == list(code.co_varnames[: code.co_argcount])
 
 
 def notes_above(file: str, line: int) -> list[str]:
     """Return the comment right above a line of a file."""
-    _, lines = _file(file)
+    lines = _text(file).splitlines()
     notes: list[str] = []
     at = line - 2
     while at >= 0 and lines[at].strip().startswith("# "):
