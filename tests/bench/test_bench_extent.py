@@ -9,6 +9,7 @@ import pytest
 import bywire
 from bywire.bench import extent
 from bywire.core.errors import StepError
+from run_once import run_once
 
 SET = "dardanelli2010"
 STEP = {"kind": "step", "start": 0, "end": "1 A", "t_step": 0}
@@ -22,19 +23,19 @@ def braking(**changes) -> bywire.Bench:
 @pytest.mark.parametrize("step", ["1 us", "5 us", "20 us", "40 us", "100 us", "1 ms"])
 def test_steps_that_divide_the_period_of_the_ecu(step):
     bench = braking(step=step, options={"duration": "5 ms", "settle": 0})
-    assert bywire.run(bench).status == "done"
+    assert run_once(bench).status == "done"
 
 
 @pytest.mark.parametrize("step", ["3 us", "30 us", "333 us", "2 ms", "1 s", "1e9 s"])
 def test_steps_that_do_not_are_refused(step):
     with pytest.raises(StepError, match="does not divide the ecu interval of 1000 us"):
-        bywire.run(braking(step=step))
+        run_once(braking(step=step))
 
 
 @pytest.mark.parametrize("record", ["20 us", "200 us", "1 ms", "5 ms", "1.2 s"])
 def test_recording_intervals(record):
     bench = braking(record=record)
-    recording = bywire.run(bench).recordings["run"]
+    recording = run_once(bench).recordings["run"]
     assert recording.sizes["time"] >= 2
     interval = float(recording["time"][1] - recording["time"][0])
     assert interval == pytest.approx(bench.record)
@@ -43,7 +44,7 @@ def test_recording_intervals(record):
 @pytest.mark.parametrize("record", ["10 us", "30 us", "1e-9 s"])
 def test_recording_intervals_that_the_step_does_not_divide(record):
     with pytest.raises(StepError, match="does not divide the recording interval"):
-        bywire.run(braking(record=record))
+        run_once(braking(record=record))
 
 
 @pytest.mark.parametrize(
@@ -55,7 +56,7 @@ def test_recording_intervals_that_the_step_does_not_divide(record):
 )
 def test_recording_interval_longer_than_the_run(record, text):
     with pytest.raises(StepError, match=text):
-        bywire.run(braking(record=record))
+        run_once(braking(record=record))
 
 
 @pytest.mark.parametrize("duration", ["1e9 s", "1e300 s"])
@@ -63,27 +64,27 @@ def test_run_that_no_memory_holds(duration):
     options = {"duration": duration}
     bench = bywire.Bench("open-loop", SET, options=options, stimulus=STEP)
     with pytest.raises(StepError, match=r"needs about .* GB of memory, but this machine has"):
-        bywire.run(bench)
+        run_once(bench)
 
 
 def test_settling_that_no_float_counts_in_bytes():
     options = {"settle": "1e305 s"}
     bench = bywire.Bench("open-loop", SET, options=options, stimulus=STEP)
     with pytest.raises(StepError, match=r"needs about .* GB of memory, but this machine has"):
-        bywire.run(bench)
+        run_once(bench)
 
 
 def test_recording_less_often_needs_less(monkeypatch):
     monkeypatch.setattr(extent, "_memory", lambda: 2e6)
     with pytest.raises(StepError, match=r"0\.002 GB.*record less often"):
-        bywire.run(braking())
-    assert bywire.run(braking(record="10 ms")).status == "done"
+        run_once(braking())
+    assert run_once(braking(record="10 ms")).status == "done"
 
 
 def test_infinite_duration():
     options = {"i_max": 1e308, "slope": 1e-308}
     with pytest.raises(StepError, match="inf"):
-        bywire.run(bywire.Bench("friction-ramp", SET, options=options))
+        run_once(bywire.Bench("friction-ramp", SET, options=options))
 
 
 def test_memory_of_this_machine_is_plausible():

@@ -14,6 +14,7 @@ from bywire.bench.recording import energy_residual, open_books, parameter_hash
 from bywire.core.errors import FileError
 from bywire.core.parameters import ParameterSet
 from bywire.core.signals import signals_of
+from run_once import run_once
 
 SHORT = {"duration": "60 ms", "settle": "20 ms"}
 
@@ -25,7 +26,7 @@ def braking(**changes) -> bywire.Bench:
 
 def recorded(**changes) -> xr.Dataset:
     """Return the recording of a short hard braking."""
-    return bywire.run(braking(**changes)).recordings["run"]
+    return run_once(braking(**changes)).recordings["run"]
 
 
 @pytest.fixture(scope="module")
@@ -86,7 +87,7 @@ def test_netcdf_gives_the_same_recording_back(recording, tmp_path):
 
 
 def test_static_characteristic_gives_itself_back_too(tmp_path):
-    curve = bywire.run(bywire.Bench("stribeck", "dardanelli2010")).recordings["curve"]
+    curve = run_once(bywire.Bench("stribeck", "dardanelli2010")).recordings["curve"]
     path = bywire.write_recording(curve, tmp_path / "curve.nc")
     xr.testing.assert_identical(bywire.read_recording(path), curve)
 
@@ -147,7 +148,7 @@ def test_two_runs_of_one_bench_have_noise_of_their_own():
         {"i_max": "0.1 A", "slope": "2 A/s"},
     )
     # With the waveform off the second run takes a sine, so only the first tick is comparable.
-    first = [run["i_meas"].values[:2] for run in bywire.run(bench).recordings.values()]
+    first = [run["i_meas"].values[:2] for run in run_once(bench).recordings.values()]
     assert np.any(first[0] != first[1])
 
 
@@ -159,8 +160,8 @@ def test_energy_balance_closes(recording):
 
 
 def test_engines_agree_on_every_signal():
-    compiled = bywire.run(braking()).recordings["run"]
-    slow = bywire.run(braking(), engine="virtual-machine").recordings["run"]
+    compiled = run_once(braking()).recordings["run"]
+    slow = run_once(braking(), engine="virtual-machine").recordings["run"]
     for name in compiled.data_vars:
         scale = float(abs(compiled[name]).max())
         assert float(abs(compiled[name] - slow[name]).max()) <= 1e-6 * scale
@@ -170,7 +171,7 @@ def test_engines_agree_on_every_signal():
                                                ("3.2e-15", True), ("3.2e-19", True)])  # fmt: skip
 def test_a_run_whose_energy_balance_is_open_says_so(k_lf, is_open):
     """A pipeline nearly without friction lets fluid of a few grams whirl at absurd speed."""
-    result = bywire.run("hard-braking", {"pipeline.k_lf": k_lf})
+    result = run_once("hard-braking", {"pipeline.k_lf": k_lf})
     said = [text for text in result.warnings if "the energy balance is open by" in text]
     assert bool(said) == is_open
     assert ("energy balance is open" in result.recordings["run"].attrs["warnings"]) == is_open

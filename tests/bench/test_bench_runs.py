@@ -11,6 +11,7 @@ import pytest
 import bywire
 from bywire.bench.experiment import as_run
 from bywire.brakes.motorcycle.operating_point import settled_start
+from run_once import run_once
 
 SET = "dardanelli2010"
 STEP = {"kind": "step", "start": 0, "end": "1 A", "t_step": "10 ms"}
@@ -20,7 +21,7 @@ SHORT = {"duration": "0.2 s", "settle": "0.1 s"}
 def braking(settle: float, **changes) -> bywire.BenchResult:
     """Return a short braking that settles for a time [s]."""
     options = {"duration": "0.3 s", "settle": settle}
-    return bywire.run(bywire.Bench("hard-braking", SET, options=options, **changes))
+    return run_once(bywire.Bench("hard-braking", SET, options=options, **changes))
 
 
 @pytest.mark.parametrize("settle", [0.1005, 0.10001, 0.0999])
@@ -83,21 +84,21 @@ def test_noise_is_the_same_whatever_the_duration():
 
 def test_recording_can_be_made_again():
     bench = bywire.Bench("open-loop", SET, options=SHORT, stimulus=STEP, seed=4)
-    recording = bywire.run(bench).recording
+    recording = run_once(bench).recording
     attrs = recording.attrs
     again = bywire.Bench(
         attrs["experiment"], attrs["parameter_set"], options=json.loads(attrs["options"]),
         stimulus=json.loads(attrs["stimulus"]), step=attrs["step"], seed=attrs["seed"],
     )  # fmt: skip
     assert again.chosen_options == bench.chosen_options
-    assert bywire.run(again).recording.equals(recording)
+    assert run_once(again).recording.equals(recording)
     assert json.loads(braking(0.0).recording.attrs["stimulus"]) == {}
 
 
 def test_breakaway_is_that_of_the_highest_pressure_in_any_order():
     names = ("breakaway_apply", "breakaway_release")
     found = [
-        [bywire.run(bywire.Bench("stribeck", SET, options={"pressures": p})).kpi(n).value
+        [run_once(bywire.Bench("stribeck", SET, options={"pressures": p})).kpi(n).value
          for n in names]
         for p in ("2 bar, 20 bar, 40 bar", "40 bar, 2 bar, 20 bar")
     ]  # fmt: skip

@@ -17,6 +17,7 @@ from bywire.core.errors import InputError, ParameterError, UnitError, UnknownNam
 from bywire.core.model import ASSEMBLIES
 from bywire.core.signals import signals_of
 from bywire.report.bench_figures import bench_figures
+from run_once import run_once
 from systems.loading import SPRING_AXIS, loaded
 
 SET = "spring-axis-one"
@@ -42,7 +43,7 @@ def bench(experiment: str, options: dict[str, Any] | None = None, **more: Any) -
 def test_every_one_runs_with_its_defaults_and_gives_what_it_declares(name: str) -> None:
     driven = name in ("open-loop", "tracking")
     made = bench(name, stimulus=STEP if driven else {})
-    result = bywire.run(made)
+    result = run_once(made)
     assert result.status == "done"
     assert {kpi.name: kpi.unit for kpi in result.kpis} == made.definition.kpis_with(
         made.chosen_options
@@ -80,7 +81,7 @@ def test_every_stimulus_of_our_brakes_can_be_driven(name: str, parameters: str) 
 
 
 def test_a_step_has_the_overshoot_of_a_second_order_lag() -> None:
-    result = bywire.run(bench("step", {"output": "x", "end": "200 N"}, overrides=SMOOTH))
+    result = run_once(bench("step", {"output": "x", "end": "200 N"}, overrides=SMOOTH))
     damping = D / (2.0 * math.sqrt(K * M))
     expected = 100.0 * math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))
     assert result.kpi("overshoot").value == pytest.approx(expected, rel=5e-3)
@@ -90,18 +91,18 @@ def test_a_step_has_the_overshoot_of_a_second_order_lag() -> None:
 
 
 def test_a_step_of_a_set_point_has_an_error() -> None:
-    result = bywire.run(bench("step", {"output": "F"}))
+    result = run_once(bench("step", {"output": "F"}))
     assert result.kpi("steady_state_error").value == pytest.approx(0.0, abs=1e-9)
 
 
 def test_a_ramp_opens_the_loop_of_its_friction() -> None:
     options = {"output": "x", "end": "200 N", "slope": "50 N/s"}
-    result = bywire.run(bench("ramp", options, overrides={"k_c": 1e-9}))
+    result = run_once(bench("ramp", options, overrides={"k_c": 1e-9}))
     apart = 2.0 * (F_C + D * 50.0 / K)  # friction and damping, both ways
     assert result.kpi("loop_width_mid").value == pytest.approx(apart + 50.0 * 1e-3, rel=1e-3)
     assert result.kpi("loop_width_mid").unit == "N"
     assert result.kpi("output_max").value == pytest.approx((200.0 - F_C) / K, rel=0.01)
-    held = bywire.run(bench("ramp", {**options, "drive": "F"}, overrides={"k_c": 1e-9}))
+    held = run_once(bench("ramp", {**options, "drive": "F"}, overrides={"k_c": 1e-9}))
     assert held.kpi("loop_width_mid").value == pytest.approx(apart, rel=1e-2)
 
 
@@ -109,7 +110,7 @@ def test_a_sine_sweep_has_the_gain_of_the_equation() -> None:
     options = {"output": "x", "mean": 0, "amplitude": "10 N", "f_start": "1 Hz", "f_end": "40 Hz",
                "n": 9, "n_settle": 12}  # fmt: skip
     made = bench("sine-sweep", options, overrides=SMOOTH)
-    result = bywire.run(made)
+    result = run_once(made)
     setting = made.definition.sweep(made.chosen_options)
     from bywire.bench.kpis.sine_sweep import select
 
@@ -124,7 +125,7 @@ def test_a_sine_sweep_has_the_gain_of_the_equation() -> None:
 
 def test_a_stribeck_curve_is_the_friction_of_the_model() -> None:
     options = {"along": "x", "levels": ["0 mm", "10 mm"], "speed_max": "0.2 m/s"}
-    result = bywire.run(bench("stribeck", options))
+    result = run_once(bench("stribeck", options))
     curve = result.recording["friction"]
     assert curve.dims == ("x", "v")
     assert curve.attrs["units"] == "N"
@@ -137,7 +138,7 @@ def test_a_stribeck_curve_is_the_friction_of_the_model() -> None:
 
 def test_a_release_tells_when_it_is_empty_and_what_is_left() -> None:
     options = {"output": "x", "start": "100 N", "empty": "1 mm"}
-    result = bywire.run(bench("release", options, overrides={"k_c": 1e-9}))
+    result = run_once(bench("release", options, overrides={"k_c": 1e-9}))
     # Without current it sticks where the spring is as strong as the friction, or nearer to zero.
     assert abs(result.kpi("residual_level").value) <= F_C / K + 1e-6
     assert 0.0 < result.kpi("time_to_empty").value < 0.2
@@ -146,7 +147,7 @@ def test_a_release_tells_when_it_is_empty_and_what_is_left() -> None:
 def test_tracking_of_what_is_held_lags_half_a_sample_at_most() -> None:
     stimulus = {"kind": "sine", "mean": 0, "amplitude": "10 N", "f": "5 Hz", "t_start": 0,
                 "phase": 0}  # fmt: skip
-    result = bywire.run(bench("tracking", {"output": "F"}, stimulus=stimulus))
+    result = run_once(bench("tracking", {"output": "F"}, stimulus=stimulus))
     assert result.kpi("tracking_max").value < 10.0 * 2.0 * math.pi * 5.0 * 1.1e-3
     with pytest.raises(ParameterError, match=r"options.output: x is in m, and the set point F_set"):
         bench("tracking", {"output": "x"}, stimulus=stimulus)
@@ -156,12 +157,12 @@ def test_further_stimuli_act_beside() -> None:
     beside = {"load": {"kind": "step", "start": 0, "end": "40 N", "t_step": 0}}
     driven = {"kind": "step", "start": 0, "end": "100 N", "t_step": 0}
     options = {"output": "x"}
-    both = bywire.run(
+    both = run_once(
         bench("open-loop", options, stimulus={**driven, **beside}, overrides=SMOOTH)
     ).recording
     assert both["x"].values[-1] == pytest.approx(60.0 / K, rel=1e-3)
     assert both["load"].values[-1] == 40.0
-    step = bywire.run(bench("step", options, stimulus=beside, overrides=SMOOTH)).recording
+    step = run_once(bench("step", options, stimulus=beside, overrides=SMOOTH)).recording
     assert step["x"].values[-1] == pytest.approx(60.0 / K, rel=1e-3)
 
 
@@ -216,7 +217,7 @@ def test_a_bench_file_of_any_brake_and_its_text(tmp_path: Any) -> None:
     again = tmp_path / "again.toml"
     again.write_text(bench_text(made))
     assert bywire.load(again).chosen_stimuli == made.chosen_stimuli
-    assert bywire.run(made).status == "passed"
+    assert run_once(made).status == "passed"
     path.write_text(f'experiment = "step"\nparameters = "{SET}"\n[options]\nend = 150\n')
     with pytest.raises(InputError, match=r"options.input is missing"):
         bywire.load(path)

@@ -10,6 +10,7 @@ import bywire
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import disc_heat
 from bywire.plant.disc_heat import Input, State
+from run_once import run_once
 
 WARM = PARAMETER_SETS.find("sport600").parameters().front.heat.replace({"law": "lumped"})
 NO_LOSS = {"h_0": 0.0, "h_1": 0.0, "epsilon": 0.0, "G_dp": 0.0, "G_open": 0.0, "G_pf": 0.0,
@@ -100,7 +101,7 @@ def test_a_warning_says_which_boiling_point_is_passed_and_when():
 def test_impossible_heat_is_refused(change, text):
     name, _, value = change.partition("=")
     with pytest.raises(bywire.BywireError, match=text.replace("(", r"\(")):
-        bywire.run("straight-stop", {f"front.heat.{name}": value})
+        run_once("straight-stop", {f"front.heat.{name}": value})
 
 
 # The trial: a mass that its brakes slow down, the front one with 0.8 of the force, no other

@@ -18,6 +18,7 @@ from bywire.bench.running import run
 from bywire.core.catalog import PARAMETER_SETS
 from bywire.core.errors import InputError
 from bywire.core.model import ASSEMBLIES
+from run_once import run_once
 
 SHORT = {"duration": "60 ms", "settle": "0 s"}
 FILE = """
@@ -159,7 +160,7 @@ def test_text_and_files_want_units(tmp_path):
             load(tmp_path / "bad.toml")
     for text in ("@1 s", "motor.hot@", "motor.hot=@1 s"):
         with pytest.raises(InputError, match="write NAME, NAME=VALUE"):
-            bywire.run("hard-braking", faults=[text])
+            run_once("hard-braking", faults=[text])
     with pytest.raises(InputError, match="NAME=VALUE@ONSET, not by"):
         read("hard-braking", {"faults.onset": "1 s"})
 

@@ -6,13 +6,14 @@ import pytest
 
 import bywire
 from bywire.control import current_pi
+from run_once import run_once
 
 OPTIONS = {"duration": "0.6 s", "settle": "0.2 s"}
 
 
 def braking(**overrides: float) -> bywire.BenchResult:
     names = {name.replace("__", "."): value for name, value in overrides.items()}
-    return bywire.run(bywire.Bench("hard-braking", "dardanelli2010", names, OPTIONS))
+    return run_once(bywire.Bench("hard-braking", "dardanelli2010", names, OPTIONS))
 
 
 def test_limit_of_the_bridge_acts_like_that_of_the_ecu() -> None:

@@ -9,13 +9,14 @@ import pytest
 import bywire
 from bywire.bench.recording import energy_residual
 from bywire.plant import reservoir_port
+from run_once import run_once
 
 DEAD = {"port.law": "dead-stroke"}
 
 
 def released(overrides: dict[str, Any]) -> Any:
     bench = bywire.Bench("release", "dardanelli2010", overrides, {"duration": "1 s"})
-    return bywire.run(bench).recording
+    return run_once(bench).recording
 
 
 def test_port_is_open_at_the_retracted_end_and_closed_after_its_stroke() -> None:
@@ -40,7 +41,7 @@ def test_piston_travels_the_dead_stroke_before_it_brakes() -> None:
 
     def travel(overrides: dict[str, Any]) -> float:
         bench = bywire.Bench("hard-braking", "dardanelli2010", overrides, options)
-        run = bywire.run(bench).recording
+        run = run_once(bench).recording
         return float(run["x_mc"][int((run["p_mc"] > 8e5).argmax("time"))])
 
     assert travel(DEAD) - travel({}) == pytest.approx(0.8e-3, abs=0.25e-3)

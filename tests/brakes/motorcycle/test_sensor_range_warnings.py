@@ -7,12 +7,13 @@ from typing import Any
 import pytest
 
 import bywire
+from run_once import run_once
 
 OPTIONS = {"duration": "0.3 s", "settle": "0.1 s"}
 
 
 def warnings(overrides: dict[str, Any]) -> list[str]:
-    return bywire.run(bywire.Bench("hard-braking", "dardanelli2010", overrides, OPTIONS)).warnings
+    return run_once(bywire.Bench("hard-braking", "dardanelli2010", overrides, OPTIONS)).warnings
 
 
 @pytest.mark.parametrize("place", ["master-cylinder", "mid-pipeline"])
@@ -32,7 +33,7 @@ def test_current_beyond_the_sensor() -> None:
 
 def released(law: str) -> list[str]:
     bench = bywire.Bench("release", "dardanelli2010", {"port.law": law}, {"duration": "1 s"})
-    return bywire.run(bench).warnings
+    return run_once(bench).warnings
 
 
 def test_piston_pulled_against_its_retracted_stop() -> None:

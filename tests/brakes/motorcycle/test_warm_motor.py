@@ -19,6 +19,7 @@ from bywire.core.catalog import PARAMETER_SETS
 from bywire.plant import motor_heat
 from bywire.plant.motor_heat import Input, State
 from bywire.simulation.run import simulate
+from run_once import run_once
 
 BRAKE: Any = PARAMETER_SETS.find("dardanelli2010-retuned").parameters()
 WARM = {"motor_heat.law": "lumped", "motor_heat.C_w": 2.0, "motor_heat.C_h": 20.0}
@@ -175,4 +176,4 @@ def test_the_limit_falls_between_two_temperatures(T: float, left: float) -> None
 def test_impossible_heat_of_a_motor_is_refused(change: str, text: str) -> None:
     name, _, value = change.partition("=")
     with pytest.raises(bywire.BywireError, match=text):
-        bywire.run("pressure-step", {name: value})
+        run_once("pressure-step", {name: value})

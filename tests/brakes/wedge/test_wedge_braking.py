@@ -10,13 +10,14 @@ from wedge_runs import IDEAL, brake, drive, residual
 
 import bywire
 from bywire.brakes.wedge.laws.moment_control import GAP, MOMENT, PARKED, RETRACTING
+from run_once import run_once
 
 NAMES = ("moment-pulses", "moment-ramp", "moment-pulse-950", "power-off-hold")
 
 
 @pytest.fixture(scope="module")
 def results():
-    return {name: bywire.run(bywire.Bench(name, "roberts2003")) for name in NAMES}
+    return {name: run_once(bywire.Bench(name, "roberts2003")) for name in NAMES}
 
 
 def test_every_substep_settles(results):

@@ -11,6 +11,7 @@ from wedge_runs import brake, drive
 
 import bywire
 from bywire.cli.main import main
+from run_once import run_once
 
 BAD = [
     ("heart.g_1=-20um", "heart.g_1 = -2e-05 m is not admissible: it must be >= 0 m, got '-20um'"),
@@ -77,7 +78,7 @@ def test_steep_angle_in_degrees_is_taken(monkeypatch, capsys):
 
 def warnings(name, options=None, **overrides):
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
-    return bywire.run(bywire.Bench(name, "roberts2003", changes, options or {})).warnings
+    return run_once(bywire.Bench(name, "roberts2003", changes, options or {})).warnings
 
 
 def test_moment_out_of_reach_is_said_with_numbers():

@@ -20,6 +20,7 @@ from bywire.core.errors import UnknownNameError
 from bywire.core.typing import Array
 from bywire.simulation.engine import prepare
 from bywire.simulation.run import Run, initial_vector, request_for, simulate
+from run_once import run_once
 
 NEVER = 2**40
 Tick = Callable[[Any, Any, Any], Any]
@@ -115,4 +116,4 @@ def test_faults_pass_through_the_ecu() -> None:
 
 def test_another_engine_is_refused() -> None:
     with pytest.raises(UnknownNameError, match=r"unknown engine 'sill': did you mean 'sil'"):
-        bywire.run("hard-braking", {"simulation.engine": "sill"})
+        run_once("hard-braking", {"simulation.engine": "sill"})

@@ -15,13 +15,14 @@ from bywire.identification.replaying.bench_replay import replay
 from bywire.identification.replaying.fit import fit_figures, judged, undefined
 from bywire.identification.replaying.segments import Segment, found_in, read_segments
 from bywire.identification.replaying.tolerances import judge_fit
+from run_once import run_once
 
 STOP = bywire.Bench("moment-pulses", "roberts2003", options={"t_hold": 0.2, "pulses": 1})
 
 
 @pytest.fixture(scope="module")
 def stop() -> xr.Dataset:
-    return bywire.run(STOP).recording
+    return run_once(STOP).recording
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +31,7 @@ def ramp() -> xr.Dataset:
         "open-loop", "dardanelli2010", options={"source": "current", "duration": 0.6},
         stimulus={"kind": "step", "start": 1.0, "end": 3.0, "t_step": 0.2},
     )  # fmt: skip
-    return bywire.run(bench).recording
+    return run_once(bench).recording
 
 
 def test_a_wedge_recording_gives_itself_back(stop: xr.Dataset) -> None:

@@ -10,6 +10,7 @@ import bywire
 from bywire.core.catalog import parameters
 from bywire.core.errors import ParameterError, UnknownNameError
 from bywire.identification.replaying.tracking import track
+from run_once import run_once
 
 NOISE = {"y_M": 2.0, "F_N": 10.0, "F_M": 5.0, "x": 2e-6, "Omega": 0.1}
 FADING = np.linspace(0.38, 0.31, 8)
@@ -25,7 +26,7 @@ def brakings() -> tuple[xr.Dataset, np.ndarray]:
             "moment-pulses", "roberts2003", overrides={"wedge.mu_B": float(mu)},
             options={"t_hold": 0.4, "pulses": 1},
         )  # fmt: skip
-        run = bywire.run(bench).recording[[*NOISE, "f_1", "f_2"]].drop_vars("time")
+        run = run_once(bench).recording[[*NOISE, "f_1", "f_2"]].drop_vars("time")
         parts.append(run)
         truth.append(np.full(run.sizes["time"], mu))
     whole = xr.concat(parts, "time")

@@ -7,6 +7,7 @@ import pytest
 
 import bywire
 from bywire.core.errors import UnitError, UnknownNameError
+from run_once import run_once
 
 SET = "dardanelli2010"
 IDEAL = ["current", "voltage"]
@@ -25,7 +26,7 @@ def held(source: str, **changes) -> bywire.Bench:
 
 @pytest.mark.parametrize("source", [*IDEAL, *ECU])
 def test_holding_holds(source):
-    result = bywire.run(held(source))
+    result = run_once(held(source))
     pressure = result.recording["p_mc"]
     assert float(abs(pressure - 20e5).max()) < 2.5e5  # dither shakes the piston
     if source in (*IDEAL, "current-direct"):
@@ -34,7 +35,7 @@ def test_holding_holds(source):
 
 @pytest.mark.parametrize("source", [*IDEAL, *ECU])
 def test_what_only_the_ecu_means_is_left_out_without_it(source):
-    result = bywire.run(held(source))
+    result = run_once(held(source))
     names = {kpi.name for kpi in result.kpis}
     assert "share_stuck" in names
     if source in IDEAL:
@@ -49,7 +50,7 @@ def test_requirement_that_the_source_leaves_out_is_refused():
     limit = {"share_sat_duty": "<= 1 %"}
     with pytest.raises(UnknownNameError, match="share_sat_duty"):
         held("current", requirements=limit)
-    assert bywire.run(held("pressure", requirements=limit)).verdicts
+    assert run_once(held("pressure", requirements=limit)).verdicts
 
 
 @pytest.mark.parametrize("source", [*IDEAL, *ECU])
@@ -60,11 +61,11 @@ def test_unit_is_that_of_the_source(source):
 
 
 def test_demand_to_the_current_loop_is_dithered_or_direct():
-    dithered, direct = (bywire.run(held(s)).recording for s in ("current-loop", "current-direct"))
+    dithered, direct = (run_once(held(s)).recording for s in ("current-loop", "current-direct"))
     assert float(abs(dithered["i_dit"]).max()) > 1.0
     assert float(abs(direct["i_dit"]).max()) == 0.0
     assert float(np.ptp(direct["i_ref"].values)) == 0.0
 
 
 def test_pressure_source_is_the_set_point():
-    assert float(bywire.run(held("pressure")).recording["p_ref"].min()) == 20e5
+    assert float(run_once(held("pressure")).recording["p_ref"].min()) == 20e5

@@ -18,13 +18,14 @@ from bywire.brakes.wedge.model import WedgeBrake
 from bywire.brakes.wedge.parameters import WedgeParameters
 from bywire.brakes.wedge.series import FRICTIONLESS
 from bywire.simulation.run import simulate
+from run_once import run_once
 
 NAMES = ("moment-release", "position-step", "disc-stop")
 
 
 @pytest.fixture(scope="module")
 def results():
-    return {name: bywire.run(bywire.Bench(name, "roberts2003")) for name in NAMES}
+    return {name: run_once(bywire.Bench(name, "roberts2003")) for name in NAMES}
 
 
 def values(result):
@@ -34,7 +35,7 @@ def values(result):
 def run(name, options=None, **overrides):
     changes = {key.replace("__", "."): value for key, value in overrides.items()}
     bench = bywire.Bench(name, "roberts2003", changes, options or {}, step=40e-6)
-    return bywire.run(bench)
+    return run_once(bench)
 
 
 def test_every_substep_settles_and_nothing_warns(results):
@@ -45,7 +46,7 @@ def test_every_substep_settles_and_nothing_warns(results):
 
 
 def test_variant_above_the_neutral_point_stops_the_disc():
-    stop = values(bywire.run(bywire.Bench("disc-stop", "roberts2003-unstable")))
+    stop = values(run_once(bywire.Bench("disc-stop", "roberts2003-unstable")))
     assert math.isfinite(stop["parking_time_drop"])
 
 
@@ -53,7 +54,7 @@ def test_variant_above_the_neutral_point_stops_the_disc():
 def test_variants_brake_and_let_go(parameters):
     """Above tan(alpha), and with a steeper wedge, closed loop and release work alike."""
     release, sweep = (
-        values(bywire.run(bywire.Bench(name, parameters)))
+        values(run_once(bywire.Bench(name, parameters)))
         for name in ("moment-release", "friction-sweep")
     )
     par = bywire.parameters(parameters)
@@ -131,7 +132,7 @@ def test_step_without_friction_is_the_loop_of_second_order():
         "motor_2.T_cog": 0.0,
     }
     options = {"amplitudes": (0.5,), "f_high": 20.0, "delta": 0.0, "duration": 1.0}
-    kpi = values(bywire.run(bywire.Bench("position-step", "roberts2003", free, options)))
+    kpi = values(run_once(bywire.Bench("position-step", "roberts2003", free, options)))
     for band in ("low", "high"):
         found = kpi[f"overshoot_{band}_500mrad"]
         ideal = 100.0 * math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta**2))

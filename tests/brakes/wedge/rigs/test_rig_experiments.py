@@ -12,6 +12,7 @@ import bywire
 from bywire.bench.recording import energy_residual
 from bywire.brakes.wedge.case import parameters_of
 from bywire.core.errors import ParameterError
+from run_once import run_once
 
 NAMES = (
     "dummy-shaft",
@@ -26,7 +27,7 @@ WINDINGS, GAINS = ("parallel", "single", "series"), ("soft", "usual", "sharp")
 
 @pytest.fixture(scope="module")
 def results():
-    return {name: bywire.run(bywire.Bench(name, "roberts2003")) for name in NAMES}
+    return {name: run_once(bywire.Bench(name, "roberts2003")) for name in NAMES}
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -65,7 +66,7 @@ def test_efficiency(results):
 def test_other_efficiencies(eta_f, eta_b):
     changes = {"screw.eta_f": eta_f, "screw.eta_b": eta_b, "bearing.C_2": 0.0}
     bench = bywire.Bench("screw-efficiency", "roberts2003", changes, step=40e-6)
-    found = values(bywire.run(bench))
+    found = values(run_once(bench))
     for suffix in ("", "_reverse"):
         assert found[f"eta_f{suffix}"] == pytest.approx(eta_f, rel=0.01)
         assert found[f"eta_b{suffix}"] == pytest.approx(eta_b, rel=0.01)
@@ -82,7 +83,7 @@ def test_other_efficiencies(eta_f, eta_b):
 )
 def test_torque_that_does_not_get_through_is_said(overrides, options, names):
     bench = bywire.Bench("screw-efficiency", "roberts2003", overrides, options, step=40e-6)
-    result = bywire.run(bench)
+    result = run_once(bench)
     for name in names:
         assert math.isnan(result.kpi(name).value), name
         assert "no steady motion" in result.kpi(name).note
@@ -107,17 +108,17 @@ def test_stiffness(results):
 )
 def test_other_stiffnesses(changes):
     bench = bywire.Bench("stiffness", "roberts2003", changes, step=40e-6)
-    check_stiffness(values(bywire.run(bench)))
+    check_stiffness(values(run_once(bench)))
 
 
 def test_stiffness_assumes_symmetry_as_the_paper_says():
     """Motors 10 % apart drag the wedge along: its friction carries force that no spring sees."""
     unequal = {"motor_2.K_ref": 0.11}
-    found = values(bywire.run(bywire.Bench("stiffness", "roberts2003", unequal, step=40e-6)))
+    found = values(run_once(bywire.Bench("stiffness", "roberts2003", unequal, step=40e-6)))
     assert found["K_S"] == pytest.approx(60e6, rel=0.01)
     assert 1.03 < found["K_W"] / 40e6 < 1.08
     smooth = unequal | {"wedge_friction.mu_int": 0.0}
-    check_stiffness(values(bywire.run(bywire.Bench("stiffness", "roberts2003", smooth,
+    check_stiffness(values(run_once(bywire.Bench("stiffness", "roberts2003", smooth,
                                                    step=40e-6))))  # fmt: skip
 
 
@@ -147,7 +148,7 @@ def test_current_loop_bandwidth_follows_gain_over_winding(results):
 def test_fast_filters_leave_the_first_order_loop():
     fast = {"drive.f_demand": 1e5, "drive.f_sense": 1e5}
     bench = bywire.Bench("current-loop", "roberts2003", fast, step=2e-6, record=4e-6)
-    found = values(bywire.run(bench))
+    found = values(run_once(bench))
     for share, winding, gain in ((0.5, "parallel", "soft"), (0.25, "series", "usual")):
         assert found[f"bandwidth_{winding}_{gain}"] == pytest.approx(1200.0 * share, rel=0.02)
 
@@ -174,11 +175,11 @@ def test_free_shaft_swings_as_its_loop():
     }  # fmt: skip
     options = {"f_low": 2.0, "duration": 2.0, "record": 1e-3, "a_small": 0.1}
     bench = bywire.Bench("dummy-shaft", "roberts2003", free, options)
-    par = parameters_of(bywire.run(bench).recordings["low_small"])
+    par = parameters_of(run_once(bench).recordings["low_small"])
     J = par.motor_1.J_M + par.rig.J_dummy + emf_inertia(par)
     zeta = par.control.position.zeta * math.sqrt(par.control.position.J_hat / J)
     overshoot = 100.0 * math.exp(-math.pi * zeta / math.sqrt(1.0 - zeta * zeta))
-    found = values(bywire.run(bench))
+    found = values(run_once(bench))
     assert found["overshoot_low_small"] == pytest.approx(overshoot, rel=0.05)
     assert found["steady_state_error_low_small"] < 1e-4
 
@@ -199,7 +200,7 @@ def test_force_fight_grows_with_the_difference():
     for scale in (0.5, 1.0):
         options = {name: scale * share for name, share in shares.items()}
         bench = bywire.Bench("force-fight", "roberts2003", options=options, step=40e-6)
-        peaks.append(values(bywire.run(bench))["peak_force_step_unequal"])
+        peaks.append(values(run_once(bench))["peak_force_step_unequal"])
     assert 10.0 < peaks[0] < peaks[1]
 
 
