@@ -15,6 +15,7 @@ from bywire.simulation.balance import balanced
 from bywire.simulation.expressions import PLAIN_C, VECTOR_C, Dialect, needed, text
 from bywire.simulation.graph import BOOLEAN, Graph, Node, _names
 from bywire.simulation.quadrature import Levels
+from bywire.simulation.raised import raised
 from bywire.simulation.signs import Interval
 
 RANGES = {("p", 0): (0.0, math.inf), ("p", 1): (-1.0, 2.0), ("p", 2): (-math.inf, 0.0)}
@@ -120,6 +121,22 @@ def test_limits_that_ranges_exclude() -> None:
     assert [graph.nodes[n].op for n in roots] == [
         "leaf", "leaf", "mul", "leaf", "fmax", "fmax", "fabs",
     ]  # fmt: skip
+
+
+def test_what_is_above_zero_is_told_by_comparisons() -> None:
+    """Without a difference or a maximum, and exactly next to zero."""
+    graph = Graph()
+    a, b = graph.leaf("x", 0), graph.leaf("x", 1)
+    differs, falls = graph.apply("sub", a, b), graph.apply("neg", b)
+    largest = graph.apply("fmax", differs, graph.apply("fmax", falls, graph.constant(0.0)))
+    truth = raised(graph, largest)
+    ops = {graph.nodes[n].op for n in needed(graph, [truth], lambda _: False)}
+    assert ops == {"lt", "or"}
+    tiny = 5e-324
+    for x in ((1.0, 1.0), (2.0 * tiny, tiny), (0.0, tiny), (-2.0, -1.0), (-0.0, 0.0)):
+        leaves = dict(zip((("x", 0), ("x", 1)), x, strict=True))
+        assert evaluate(graph, truth, leaves) == (evaluate(graph, largest, leaves) != 0.0), x
+    assert graph.nodes[raised(graph, differs)].op == "ne"  # may be negative
 
 
 def test_fixed_parts_are_gathered() -> None:

@@ -25,6 +25,7 @@ FUNCTIONS = {
     "MIN": "MIN(a, SET(0.3))", "SELECT": "SELECT(LT(a, SET(0.3)), a, SET(2.0))",
     "TAN": "TAN(a)", "POW": "POW(a, SET(1.7))",
     "EXP_WHERE": "EXP_WHERE(LE(a, SET(1.0)), a)",
+    "EXP_DECAYED": "EXP_DECAYED(LT(-a, SET(40.0)), a)",
     "LOGIC": "SELECT((LT(SET(0.0), a) & NOT(EQ(a, SET(1.0)))) | NE(a, a), SET(1.0), SET(0.0))",
 }  # fmt: skip
 
@@ -73,6 +74,9 @@ def test_exponential(library: ctypes.CDLL) -> None:
     near = np.linspace(-40.0, 2.0, 8_000)
     expected = np.where(near <= 1.0, np.exp(near), 0.0)
     np.testing.assert_allclose(apply(library, "EXP_WHERE", near), expected, rtol=2.0 * EPS)
+    below = np.array([-1e300, -900.0, -40.0, -39.9, -1.0, -1e-9, -0.0, 0.0])
+    whole = np.where(-below < 40.0, apply(library, "EXP", below), 0.0)
+    np.testing.assert_array_equal(apply(library, "EXP_DECAYED", below), whole)
 
 
 @pytest.mark.parametrize("reach", [math.pi, 100.0, 1e5])

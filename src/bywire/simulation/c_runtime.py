@@ -155,8 +155,7 @@ static inline V each(double (*f)(double), V a) {
 # sin, cos: Cody-Waite reduction by multiples of pi/2 in three parts, good to |x| = 1e5; Taylor
 # on |r| <= pi/4 to r^16. What is beyond, and powers and logarithms next to zero, are the library's.
 _FUNCTIONS = r"""
-static FUNCTION V N(exp)(V x) {
-  x = WITHIN(x, SET(-708.0), SET(709.0));
+static IN_PLACE V N(exp_within)(V x) {
   const V t = x * 1.4426950408889634 + MAGIC;
   const V k = t - MAGIC;
   const V r = (x - k * 6.93147180369123816490e-01) - k * 1.90821492927058770002e-10;
@@ -169,6 +168,7 @@ static FUNCTION V N(exp)(V x) {
   const V scale = REAL((BITS(t) + 1023) << 52);
   return scale * a + ((scale * r4) * b + (scale * r8) * c);
 }
+static FUNCTION V N(exp)(V x) { return N(exp_within)(WITHIN(x, SET(-708.0), SET(709.0))); }
 
 static FUNCTION V N(turned)(V x, int64_t quarter) {
   const V t = x * 0.63661977236758134308 + MAGIC;
@@ -243,6 +243,7 @@ static inline double within(double a, double low, double high) {
 #define I int64_t
 #define N(f) bw_##f
 #define FUNCTION __attribute__((noinline, unused))
+#define IN_PLACE inline __attribute__((always_inline))
 #define SET(x) (x)
 #define BITS(x) bits_of(x)
 #define REAL(i) real_of(i)
@@ -312,6 +313,11 @@ static inline V chosen_beyond_of_two(double (*f)(double, double), B c, V a, V b,
 static inline V EXP_WHERE(B c, V x) {
   if (!ANY(c)) return SET(0.0);
   return SELECT(c, EXP(x), SET(0.0));
+}
+/* The same where c holds for nothing that the range would change. */
+static inline V EXP_DECAYED(B c, V x) {
+  if (!ANY(c)) return SET(0.0);
+  return SELECT(c, lanes_exp_within(x), SET(0.0));
 }
 """
 )

@@ -168,7 +168,7 @@ def emit_lanes(stages: Stages) -> str:
     for (int64_t s = 0; s < substeps; ++s) {{
       {indented(t.substep(), 6)}
       {indented(new, 6)}
-      const B flagged = NE({t.number(t.flag)}, SET(0.0));
+      const B flagged = {condition(t.graph, t.flag, t.name, VECTOR_C)};
       if (__builtin_expect(ANY(flagged), 0)) {{
         {indented(_repeat(t), 8)}
       }}

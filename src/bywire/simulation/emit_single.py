@@ -136,7 +136,7 @@ def emit_single(stages: Stages) -> str:
       {indented(block(lead), 6)}
       {indented([line for k, each in enumerate(groups) for line in renewed(k, each)], 6)}
       {indented(substep(rest, frozenset(pass_roots)), 6)}
-      if (__builtin_expect({as_number(graph, stages.fast["flag"][0], name)} != 0.0, 0)) {{
+      if (__builtin_expect({condition(graph, stages.fast["flag"][0], name)}, 0)) {{
         {indented(_repeat(layout) + ahead, 8)}
       }} else {{
         {indented(_commit(results, products, name) + ahead, 8)}

@@ -14,6 +14,7 @@ _INFIX = {"add": "+", "sub": "-", "mul": "*"}
 _LIBRARY = ("sqrt", "fabs", "floor", "ceil", "tan", "atan", "tanh", "copysign")
 OWN = frozenset({"exp", "log", "sin", "cos"})
 COSTLY = OWN | {"pow", "constpow"}  # worth a branch around them
+EXPONENT_RANGE = 708.0  # by which the exponential's argument may lie below zero
 
 
 @dataclass(frozen=True)
@@ -26,8 +27,9 @@ class Dialect:
         Functions by operation.
     select, compare, both, either, negation, extreme, inverse
         Format strings of selections, comparisons, truth values, maxima and reciprocals.
-    exp_where
-        Format string of "c ? exp(a) : 0" where that is one operation.
+    exp_where, exp_decayed
+        Format strings of "c ? exp(a) : 0" where that is one operation, and of the same where c says
+        that a, which is not above zero, is in the function's range.
     kept
         Condition of a truth value that is kept as a number, empty where it is not.
     """
@@ -43,6 +45,7 @@ class Dialect:
     zero: str
     one: str
     exp_where: str = ""
+    exp_decayed: str = ""
     kept: Callable[[Node], str] = lambda _: ""
 
 
@@ -84,6 +87,7 @@ VECTOR_C = Dialect(
     zero="SET(0.0)",
     one="SET(1.0)",
     exp_where="EXP_WHERE({c}, {a})",
+    exp_decayed="EXP_DECAYED({c}, {a})",
 )
 
 
@@ -128,8 +132,9 @@ def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> s
         return dialect.inverse.format(a=number(operation.args[0]))
     if op == "if_else_zero" and dialect.exp_where and graph.nodes[operation.args[1]].op == "exp":
         truth, power = operation.args
-        argument = number(graph.nodes[power].args[0])
-        return dialect.exp_where.format(c=condition(graph, truth, name, dialect), a=argument)
+        argument = graph.nodes[power].args[0]
+        form = dialect.exp_decayed if _decayed(graph, truth, argument) else dialect.exp_where
+        return form.format(c=condition(graph, truth, name, dialect), a=number(argument))
     if op in ("if_else_zero", "select"):
         truth, value, *other = operation.args
         return dialect.select.format(
@@ -143,6 +148,16 @@ def text(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> s
         a, b = (number(x) for x in ordered)
         return dialect.extreme[op].format(a=a, b=b)
     return f"{dialect.calls[op]}({', '.join(number(a) for a in operation.args)})"
+
+
+def _decayed(graph: Graph, truth: Node, argument: Node) -> bool:
+    """Return whether ``truth`` is -argument < b with b within the exponential's range, 0 below."""
+    compared, operation = graph.nodes[truth], graph.nodes[argument]
+    if compared.op != "lt" or operation.op != "neg" or not graph.intervals[argument].negative:
+        return False
+    lower, bound = compared.args
+    is_bounded = graph.nodes[bound].op == "const" and graph.intervals[bound].high <= EXPONENT_RANGE
+    return bool(lower == operation.args[0] and is_bounded)
 
 
 def as_number(graph: Graph, node: Node, name: Namer, dialect: Dialect = PLAIN_C) -> str:

@@ -14,6 +14,7 @@ from bywire.simulation.graph import Graph
 from bywire.simulation.operation import Node
 from bywire.simulation.program import Program
 from bywire.simulation.quadrature import Levels, Quadrature, collapsed, factored
+from bywire.simulation.raised import raised
 from bywire.simulation.signs import NOT_NEGATIVE, Interval
 
 # When a leaf changes: 0 once a run, 1 once a frame (a tick may change it), 2 every substep.
@@ -30,7 +31,7 @@ class Stages:
     ----------
     fast, exact
         Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
-        ``Program``.
+        ``Program``. The flag of the fast one is a truth value.
     ticks
         Nodes of the memory after each task.
     output
@@ -126,6 +127,7 @@ def build_stages(
         wanted, zero = [leaf in read for leaf in leaves["q"]], graph.constant(0.0)
         quadrature = quadrature.of(wanted)
         fast["q"] = [n if is_read else zero for n, is_read in zip(fast["q"], wanted, strict=True)]
+    fast["flag"] = [raised(graph, fast["flag"][0])]
     return Stages(
         graph=graph,
         fast=fast,
