@@ -14,6 +14,8 @@ from exported_ecu import bench_of, build, needs_compiler
 import bywire
 from bywire.core.errors import FileError, ModelError, ParameterError, UnknownNameError
 from bywire.core.model import Task
+from bywire.core.parameters import leaf_fields
+from bywire.core.signals import signals_of
 from bywire.export.controller.program import program
 
 EXAMPLE = Path(__file__).parents[3] / "examples" / "emb_caliper"
@@ -88,11 +90,38 @@ def test_description_names_what_is_read(tmp_path: Path) -> None:
     assert 'SYMBOL_LINK "wedge_brake_memory.i_1_ref" 0' in text
 
 
-def test_a_parser_reads_the_description(tmp_path: Path) -> None:
-    parser = pytest.importorskip("pya2l.parser", reason="pya2l is not installed")
-    made = bywire.export_controller("straight-stop", tmp_path, vectors=1).program
+NO_READER = (
+    "pya2l is not installed: its wheel of 89 MB, 254 MB unpacked, carries libraries for nine "
+    "platforms, too much to ask of every environment; pip install pya2l"
+)
+
+
+@pytest.mark.parametrize("experiment", ["straight-stop", "hard-braking", "moment-pulses"])
+def test_a_reader_finds_what_is_declared(tmp_path: Path, experiment: str) -> None:
+    parser = pytest.importorskip("pya2l.parser", reason=NO_READER)
+    made = bywire.export_controller(experiment, tmp_path, vectors=1).program
     with parser.A2lParser() as reader:
         tree = reader.tree_from_a2l((tmp_path / f"{made.name}.a2l").read_bytes())
     (module,) = tree.PROJECT.MODULE
-    assert len(module.CHARACTERISTIC) == len(made.parameters())
-    assert len(module.MEASUREMENT) == len(made.members(made.model.Memory))
+    units = {each.Name.Value: each.Unit.Value for each in module.COMPU_METHOD}
+
+    leaves = leaf_fields(type(made.par))
+    read = {each.Name.Value: each for each in module.CHARACTERISTIC}
+    assert list(read) == [name for name, _ in made.parameters()]
+    for name, member in made.parameters():
+        each, leaf = read[name], leaves[name]
+        limits = (each.LowerLimit.Value, each.UpperLimit.Value)
+        assert limits == (max(leaf.low, -1e32), min(leaf.high, 1e32)), name
+        assert units[each.Conversion.Value] == leaf.unit.symbol
+        assert each.Type == ("VAL_BLK" if member.length else "VALUE")
+        assert each.NUMBER.Number.Value == (member.length or 0)
+        assert each.SYMBOL_LINK.SymbolName.Value == f"{made.name}_parameters.{name}"
+
+    signals = signals_of(made.model.Memory)
+    measured = {each.Name.Value: each for each in module.MEASUREMENT}
+    assert list(measured) == [f"memory.{m.name}" for m in made.members(made.model.Memory)]
+    for name, each in measured.items():
+        signal = signals[name.removeprefix("memory.")]
+        assert units[each.Conversion.Value] == signal.unit
+        assert each.LongIdentifier.Value == signal.label
+        assert each.SYMBOL_LINK.SymbolName.Value == f"{made.name}_{name}"
