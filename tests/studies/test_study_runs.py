@@ -18,7 +18,14 @@ from scipy import stats
 
 import bywire
 from bywire.core.errors import FileError, InputError, ParameterError, RunError
-from bywire.studies.executor import CLUSTER_SETTINGS, Cluster, InProcess, Pool, executor_of
+from bywire.studies.executor import (
+    CLUSTER_MEMORY,
+    CLUSTER_SETTINGS,
+    Cluster,
+    InProcess,
+    Pool,
+    executor_of,
+)
 from bywire.studies.store import Origin, StudyStore
 from bywire.studies.study_file import read_study
 from undrawn import undrawn
@@ -113,6 +120,10 @@ def test_the_page_says_how_a_cluster_is_best_started():
     for name, value in CLUSTER_SETTINGS.items():
         assert config.get(name) != value  # there is such a setting, and it is another one
         assert config.get(name, config=read) == value
+    memory = dict(re.findall(r"^export (MALLOC_\w+)=(\d+)$", page, re.M))
+    assert {name: int(value) for name, value in memory.items()} == CLUSTER_MEMORY
+    known = config.get("distributed.nanny.pre-spawn-environ")
+    assert int(known["MALLOC_TRIM_THRESHOLD_"]) < CLUSTER_MEMORY["MALLOC_TRIM_THRESHOLD_"]
 
 
 def test_a_cluster_computes_the_same_until_its_workers_are_gone(study):

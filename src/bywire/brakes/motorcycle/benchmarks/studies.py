@@ -17,7 +17,13 @@ from bywire.benchmark.suite import Part
 from bywire.core.unneeded import allow_dask
 from bywire.data.file_format import library
 from bywire.studies.chunk import computed_chunk
-from bywire.studies.executor import CLUSTER_SETTINGS, Cluster, Executor, Pool
+from bywire.studies.executor import (
+    CLUSTER_MEMORY,
+    CLUSTER_SETTINGS,
+    Cluster,
+    Executor,
+    Pool,
+)
 from bywire.studies.plan import CHUNK, StudyPlan
 from bywire.studies.study_file import read_study
 
@@ -103,9 +109,10 @@ def _efficiency(plan: StudyPlan, cores: int) -> Result:
     allow_dask()
     distributed = library("distributed", "clusters", "cluster")
     config = library("dask", "clusters", "cluster").config
+    memory = {f"distributed.nanny.pre-spawn-environ.{k}": v for k, v in CLUSTER_MEMORY.items()}
     plain = _rate(Pool(cores), plan, cores)
     with (
-        config.set(CLUSTER_SETTINGS),
+        config.set(CLUSTER_SETTINGS | memory),
         distributed.LocalCluster(
             n_workers=cores, threads_per_worker=1, dashboard_address=None
         ) as cluster,
