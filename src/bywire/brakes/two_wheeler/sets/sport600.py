@@ -50,12 +50,16 @@ _AXLE = {  # of the heat of front and rear brake
     "T_wet": derived(428.15, "DOT 4, 155 degC: FMVSS 116"),
     "T_most": chosen(923.15, "650 degC: discs of stainless steel begin to temper and warp"),
 }
-_SOUGHT = "found by search for the shortest stops on five surfaces at once, rounded"
+_SOUGHT = (
+    "found by search for the shortest stops on five surfaces, the worst of 48 angles of the pulse "
+    "wheels, rounded"
+)
 _RULES = {
-    "slip_keep": 0.35, "slip_dump": 0.46, "slip_back": 0.2, "t_lead": 0.13, "a_hold": 14.0,
-    "t_hold": 0.035, "t_most": 0.24, "dump": 90.0, "depth": 0.92, "back": 1.02, "t_step": 0.025,
-    "step": 0.05, "growth": 1.12, "tau_a": 0.005, "tau_p": 0.025,
-    "v_fall": 5.0,
+    "slip_keep": 0.345, "slip_dump": 0.51, "slip_back": 0.224, "t_lead": 0.133, "a_hold": 13.7,
+    "t_hold": 0.0265, "t_most": 0.47, "dump": 100.0, "depth": 0.935, "back": 1.015,
+    "t_step": 0.0183,
+    "step": 0.0425, "growth": 1.12, "tau_a": 0.0055, "tau_p": 0.025,
+    "v_fall": 4.85,
 }  # fmt: skip
 _DRY = {
     name: derived(value, "dry asphalt for car tyres, as circulated")
