@@ -12,11 +12,11 @@ from bywire.export.controller.harness import FLAGS, WARNINGS
 from bywire.export.controller.program import program
 from bywire.export.controller.vectors import vectors
 
-MANY, MORE, FEW, DAILY = 2000, 500, 300, 150
+MANY, MORE, FEW, DAILY, SINGLE = 2000, 300, 300, 150, 80
 LARGE = (*BRAKES, "gains that differ by region")
 CASES = [
     *((structure, "double", MORE if structure in LARGE else DAILY) for structure in STRUCTURES),
-    *((structure, "single", DAILY) for structure in LARGE),
+    *((structure, "single", SINGLE) for structure in LARGE),
     *(pytest.param(structure, "double", MANY, marks=pytest.mark.trust) for structure in STRUCTURES),
     *(pytest.param(structure, "single", FEW, marks=pytest.mark.trust) for structure in STRUCTURES),
 ]
