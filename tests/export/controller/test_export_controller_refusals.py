@@ -38,9 +38,21 @@ def unknown(x: Any, m: Any, u: Any, par: Any) -> Any:
     return m._replace(duty=divmod(m.duty, 2.0)[0])
 
 
+def crossed(x: Any, m: Any, u: Any, par: Any) -> Any:
+    """Take an operator that numbers do not have."""
+    return m._replace(duty=m.duty @ 2.0)
+
+
+def beyond(x: Any, m: Any, u: Any, par: Any) -> Any:
+    """Read behind the end of a tuple."""
+    return m._replace(duty=m.duty * (1.0, 2.0)[2])
+
+
 @pytest.mark.parametrize(
     ("tick", "said"),
     [
+        (crossed, "this operator is not translated, in: m.duty @ 2.0"),
+        (beyond, r"tuple index out of range, in: \(1.0, 2.0\)\[2\]"),
         (branching, "it depends on a value that only the running ECU knows: use ops.where"),
         (endless, "endless calls itself"),
         (unknown, "divmod is not translated"),

@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from bywire.export.controller.body import Body, built_shape
+from bywire.export.controller.body import Body
+from bywire.export.controller.c_values import built_shape, ctype_of
 from bywire.export.controller.structs import Structs
 from bywire.export.controller.values import (
     Array,
@@ -90,7 +91,7 @@ def received(value: Any, name: str, body: Body) -> Iterator[tuple[Any, Argument 
         return
     target = body.fresh(name)
     here = Expr(target, uses=frozenset({("local", target)}))
-    ctype = body.ctype_of(value) if not isinstance(value, Array) else structs.precision.real
+    ctype = ctype_of(structs, value) if not isinstance(value, Array) else structs.precision.real
     body.types[target] = ctype
     if isinstance(value, (Expr, Known)):
         is_truth = isinstance(value, Expr) and value.truth

@@ -8,28 +8,24 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.c_values import built_shape, ctype_of, is_number, literal
 from bywire.export.controller.derived import is_exact
 from bywire.export.controller.memories import Memories
 from bywire.export.controller.statements import Statement
 from bywire.export.controller.structs import Structs
 from bywire.export.controller.values import (
     PRIMARY,
-    UNARY,
-    Array,
     Built,
     BuiltGroup,
-    Choice,
     Expr,
     Group,
     Items,
     Known,
-    Number,
     Record,
     Shape,
     Table,
     Update,
     lifted,
-    shape_of,
 )
 
 
@@ -115,19 +111,6 @@ class Body:
             return list(values)
         return [self.derived(each) for each in values]
 
-    def ctype_of(self, value: Any) -> str:
-        """Return the C type of a number, a truth value or a structure."""
-        value = lifted(value)
-        if isinstance(value, (Record, Built)):
-            return self.structs.of_tuple(value.cls).name
-        if isinstance(value, Update):
-            return self.structs.of_tuple(value.record.cls).name
-        if isinstance(value, Group):
-            return self.structs.of_group(value.shape).name
-        if isinstance(value, BuiltGroup):
-            return self.structs.of_group(built_shape(value)).name
-        return "bool" if isinstance(value, Expr) and value.truth else self.structs.precision.real
-
     def settled(self, value: Any, hint: str) -> Any:
         """Return a value that means the same further down; what has to be kept gets a variable."""
         value = lifted(value)
@@ -157,7 +140,7 @@ class Body:
         if isinstance(value, Update) and self.structs.is_memory(value):
             return self.changed_memory(value)
         target = name or self.fresh(hint)
-        ctype = self.ctype_of(value)
+        ctype = ctype_of(self.structs, value)
         here = Expr(target, uses=frozenset({("local", target)}))
         if isinstance(value, (Record, Built)) and self.structs.is_memory(value):
             self.write(target, ctype, self.rvalue(value))
@@ -265,40 +248,3 @@ class Body:
             return expr
         one, zero = (self.structs.precision.literal(v) for v in (1.0, 0.0))
         return Expr(f"({expr.at(PRIMARY)} ? {one} : {zero})", uses=expr.uses)
-
-
-def is_number(value: Any) -> bool:
-    """Return whether a value is a known number."""
-    known = value.value if isinstance(value, Known) else None
-    return isinstance(known, (int, float)) and not isinstance(known, bool)
-
-
-def literal(value: Known, structs: Structs) -> Expr:
-    """Return the literal, or the constant's name, of a known number."""
-    if isinstance(value.value, bool):
-        return Expr("true" if value.value else "false", truth=True)
-    if not is_number(value):
-        raise TypeError(f"{value.value!r} is no number")
-    if value.name:
-        return Expr(value.name, uses=frozenset({("constant", value.name, float(value.value))}))
-    text = structs.precision.literal(value.value)
-    return Expr(text, UNARY if text.startswith("-") else PRIMARY)
-
-
-def built_shape(value: BuiltGroup) -> Shape:
-    """Return the structure of a parameter set that is made of values."""
-    fields: list[tuple[str, Any]] = []
-    for name, each in value.items.items():
-        if isinstance(each, Group):
-            fields.append((name, each.shape))
-        elif isinstance(each, BuiltGroup):
-            fields.append((name, built_shape(each)))
-        elif isinstance(each, Expr) or is_number(each):
-            fields.append((name, Number()))
-        elif isinstance(each, Array):
-            raise TypeError("a parameter set with a table cannot be made anew")
-        elif hasattr(type(each.value), "model_fields"):
-            fields.append((name, shape_of(each.value)))
-        else:
-            fields.append((name, Choice(each.value)))
-    return Shape(value.cls, tuple(fields))

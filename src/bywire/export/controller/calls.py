@@ -14,6 +14,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.export.controller.context import Context
 from bywire.export.controller.elementary import MAGNITUDE
 from bywire.export.controller.members import attribute
+from bywire.export.controller.operators import chosen
 from bywire.export.controller.values import (
     PRIMARY,
     SUM,
@@ -58,7 +59,7 @@ def called(at: Context, node: ast.Call, function: Any, given: list[Any], named: 
     if target in _LIBRARY or target in _OURS or target in EXTREMES:
         return _elementary(at, node, target, given)
     if target is ops.where:
-        return at.chosen(node, *given, *named.values())
+        return chosen(at, node, *given, *named.values())
     if is_named_tuple(target):
         return _made(at, node, target, given, named)
     if isinstance(target, types.MethodType) and isinstance(target.__self__, type):

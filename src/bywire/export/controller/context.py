@@ -51,7 +51,3 @@ class Context(Protocol):
     def sequence(self, node: ast.AST, value: Any) -> tuple[Any, ...]:
         """Return the values of a tuple and its like."""
         ...
-
-    def chosen(self, node: ast.AST, condition: Any, then: Any, otherwise: Any) -> Any:
-        """Return what ``ops.where`` gives."""
-        ...

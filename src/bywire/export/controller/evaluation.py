@@ -4,25 +4,18 @@ from __future__ import annotations
 
 import ast
 import builtins
-import operator
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from bywire.core.errors import ModelError
-from bywire.export.controller.body import Body, is_number, literal
+from bywire.export.controller.body import Body
+from bywire.export.controller.c_values import is_number, literal
 from bywire.export.controller.calls import called
 from bywire.export.controller.context import Functions
 from bywire.export.controller.members import attribute
+from bywire.export.controller.operators import binary, compared, connected, unary
 from bywire.export.controller.values import (
-    BOTH,
-    CHOICE,
-    COMPARED,
-    EITHER,
-    PRIMARY,
-    PRODUCT,
-    SUM,
-    UNARY,
     Array,
     Built,
     Closure,
@@ -33,38 +26,6 @@ from bywire.export.controller.values import (
     Table,
     lifted,
 )
-
-_ARITHMETIC: dict[type[Any], tuple[str, int, Callable[[Any, Any], Any]]] = {
-    ast.Add: ("+", SUM, operator.add),
-    ast.Sub: ("-", SUM, operator.sub),
-    ast.Mult: ("*", PRODUCT, operator.mul),
-    ast.Div: ("/", PRODUCT, operator.truediv),
-}
-_KNOWN_ONLY: dict[type[Any], Callable[[Any, Any], Any]] = {
-    ast.Pow: operator.pow,
-    ast.Mod: operator.mod,
-    ast.FloorDiv: operator.floordiv,
-    ast.BitOr: operator.or_,
-    ast.BitAnd: operator.and_,
-}
-_SIGNS: dict[type[Any], Callable[[Any], Any]] = {
-    ast.Not: operator.not_,
-    ast.USub: operator.neg,
-    ast.UAdd: operator.pos,
-    ast.Invert: operator.invert,
-}
-_COMPARED: dict[type[Any], tuple[str, Callable[[Any, Any], Any]]] = {
-    ast.Lt: ("<", operator.lt),
-    ast.LtE: ("<=", operator.le),
-    ast.Gt: (">", operator.gt),
-    ast.GtE: (">=", operator.ge),
-    ast.Eq: ("==", operator.eq),
-    ast.NotEq: ("!=", operator.ne),
-    ast.In: ("in", lambda a, b: a in b),
-    ast.NotIn: ("not in", lambda a, b: a not in b),
-    ast.Is: ("is", operator.is_),
-    ast.IsNot: ("is not", operator.is_not),
-}
 
 
 @dataclass
@@ -100,7 +61,10 @@ class Evaluator:
         rule = getattr(self, f"_{type(node).__name__.lower()}", None)
         if rule is None:
             raise self.refuse(node, f"{type(node).__name__} is not translated")
-        return rule(node)
+        try:
+            return rule(node)
+        except (ArithmeticError, LookupError) as error:  # as Python would have it at run time
+            raise self.refuse(node, str(error)) from None
 
     def number(self, node: ast.AST, value: Any) -> Expr:
         """Return the C text of a number or a truth value."""
@@ -204,96 +168,18 @@ class Evaluator:
         return bool(self.known(node, value, why))
 
     def _unaryop(self, node: ast.UnaryOp) -> Any:
-        value = self.value(node.operand)
-        if isinstance(value, Known):
-            return Known(_SIGNS[type(node.op)](value.value))
-        expr = self.number(node, value)
-        if isinstance(node.op, ast.USub) and not expr.truth:
-            return Expr(f"-{expr.at(PRIMARY)}", UNARY, expr.uses)
-        if isinstance(node.op, ast.Not) and expr.truth:
-            return Expr(f"!{expr.at(PRIMARY)}", UNARY, expr.uses, truth=True)
-        raise self.refuse(node, "this operator is not translated")
+        return unary(self, node, self.value(node.operand))
 
     def _binop(self, node: ast.BinOp) -> Any:
-        left, right = lifted(self.value(node.left)), lifted(self.value(node.right))
-        kind = type(node.op)
-        known = _KNOWN_ONLY.get(kind) or _ARITHMETIC[kind][2]
-        if isinstance(left, Known) and isinstance(right, Known):
-            return Known(known(left.value, right.value))
-        if isinstance(left, Items) and isinstance(right, Items) and kind is ast.Add:
-            return Items(left.values + right.values)
-        if kind is ast.Pow and isinstance(right, Known) and right.value in (2, 2.0):
-            return self.product(node, left)
-        if kind not in _ARITHMETIC:
-            raise self.refuse(node, "this operator is not translated")
-        sign, level, _ = _ARITHMETIC[kind]
-        a, b = (self.body.as_number(self.number(node, each)) for each in (left, right))
-        a, b = self.body.operands(a, b)
-        text = f"{a.at(level)} {sign} {b.at(level + 1)}"
-        return Expr(text, level, a.uses | b.uses)
-
-    def product(self, node: ast.AST, value: Any) -> Expr:
-        """Return the square of a value."""
-        base = self.body.settled(self.number(node, value), "base")
-        return Expr(f"{base.at(PRODUCT)} * {base.at(PRODUCT + 1)}", PRODUCT, base.uses)
+        return binary(self, node, self.value(node.left), self.value(node.right))
 
     def _compare(self, node: ast.Compare) -> Any:
         if len(node.ops) > 1:
             raise self.refuse(node, "chained comparisons are not translated")
-        left, right = self.value(node.left), self.value(node.comparators[0])
-        sign, known = _COMPARED[type(node.ops[0])]
-        if isinstance(right, (Items, Table)) and isinstance(left, Known):
-            each = right.values if isinstance(right, Items) else map(Known, right.items)
-            right = Known([v.value for v in each if isinstance(v, Known)])
-        if isinstance(left, Known) and isinstance(right, Known):
-            return Known(known(left.value, right.value))
-        if sign in ("==", "!="):
-            return self._equal(node, left, right, sign)
-        if sign not in ("<", "<=", ">", ">="):
-            raise self.refuse(node, "this comparison is not translated")
-        a, b = self.body.operands(*(self.number(node, each) for each in (left, right)))
-        return Expr(f"{a.at(SUM)} {sign} {b.at(SUM)}", COMPARED, a.uses | b.uses, truth=True)
-
-    def _equal(self, node: ast.AST, left: Any, right: Any, sign: str) -> Expr:
-        """Return a comparison of floats for equality, in words that compilers do not warn of."""
-        a, b = (self.body.settled(self.number(node, v), "compared") for v in (left, right))
-        both = f"({a.at(SUM)} <= {b.at(SUM)}) && ({a.at(SUM)} >= {b.at(SUM)})"
-        uses = a.uses | b.uses
-        if sign == "==":
-            return Expr(both, BOTH, uses, truth=True)
-        return Expr(f"!({both})", UNARY, uses, truth=True)
+        return compared(self, node, self.value(node.left), self.value(node.comparators[0]))
 
     def _boolop(self, node: ast.BoolOp) -> Any:
-        is_and = isinstance(node.op, ast.And)
-        parts: list[Expr] = []
-        value: Any = Known(is_and)
-        for each in node.values:
-            value = self.value(each)
-            if isinstance(value, Known):
-                if bool(value.value) != is_and and not parts:
-                    return value
-                continue
-            expr = self.number(each, value)
-            if not expr.truth:
-                raise self.refuse(each, "a number stands for a truth value")
-            parts.append(expr)
-        if not parts:
-            return value
-        sign, level = ("&&", BOTH) if is_and else ("||", EITHER)
-        uses = frozenset().union(*(each.uses for each in parts))
-        text = f" {sign} ".join(each.at(PRIMARY) for each in parts)
-        return Expr(text, level if len(parts) > 1 else PRIMARY, uses, truth=True)
-
-    def chosen(self, node: ast.AST, condition: Any, then: Any, otherwise: Any) -> Any:
-        """Return what ``ops.where`` gives."""
-        if isinstance(condition, Known):
-            return then if condition.value else otherwise
-        test = self.number(node, condition)
-        if not test.truth:
-            raise self.refuse(node, "a number stands for a truth value")
-        a, b = (self.number(node, each) for each in (then, otherwise))
-        text = f"{test.at(PRIMARY)} ? {a.at(CHOICE + 1)} : {b.at(CHOICE + 1)}"
-        return Expr(text, CHOICE, test.uses | a.uses | b.uses, a.truth and b.truth)
+        return connected(self, node, map(self.value, node.values))
 
     def _subscript(self, node: ast.Subscript) -> Any:
         value = lifted(self.value(node.value))

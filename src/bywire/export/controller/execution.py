@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from bywire.export.controller.body import Body
+from bywire.export.controller.c_values import ctype_of
 from bywire.export.controller.evaluation import Evaluator
 from bywire.export.controller.source import notes_above
 from bywire.export.controller.values import (
@@ -146,7 +147,7 @@ class Executor(Evaluator):
 
     def _variable(self, name: str, value: Any) -> Any:
         body: Body = self.body
-        ctype = body.ctype_of(value)
+        ctype = ctype_of(body.structs, value)
         held = self.scope.get(name)
         place = held.expr if isinstance(held, (Record, Group)) else held
         is_own = isinstance(place, Expr) and body.types.get(place.text) == ctype

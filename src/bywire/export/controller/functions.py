@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from bywire.export.controller.arguments import Argument
-from bywire.export.controller.body import Body, built_shape
+from bywire.export.controller.body import Body
 from bywire.export.controller.c_text import c_name, unique
+from bywire.export.controller.c_values import built_shape, ctype_of
 from bywire.export.controller.statements import Statement, live
 from bywire.export.controller.structs import Structs
 from bywire.export.controller.values import (
@@ -86,7 +87,7 @@ def finish(made: CFunction, body: Body, value: Any, node: ast.AST) -> None:
     elif isinstance(value, (Items, Table)):
         _several(made, body, value, node)
     else:
-        made.result, made.value = body.ctype_of(value), value
+        made.result, made.value = ctype_of(body.structs, value), value
         made.returned = body.rvalue(value)
     changed: frozenset[Use] = frozenset(("local", place) for place in made.changes)
     if made.returned is not None:
@@ -158,7 +159,7 @@ def _several(made: CFunction, body: Body, value: Items | Table, node: ast.AST) -
     for place, leaf in leaves:
         name = unique(c_name(names.get(place[0], "item") if len(place) == 1 else
                              "_".join(map(str, place))), types)  # fmt: skip
-        types[name] = body.ctype_of(leaf)
+        types[name] = ctype_of(body.structs, leaf)
         made.members[place] = name
     made.value = value
     if not leaves:
