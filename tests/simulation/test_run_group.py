@@ -9,6 +9,7 @@ import pytest
 
 from bywire.bench.bench_file import read
 from bywire.core.errors import ParameterError, SolverError
+from bywire.simulation import run_group
 from bywire.simulation.run import simulate
 from bywire.simulation.run_group import fit_lanes, simulate_group
 
@@ -52,6 +53,19 @@ def test_some_signals_on_one_thread(runs):
     assert few[0].names == ("p_mc",)
     # Another kernel: it may round otherwise.
     np.testing.assert_allclose(few[1]["p_mc"], everything[1]["p_mc"], rtol=1e-9)
+
+
+def test_vectors_that_take_turns_change_no_bit(runs, monkeypatch):
+    stopping = braking("12 bar", p_from="5 bar", duration="0.2 s")
+    longer = [replace(run, duration=stopping.duration) for run in runs]
+    many = [*longer, *[stopping] * 5]  # both vectors are used, the second not in all lanes
+    usual = simulate_group(many, ["p_mc", "i"])
+    monkeypatch.setattr(run_group, "PAIRED", len(many))
+    in_turn = simulate_group(many, ["p_mc", "i"])
+    assert in_turn.kernel.lanes == 2 * usual.kernel.lanes
+    np.testing.assert_array_equal(in_turn.values, usual.values)
+    np.testing.assert_array_equal(in_turn.vectors, usual.vectors)
+    assert in_turn.vectors[in_turn.kernel.layout.start["counters"] + 1].max() > 0  # cut substeps
 
 
 def test_what_does_not_fit_is_refused(runs):

@@ -1,28 +1,22 @@
-"""Kernel of an ensemble: as many cases side by side as the processor's vectors hold."""
+"""Kernel of an ensemble: as many cases side by side as the processor's vectors hold.
+
+Where the substep of a model is short it waits for chains of operations as long as it computes. Then
+two vectors are carried on in turn, statement by statement: each computes while the other waits.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from bywire.simulation.c_runtime import LANES
-from bywire.simulation.emission import (
-    branching_statements,
-    indented,
-    layout_of,
-    leaf_count,
-    leaf_namer,
-    midpoints,
-    statements,
-    unread,
-)
+from bywire.simulation.emission import indented, leaf_count
 from bywire.simulation.emit_rare import rare_substep
-from bywire.simulation.expressions import VECTOR_C, as_number, condition, needed
+from bywire.simulation.expressions import VECTOR_C, condition
+from bywire.simulation.lane_statements import Lanes
 from bywire.simulation.layout import Layout
-from bywire.simulation.modes import modes
-from bywire.simulation.operation import Node
 from bywire.simulation.stages import STATE, Stages
 
-SIGNATURE = """int bw_lanes(void) { return W; }
+SIGNATURE = """int bw_lanes(void) { return TURNS * W; }
 
 void bw_run_lanes(const double *restrict p, double h_, const double *restrict u,
     double *restrict state, const int64_t *restrict plan, double *restrict rec)"""
@@ -35,151 +29,124 @@ PLAN = """const int64_t begin = plan[0], end = plan[1], last = plan[2], substeps
   const int64_t by_row = plan[{at} + 3], by_signal = plan[{at} + 4];"""
 
 
-class _Lanes:
-    """Statements of every stage, in vectors."""
-
-    def __init__(self, stages: Stages) -> None:
-        self.stages, self.graph, self.level = stages, stages.graph, stages.level()
-        self.layout: Layout = layout_of(stages)
-        skipped = unread(stages)
-        self.results = {
-            f"{kind}{k}": node
-            for kind in ("x", "d", "r")
-            for k, node in enumerate(stages.fast[kind])
-            if f"{kind}{k}" not in skipped
-        }
-        self.products = stages.quadrature.products
-        self.flag = stages.fast["flag"][0]
-        self.pass_roots = [*self.results.values(), *self.products, self.flag]
-        self.coefficients = [c for pairs in stages.quadrature.combinations for c, _ in pairs]
-        self.carried = midpoints(
-            self.graph, needed(self.graph, self.pass_roots, lambda n: self.level[n] < 2)
-        )
-        self.name = leaf_namer(self.graph, self._leaf, self._value, "SET({})")
-        self.mode = modes(self.graph, self.pass_roots, self.level).without(self.carried)
-
-    def _leaf(self, kind: str, index: int) -> str:
-        if kind in ("p", "u"):
-            return f"{kind.upper()}[{index}]"
-        return "h" if kind == "h" else f"{kind}{index}"
-
-    def _value(self, node: Node) -> str:
-        return f"y{self.carried[node]}" if node in self.carried else f"v{node}"
-
-    def block(self, roots: Sequence[Node], below: int) -> list[str]:
-        """Return the statements that results need, apart from what is computed less often."""
-        order = needed(self.graph, roots, lambda n: self.level[n] < below)
-        return self.lines(order)
-
-    def lines(self, order: Sequence[Node]) -> list[str]:
-        """Return the statements of nodes."""
-        return branching_statements(self.graph, order, self.name, "const V ", VECTOR_C)
-
-    def number(self, node: Node) -> str:
-        """Return the text of a result."""
-        return as_number(self.graph, node, self.name, VECTOR_C)
-
-    def once(self) -> list[str]:
-        """Return the statements of what depends on parameters alone."""
-        ticks = [n for task in self.stages.ticks for n in task]
-        roots = [*self.pass_roots, *self.coefficients, *ticks, *self.stages.output]
-        order = needed(self.graph, roots, lambda _: False)
-        return self.lines([n for n in order if self.level[n] == 0])
-
-    def framed(self) -> list[str]:
-        """Return the statements of what changes with the ticks."""
-        roots = [*self.pass_roots, *self.coefficients]
-        order = needed(self.graph, roots, lambda n: self.level[n] == 0)
-        own = frozenset(self.mode.values)
-        return self.lines([n for n in order if self.level[n] == 1 and n not in own])
-
-    def mode_state(self) -> list[str]:
-        """Return the declarations of what changes with the mode alone, and of the mode."""
-        if not self.mode.atoms:
-            return []
-        values = [f"V {self.name(n)} = SET(0.0);" for n in self.mode.values]
-        return [*values, *(f"B b{n} = (B){{0}};" for n in self.mode.atoms), "int fresh = 1;"]
-
-    def substep(self) -> list[str]:
-        """Return the statements of a substep; what hangs on the mode is renewed with it."""
-        mode = self.mode
-        if not mode.atoms:
-            return self.lines(mode.rest)
-        changed = " | ".join(f"(n{n} ^ b{n})" for n in mode.atoms)
-        truth = [condition(self.graph, n, self.name, VECTOR_C) for n in mode.atoms]
-        renewed = statements(self.graph, mode.values, self.name, "", VECTOR_C)
-        return [
-            *self.lines(mode.first),
-            *(f"const B n{n} = {text};" for n, text in zip(mode.atoms, truth, strict=True)),
-            f"if (__builtin_expect(fresh | ANY({changed}), 0)) {{",
-            "  fresh = 0;",
-            *(f"  b{n} = n{n};" for n in mode.atoms),
-            *(f"  {line}" for line in renewed),
-            "}",
-            *self.lines(mode.rest),
-        ]
+# Operations of a substep up to which two vectors take turns: more do not fit into registers.
+_SHORT = 160
 
 
-def emit_lanes(stages: Stages) -> str:
-    """Return the C source of the kernel for one vector of cases."""
-    t = _Lanes(stages)
-    layout = t.layout
-    counters, names = layout.start["counters"], _names(layout)
-    sums = [f"s{k}" for k in range(len(t.products))]
-    new = [f"V {target}_ = {t.number(n)};" for target, n in t.results.items()]
-    new += [f"V z{k} = {t.number(n)};" for k, n in enumerate(t.products)]
-    commit = [f"{target} = {target}_;" for target in t.results]
-    commit += [f"{s} += z{k};" for k, s in enumerate(sums)]
-    ahead = [f"y{k} = x{k} + d{k};" for k in t.carried.values()]
-    integrals = [
-        f"q{j} += {' + '.join(f'{t.number(c)} * s{k}' for c, k in pairs) or 'SET(0.0)'};"
-        for j, pairs in enumerate(stages.quadrature.combinations)
-    ]
-    parameters, stimuli = leaf_count(stages, "p"), leaf_count(stages, "u")
-    return f"""{LANES}{rare_substep(stages)}
+def takes_turns(stages: Stages) -> bool:
+    """Return whether a substep is so short that two vectors in turn are quicker than one."""
+    t = Lanes(stages)
+    return not t.mode.atoms and len(t.substep()) <= _SHORT
+
+
+def emit_lanes(stages: Stages, in_turn: bool = False) -> str:
+    """Return the C source of the kernel for one vector of cases, or for two that take turns."""
+    t = Lanes(stages)
+    turns = [Lanes(stages, at, 2) for at in (0, 1)] if in_turn else [t]
+
+    def each(lines: Callable[[Lanes], Sequence[str]], spaces: int) -> str:
+        rows = zip(*(lines(turn) for turn in turns), strict=True)
+        return indented([line for row in rows for line in row], spaces)
+
+    counters, stimuli = t.layout.start["counters"], leaf_count(stages, "u")
+    return f"""{LANES}
+#define TURNS {len(turns)}
+{rare_substep(stages)}
 {_settle_lanes(t)}
 {SIGNATURE} {{
   {PLAN.format(at=8 + len(stages.ticks))}
   const M *restrict P = (const M *)p;
   M *restrict vectors = (M *)state;
   const V h = SET(h_);
-  V U[{max(stimuli, 1)}];
-  double ps[{max(parameters, 1)}], c[W * (CONSTANTS + 1)];
-  for (int l = 0; l < W; ++l) {{
-    for (int k = 0; k < {parameters}; ++k) ps[k] = P[k][l];
-    constants(ps, c + l * (CONSTANTS + 1));
-  }}
-  {indented([f"V {name} = vectors[{k}];" for k, name in enumerate(names)], 2)}
-  {indented(t.once(), 2)}
-  {indented(t.mode_state(), 2)}
-  {indented([f"V {each}" for each in ahead], 2)}
+  double ps[{max(leaf_count(stages, "p"), 1)}];
+  {each(_begin, 2)}
+  {each(Lanes.once, 2)}
+  {each(Lanes.mode_state, 2)}
+  {each(lambda t: [f"V {line}" for line in _ahead(t)], 2)}
   for (int64_t f = begin; f < end + last; ++f) {{
-    for (int j = 0; j < {stimuli}; ++j) {{
-      const double *row = u + (f / stim) * {stimuli} * (own ? W : 1);
-      for (int l = 0; l < W; ++l) U[j][l] = own ? row[j * W + l] : row[j];
-    }}
-    {indented(_ticks(t), 4)}
+    const double *row = u + (f / stim) * {stimuli} * (own ? TURNS * W : 1);
+    {each(_stimulus, 4)}
+    {each(_ticks, 4)}
     if (f % every == 0) {{
-      {indented(_record(t), 6)}
+      {each(_record, 6)}
     }}
     if (f == end) break;
-    {indented(t.framed(), 4)}
-    {indented([f"V {s} = SET(0.0);" for s in sums], 4)}
+    {each(Lanes.framed, 4)}
+    {each(lambda t: [f"V s{k}{t.mark} = SET(0.0);" for k in range(len(t.products))], 4)}
     for (int64_t s = 0; s < substeps; ++s) {{
-      {indented(t.substep(), 6)}
-      {indented(new, 6)}
-      const B flagged = {condition(t.graph, t.flag, t.name, VECTOR_C)};
-      if (__builtin_expect(ANY(flagged), 0)) {{
-        {indented(_repeat(t), 8)}
-      }}
-      {indented(commit + ahead, 6)}
+      {each(Lanes.substep, 6)}
+      {each(_new, 6)}
+      {each(_rare, 6)}
+      {each(_commit, 6)}
     }}
-    {indented(integrals, 4)}
+    {each(_integrals, 4)}
   }}
-  {indented([f"vectors[{k}] = {name};" for k, name in enumerate(names)], 2)}
-  (void)U; (void)P; (void)h; (void)own; (void){counters};
+  {each(_stores, 2)}
+  (void)P; (void)h; (void)own; (void){counters};
 }}
 """
+
+
+def _begin(t: Lanes) -> list[str]:
+    """Return the declarations of what every vector has, with its values at the start."""
+    parameters, m = leaf_count(t.stages, "p"), t.mark
+    return [
+        f"V U{m}[{max(leaf_count(t.stages, 'u'), 1)}];",
+        f"double c{m}[W * (CONSTANTS + 1)];",
+        "for (int l = 0; l < W; ++l) {\n"
+        f"    for (int k = 0; k < {parameters}; ++k) ps[k] = P[k * TURNS + {t.at}][l];\n"
+        f"    constants(ps, c{m} + l * (CONSTANTS + 1));\n"
+        "  }",
+        *(f"V {name}{m} = vectors[{t.row(k)}];" for k, name in enumerate(_names(t.layout))),
+    ]
+
+
+def _stimulus(t: Lanes) -> list[str]:
+    here = f"row[(j * TURNS + {t.at}) * W + l]"
+    return [
+        f"for (int j = 0; j < {leaf_count(t.stages, 'u')}; ++j)\n"
+        f"      for (int l = 0; l < W; ++l) U{t.mark}[j][l] = own ? {here} : row[j];",
+        f"(void)U{t.mark};",
+    ]
+
+
+def _ahead(t: Lanes) -> list[str]:
+    return [f"y{k}{t.mark} = x{k}{t.mark} + d{k}{t.mark};" for k in t.carried.values()]
+
+
+def _new(t: Lanes) -> list[str]:
+    lines = [f"V {target}_{t.mark} = {t.number(n)};" for target, n in t.results.items()]
+    return lines + [f"V z{k}{t.mark} = {t.number(n)};" for k, n in enumerate(t.products)]
+
+
+def _rare(t: Lanes) -> list[str]:
+    """Return, in one piece, what becomes of lanes that raise their flag."""
+    flagged = f"flagged{t.mark}"
+    return [
+        f"const B {flagged} = {condition(t.graph, t.flag, t.name, VECTOR_C)};\n"
+        f"      if (__builtin_expect(ANY({flagged}), 0)) {{\n"
+        f"        {indented(_repeat(t), 8)}\n"
+        "      }",
+    ]
+
+
+def _commit(t: Lanes) -> list[str]:
+    lines = [f"{target}{t.mark} = {target}_{t.mark};" for target in t.results]
+    lines += [f"s{k}{t.mark} += z{k}{t.mark};" for k in range(len(t.products))]
+    return lines + _ahead(t)
+
+
+def _integrals(t: Lanes) -> list[str]:
+    return [
+        f"q{j}{t.mark} += "
+        f"{' + '.join(f'{t.number(c)} * s{k}{t.mark}' for c, k in pairs) or 'SET(0.0)'};"
+        for j, pairs in enumerate(t.stages.quadrature.combinations)
+    ]
+
+
+def _stores(t: Lanes) -> list[str]:
+    names = t.marked(*_names(t.layout))
+    return [f"vectors[{t.row(k)}] = {name};" for k, name in enumerate(names)]
 
 
 def _names(layout: Layout) -> list[str]:
@@ -188,29 +155,30 @@ def _names(layout: Layout) -> list[str]:
     return [*entries, "failures", "repeats"]
 
 
-def _ticks(t: _Lanes) -> list[str]:
+def _ticks(t: Lanes) -> list[str]:
     texts = []
     for k, roots in enumerate(t.stages.ticks):
         lines = t.block(roots, 1)
         lines += [f"const V w{j} = {t.number(n)};" for j, n in enumerate(roots)]
-        lines += [f"m{j} = w{j};" for j in range(len(roots))]
+        lines += [f"m{j}{t.mark} = w{j};" for j in range(len(roots))]
         texts.append(f"if (f % plan[{8 + k}] == 0) {{\n      {indented(lines, 6)}\n    }}")
     return texts
 
 
-def _record(t: _Lanes) -> list[str]:
-    roots = t.stages.output
+def _record(t: Lanes) -> list[str]:
+    roots, first = t.stages.output, f"{t.at} * W"
     return [
         *t.block(roots, 1),
-        f"V o[{max(len(roots), 1)}];",
-        *(f"o[{j}] = {t.number(n)};" for j, n in enumerate(roots)),
-        "double *row = rec + (f / every - row0) * by_row;",
-        f"for (int j = 0; j < {len(roots)}; ++j)",
-        "  for (int l = 0; l < used; ++l) row[j * by_signal + l * by_lane] = o[j][l];",
+        f"V o{t.mark}[{max(len(roots), 1)}];",
+        *(f"o{t.mark}[{j}] = {t.number(n)};" for j, n in enumerate(roots)),
+        f"double *place{t.mark} = rec + (f / every - row0) * by_row + {first} * by_lane;",
+        f"for (int j = 0; j < {len(roots)}; ++j)\n"
+        f"        for (int l = 0; l < W && l + {first} < used; ++l)\n"
+        f"          place{t.mark}[j * by_signal + l * by_lane] = o{t.mark}[j][l];",
     ]
 
 
-def _settle_lanes(t: _Lanes) -> str:
+def _settle_lanes(t: Lanes) -> str:
     """Return the C function that settles the flagged lanes one by one.
 
     It works on copies: a vector whose lanes are addressed would live in memory everywhere.
@@ -243,20 +211,21 @@ def _settle_lanes(t: _Lanes) -> str:
 """
 
 
-def _repeat(t: _Lanes) -> list[str]:
+def _repeat(t: Lanes) -> list[str]:
     """Return the statements that hand a substep with flagged lanes to ``settle_lanes``."""
     length = t.layout.length
-    old = [f"{kind}{k}" for kind in ("x", "d") for k in range(length[kind])]
-    new = [*(f"{target}_" for target in t.results), *(f"z{k}" for k in range(len(t.products)))]
-    flow = [f"q{k}" for k in range(length["q"])]
-    memory = [f"m{k}" for k in range(length["m"])]
+    old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(length[kind])))
+    new = t.marked(*(f"{name}_" for name in t.results), *(f"z{k}" for k in range(len(t.products))))
+    flow = t.marked(*(f"q{k}" for k in range(length["q"])))
+    memory = t.marked(*(f"m{k}" for k in range(length["m"])))
+    failures, repeats, flagged, c = t.marked("failures", "repeats", "flagged", "c")
     arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
     return [
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
-        "V count[] = {failures, repeats};",
-        "settle_lanes(flagged, c, h_, memory, old, n, flow, count);",
+        f"V count[] = {{{failures}, {repeats}}};",
+        f"settle_lanes({flagged}, {c}, h_, memory, old, n, flow, count);",
         *(f"{name} = n[{k}];" for k, name in enumerate(new)),
         *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
-        "failures = count[0];",
-        "repeats = count[1];",
+        f"{failures} = count[0];",
+        f"{repeats} = count[1];",
     ]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from bywire.core.errors import ParameterError
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
-from bywire.simulation.compiler import VECTOR, Compiler, find_compiler, load_library
+from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load_library
 from bywire.simulation.engine import Prepared, built_once, prepare
 from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
@@ -33,6 +33,9 @@ from bywire.simulation.variations import Variations, case_matrix
 
 if TYPE_CHECKING:
     from bywire.simulation.program import Program
+
+PAIRED = 32
+"""cases from which on kernels may carry on two vectors in turn: with fewer, lanes would be idle"""
 
 
 @dataclass(frozen=True)
@@ -80,14 +83,21 @@ class LaneKernel:
         self._run.restype = None
 
     @classmethod
-    def of(cls, program: Program, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
-        """Emit the kernel of a program, and compile it unless the cache has it."""
+    def of(
+        cls, program: Program, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool
+    ) -> LaneKernel:
+        """Emit the kernel of a program, and compile it unless the cache has it.
+
+        ``in_pairs``: whether there are cases enough for two vectors, should they pay.
+        """
         from bywire.simulation.emission import layout_of
-        from bywire.simulation.emit_lanes import emit_lanes
+        from bywire.simulation.emit_lanes import emit_lanes, takes_turns
         from bywire.simulation.stages import build_stages
 
         stages = build_stages(program, outputs=selection)
-        _, library = load_library(emit_lanes(stages), VECTOR, compiler, cls.ENTRY)
+        in_turn = in_pairs and takes_turns(stages)
+        flags = IN_TURN if in_turn else VECTOR
+        _, library = load_library(emit_lanes(stages, in_turn), flags, compiler, cls.ENTRY)
         return cls(layout_of(stages), library, compiler, len(selection))
 
     def advance(
@@ -172,10 +182,10 @@ def simulate_ensemble(
     if compiler is None:
         return _one_by_one(run, variations, tuple(signals))
     selection = selected(tuple(prepared.outputs), signals)
-    kernel = lane_kernel(prepared, compiler, tuple(selection.tolist()))
+    count = matrix.shape[1]
+    kernel = lane_kernel(prepared, compiler, tuple(selection.tolist()), count >= PAIRED)
     schedule = run.schedule()
     stimulus = sampled_stimulus(run, schedule)
-    count = matrix.shape[1]
     padded = -(-count // kernel.lanes) * kernel.lanes
     values = np.empty((padded, schedule.rows, len(signals)))
     counters = np.zeros((2, padded))
@@ -205,16 +215,18 @@ def simulate_ensemble(
 
 
 @built_once
-def lane_kernel(prepared: Prepared, compiler: Compiler, selection: tuple[int, ...]) -> LaneKernel:
+def lane_kernel(
+    prepared: Prepared, compiler: Compiler, selection: tuple[int, ...], in_pairs: bool = False
+) -> LaneKernel:
     """Return the kernel that records some outputs, by index; built once.
 
-    What an earlier command kept is taken as it is.
+    What an earlier command kept is taken as it is. ``in_pairs``: see `LaneKernel.of`.
     """
-    place = None if prepared.place is None else prepared.place.in_lanes(selection)
+    place = None if prepared.place is None else prepared.place.in_lanes(selection, in_pairs)
     kept = None if place is None else place.kept()
     if kept is not None and kept.library is not None and kept.compiler == compiler.label:
         return LaneKernel(kept.layout, kept.library, compiler, len(selection))
-    kernel = LaneKernel.of(prepared.program, compiler, selection)
+    kernel = LaneKernel.of(prepared.program, compiler, selection, in_pairs)
     if place is not None:
         place.keep(kernel)
         prepared.keep_model()

@@ -24,7 +24,7 @@ from bywire.simulation.advance import require_finite
 from bywire.simulation.changes import energies, pieces, put_in_signals
 from bywire.simulation.compiler import find_compiler
 from bywire.simulation.engine import prepare, structure_of
-from bywire.simulation.ensemble import LaneKernel, lane_kernel
+from bywire.simulation.ensemble import PAIRED, LaneKernel, lane_kernel
 from bywire.simulation.run import (
     Run,
     Trajectory,
@@ -157,7 +157,8 @@ def simulate_group(
     prepared = prepare(runs[0].model, runs[0].par)
     names = tuple(prepared.outputs)
     wanted = names if signals is None else tuple(signals)
-    kernel = lane_kernel(prepared, compiler, tuple(selected(names, wanted).tolist()))
+    selection = tuple(selected(names, wanted).tolist())
+    kernel = lane_kernel(prepared, compiler, selection, len(runs) >= PAIRED)
     schedule = runs[0].schedule()
     edges = _edges(schedule, first, runs)
     output = runs[0].model.Output
