@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from bywire.core import scratch
-from bywire.core.scratch import process_folder, replacing, scratch_folder
+from bywire.core.scratch import made_folder, process_folder, replacing, scratch_folder
 
 posix = pytest.mark.skipif(sys.platform == "win32", reason="locks of POSIX")
 
@@ -123,3 +123,17 @@ def test_a_folder_that_goes_while_others_are_listed_is_no_trouble(tmp_path, monk
     with scratch_folder(tmp_path) as folder:
         assert folder.is_dir()
     assert not os.path.lexists(left)
+
+
+def test_a_folder_that_stays_empty_goes_with_the_parents_that_were_made(tmp_path):
+    (tmp_path / "kept").mkdir()
+    with pytest.raises(KeyError), made_folder(tmp_path / "kept" / "a" / "b"):
+        raise KeyError
+    assert list(tmp_path.rglob("*")) == [tmp_path / "kept"]
+    with made_folder(tmp_path / "kept" / "a" / "b"):
+        (tmp_path / "kept" / "a" / "result").write_text("x")
+    assert [path.name for path in (tmp_path / "kept" / "a").iterdir()] == ["result"]
+    with made_folder(tmp_path / "kept"):  # was there
+        pass
+    with pytest.raises(OSError, match="null byte"), made_folder(Path("a\0b")):
+        pass

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from bywire.api.controller_check import ControllerCheck, check_controller
+from bywire.api.export_folder import export_folder
 from bywire.bench.bench import Bench
 from bywire.bench.bench_file import read
 from bywire.core.catalog import PARAMETER_SETS
-from bywire.core.errors import FileError, ParameterError, unknown_name
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.scratch import scratch_folder
 from bywire.export.controller.c_text import PRECISIONS
 from bywire.export.controller.files import files
@@ -153,18 +154,10 @@ def export_controller(
     cited = PARAMETER_SETS.find(chosen.parameters).values
     every = test_vectors(made, case.memory, vectors)
     texts = files(made, case.memory, cited, every, bus=dbc)
-    folder = Path(out).expanduser()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with scratch_folder(folder) as scratch:  # all, or none
-            for name, text in texts.items():
-                (scratch / name).write_text(text, encoding="utf-8")
-            for name in texts:
-                os.replace(scratch / name, folder / name)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(
-            f"{folder} cannot be written: {reason}; name another folder"
-        ) from None
+    with export_folder(out) as folder, scratch_folder(folder) as scratch:  # all, or none
+        for name, text in texts.items():
+            (scratch / name).write_text(text, encoding="utf-8")
+        for name in texts:
+            os.replace(scratch / name, folder / name)
     checked = check_controller(case, cited, vectors) if check else None
     return ControllerExport(folder, tuple(texts), made, vectors, checked)

@@ -8,9 +8,10 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from bywire.api.export_folder import export_folder
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
-from bywire.core.errors import FileError, ParameterError, quoted, unknown_name
+from bywire.core.errors import ParameterError, quoted, unknown_name
 from bywire.core.typing import silent
 from bywire.core.units import shown
 from bywire.export.fmu.archive import unit_of, write_unit
@@ -189,16 +190,9 @@ def export_fmu(
     from bywire.export.exported import exported
 
     unit = unit_of(exported(bench, case), part, fmi, kind)
-    folder = Path(out)
-    path = folder / f"{unit.identifier}.fmu"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with export_folder(out) as folder:
+        path = folder / f"{unit.identifier}.fmu"
         compilers = write_unit(unit, path, systems, progress or silent)
-    except OSError as error:
-        raise FileError(
-            f"{path} cannot be written: {error.strerror or error}; make room there, or name "
-            "another folder"
-        ) from None
     return ExportedFmu(path, unit, systems, tuple(compilers))
 
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+from bywire.api.export_folder import export_folder
 from bywire.bench import bench_file
 from bywire.bench.bench import Bench
-from bywire.core.errors import FileError
-from bywire.core.scratch import replacing
+from bywire.core.scratch import scratch_folder
 from bywire.report.answer import Answer, use_case
 from bywire.report.document import Document, Listing, Section
 
@@ -100,16 +101,10 @@ def export_wasm(
 
     made = exported(bench, case)
     contents = module_files(made, identifier_of(bench.name or bench.experiment))
-    folder = Path(out)
-    paths = tuple(folder / name for name in contents)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        for path, content in zip(paths, contents.values(), strict=True):
-            with replacing(path) as fresh:
-                fresh.write_bytes(content)
-    except OSError as error:
-        raise FileError(
-            f"{folder} cannot be written to: {error.strerror or error}; make room there, or name "
-            "another folder"
-        ) from None
+    with export_folder(out) as folder, scratch_folder(folder) as scratch:  # all, or none
+        for name, content in contents.items():
+            (scratch / name).write_bytes(content)
+        paths = tuple(folder / name for name in contents)
+        for path in paths:
+            os.replace(scratch / path.name, path)
     return ExportedWasm(paths, made, len(next(iter(contents.values()))))

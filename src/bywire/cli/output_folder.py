@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 
 from bywire.core.errors import FileError
+from bywire.core.scratch import made_folder
 
 
 def folder(text: str) -> Path:
@@ -35,19 +35,14 @@ def output_folder(out: Path) -> Iterator[None]:
     FileError
         When it cannot be made or written to.
     """
-    missing = [each for each in (out, *out.parents) if not os.path.lexists(each)]
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=out):
-            pass
-    except (OSError, ValueError) as error:  # ValueError: a null character in the path
-        reason = getattr(error, "strerror", None) or str(error)
-        raise FileError(
-            f"cannot write to the output folder {out}: {reason}; name another one with --out"
-        ) from None
-    try:
+    with ExitStack() as made:
+        try:
+            made.enter_context(made_folder(out))
+            with TemporaryFile(dir=out):
+                pass
+        except OSError as error:
+            raise FileError(
+                f"cannot write to the output folder {out}: {error.strerror or error}; name another "
+                "one with --out"
+            ) from None
         yield
-    finally:
-        with suppress(OSError):  # there is a result
-            for each in missing:
-                each.rmdir()

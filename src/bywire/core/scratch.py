@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import errno
 import os
 import shutil
 import sys
@@ -49,6 +50,28 @@ def replacing(target: Path) -> Iterator[Path]:
         fresh = folder / target.name
         yield fresh
         os.replace(fresh, target)
+
+
+@contextmanager
+def made_folder(folder: Path) -> Iterator[None]:
+    """Make a folder with its parents; what was made and is empty in the end is removed.
+
+    Raises
+    ------
+    OSError
+        When it cannot be made.
+    """
+    missing = [each for each in (folder, *folder.parents) if not os.path.lexists(each)]
+    try:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+        except ValueError as error:  # a null character in the path
+            raise OSError(errno.EINVAL, str(error)) from None
+        yield
+    finally:
+        with contextlib.suppress(OSError, ValueError):  # there is a result
+            for each in missing:
+                each.rmdir()
 
 
 @contextmanager

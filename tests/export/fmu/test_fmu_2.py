@@ -12,7 +12,7 @@ from fmpy.validation import validate_fmu
 import bywire
 from bywire.api.export_fmu import ExportedFmu, export_fmu
 from bywire.bench.running import run_of
-from bywire.core.errors import CompilerError, ParameterError, UnknownNameError
+from bywire.core.errors import CompilerError, FileError, ParameterError, UnknownNameError
 from bywire.export.fmu import binaries
 from export.fmu.clients import Client
 
@@ -202,5 +202,7 @@ def test_what_cannot_be_exported_is_said(tmp_path: Path, monkeypatch: pytest.Mon
         export_fmu(bywire.Bench("hard-braking", "dardanelli2010", faults=failing), tmp_path)
     monkeypatch.setattr(binaries, "find_compiler", lambda: None)
     with pytest.raises(CompilerError):
-        export_fmu(MOTORCYCLE, tmp_path)
+        export_fmu(MOTORCYCLE, tmp_path / "a" / "folder")
+    with pytest.raises(FileError, match="null byte; make room there, or name another folder"):
+        export_fmu(MOTORCYCLE, f"{tmp_path}/a\0b")
     assert list(tmp_path.iterdir()) == []
