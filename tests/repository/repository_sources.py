@@ -14,6 +14,7 @@ ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "bywire"
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 MODULES = sorted(PACKAGE.rglob("*.py"))
+_HOLDS_STATEMENTS = (ast.stmt, ast.ExceptHandler, ast.match_case)
 FOLDERS = (".git", ".venv", "results", "dist", "build", "node_modules")
 
 
@@ -45,7 +46,7 @@ def imports(module: ast.AST, *, typing_too: bool = True) -> Iterator[str]:
             yield node.module
         elif isinstance(node, ast.If) and not typing_too and _is_for_typing(node.test):
             continue
-        else:
+        elif isinstance(node, _HOLDS_STATEMENTS):
             yield from imports(node, typing_too=typing_too)
 
 

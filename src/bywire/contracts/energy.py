@@ -33,6 +33,7 @@ from bywire.contracts.sampling import (
     call,
     combinations,
     flattened,
+    samples_of,
     symbolic,
 )
 
@@ -71,7 +72,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
     arguments = merged(laws.values())
     is_alive = False
     for choices in combinations(arguments):
-        structure, matrix = Sampler(arguments, choices).matrix(SAMPLES)
+        structure, samples = samples_of(arguments, choices, SAMPLES)
         column, sample = symbolic(structure)
         sample = _consistent(module, arguments, sample)
         rates = _rates(module, laws, arguments, sample)
@@ -85,7 +86,7 @@ def keeps_energy(module: ModuleType) -> Iterator[Evidence]:
         signals = [k for k in slopes if not is_parameters(arguments[k.split(".")[0]])]
         unmoved = [slopes[k] for k in signals if k not in rates]
         compiled = ca.Function("E", [column], [ca.vertcat(*terms), ca.vertcat(0.0, *unmoved)])
-        powers, hidden = (out.full() for out in compiled(matrix))
+        powers, hidden = (out.full() for out in compiled(samples))
         if hidden.any():
             text = f"the energy depends on inputs without input_rate; {choices}"
             yield Evidence(False, text, place=place)
@@ -113,10 +114,10 @@ def loses_what_it_says(module: ModuleType) -> Iterator[Evidence]:
         return
     arguments, _ = signature_of(loss)
     for choices in combinations(arguments):
-        structure, matrix = Sampler(arguments, choices).matrix(SAMPLES * 4)
+        structure, samples = samples_of(arguments, choices, SAMPLES * 4)
         column, sample = symbolic(structure)
         heat = call(loss, _consistent(module, arguments, sample))
-        values = ca.Function("P", [column], [heat])(matrix).full()
+        values = ca.Function("P", [column], [heat])(samples).full()
         least = float(values.min())
         yield Evidence(least >= 0.0, f"power_loss falls to {least:g} W; {choices}", place=place)
 

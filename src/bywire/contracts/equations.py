@@ -19,6 +19,7 @@ from bywire.contracts.sampling import (
     combinations,
     evaluate,
     flattened,
+    samples_of,
     traced,
 )
 from bywire.core.typing import Array
@@ -70,11 +71,12 @@ def has_agreeing_back_ends(function: Function) -> Iterator[Evidence]:
     """Find whether floats, NumPy arrays and CasADi symbols give one result."""
     arguments, _ = signature_of(function)
     for choices in combinations(arguments):
-        structure, matrix = Sampler(arguments, choices).matrix(SAMPLES)
-        floats = np.array([evaluate(function, structure, column) for column in matrix.T.tolist()]).T
-        arrays = evaluate(function, structure, matrix)
+        structure, samples = samples_of(arguments, choices, SAMPLES)
+        each = [evaluate(function, structure, numbers_in) for numbers_in in samples.T.tolist()]
+        floats = np.array(each).T
+        arrays = evaluate(function, structure, samples)
         column, results = traced(function, structure)
-        symbols = ca.Function("f", [column], [results])(matrix).full()
+        symbols = ca.Function("f", [column], [results])(samples).full()
         # A difference of large terms is as good as the terms: the row's largest value is scale.
         scale = np.abs(floats).max(axis=1, keepdims=True)
         for name, other in (("arrays", arrays), ("symbols", symbols)):
@@ -87,19 +89,19 @@ def has_its_slopes(function: Function) -> Iterator[Evidence]:
     arguments, _ = signature_of(function)
     for choices in combinations(arguments):
         sampler = Sampler(arguments, choices)
-        structure, matrix = sampler.matrix(SAMPLES)
+        structure, samples = samples_of(arguments, choices, SAMPLES)
         column, results = traced(function, structure)
         shape = (results.numel(), column.numel(), SAMPLES)
         compiled = ca.Function("J", [column], [ca.vec(ca.densify(ca.jacobian(results, column)))])
-        exact = compiled(matrix).full().reshape(shape, order="F")
+        exact = compiled(samples).full().reshape(shape, order="F")
         if not np.all(np.isfinite(exact)):
             yield Evidence(False, f"the Jacobian is not finite; {choices}")
             return
-        largest = np.abs(evaluate(function, structure, matrix)).max(axis=1)[:, None]
+        largest = np.abs(evaluate(function, structure, samples)).max(axis=1)[:, None]
         names = list(flattened(structure))
         nominals = np.array([abs(sampler.known(name).nominal) for name in names])
         both = [
-            _slopes(function, structure, matrix, h * nominals)
+            _slopes(function, structure, samples, h * nominals)
             for h in (DIFFERENCE, DIFFERENCE / 2)
         ]
         for j, (name, nominal, wide, narrow) in enumerate(zip(names, nominals, *both, strict=True)):

@@ -84,11 +84,6 @@ class Sampler:
         """Return one sample of all arguments, as floats."""
         return {name: self._argument(name, note) for name, note in self.annotations.items()}
 
-    def matrix(self, count: int) -> tuple[Arguments, np.ndarray]:
-        """Return one sample, and the numbers of ``count`` samples, shape (numbers, count)."""
-        samples = [self.sample() for _ in range(count)]
-        return samples[0], np.array([list(flattened(s).values()) for s in samples]).T
-
     def known(self, name: str) -> Number:
         """Return what is known of a flattened number; the nodes of a table share it."""
         return self._known[name if name in self._known else name.rsplit(".", 1)[0]]
@@ -129,6 +124,27 @@ class Sampler:
         if number.nominal <= number.low:
             raise ValueError(f"{number}: the nominal value must lie inside the range")
         return number.low + (number.nominal - number.low) * 10 ** self._rng.uniform(-0.3, 0.3)
+
+
+def samples_of(
+    annotations: Mapping[str, Any], choices: Choices, count: int
+) -> tuple[Arguments, np.ndarray]:
+    """Return one sample, and the numbers of ``count`` samples, shape (numbers, count).
+
+    Contracts of the same arguments look at the same samples.
+    """
+    return _samples(tuple(annotations.items()), tuple(choices.items()), count)
+
+
+@lru_cache(maxsize=1024)
+def _samples(
+    annotations: tuple[tuple[str, Any], ...], choices: tuple[tuple[str, Any], ...], count: int
+) -> tuple[Arguments, np.ndarray]:
+    sampler = Sampler(dict(annotations), dict(choices))
+    samples = [sampler.sample() for _ in range(count)]
+    numbers_in = np.array([list(flattened(s).values()) for s in samples]).T
+    numbers_in.setflags(write=False)
+    return samples[0], numbers_in
 
 
 @lru_cache(maxsize=4096)
