@@ -27,41 +27,55 @@ def warnings_of(model: Any, recording: Any, par: Any) -> list[str]:
     felt = tuple(each for each in _felt(model, par) if each[0].name not in silent)
     if not felt:
         return []
-    return [text for _, texts in _said(model, felt, recording, (par,)) for text in texts]
+    return [text for _, texts in _said(model, felt, recording, (par,), par) for text in texts]
 
 
 def silent_parts(model: Any, rows: Any, pars: Sequence[Any]) -> frozenset[str]:
     """Return the parts of an assembly whose elements say nothing of any of several cases.
 
-    ``rows``: signals of shape (cases, rows). Only elements that are watched row by row can be told,
-    with the same parameters of their own in every case.
+    ``rows``: signals of shape (cases, rows). Only elements that are watched row by row can be told.
+    Parameters that differ between the cases are arrays of shape (cases, 1) to them.
     """
     felt = tuple(
         (part, each)
         for part, each in _felt(model, pars[0])
         if hasattr(part.element.watch, "row_by_row")
-        and all(_is_shared(name, pars) for name in (part.path, *model.shared))
     )
-    return frozenset(part.name for part, texts in _said(model, felt, rows, pars) if not texts)
+    joined = _joined(pars)
+    silent = set()
+    for each in felt:
+        try:
+            ((part, texts),) = _said(model, (each,), rows, pars, joined)
+        except (TypeError, ValueError):  # it asks or says something that is not one number here
+            continue
+        if not texts:
+            silent.add(part.name)
+    return frozenset(silent)
 
 
-def _is_shared(name: str, pars: Sequence[Any]) -> bool:
-    """Return whether a group of parameters is the same in all sets, or there is none."""
-    try:
-        first, *others = (par.value(name) for par in pars)
-    except AttributeError:
-        return True
-    return all(other is first or other == first for other in others)
+def _joined(pars: Sequence[Any]) -> Any:
+    """Return sets of one structure as a single one: where they differ, with an array of all."""
+    if len(pars) == 1:
+        return pars[0]
+    table = np.array([tuple(par.leaves().values()) for par in pars], dtype=np.float64)
+    differs = (table != table[0]).any(axis=0)
+    columns = zip(pars[0].leaves().items(), table.T, differs, strict=True)
+    return pars[0].with_leaves(
+        {name: column[:, None] if varies else value for (name, value), column, varies in columns}
+    )
 
 
 def _said(
-    model: Any, felt: Felt, rows: Any, pars: Sequence[Any]
+    model: Any, felt: Felt, rows: Any, pars: Sequence[Any], joined: Any
 ) -> Iterator[tuple[Any, list[str]]]:
-    """Yield parts that watch and what they say of rows; ``pars``: one for all, or of each case."""
+    """Yield parts that watch and what they say of rows.
+
+    ``pars``: one set for all, or of each case; ``joined``: these as one.
+    """
     with np.errstate(all="ignore"):
         values = computed(tuple(tuple(each.values()) for _, each in felt), _Given(rows, pars))
         for (part, names), each in zip(felt, values, strict=True):
-            wired: Any = Wired(part, Instant(None, None, None, pars[0], model.shared))
+            wired: Any = Wired(part, Instant(None, None, None, joined, model.shared))
             more = dict(zip(names, each, strict=True))
             yield part, wired.call(part.element.watch, t=rows["time"].values, **more)
 

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Sequence
+from typing import Any, Literal, cast
 
+import numpy as np
 import xarray as xr
 
 from bywire.bench.experiment import Case, Experiment
 from bywire.bench.kpis import effort, occupation, step_response
 from bywire.bench.kpis.cases import FamilyJudge
-from bywire.bench.kpis.kpi import Figures, Kpi
+from bywire.bench.kpis.kpi import Figures, Kpi, KpiOfCases
 from bywire.bench.kpis.registry import units_of
+from bywire.bench.rows import Rows
 from bywire.brakes.motorcycle.case import case_from_rest, smoothing, step_at_zero
 from bywire.brakes.motorcycle.operating_point import settled_start
 from bywire.brakes.motorcycle.parameters import MotorcycleParameters
@@ -84,6 +87,19 @@ def gain(run: xr.Dataset, options: Options) -> tuple[Kpi, ...]:
     return GAIN(static_gain=((data.end - data.start) / options.i_step, data.note))
 
 
+def gains(rows: Rows, options: Sequence[Options]) -> tuple[KpiOfCases, ...] | None:
+    """Return the static gains of many cases; None where their steps are not looked at alike."""
+    alike = step(options[0])
+    if any(step(each) != alike for each in {id(each): each for each in options}.values()):
+        return None
+    data = step_response.select(cast(xr.Dataset, rows), alike)
+    if data.problem:
+        return None
+    values = (data.end - data.start) / np.array([each.i_step for each in options])
+    unit, definition = GAIN.declared["static_gain"]
+    return (KpiOfCases("static_gain", values, unit, definition, lambda _: data.note),)
+
+
 EXPERIMENT = Experiment(
     name="pressure-step",
     assembly="motorcycle-brake",
@@ -93,7 +109,9 @@ EXPERIMENT = Experiment(
         p_start=25e5, start="settled", i_step=0.35, duration=4.0, settle=3.0, smoothing=0.02
     ),
     cases=cases,
-    judge=FamilyJudge(settings, further=gain, further_signals=("p_mc",)),
+    judge=FamilyJudge(
+        settings, further=gain, further_together=gains, further_signals=("p_mc",)
+    ),
     kpis={
         **units_of("step_response", "effort", "occupation", resolved={"level": "Pa"}),
         **GAIN.units,
