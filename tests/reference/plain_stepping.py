@@ -164,12 +164,16 @@ class Point:
 
 @dataclass
 class Part:
-    """What a step of any length gives: as in ``Point``, and the rates of the integrals."""
+    """What a step of any length gives: as in ``Point``, and the rates of the integrals.
+
+    ``jump``: by how much each friction would change an increment if it turned round.
+    """
 
     x: Array
     d: Array
     r: Array
     flow: Array
+    jump: dict[int, float]
     passes: int
     settled: bool
 
@@ -184,8 +188,6 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
     while True:
         new = _part(model, par, at, rate * left, left, cap)
         passes += new.passes
-        if cuts:
-            new = _part(model, par, at, new.d, left, cap)
         turned = [k for k in rubs if at.x[k] * new.x[k] < 0.0]
         if not turned:
             break
@@ -197,7 +199,8 @@ def substep(model: Any, par: Any, at: Point, h: float, cap: int) -> None:
         t, k = min(zip(roots, turned, strict=True))
         new = _part(model, par, at, rate * t, t, cap)
         at.x, rate, at.q = new.x, new.d / t, at.q + t / h * new.flow
-        at.x[k] = rate[k] = 0.0
+        at.x[k] = 0.0
+        rate[k] = math.copysign(max(abs(rate[k]) - new.jump[k] / t, 0.0), rate[k])
         left, cuts = left - t, cuts + 1
         settled &= new.settled
     at.unsettled += int(cap > 1 and not (settled and new.settled))
@@ -225,10 +228,12 @@ def _part(model: Any, par: Any, at: Point, predicted: Array, h: float, cap: int)
 
         state = model.State(*map(float, y))
         f, J = differentiate(right, y)
-        A = np.diag(np.array(model.mass(state, par), dtype=float)) - 0.5 * h * J
+        masses = np.array(model.mass(state, par), dtype=float)
+        A = np.diag(masses) - 0.5 * h * J
         r = h * (f - 0.5 * J @ predicted)
         bounds = model.bounds(state, state, at.m, par, tuple(map(float, force(y))))
         bounds = [(min(lo, 0.0), max(hi, 0.0)) for lo, hi in bounds]
+        jump = {k: h * (hi - lo) / masses[k] for k, (lo, hi) in zip(held, bounds, strict=False)}
         for n, k in enumerate(held[: len(bounds)]):  # a velocity keeps the sign that it has
             lo, hi = bounds[n]
             bounds[n] = (hi if at.x[k] < 0.0 else lo, lo if at.x[k] > 0.0 else hi)
@@ -251,7 +256,7 @@ def _part(model: Any, par: Any, at: Point, predicted: Array, h: float, cap: int)
     flow = np.array(model.powers(*args, at.m, par, tuple(F), tuple(reaction)), dtype=float)
     x = at.x + d
     x[held] = w
-    return Part(x, d, reaction, flow, passes, settled)
+    return Part(x, d, reaction, flow, jump, passes, settled)
 
 
 def _contacts(model: Any, par: Any, x: Array) -> tuple[tuple[tuple[int, ...], ...], Array]:

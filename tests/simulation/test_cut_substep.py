@@ -17,7 +17,7 @@ def settled(x: Array, d: Array, m: Array, p: Array, h: float) -> tuple[list[Arra
     v, _ = x
     force = 0.0 if v == 0.0 else -2.0 * np.sign(v) - 40.0 * (v + d[0]) ** 2
     end = np.array([v + h * force, x[1] + h])
-    jump = np.array([4.0])
+    jump = np.array([0.5 * h * 4.0])
     return [end, 0.5 * (end - x), np.zeros(1), np.zeros(0), jump], False
 
 

@@ -97,7 +97,7 @@ def test_stiff_undamped_wall_is_doubted() -> None:
     stiff = rig(0.06, record=1e-3, tau_wall=0.0, mu=0.0, **STIFF)
     result = simulate(stiff)
     gained = result["E_stored"] + result["E_friction"] + result["E_damping"] - result["E_source"]
-    assert gained.max() > 0.05 * result["E_source"].max()  # else the doubt were for nothing
+    assert gained.max() > 0.02 * result["E_source"].max()  # else the doubt were for nothing
     assert result.status == "unsettled" or "swings at" in result.doubt
 
 

@@ -74,6 +74,9 @@ INLINE V bw_fma(V a, V b, V c) { return (V)__builtin_ia32_vfmaddpd512_mask(a, b,
 #endif
 #define NOT(m) ((B)~(m))
 #define LANE(m, l) (((m) >> (l)) & 1)
+#define EACH_LANE(l, m) for (int left_ = (m), l; left_ && (l = __builtin_ctz(left_), 1); \
+    left_ &= left_ - 1)
+static inline B ONLY(int l) { return (B)(1 << l); }
 /* An estimate of 14 bits and three Newton steps, the last of which rounds as a division does
  * (Markstein, IBM Journal of Research and Development 34, 1990), in less time than it takes but on
  * processors that divide quickly: there a kernel is a tenth slower with it. */
@@ -96,6 +99,12 @@ typedef I B;
 #define NE(a, b) ((a) != (b))
 #define NOT(m) (~(m))
 #define LANE(m, l) ((m)[l] != 0)
+#define EACH_LANE(l, m) for (int l = 0; l < W; ++l) if (LANE(m, l))
+static inline B ONLY(int l) {
+  B m = {0};
+  m[l] = -1;
+  return m;
+}
 static inline int ANY(B m) {
   int64_t any = 0;
   for (int l = 0; l < W; ++l) any |= m[l];

@@ -5,12 +5,13 @@ The same as the functions of ``emit_rare``, which says why.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from bywire.core.typing import Array
-from bywire.simulation.layout import ATTEMPTS, CLOSE, EDGE, JUMP, STILL, most_cuts
+from bywire.simulation.layout import ATTEMPTS, CLOSE, EDGE, JUMP, NEAR, STILL, most_cuts
 
 Settle = Callable[[Array, Array, Array, Array, float], tuple[list[Array], bool]]
 
@@ -43,8 +44,6 @@ class CutSubstep:
         unsettled = False
         for count in range(most + 1):
             o, failed = self._part(x, d, left)
-            if count:  # accelerations differ from those that the midpoint was predicted from
-                o, failed = self._settle(x, o[1], self._m, self._p, left)
             turns, _ = self._first_turn(x, o)
             if turns < 0:
                 break
@@ -55,9 +54,9 @@ class CutSubstep:
             o, t, turns, failed = self._locate(x, d, o, left)
             unsettled |= failed
             before, x, d = x, o[0], o[1] * (h / t)
-            # Bodies that are alike stop at once.
-            still = [k for k in self._velocities if abs(x[k]) < STILL * abs(before[k])]
-            x[[turns, *still]] = d[[turns, *still]] = 0.0
+            for k, jump in self._jumps(o):
+                if k == turns or abs(x[k]) < STILL * abs(before[k]):  # alike bodies stop at once
+                    x[k], d[k] = 0.0, _turned_back(float(d[k]), jump * (h / t))
             flow = flow + o[3] * (t / h)
             left -= t
         if left < h:
@@ -91,7 +90,8 @@ class CutSubstep:
         turns, _ = self._first_turn(x, o)
         low, high = 0.0, length
         points = [(0.0, float(x[turns])), (length, float(o[0][turns]))]
-        close = CLOSE * abs(points[0][1] - points[1][1])
+        change = abs(points[0][1] - points[1][1])
+        before: tuple[float, list[Array]] | None = None
         t = _zero_of(*points[0][1:], *points[1], 2.0 * float(d[turns]) / self._h, self._h)
         for n in range(1, ATTEMPTS + 1):
             t = float(np.clip(t, first, final))
@@ -100,19 +100,30 @@ class CutSubstep:
             if other >= 0 and other != turns and n < ATTEMPTS:
                 turns, low, high = other, 0.0, t
                 points = [(0.0, float(x[turns])), (t, float(o[0][turns]))]
-                close = CLOSE * abs(points[0][1] - points[1][1])
+                change, before = abs(points[0][1] - points[1][1]), None
                 t = t * share
                 continue
             w = float(o[0][turns])
             (P, at_P), (Q, at_Q) = points
-            if abs(w) <= close or not first < t < final or t in (P, Q) or n == ATTEMPTS:
+            if abs(w) <= CLOSE * change or not first < t < final or t in (P, Q) or n == ATTEMPTS:
                 break  # with what this length gives
             low, high = (t, high) if w * x[turns] > 0.0 else (low, t)
             slope = (w - at_P) / (t - P) + (w - at_Q) / (t - Q) - (at_Q - at_P) / (Q - P)
             following = t - w / slope
+            if abs(w) <= NEAR * change and before is not None:
+                # The rest is on the line through two attempts.
+                share = (following - t) / (t - before[0])
+                moved = [now + share * (now - was) for now, was in zip(o, before[1], strict=True)]
+                return [*moved[:JUMP], *o[JUMP:]], following, turns, failed
+            before = (t, o)
             points[0 if abs(P - following) > abs(Q - following) else 1] = (t, w)
             t = following if low < following < high else 0.5 * (low + high)
         return o, t, turns, failed
+
+
+def _turned_back(before: float, jump: float) -> float:
+    """Return half the increment behind a zero of what had another before it."""
+    return math.copysign(max(abs(before) - jump, 0.0), before)
 
 
 def _zero_of(v: float, t: float, w: float, before: float, h: float) -> float:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from bywire.simulation.c_runtime import LANES
 from bywire.simulation.emission import indented, leaf_count
-from bywire.simulation.emit_rare import rare_substep
+from bywire.simulation.emit_rare import rare_roots, rare_substep
 from bywire.simulation.expressions import VECTOR_C, condition
 from bywire.simulation.lane_statements import Lanes
 from bywire.simulation.layout import Layout
@@ -102,10 +102,10 @@ def _begin(t: Lanes) -> list[str]:
 
 
 def _stimulus(t: Lanes) -> list[str]:
-    here = f"row[(j * TURNS + {t.at}) * W + l]"
+    here = f"(V)((const M *)row)[j * TURNS + {t.at}]"
     return [
         f"for (int j = 0; j < {leaf_count(t.stages, 'u')}; ++j)\n"
-        f"      for (int l = 0; l < W; ++l) U{t.mark}[j][l] = own ? {here} : row[j];",
+        f"      U{t.mark}[j] = own ? {here} : SET(row[j]);",
         f"(void)U{t.mark};",
     ]
 
@@ -181,49 +181,62 @@ def _record(t: Lanes) -> list[str]:
 def _settle_lanes(t: Lanes) -> str:
     """Return the C function that settles the flagged lanes one by one.
 
-    It works on copies: a vector whose lanes are addressed would live in memory everywhere.
+    It works on copies: a vector whose lanes are addressed would live in memory everywhere. Of a
+    lane that is not in doubt the velocities of the ordinary pass are known.
     """
-    layout = t.layout
-    nx, nm, nz = layout.length["x"], layout.length["m"], len(t.products)
-    at, lines = 0, []
+    stages, nx = t.stages, t.layout.length["x"]
     targets = {name: k for k, name in enumerate(t.results)}
-    for kind in STATE:
-        for k in range(layout.length[kind]):
-            if kind == "q":
-                lines.append(f"q[{k}][l] += o[{at}];")
-            elif f"{kind}{k}" in targets:
-                lines.append(f"n[{targets[f'{kind}{k}']}][l] = o[{at}];")
-            at += 1
-    return f"""static RARE void settle_lanes(B flagged, const double *c, double h, const V *m,
-    const V *old, V *n, V *q, V *counters) {{
-  double ms[{max(nm, 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
-  for (int l = 0; l < W; ++l) {{
-    if (!LANE(flagged, l)) continue;
-    for (int k = 0; k < {nm}; ++k) ms[k] = m[k][l];
+    places = [f"{kind}{k}" for kind in STATE for k in range(t.layout.length[kind])]
+    given = [f"ms[{k}] = m[{j}][l];" for j, k in enumerate(_memory(t))]
+    given += [f"o[{v}] = n[{targets[f'x{v}']}][l];" for v in stages.velocities]
+    taken = [
+        f"n[{k}] = SELECT(ONLY(l), SET(o[{places.index(name)}]), n[{k}]);"
+        for name, k in targets.items()
+    ]
+    added = [f"q[{j}][l] += o[{places.index(name)}];" for j, name in enumerate(_flows(t))]
+    return f"""static RARE void settle_lanes(B flagged, B doubtful, const double *c, double h,
+    const V *m, const V *old, V *n, V *q, V *counters) {{
+  double ms[{max(t.layout.length["m"], 1)}], xs[{nx}], ds[{nx}], o[RESULTS];
+  EACH_LANE(l, flagged) {{
     for (int k = 0; k < {nx}; ++k) {{ xs[k] = old[k][l]; ds[k] = old[{nx} + k][l]; }}
+    {indented(given, 4)}
     cuts made;
-    counters[0][l] += located(c + l * (CONSTANTS + 1), h, ms, xs, ds, o, &made);
+    counters[0][l] += located(c + l * (CONSTANTS + 1), h, ms, xs, ds, !LANE(doubtful, l), o, &made);
     counters[1][l] += 1.0;
-    for (int k = 0; k < {nz}; ++k) n[{len(targets)} + k][l] = 0.0;
-    {indented(lines, 4)}
+    for (int k = 0; k < {len(t.products)}; ++k) n[{len(targets)} + k][l] = 0.0;
+    {indented(taken + added, 4)}
   }}
+  (void)m; (void)q;
 }}
 """
 
 
+def _memory(t: Lanes) -> list[int]:
+    """Return the entries of the memory that a rare pass reads."""
+    read = t.graph.read_by(rare_roots(t.stages))
+    return [k for k in range(t.layout.length["m"]) if t.graph.leaf("m", k) in read]
+
+
+def _flows(t: Lanes) -> list[str]:
+    """Return the integrals that signals read; the others stay as they are."""
+    read = t.graph.read_by(t.stages.output)
+    return [f"q{k}" for k in range(t.layout.length["q"]) if t.graph.leaf("q", k) in read]
+
+
 def _repeat(t: Lanes) -> list[str]:
     """Return the statements that hand a substep with flagged lanes to ``settle_lanes``."""
-    length = t.layout.length
-    old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(length[kind])))
+    old = t.marked(*(f"{kind}{k}" for kind in ("x", "d") for k in range(t.layout.length[kind])))
     new = t.marked(*(f"{name}_" for name in t.results), *(f"z{k}" for k in range(len(t.products))))
-    flow = t.marked(*(f"q{k}" for k in range(length["q"])))
-    memory = t.marked(*(f"m{k}" for k in range(length["m"])))
+    flow = t.marked(*_flows(t))
+    memory = t.marked(*(f"m{k}" for k in _memory(t)))
     failures, repeats, flagged, c = t.marked("failures", "repeats", "flagged", "c")
-    arrays = {"old": old, "memory": memory or ["SET(0.0)"], "n": new, "flow": flow or ["SET(0.0)"]}
+    doubtful = condition(t.graph, t.stages.fast["doubtful"][0], t.name, VECTOR_C)
+    nothing = ["SET(0.0)"]
+    arrays = {"old": old, "memory": memory or nothing, "n": new, "flow": flow or nothing}
     return [
         *(f"V {name}[] = {{{', '.join(values)}}};" for name, values in arrays.items()),
         f"V count[] = {{{failures}, {repeats}}};",
-        f"settle_lanes({flagged}, {c}, h_, memory, old, n, flow, count);",
+        f"settle_lanes({flagged}, {doubtful}, {c}, h_, memory, old, n, flow, count);",
         *(f"{name} = n[{k}];" for k, name in enumerate(new)),
         *(f"{name} = flow[{k}];" for k, name in enumerate(flow)),
         f"{failures} = count[0];",

@@ -11,7 +11,7 @@ from __future__ import annotations
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph
-from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, STILL, most_cuts
+from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, most_cuts
 from bywire.simulation.operation import Node
 from bywire.simulation.quadrature import Levels
 from bywire.simulation.stages import STATE, Stages
@@ -35,10 +35,10 @@ static APART int settle(const double *c, double h, const double *m, const double
 """
 
 _CUT = """
-// Where a substep was cut: length of each part but the last, and which state is zero at its end.
-typedef struct { int count, state[CUTS]; double length[CUTS]; } cuts;
+// Where a substep was cut: length of each part but the last, and which velocity is zero at its end.
+typedef struct { int count, which[CUTS]; double length[CUTS]; } cuts;
 
-// The velocity that is the first to change its sign within a part, -1 if none does, and when.
+// Which velocity is the first to change its sign within a part, -1 if none does, and when.
 static inline int first_turn(const double *x, const double *o, double *share) {
   int first = -1;
   *share = 1.0;
@@ -46,14 +46,14 @@ static inline int first_turn(const double *x, const double *o, double *share) {
     const double v = x[velocity[k]], w = o[velocity[k]];
     if (v * w * o[JUMP + k] < 0.0 && v / (v - w) <= *share) {
       *share = v / (v - w);
-      first = velocity[k];
+      first = k;
     }
   }
   return first;
 }
 
 // A part of length t; last: half increments of a whole substep h, from which it is predicted.
-static int part(const double *c, double h, double t, const double *m, const double *x,
+static inline int part(const double *c, double h, double t, const double *m, const double *x,
     const double *last, double *d, double *o) {
   for (int k = 0; k < NX; ++k) d[k] = last[k] * (t / h);
   return settle(c, t, m, x, d, o);
@@ -71,66 +71,83 @@ static inline double zero_of(double v, double w, double t, double before, double
 
 // Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
 // through three lengths, within what is known to lie before and behind. Before, o is that of *t in
-// the velocities, behind in everything. Return which velocity it is; failed: that part did not
-// settle.
+// the velocities, behind in everything. Return which velocity it is, -1 if its friction turns out
+// not to jump; failed: that part did not settle.
 static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
     const double *last, double *o, int *failed) {
   double d[NX], share, low = 0.0, high = *t;
   const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
-  int turns = first_turn(x, o, &share);
+  int which = first_turn(x, o, &share), turns = velocity[which];
   double P = 0.0, at_P = x[turns], Q = *t, at_Q = o[turns];
   double N = zero_of(at_P, at_Q, Q, 2.0 * last[turns] / h, h);
-  double close = CLOSE * fabs(at_P - at_Q);
+  double change = fabs(at_P - at_Q), before = 0.0, was[RESULTS];
   for (int n = 1;; ++n) { // what is left of the last attempt is of the length that is returned
     N = fmin(fmax(N, first), final);
     *failed = part(c, h, N, m, x, last, d, o);
-    const int other = first_turn(x, o, &share);
-    if (other >= 0 && other != turns && n < ATTEMPTS) { // another one is earlier
-      turns = other;
+    if (o[JUMP + which] == 0.0) return -1;
+    const int other = VELOCITIES > 1 ? first_turn(x, o, &share) : -1;
+    if (other >= 0 && other != which && n < ATTEMPTS) { // another one is earlier
+      which = other, turns = velocity[which];
       low = 0.0, high = N;
       P = 0.0, at_P = x[turns], Q = N, at_Q = o[turns], N = N * share;
-      close = CLOSE * fabs(at_P - at_Q);
+      change = fabs(at_P - at_Q), before = 0.0;
       continue;
     }
     const double at_N = o[turns];
-    if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q || n == ATTEMPTS) break;
+    if (fabs(at_N) <= CLOSE * change || N <= first || N >= final || N == P || N == Q
+        || n == ATTEMPTS) break;
     if (at_N * x[turns] > 0.0) low = N; else high = N;
     const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
         - (at_Q - at_P) / (Q - P);
     const double next = N - at_N / slope;
+    if (fabs(at_N) <= NEAR * change && before > 0.0) { // the rest on the line through two attempts
+      const double share = (next - N) / (N - before);
+      #pragma omp simd
+      for (int k = 0; k < JUMP; ++k) o[k] += share * (o[k] - was[k]);
+      N = next;
+      break;
+    }
+    memcpy(was, o, sizeof(was));
+    before = N;
     if (fabs(P - next) > fabs(Q - next)) P = N, at_P = at_N; else Q = N, at_Q = at_N;
     N = next > low && next < high ? next : 0.5 * (low + high);
   }
   *t = N;
-  return turns;
+  return which;
 }
 
-// At the end of a part that was cut, from speeds x: what is zero there, with its increment.
-static inline void rest(const double *x, int turns, double *at, double *last) {
-  at[turns] = last[turns] = 0.0;
+// Half the increment behind a zero of what had a before it: less by the jump of friction, which
+// opposes the other direction, and nothing where it holds.
+static inline double turned_back(double a, double j) {
+  return copysign(fmax(fabs(a) - j, 0.0), a);
+}
+
+// At the end of a part of length t of a substep h that was cut, from speeds x: what is zero there
+// in o, and last, half increments from which the next part is predicted.
+static inline void rest(const double *x, int which, double t, double h, double *o, double *last) {
+  for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
   for (int k = 0; k < VELOCITIES; ++k) {
     const int v = velocity[k]; // bodies that are alike stop at once
-    if (fabs(at[v]) < STILL * fabs(x[v])) at[v] = last[v] = 0.0;
+    if (k != which && fabs(o[v]) >= STILL * fabs(x[v])) continue;
+    o[v] = 0.0;
+    last[v] = turned_back(last[v], o[JUMP + k] * (h / t));
   }
 }
 
-// A substep, repeated until it settles, and cut where velocities pass zero. Behind a cut
-// accelerations differ from those that the midpoint was predicted from: the last part is computed
-// twice.
+// A substep, repeated until it settles, and cut where velocities pass zero. known: o holds
+// velocities of the whole substep, which has settled, from an ordinary pass.
 static APART int located(const double *c, double h, const double *m, const double *x,
-    const double *d, double *o, cuts *made) {
+    const double *d, int known, double *o, cuts *made) {
   double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
   int failed = 0, before = 0;
   memcpy(at, x, sizeof(at));
   memcpy(last, d, sizeof(last));
   memset(sum, 0, sizeof(sum));
-  for (made->count = 0;; ++made->count) {
-    failed = part(c, h, left, m, at, last, guess, o);
-    if (made->count) {
-      memcpy(guess, o + NX, sizeof(guess));
-      failed = settle(c, left, m, at, guess, o);
-    }
-    if (first_turn(at, o, &share) < 0) break;
+  for (int k = 0; k < VELOCITIES; ++k) o[JUMP + k] = known;
+  for (made->count = 0;; known = 0, ++made->count) {
+    if (!known) failed = part(c, h, left, m, at, last, guess, o);
+    const int turns = first_turn(at, o, &share) >= 0;
+    if (!turns && !known) break;
     if (made->count == CUTS) { // there is no end to it
       for (int k = 0; k < VELOCITIES; ++k)
         if (at[velocity[k]] * o[velocity[k]] * o[JUMP + k] < 0.0) o[velocity[k]] = 0.0;
@@ -138,13 +155,16 @@ static APART int located(const double *c, double h, const double *m, const doubl
       break;
     }
     double t = left;
-    const int turns = locate(c, h, &t, m, at, last, o, &failed);
+    const int which = turns ? locate(c, h, &t, m, at, last, o, &failed) : -1;
+    if (which < 0) { // then once more, knowing nothing
+      --made->count;
+      continue;
+    }
     before |= failed;
-    for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
-    rest(at, turns, o, last);
+    rest(at, which, t, h, o, last);
     memcpy(at, o, sizeof(at));
     for (int k = 0; k < FLOWS; ++k) sum[k] += o[FLOW + k] * (t / h);
-    made->state[made->count] = turns;
+    made->which[made->count] = which;
     made->length[made->count] = t;
     left -= t;
   }
@@ -177,12 +197,18 @@ enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocit
   CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
+#define NEAR {NEAR}
 #define STILL {STILL}
 static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};
 {_constants_function(stages.graph, slots)}
 {_pass_function(stages, stages.fast, slots, "fast_pass", APART)}
 {_pass_function(stages, stages.exact, slots, "exact_pass", "RARE")}
 {_SETTLE}{_CUT}"""
+
+
+def rare_roots(stages: Stages) -> list[Node]:
+    """Return all that the passes of a rare substep give."""
+    return [*_roots(stages.fast), *_roots(stages.exact)]
 
 
 def _roots(results: dict[str, list[Node]]) -> list[Node]:
@@ -192,7 +218,7 @@ def _roots(results: dict[str, list[Node]]) -> list[Node]:
 def _constants(stages: Stages) -> dict[Node, int]:
     """Return the places of what follows from parameters alone and is read beside other things."""
     graph, level = stages.graph, Levels(stages.graph, {"p": 0})
-    roots = [*_roots(stages.fast), *_roots(stages.exact)]
+    roots = rare_roots(stages)
     order = needed(graph, roots, lambda _: False)
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
     read = [*roots, *(a for node in readers for a in graph.arguments(node))]

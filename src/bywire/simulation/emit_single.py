@@ -137,7 +137,7 @@ def emit_single(stages: Stages) -> str:
       {indented([line for k, each in enumerate(groups) for line in renewed(k, each)], 6)}
       {indented(substep(rest, frozenset(pass_roots)), 6)}
       if (__builtin_expect({condition(graph, stages.fast["flag"][0], name)}, 0)) {{
-        {indented(_repeat(layout) + ahead, 8)}
+        {indented(_repeat(stages, results, name) + ahead, 8)}
       }} else {{
         {indented(_commit(results, products, name) + ahead, 8)}
       }}
@@ -204,7 +204,8 @@ def _integrals(stages: Stages, name: Namer) -> list[str]:
     return lines
 
 
-def _repeat(layout: Layout) -> list[str]:
+def _repeat(stages: Stages, results: dict[str, Node], name: Namer) -> list[str]:
+    graph, layout = stages.graph, layout_of(stages)
     nx, nm = layout.length["x"], layout.length["m"]
     xs = ", ".join(f"x{k}" for k in range(nx))
     ds = ", ".join(f"d{k}" for k in range(nx))
@@ -213,8 +214,10 @@ def _repeat(layout: Layout) -> list[str]:
         "double o[RESULTS];",
         f"const double xs[] = {{{xs}}}, ms[] = {{{ms}}};",
         f"const double ds[] = {{{ds}}};",
+        f"const int known = !({condition(graph, stages.fast['doubtful'][0], name)});",
+        *(f"o[{v}] = {as_number(graph, results[f'x{v}'], name)};" for v in stages.velocities),
         "cuts made;",
-        "failures += located(c, h, ms, xs, ds, o, &made);",
+        "failures += located(c, h, ms, xs, ds, known, o, &made);",
         "repeats += 1.0;",
     ]
     at = 0

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 CAP = 8  # passes through one substep before it is counted as unsettled
 JUMP, FLAG, DOUBT = 4, 5, 6  # places among the results of a pass, behind x, d, r, q
 # Where a substep is cut: how often the instant is tried, within which share of the substep's change
-# of velocity it counts as met, and the least share of a part that is cut off or left.
-ATTEMPTS, CLOSE, EDGE = 12, 1e-12, 1e-9
+# of velocity it counts as met, or as so near that a line leads there, and the least share of a part
+# that is cut off or left.
+ATTEMPTS, CLOSE, NEAR, EDGE = 12, 1e-12, 1e-9, 1e-9
 STILL = 1e-9  # share of its speed below which another velocity counts as zero at the same instant
 
 

@@ -55,7 +55,8 @@ class Pass:
         Positive where the pass must be repeated: a contact set changed, a limit was crossed, or the
         projection of the frictions failed.
     jump
-        By how much each dry friction would change where its velocity changes sign, shape (m,).
+        By how much half the increment of each velocity with dry friction is less behind a change
+        of its sign, by its mass alone, shape (m,).
     turn
         Positive where a velocity with dry friction does: where that jumps, the substep is cut.
     """
@@ -105,8 +106,14 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     at_y = K @ closed
     linear = _linearize(model, par, s, y, K, gaps)
     bounds = _bounds(model, par, s, y, at_y)
-    jump = column([high - low for low, high in bounds])
     mass = column(model.mass(symbol_tuple(model.State, y), par))
+    rubbing = [_index(model, name) for name in model.frictions]
+    jump = column(
+        [
+            0.5 * s.h * (high - low) / mass[k]
+            for k, (low, high) in zip(rubbing, bounds, strict=True)
+        ]
+    )
     A = ca.diag(2.0 / s.h * mass) - linear.J
     right = dict(enumerate(linear.rows))
     kept = _set_valued_states(model, exact)

@@ -31,7 +31,7 @@ class Stages:
     ----------
     fast, exact
         Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
-        ``Program``. The flag of the fast one is a truth value.
+        ``Program``. The flag of the fast one is a truth value, and so is its ``doubtful``.
     ticks
         Nodes of the memory after each task.
     output
@@ -128,6 +128,7 @@ def build_stages(
         quadrature = quadrature.of(wanted)
         fast["q"] = [n if is_read else zero for n, is_read in zip(fast["q"], wanted, strict=True)]
     fast["flag"] = [raised(graph, fast["flag"][0])]
+    fast["doubtful"] = [raised(graph, fast["doubt"][0])]
     return Stages(
         graph=graph,
         fast=fast,

@@ -18,7 +18,8 @@
 #define CAP 8            /* passes after which a substep whose contacts change is let go */
 #define FAR_DECAYED 40.0 /* exp(-40) is far below the last digit of 1 */
 #define TRIES 12         /* lengths tried to find where a speed passes zero */
-#define CLOSE 1e-11      /* share of a speed's change that counts as zero there */
+#define CLOSE 1e-12      /* share of a speed's change that counts as zero there */
+#define NEAR 1e-9        /* share within which a line through two lengths leads there */
 #define EDGE 1e-6        /* least share of a part that is cut off or left */
 #define CUTS 4           /* after which a substep is let go */
 #define BRINK 1e-9       /* share of the stroke at which a stop counts as near */
@@ -70,7 +71,7 @@ typedef struct { Sim s; double m[M_COUNT], e[E_COUNT]; } Saved;
 
 /* Which of the stops push, as stiffnesses, and whether the chamber is held at zero pressure. */
 typedef struct { bool touching, held; double k_near, k_far; } Sides;
-typedef struct { double om, i, dpm, dpd, impulse; } Pass;
+typedef struct { double om, i, dpm, dpd, impulse, way, load, limit; } Pass;
 
 INLINE double max2(double a, double b) { return a > b ? a : b; }
 INLINE double min2(double a, double b) { return a < b ? a : b; }
@@ -167,6 +168,7 @@ INLINE Pass solve(const Plant *k, const Held *u, const Sim *s, Sides side)
     Pass q;
     q.impulse = -copysign(s->om == 0.0 && fabs(c) < limit ? fabs(c) : limit, way);
     q.om = (c + q.impulse) * (1.0 / S);
+    q.way = way, q.load = load, q.limit = limit;
     const double both = s->om + q.om;
     q.i = u->alpha * s->i + u->drive - u->gamma * both;
     q.dpm = side.held ? -s->pm : r * (k->a * both - k->two_g * drop);
@@ -262,19 +264,32 @@ static void try_part(Part *y, const Plant *k, double duty, const Sim *s, double 
     settle(y, duty);
 }
 
+/* By how much half an increment of the speed is less behind a zero: friction jumps, and opposes the
+ * other direction, or holds. */
+static double jump(const Part *y)
+{
+    const Plant *k = &y->k;
+    const double om = y->s.om + y->s.dom, speed = fabs(om);
+    const double decay = speed < k->still ? exp(-k->c * speed) : 0.0;
+    const double coulomb = k->T_pr + (y->q.way > 0.0 ? k->f_n : k->f_p) * y->q.load;
+    const double peak = coulomb * (y->q.way > 0.0 ? k->brk_n : k->brk_p);
+    return 0.5 * (y->q.limit + (coulomb + k->mu * speed) + peak * decay) / k->M;
+}
+
 /* Shorten a part of length t to where the speed is zero: by the parabola through three lengths,
  * within what is known to lie before and behind. Return the length. */
 static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double t)
 {
     const double first = EDGE * t, final = (1.0 - EDGE) * t;
     double low = 0.0, high = t, P = 0.0, at_P = s->om, Q = t, at_Q = y->q.om;
-    const double close = CLOSE * fabs(at_P - at_Q);
-    double N = t * at_P / (at_P - at_Q);
+    const double change = fabs(at_P - at_Q);
+    double N = t * at_P / (at_P - at_Q), before = 0.0;
+    Pass was = y->q;
     for (int n = 1;; n++) {
         N = clip(N, first, final);
         try_part(y, k, duty, s, N);
         const double at_N = y->q.om;
-        if (fabs(at_N) <= close || N <= first || N >= final || N == P || N == Q || n == TRIES)
+        if (fabs(at_N) <= CLOSE * change || N <= first || N >= final || N == P || N == Q || n == TRIES)
             break;
         if (at_N * s->om > 0.0)
             low = N;
@@ -283,6 +298,15 @@ static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double
         const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
                              - (at_Q - at_P) / (Q - P);
         const double next = N - at_N / slope;
+        if (fabs(at_N) <= NEAR * change && before > 0.0) {
+            const double share = (next - N) / (N - before);
+            y->q.om += share * (y->q.om - was.om), y->q.i += share * (y->q.i - was.i);
+            y->q.dpm += share * (y->q.dpm - was.dpm), y->q.dpd += share * (y->q.dpd - was.dpd);
+            y->q.impulse += share * (y->q.impulse - was.impulse);
+            N = next, y->k = with_step(k, N);
+            break;
+        }
+        was = y->q, before = N;
         if (fabs(P - next) > fabs(Q - next))
             P = N, at_P = at_N;
         else
@@ -293,8 +317,8 @@ static double shorten(Part *y, const Plant *k, double duty, const Sim *s, double
 }
 
 /* A substep near a stop, with the pressure about to fall below zero, or in which the speed passes
- * zero: there it is cut, for friction jumps, and the shaft rests or turns on as friction decides.
- * Behind a cut the midpoint is predicted anew, from a first pass. */
+ * zero: there it is cut, for friction jumps, and the shaft rests or turns on as friction decides,
+ * from whose jump the midpoint behind the cut is predicted. */
 static void careful(const Plant *k, double duty, Sim *s)
 {
     double left = k->h;
@@ -302,15 +326,11 @@ static void careful(const Plant *k, double duty, Sim *s)
     Part y;
     for (int cuts = 0;; cuts++) {
         try_part(&y, k, duty, s, left);
-        if (cuts) {
-            y.s = *s;
-            predict(&y.k, &y.s, y.q);
-            settle(&y, duty);
-        }
         const bool turns = s->om * y.q.om < 0.0, cut = turns && cuts < CUTS;
         if (turns && !cut)
             y.q.om = 0.0;
         const double t = cut ? shorten(&y, k, duty, s, left) : left, share = t / k->h;
+        const double less = cut ? jump(&y) / share : 0.0;
         settled &= y.settled && turns == cut;
         book_sides(&y.k, &y.s, y.q, y.side, share);
         commit(&y.k, &y.s, y.q, share);
@@ -318,7 +338,7 @@ static void careful(const Plant *k, double duty, Sim *s)
         stretch(s, 1.0 / share);
         if (!cut)
             break;
-        s->om = s->dom = 0.0, left -= t;
+        s->om = 0.0, s->dom = copysign(max2(fabs(s->dom) - less, 0.0), s->dom), left -= t;
     }
     s->careful += 1.0, s->unsettled += !settled;
 }
