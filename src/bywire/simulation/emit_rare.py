@@ -39,7 +39,7 @@ def rare_substep(stages: Stages) -> str:
 #define APART {APART}
 enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
   JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, CONSTANTS = {len(slots)},
-  ROWS = {rows}, POSED = {len(stages.posed)}, CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
+  SETS = {rows}, POSED = {len(stages.posed)}, CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
 #define STILL {STILL}
@@ -92,7 +92,7 @@ def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
     if not stages.rows:
         return ["const double failed[] = {0.0};", "(void)failed;", *after]
     return [
-        "double posed[POSED], w[ROWS], force[ROWS];",
+        "double posed[POSED], w[SETS], force[SETS];",
         *posed,
         "const double failed[] = {project(posed, w, force)};",
         *after,

@@ -7,14 +7,14 @@ PROJECTION = """
 // Solve S w = b of the rows that move, by elimination on the diagonal; where none does, nothing.
 static inline void with_signs(const double *S, const double *c, const double *low, const double *high,
     const int *sign, double *w) {
-  double A[ROWS][ROWS], b[ROWS], inverse[ROWS];
-  int at[ROWS], n = 0;
-  for (int k = 0; k < ROWS; ++k) {
+  double A[SETS][SETS], b[SETS], inverse[SETS];
+  int at[SETS], n = 0;
+  for (int k = 0; k < SETS; ++k) {
     w[k] = 0.0;
     if (sign[k]) at[n++] = k;
   }
   for (int i = 0; i < n; ++i) {
-    for (int j = 0; j < n; ++j) A[i][j] = S[at[i] * ROWS + at[j]];
+    for (int j = 0; j < n; ++j) A[i][j] = S[at[i] * SETS + at[j]];
     b[i] = c[at[i]] + (sign[at[i]] > 0 ? low[at[i]] : high[at[i]]);
   }
   for (int k = 0; k < n; ++k) {
@@ -36,11 +36,11 @@ static inline void with_signs(const double *S, const double *c, const double *lo
 static inline double misfit(const double *S, const double *c, const double *low,
     const double *high, const double *w) {
   double total = 0.0;
-  for (int k = 0; k < ROWS; ++k) {
-    const double inverse = 1.0 / S[k * ROWS + k];
+  for (int k = 0; k < SETS; ++k) {
+    const double inverse = 1.0 / S[k * SETS + k];
     double others = 0.0, parts = fabs(c[k]);
-    for (int j = 0; j < ROWS; ++j) {
-      const double part = j == k ? 0.0 : S[k * ROWS + j] * w[j];
+    for (int j = 0; j < SETS; ++j) {
+      const double part = j == k ? 0.0 : S[k * SETS + j] * w[j];
       others += part;
       parts += fabs(part);
     }
@@ -53,28 +53,28 @@ static inline double misfit(const double *S, const double *c, const double *low,
 
 // Try every combination of signs and take the one that fits best; return whether it fails.
 static APART int project(const double *posed, double *w, double *force) {
-  const double *S = posed, *c = S + ROWS * ROWS, *low = c + ROWS, *high = low + ROWS;
-  double best = NEVER, tried[ROWS];
-  int sign[ROWS] = {0}, k = 0;
-  memset(w, 0, ROWS * sizeof(double));
+  const double *S = posed, *c = S + SETS * SETS, *low = c + SETS, *high = low + SETS;
+  double best = NEVER, tried[SETS];
+  int sign[SETS] = {0}, k = 0;
+  memset(w, 0, SETS * sizeof(double));
   while (k >= 0) {
     with_signs(S, c, low, high, sign, tried);
     double total = misfit(S, c, low, high, tried);
-    for (int i = 0; i < ROWS; ++i) total += !sign[i] && low[i] >= high[i];
+    for (int i = 0; i < SETS; ++i) total += !sign[i] && low[i] >= high[i];
     if (total < best) {
       best = total;
       memcpy(w, tried, sizeof(tried));
     }
-    for (k = ROWS - 1; k >= 0; --k) { // 0, 1, -1, the last row first
+    for (k = SETS - 1; k >= 0; --k) { // 0, 1, -1, the last row first
       sign[k] = sign[k] ? (sign[k] > 0 ? -1 : 0) : 1;
       if (sign[k]) break;
     }
   }
   const double left = misfit(S, c, low, high, w) * NOTHING;
-  for (int i = 0; i < ROWS; ++i) w[i] += left;
-  for (int i = 0; i < ROWS; ++i) {
+  for (int i = 0; i < SETS; ++i) w[i] += left;
+  for (int i = 0; i < SETS; ++i) {
     double sum = 0.0;
-    for (int j = 0; j < ROWS; ++j) sum += S[i * ROWS + j] * w[j];
+    for (int j = 0; j < SETS; ++j) sum += S[i * SETS + j] * w[j];
     const double held = sum - c[i] > low[i] ? sum - c[i] : low[i];
     force[i] = held < high[i] ? held : high[i];
   }
