@@ -24,33 +24,39 @@ function section(id, items) {
 
 const named = (name) => [name.length, ...new TextEncoder().encode(name)];
 
-/** Return values (inputs, constants, then operations with their operands) and formulas. */
+/** Return values (inputs, constants, operations with their operands) and formulas. */
 function readTable(buffer) {
   const view = new DataView(buffer), bytes = new Uint8Array(buffer);
   const [count, operands, length] = [0, 2, 4].map((at) => view.getUint16(at, true));
-  let at = 6 + count, next = 6 + count + operands;
+  let at = 6 + count, next = at + operands;
+  const behind = next + 2 * length;
   const number = () => bytes[next] | bytes[next++ + length] << 8;
   const row = (n) => Array.from({ length: n }, number);
   const steps = (n) => { let sum = 0; return row(n).map((each) => (sum = sum + each & 0xffff)); };
   const inputs = number(), constants = number(), formulas = number();
   const values = steps(inputs).map((place) => ({ place }));
-  const from = 6 + count + operands + 2 * length;
   for (let k = 0; k < constants; ++k)
-    values.push({ constant: new Uint8Array(buffer, from + 8 * k, 8) });
-  const made = [];
-  for (let k = 0; k < formulas; ++k) {
+    values.push({ constant: new Uint8Array(buffer, behind + 8 * k, 8) });
+  const made = Array.from({ length: formulas }, () => {
     const again = number(), n = number();
-    made.push({ again, results: row(n), places: steps(n) });
-  }
-  const operand = (here) => {
+    return { again, results: steps(n), places: steps(n) };
+  });
+  const kinds = row(number()), often = steps(number());
+  const names = values.map((_, k) => k), stack = [];
+  const operand = () => {
     const byte = bytes[at++];
-    return byte === 0 ? number() : byte <= NEAR ? here - byte : byte - NEAR - 1;
+    return names[byte === 0 ? number() : byte > NEAR ? often[byte - NEAR - 1] : names.length - byte];
   };
   for (let k = 0; k < count; ++k) {
-    const op = OPERATIONS[bytes[6 + k]], here = values.length;
+    const kind = kinds[bytes[6 + k]], op = OPERATIONS[kind >> 4];
     const several = UNARY.has(op) ? 1 : op === "select" ? 3 : 2;
-    values.push({ op, args: Array.from({ length: several }, () => operand(here)) });
+    const isOperand = [1, 2, 3].map((bit) => kind >> bit & 1).slice(0, several);
+    const taken = stack.splice(stack.length - isOperand.filter((is) => !is).length);
+    const args = isOperand.map((is) => (is ? operand() : taken.shift()));
+    (kind & 1 ? names : stack).push(values.length);
+    values.push({ op, args });
   }
+  for (const each of made) each.results = each.results.map((name) => names[name]);
   return { values, formulas: made };
 }
 
