@@ -27,8 +27,6 @@ def rare_substep(stages: Stages) -> str:
 
     ``constants(p, c)`` fills c, shape (CONSTANTS,), with what they read of the parameters p.
     """
-    velocities, rows = stages.velocities, stages.rows
-    nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     slots = _constants(stages)
     return f"""
 #if defined(QUICK) && !defined(__clang__)
@@ -36,31 +34,40 @@ def rare_substep(stages: Stages) -> str:
 #else
 #define RARE __attribute__((noinline, cold))
 #endif
-#define APART {APART}
+{rare_header(stages)}
+enum {{ CONSTANTS = {len(slots)}, POSED = {len(stages.posed)} }};
+{_constants_function(stages.graph, slots)}
+{_pass_function("fast_pass", APART, _lines(stages, rare_results(stages.fast), slots))}
+{PROJECTION if stages.rows else ""}{_pass_function("exact_pass", "RARE", _exact(stages, slots))}
+{CUT}"""
+
+
+def rare_header(stages: Stages) -> str:
+    """Return what the C text of `rare_text` is told of a model."""
+    nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
+    velocities = stages.velocities
+    return f"""#define APART {APART}
 enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
-  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, CONSTANTS = {len(slots)},
-  SETS = {rows}, POSED = {len(stages.posed)}, CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
+  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, SETS = {stages.rows},
+  CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
 #define STILL {STILL}
 #define NEVER {NEVER}
 #define NOTHING {NOTHING}
 #define RESIDUAL {RESIDUAL}
-static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};
-{_constants_function(stages.graph, slots)}
-{_pass_function("fast_pass", APART, _lines(stages, _results(stages.fast), slots))}
-{PROJECTION if rows else ""}{_pass_function("exact_pass", "RARE", _exact(stages, slots))}
-{CUT}"""
+static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};"""
 
 
-def _results(results: dict[str, list[Node]]) -> list[Node]:
+def rare_results(results: dict[str, list[Node]]) -> list[Node]:
+    """Return the results of a pass in the order of o."""
     return [node for kind in (*STATE, "jump", "doubt") for node in results[kind]]
 
 
 def _constants(stages: Stages) -> dict[Node, int]:
     """Return the places of what follows from parameters alone and is read beside other things."""
     graph, level = stages.graph, Levels(stages.graph, {"p": 0})
-    roots = [*_results(stages.fast), *stages.posed, *_results(stages.exact)]
+    roots = [*rare_results(stages.fast), *stages.posed, *rare_results(stages.exact)]
     order = needed(graph, roots, lambda _: False)
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
     read = [*roots, *(a for node in readers for a in graph.arguments(node))]
@@ -88,7 +95,7 @@ def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
     """Return the statements of the exact pass, between whose halves forces are looked for."""
     posed = _lines(stages, stages.posed, slots, "posed")
     known = frozenset(needed(stages.graph, stages.posed, slots.__contains__))
-    after = _lines(stages, _results(stages.exact), slots, "o", known)
+    after = _lines(stages, rare_results(stages.exact), slots, "o", known)
     if not stages.rows:
         return ["const double failed[] = {0.0};", "(void)failed;", *after]
     return [

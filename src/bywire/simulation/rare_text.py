@@ -5,8 +5,8 @@ from __future__ import annotations
 # The same as ``set_valued.project_exact``, which says why, in a loop: that is a tenth of the code.
 PROJECTION = """
 // Solve S w = b of the rows that move, by elimination on the diagonal; where none does, nothing.
-static inline void with_signs(const double *S, const double *c, const double *low, const double *high,
-    const int *sign, double *w) {
+static inline void with_signs(const double *S, const double *c, const double *low,
+    const double *high, const int *sign, double *w) {
   double A[SETS][SETS], b[SETS], inverse[SETS];
   int at[SETS], n = 0;
   for (int k = 0; k < SETS; ++k) {

@@ -10,9 +10,10 @@ from __future__ import annotations
 
 import struct
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
+from bywire.core.errors import CompilerError
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.operation import Node
@@ -25,6 +26,7 @@ OPERATIONS = (
 """In the order of their numbers in the table; the loader has the same."""
 
 _NEAR = 64  # named values back that a byte of an operand reaches; 0 is none, above it are others
+_MOST = 0xFFFF  # lengths and names have two bytes
 _EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # operands may change places
 
 Places = Mapping[tuple[str, int], int]
@@ -105,6 +107,11 @@ def table(formulas: Sequence[Formula], places: Places) -> bytes:
     ----------
     places
         Where inputs stand in the working memory, by kind and index.
+
+    Raises
+    ------
+    CompilerError
+        When there are more than the table can name.
     """
     orders = [needed(f.graph, [n for _, n in f.results], lambda _: False) for f in formulas]
     uses, graphs = _uses(formulas, orders)
@@ -155,8 +162,12 @@ def _packed(
 ) -> bytes:
     """Return lengths and planes: bytes that are alike stand together."""
     kinds = [kind for kind, _ in Counter(made.tokens).most_common()]
-    if max(len(kinds) - 200, len(made.tokens), len(made.operands), len(numbers)) > 0xFFFF:
-        raise ValueError("these are too many operations for a table of formulas")
+    count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
+    if count > _MOST or len(kinds) > 255:
+        raise CompilerError(
+            f"a module has room for {_MOST} operands of its formulas, and these have {count}: "
+            "export the run as an FMU, whose kernel is compiled"
+        )
     far = Counter(name for name, count in made.operands if not _is_near(name, count, leaves))
     often = sorted(name for name, _ in far.most_common(255 - _NEAR))
     code = {name: _NEAR + 1 + k for k, name in enumerate(often)}

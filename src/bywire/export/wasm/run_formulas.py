@@ -10,12 +10,11 @@ from bywire.export.initial_values import start_nodes
 from bywire.export.model_header import braced, number
 from bywire.export.wasm.formulas import OPERATIONS, Formula, table
 from bywire.simulation.emission import leaf_count, unread
+from bywire.simulation.emit_rare import rare_header, rare_results
 from bywire.simulation.expressions import needed
 from bywire.simulation.graph import Graph
-from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, STILL, most_cuts
 from bywire.simulation.operation import Node, Operation
 from bywire.simulation.rare_text import PROJECTION
-from bywire.simulation.set_valued import NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages
 
 _OWN = OPERATIONS[OPERATIONS.index("exp") : OPERATIONS.index("pow") + 1]  # functions of the kernel
@@ -33,8 +32,7 @@ def run_formulas(made: Exported) -> RunFormulas:
     """Return the formulas of a run."""
     stages, graph = made.stages, made.stages.graph
     lengths = {kind: len(stages.fast[kind]) for kind in STATE}
-    results = [node for kind in (*STATE, "jump", "doubt") for node in stages.fast[kind]]
-    exact = [node for kind in (*STATE, "jump", "doubt") for node in stages.exact[kind]]
+    results, exact = rare_results(stages.fast), rare_results(stages.exact)
     products = stages.quadrature.products
     blocks = {
         **lengths, "m": len(stages.ticks[0]), "counters": 2, "p": made.program.sizes.parameters,
@@ -52,8 +50,10 @@ def run_formulas(made: Exported) -> RunFormulas:
         return [(at[kind] + k, node) for k, node in enumerate(nodes)]
 
     skipped = unread(stages)
-    again = [(at[kind] + k, node) for kind in ("x", "d", "r")
-             for k, node in enumerate(stages.fast[kind]) if f"{kind}{k}" not in skipped]  # fmt: skip
+    again = [
+        (at[kind] + k, node) for kind in ("x", "d", "r")
+        for k, node in enumerate(stages.fast[kind]) if f"{kind}{k}" not in skipped
+    ]  # fmt: skip
     start = start_nodes(made)
     others = [
         Formula(graph, [(0, stages.fast["flag"][0]), *again, *placed("s", products)], len(again)),
@@ -94,37 +94,27 @@ def _kept(stages: Stages, roots: Sequence[Node]) -> list[Node]:
     order = needed(graph, roots, lambda _: False)
     readers = [node for node in order if level[node] or graph.is_boolean(node)]
     read = [*roots, *(a for node in readers for a in graph.arguments(node))]
-    return [node for node in dict.fromkeys(read)
-            if not level[node] and not graph.is_boolean(node) and graph.arguments(node)]  # fmt: skip
+    return [
+        node for node in dict.fromkeys(read)
+        if not level[node] and not graph.is_boolean(node) and graph.arguments(node)
+    ]  # fmt: skip
 
 
 def _header(made: Exported, at: dict[str, int], total: int, used: set[str]) -> str:
-    stages, schedule, velocities = made.stages, made.schedule, made.stages.velocities
-    nx, nr, nq = (len(stages.fast[kind]) for kind in ("x", "r", "q"))
+    stages, schedule = made.stages, made.schedule
     places = ", ".join(f"{kind.upper()}_AT = {place}" for kind, place in at.items())
-    rows = stages.rows
-    return f"""#define APART __attribute__((noinline))
-#define STEP {number(schedule.step)}
-#define EDGE {EDGE}
-#define CLOSE {CLOSE}
-#define STILL {STILL}
-#define NEVER {NEVER}
-#define NOTHING {NOTHING}
-#define RESIDUAL {RESIDUAL}
+    projected = "project(area + POSED_AT, area + W_AT, area + FORCE_AT)" if stages.rows else "0.0"
+    return f"""{rare_header(stages)}
 enum {{ {places}, AREA = {total} }};
-enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
-  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, SETS = {rows},
-  PRODUCTS = {len(stages.quadrature.products)}, STIMULI = {leaf_count(stages, "u")},
+enum {{ PRODUCTS = {len(stages.quadrature.products)}, STIMULI = {leaf_count(stages, "u")},
   ROWS = {len(stages.output)}, STATE = {made.layout.total}, SUBSTEPS = {schedule.substeps},
-  TASKS = {len(schedule.task_frames)}, CAP = {CAP}, CUTS = {most_cuts(len(velocities))},
-  ATTEMPTS = {ATTEMPTS} }};
-static const int velocity[] = {braced(map(str, velocities))};
+  TASKS = {len(schedule.task_frames)} }};
+#define STEP {number(schedule.step)}
+#define PROJECTED {projected}
 static const int task_frames[] = {braced(map(str, schedule.task_frames))};
 static const double state_start[] = {braced(map(number, made.vector))};
-{"".join(_lent(op) for op in _OWN if op in used)}
-{PROJECTION if rows else ""}
-#define PROJECTED {"project(area + POSED_AT, area + W_AT, area + FORCE_AT)" if rows else "0.0"}
-"""
+{PROJECTION if stages.rows else ""}
+{"".join(_lent(op) for op in _OWN if op in used)}"""
 
 
 def _lent(op: str) -> str:
