@@ -17,10 +17,16 @@ function leb(number) {
   return [...bytes, number];
 }
 
-function section(id, items) {
-  const body = [...leb(items.length), ...items.flat()];
-  return [id, ...leb(body.length), ...body];
+/** Return bytes with their number before them. */
+function counted(...parts) {
+  const length = parts.reduce((sum, part) => sum + part.length, 0), start = leb(length);
+  const bytes = new Uint8Array(start.length + length);
+  let at = 0;
+  for (const part of [start, ...parts]) { bytes.set(part, at); at += part.length; }
+  return bytes;
 }
+
+const section = (id, items) => [[id], counted(leb(items.length), ...items)];
 
 const named = (name) => [name.length, ...new TextEncoder().encode(name)];
 
@@ -54,7 +60,7 @@ function readTable(buffer) {
     const taken = stack.splice(stack.length - isOperand.filter((is) => !is).length);
     const args = isOperand.map((is) => (is ? operand() : taken.shift()));
     (kind & 1 ? names : stack).push(values.length);
-    values.push({ op, args });
+    values.push({ op, args, isTruth: TRUTHS.has(op) });
   }
   for (const each of made) each.results = each.results.map((name) => names[name]);
   return { values, formulas: made };
@@ -62,103 +68,100 @@ function readTable(buffer) {
 
 /** Return the body of the function that computes a formula, in a working memory from `base` on. */
 function bodyOf({ again, results, places }, values, kept, base) {
-  const uses = new Map(), code = [], types = [], locals = new Map();
+  const uses = new Uint32Array(values.length), locals = new Int32Array(values.length).fill(-1);
+  const code = [], types = [], held = new Map(); // held: locals of what stands in memory, by place
   const isOther = (v) => !values[v].op || kept.has(v); // there is nothing to compute
-  const isTruth = (v) => TRUTHS.has(values[v].op);
   const stack = [...results];
   while (stack.length) {
-    const v = stack.pop(), isKnown = uses.has(v);
-    uses.set(v, (uses.get(v) ?? 0) + 1);
-    if (isKnown || isOther(v)) continue;
+    const v = stack.pop();
+    if (uses[v]++ || isOther(v)) continue;
     const { op, args } = values[v];
     stack.push(...args);
     if (op === "fmax" || op === "fmin") stack.push(...args); // which read each operand twice
   }
-  const emit = (...bytes) => { for (const byte of bytes) code.push(byte); };
+  const at = (opcode, number) => { // an instruction with its operand
+    code.push(opcode);
+    for (; number > 127; number >>>= 7) code.push(number & 127 | 128);
+    code.push(number);
+  };
   const local = (type) => types.push(type) - (again ? 0 : 1); // behind the argument of a loop
-  const access = (opcode, place) => emit(opcode, 3, ...leb(base + 8 * place));
-  const load = (place) => { emit(0x41, 0); access(LOAD, place); };
-  const zero = () => emit(0x44, 0, 0, 0, 0, 0, 0, 0, 0);
-  const isCostly = (v) => !isOther(v) && uses.get(v) === 1
+  const load = (place) => { code.push(0x41, 0, LOAD); at(3, base + 8 * place); };
+  const zero = () => code.push(0x44, 0, 0, 0, 0, 0, 0, 0, 0);
+  const isCostly = (v) => !isOther(v) && uses[v] === 1
     && (CALLED.includes(values[v].op) || values[v].args.some(isCostly));
-  const number = (v) => { value(v); if (isTruth(v)) emit(0xb7); };
-  const truth = (v) => { value(v); if (!isTruth(v)) { zero(); emit(PLAIN.ne); } };
+  const number = (v) => { value(v); if (values[v].isTruth) code.push(0xb7); };
+  const truth = (v) => { value(v); if (!values[v].isTruth) { zero(); code.push(PLAIN.ne); } };
   function value(v) {
-    if (locals.has(v)) emit(GET, ...leb(locals.get(v)));
-    else if (values[v].constant) emit(0x44, ...values[v].constant);
+    if (locals[v] >= 0) at(GET, locals[v]);
+    else if (values[v].constant) code.push(0x44, ...values[v].constant);
     else compute(v);
   }
   function choose([condition, first, second]) {
     const other = () => second === undefined ? zero() : number(second);
     if (isCostly(first) || second !== undefined && isCostly(second)) {
       truth(condition);
-      emit(0x04, F64); number(first); emit(0x05); other(); emit(0x0b);
+      code.push(0x04, F64); number(first); code.push(0x05); other(); code.push(0x0b);
     } else {
-      number(first); other(); truth(condition); emit(0x1b);
+      number(first); other(); truth(condition); code.push(0x1b);
     }
   }
   function compute(v) {
     const { op, args } = values[v];
     if (op === "if_else_zero" || op === "select") return choose(args);
-    if (op === "inv") emit(0x44, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f);
+    if (op === "inv") code.push(0x44, 0, 0, 0, 0, 0, 0, 0xf0, 0x3f);
     if (op === "not" || op === "and" || op === "or") {
       args.forEach(truth);
-      return emit({ not: 0x45, and: 0x71, or: 0x72 }[op]);
+      return code.push({ not: 0x45, and: 0x71, or: 0x72 }[op]);
     }
     args.forEach(number);
     if (op === "fmax" || op === "fmin") {
       args.forEach(number);
-      return emit(op === "fmax" ? 0x64 : PLAIN.lt, 0x1b);
+      return code.push(op === "fmax" ? 0x64 : PLAIN.lt, 0x1b);
     }
-    if (op === "inv") return emit(0xa3);
-    return CALLED.includes(op) ? emit(0x10, CALLED.indexOf(op)) : emit(PLAIN[op]);
+    if (op === "inv") return code.push(0xa3);
+    return CALLED.includes(op) ? code.push(0x10, CALLED.indexOf(op)) : code.push(PLAIN[op]);
   }
-  const order = [...uses.keys()].sort((a, b) => a - b), held = new Map();
-  for (const v of order) {
-    const place = kept.get(v) ?? values[v].place;
-    if (place === undefined) continue;
+  const hold = (place) => {
     load(place);
-    locals.set(v, local(F64));
-    held.set(place, locals.get(v));
-    emit(SET, ...leb(locals.get(v)));
-  }
+    held.set(place, local(F64));
+    at(SET, held.get(place));
+    return held.get(place);
+  };
   const all = () => {
-    for (const v of order) {
-      if (isOther(v) || uses.get(v) < 2) continue;
+    for (let v = 0; v < uses.length; ++v) {
+      if (uses[v] < 2 || isOther(v)) continue;
       compute(v);
-      locals.set(v, local(isTruth(v) ? I32 : F64));
-      emit(SET, ...leb(locals.get(v)));
+      locals[v] = local(values[v].isTruth ? I32 : F64);
+      at(SET, locals[v]);
     }
   };
-  const store = (place, put) => { emit(0x41, 0); put(); access(STORE, place); };
+  const store = (place, put) => {
+    code.push(0x41, 0); put(); code.push(STORE); at(3, base + 8 * place);
+  };
+  for (let v = 0; v < uses.length; ++v) {
+    const place = uses[v] ? kept.get(v) ?? values[v].place : undefined;
+    if (place !== undefined) locals[v] = hold(place);
+  }
   if (!again) {
     all();
     results.forEach((v, k) => store(places[k], () => number(v)));
   } else {
-    const own = places.map((place, k) => {
-      if (k && !held.has(place)) {
-        load(place);
-        held.set(place, local(F64));
-        emit(SET, ...leb(held.get(place)));
-      }
-      return held.get(place);
-    });
-    emit(0x02, 0x40, 0x03, 0x40); // a block around a loop
+    const own = places.map((place, k) => (k ? held.get(place) ?? hold(place) : 0));
+    code.push(0x02, 0x40, 0x03, 0x40); // a block around a loop
     all();
     truth(results[0]);
-    emit(0x0d, 1); // leaves both
+    code.push(0x0d, 1); // leaves both
     results.forEach((v, k) => {
-      if (k > again) { emit(GET, ...leb(own[k])); number(v); emit(0xa0, SET, ...leb(own[k])); }
+      if (k > again) { at(GET, own[k]); number(v); code.push(0xa0); at(SET, own[k]); }
     });
     for (let k = 1; k <= again; ++k) number(results[k]);
-    for (let k = again; k >= 1; --k) emit(SET, ...leb(own[k]));
-    emit(GET, 0, 0x41, 1, 0x6b, TEE, 0, 0x0d, 0, 0x0b, 0x0b);
-    places.forEach((place, k) => { if (k) store(place, () => emit(GET, ...leb(own[k]))); });
-    emit(GET, 0);
+    for (let k = again; k >= 1; --k) at(SET, own[k]);
+    code.push(GET, 0, 0x41, 1, 0x6b, TEE, 0, 0x0d, 0, 0x0b, 0x0b);
+    places.forEach((place, k) => { if (k) store(place, () => at(GET, own[k])); });
+    code.push(GET, 0);
   }
-  const declared = types.map((type) => [1, type]);
-  const body = [...leb(declared.length), ...declared.flat(), ...code, 0x0b];
-  return [...leb(body.length), ...body];
+  code.push(0x0b);
+  return counted(leb(types.length), types.flatMap((type) => [1, type]), code);
 }
 
 /**
@@ -172,8 +175,8 @@ async function functionsOf(buffer, exported, base) {
   const first = formulas[0];
   const keeps = new Map(first.results.map((v, k) => [v, first.places[k]]));
   const bodies = formulas.map((each, k) => bodyOf(each, values, k ? keeps : new Map(), base));
-  const bytes = Uint8Array.from([
-    0, 0x61, 0x73, 0x6d, 1, 0, 0, 0,
+  const parts = [
+    [0, 0x61, 0x73, 0x6d, 1, 0, 0, 0],
     ...section(1, [[0x60, 0, 0], [0x60, 1, I32, 1, I32], [0x60, 1, F64, 1, F64],
       [0x60, 2, F64, F64, 1, F64]]),
     ...section(2, [...CALLED.map((op) => [...named("m"), ...named(op), 0, op === "pow" ? 3 : 2]),
@@ -181,7 +184,9 @@ async function functionsOf(buffer, exported, base) {
     ...section(3, formulas.map(({ again }) => [again ? 1 : 0])),
     ...section(7, formulas.map((_, k) => [...named(`${k}`), 0, ...leb(CALLED.length + k)])),
     ...section(10, bodies),
-  ]);
+  ];
+  const bytes = new Uint8Array(parts.reduce((sum, part) => sum + part.length, 0));
+  parts.reduce((at, part) => { bytes.set(part, at); return at + part.length; }, 0);
   const { instance } = await WebAssembly.instantiate(bytes, { m: exported });
   return formulas.map((_, k) => instance.exports[`${k}`]);
 }
