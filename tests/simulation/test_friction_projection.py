@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 from itertools import product
 
 import casadi as ca
@@ -9,7 +10,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from bywire.simulation.set_valued import project_exact, project_fast
+from bywire.simulation.c_runtime import SCALAR
+from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
+from bywire.simulation.rare_text import PROJECTION
+from bywire.simulation.set_valued import (
+    NEVER,
+    NOTHING,
+    RESIDUAL,
+    project_exact,
+    project_fast,
+)
 
 Array = NDArray[np.float64]
 COUNT = 5000
@@ -27,6 +37,30 @@ def evaluate(project: object, S: Array, c: Array, low: Array, high: Array) -> tu
     values = [ca.DM(np.hstack(list(S))), *(ca.DM(v.T) for v in (c, low, high))]
     w, failed = one.map(count)(*values)
     return np.array(w).T, np.array(failed).ravel() != 0
+
+
+def in_c(S: Array, c: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the same of the C text of kernels."""
+    count, m = c.shape
+    compiler = find_compiler()
+    assert compiler is not None
+    source = f"""{SCALAR}
+#define APART
+enum {{ SETS = {m} }};
+#define NEVER {NEVER}
+#define NOTHING {NOTHING}
+#define RESIDUAL {RESIDUAL}
+{PROJECTION}
+void each(int count, const double *posed, double *w, double *failed) {{
+  double force[SETS];
+  for (int k = 0; k < count; ++k)
+    failed[k] = project(posed + k * SETS * (SETS + 3), w + k * SETS, force);
+}}"""
+    library = ctypes.CDLL(str(compile_library(source, SINGLE, compiler, "each")))
+    posed = np.ascontiguousarray(np.hstack([S.reshape(count, m * m), c, low, high]))
+    w, failed = np.empty((count, m)), np.empty(count)
+    library.each(count, *(ctypes.c_void_p(a.ctypes.data) for a in (posed, w, failed)))
+    return w, failed != 0
 
 
 def violation(S: Array, c: Array, low: Array, high: Array, w: Array) -> Array:
@@ -86,8 +120,8 @@ def test_never_wrong(m: int, coupling: str) -> None:
     expected, least = brute(*problem)
     assert least.max() < 1e-9
     scale = np.abs(expected).max(axis=1, keepdims=True) + 1e-300
-    for project in (project_fast, project_exact):
-        w, failed = evaluate(project, *problem)
+    for project in (project_fast, project_exact, in_c):
+        w, failed = in_c(*problem) if project is in_c else evaluate(project, *problem)
         right = (np.abs(w - expected) / scale).max(axis=1) < TOLERANCE
         assert np.all(right | failed)
         assert project is project_fast or not failed.any()
@@ -113,8 +147,8 @@ def test_only_what_breaks_away_takes_the_enumeration(m: int, coupling: str) -> N
 def test_without_a_unique_solution(m: int) -> None:
     """An indefinite matrix may have several solutions: one of them, or a report of failure."""
     problem = cases(m, "indefinite", 60 + m)
-    for project in (project_fast, project_exact):
-        w, failed = evaluate(project, *problem)
+    for project in (project_fast, project_exact, in_c):
+        w, failed = in_c(*problem) if project is in_c else evaluate(project, *problem)
         assert violation(*problem, w)[~failed].max(initial=0.0) < TOLERANCE
         assert failed.mean() < (0.8 if project is project_fast else 0.35)
 
@@ -125,9 +159,10 @@ def test_forces_that_cancel_leave_rounding_and_no_failure() -> None:
     low, high = -np.ones(3), np.ones(3)
     wanted = np.array([1e9 / 3.0, -7e9 / 9.0, 1.0])
     c = S @ wanted - np.where(wanted > 0.0, low, high)
-    w, failed = evaluate(project_exact, S[None], c[None], low[None], high[None])
-    np.testing.assert_allclose(w[0], wanted, rtol=1e-6)
-    assert not failed.any()
+    problem = S[None], c[None], low[None], high[None]
+    for w, failed in (evaluate(project_exact, *problem), in_c(*problem)):
+        np.testing.assert_allclose(w[0], wanted, rtol=1e-6)
+        assert not failed.any()
 
 
 @pytest.mark.parametrize("project", [project_fast, project_exact])

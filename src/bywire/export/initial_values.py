@@ -1,6 +1,8 @@
-"""C text of the state in which a run begins, for parameters that are not the exported ones."""
+"""The state in which a run begins, for parameters that are not the exported ones, also in C."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import casadi as ca
 import numpy as np
@@ -10,6 +12,7 @@ from bywire.export.exported import Exported
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
 from bywire.simulation.symbols import SX, column, scalars
 
 _AGREES = 1e-9  # of a value, that the same start may differ where it was computed otherwise
@@ -18,26 +21,50 @@ _NOT_SYMBOLIC = (BywireError, TypeError, ValueError, ArithmeticError, RuntimeErr
 HEADING = "void bw_start(const double *p, double *state)"
 
 
-def start_source(made: Exported) -> tuple[str, frozenset[int]]:
-    """Return the C function that sets the state vector, and which parameters it reads.
+@dataclass(frozen=True)
+class Start:
+    """The state in which a run begins, over parameters.
 
-    Empty text where the start is not known for other parameters: the exported one then stays.
+    Parameters
+    ----------
+    graph, targets
+        Expressions, and the node of every place in the state vector that they set.
+    reads
+        Parameters that they read, by index.
     """
+
+    graph: Graph
+    targets: dict[int, Node]
+    reads: frozenset[int]
+
+
+def start_nodes(made: Exported) -> Start | None:
+    """Return the equations of the start; None where it is not known for other parameters."""
     function = _start(made)
     if function is None:
-        return "", frozenset()
+        return None
     graph = Graph()
     leaves = [graph.leaf("p", k) for k in range(made.program.sizes.parameters)]
     states, memory = graph.add_function(function, [leaves])
     targets = {made.layout.start["x"] + k: node for k, node in enumerate(states)}
     targets |= {made.layout.start["m"] + k: node for k, node in enumerate(memory)}
-    roots = list(targets.values())
+    read = graph.read_by(targets.values())
+    return Start(graph, targets, frozenset(k for k, leaf in enumerate(leaves) if leaf in read))
+
+
+def start_source(made: Exported) -> tuple[str, frozenset[int]]:
+    """Return the C function that sets the state vector, and which parameters it reads.
+
+    Empty text where the start is not known for other parameters: the exported one then stays.
+    """
+    start = start_nodes(made)
+    if start is None:
+        return "", frozenset()
+    graph, roots = start.graph, list(start.targets.values())
     name = leaf_namer(graph, lambda kind, k: f"{kind}[{k}]", lambda node: f"v{node}")
     lines = statements(graph, needed(graph, roots, lambda _: False), name, "const double ")
-    lines += [f"state[{at}] = {as_number(graph, node, name)};" for at, node in targets.items()]
-    read = graph.read_by(roots)
-    reads = frozenset(k for k, leaf in enumerate(leaves) if leaf in read)
-    return f"{HEADING} {{\n  (void)p;\n  {indented(lines, 2)}\n}}\n", reads
+    lines += [f"state[{at}] = {as_number(graph, n, name)};" for at, n in start.targets.items()]
+    return f"{HEADING} {{\n  (void)p;\n  {indented(lines, 2)}\n}}\n", start.reads
 
 
 def _start(made: Exported) -> ca.Function | None:

@@ -102,7 +102,7 @@ class _Reads:
     def of(cls, stages: Stages) -> _Reads:
         passes = [node for each in (stages.fast, stages.exact) for nodes in each.values()
                   for node in nodes]  # fmt: skip
-        passes += stages.quadrature.products
+        passes += stages.posed + stages.quadrature.products
         passes += [c for pairs in stages.quadrature.combinations for c, _ in pairs]
         ticks = [node for roots in stages.ticks for node in _changed(stages, roots)]
         return cls(

@@ -25,7 +25,7 @@ def unread(stages: Stages) -> frozenset[str]:
     """
     roots = [node for pass_ in (stages.fast, stages.exact) for nodes in pass_.values()
              for node in nodes]  # fmt: skip
-    roots += [node for tick in stages.ticks for node in tick] + stages.output
+    roots += [node for tick in stages.ticks for node in tick] + stages.output + stages.posed
     read = stages.graph.read_by(roots)
     return frozenset(
         f"{kind}{k}"

@@ -8,182 +8,25 @@ what has come to zero rests or moves on in the next part, as its bounds decide.
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from bywire.simulation.emission import indented, leaf_namer, statements
 from bywire.simulation.expressions import as_number, needed
 from bywire.simulation.graph import Graph
 from bywire.simulation.layout import ATTEMPTS, CAP, CLOSE, EDGE, NEAR, STILL, most_cuts
 from bywire.simulation.operation import Node
 from bywire.simulation.quadrature import Levels
+from bywire.simulation.rare_text import CUT, PROJECTION
+from bywire.simulation.set_valued import NEVER, NOTHING, RESIDUAL
 from bywire.simulation.stages import STATE, Stages
 
 APART = "__attribute__((noinline))"  # but fast: what is cold is compiled to be short
-
-# A pass gives o: x, d, r, q, jump, doubt. Where the ordinary one is in doubt, the exact one is
-# repeated from its own increment until its contact sets reproduce.
-_SETTLE = """
-static APART int settle(const double *c, double h, const double *m, const double *x, double *d,
-    double *o) {
-  fast_pass(c, h, m, x, d, o);
-  if (o[DOUBT] == 0.0) return 0;
-  for (int pass = 0; pass < CAP; ++pass) {
-    exact_pass(c, h, m, x, d, o);
-    if (o[DOUBT] == 0.0) return 0;
-    memcpy(d, o + NX, NX * sizeof(double));
-  }
-  return 1;
-}
-"""
-
-_CUT = """
-// Where a substep was cut: length of each part but the last, and which velocity is zero at its end.
-typedef struct { int count, which[CUTS]; double length[CUTS]; } cuts;
-
-// Which velocity is the first to change its sign within a part, -1 if none does, and when.
-static inline int first_turn(const double *x, const double *o, double *share) {
-  int first = -1;
-  *share = 1.0;
-  for (int k = 0; k < VELOCITIES; ++k) {
-    const double v = x[velocity[k]], w = o[velocity[k]];
-    if (v * w * o[JUMP + k] < 0.0 && v / (v - w) <= *share) {
-      *share = v / (v - w);
-      first = k;
-    }
-  }
-  return first;
-}
-
-// A part of length t; last: half increments of a whole substep h, from which it is predicted.
-static inline int part(const double *c, double h, double t, const double *m, const double *x,
-    const double *last, double *d, double *o) {
-  for (int k = 0; k < NX; ++k) d[k] = last[k] * (t / h);
-  return settle(c, t, m, x, d, o);
-}
-
-// Where a velocity that goes from v to w within a part of length t is zero, on the parabola that
-// has the mean slope before over an earlier length h, too.
-static inline double zero_of(double v, double w, double t, double before, double h) {
-  const double mean = (w - v) / t, linear = -v / mean;
-  const double bend = before != 0.0 ? 2.0 * (mean - before) / (t + h) : 0.0;
-  const double slope = mean + bend * (linear - 0.5 * t);
-  const double zero = linear - 0.5 * bend * linear * (linear - t) / slope;
-  return zero > 0.0 && zero < t ? zero : linear;
-}
-
-// Shorten a part of length *t to the first instant at which a velocity is zero: by the parabola
-// through three lengths, within what is known to lie before and behind. Before, o is that of *t in
-// the velocities, behind in everything. Return which velocity it is, -1 if its friction turns out
-// not to jump; failed: that part did not settle.
-static APART int locate(const double *c, double h, double *t, const double *m, const double *x,
-    const double *last, double *o, int *failed) {
-  double d[NX], share, low = 0.0, high = *t;
-  const double first = EDGE * *t, final = (1.0 - EDGE) * *t;
-  int which = first_turn(x, o, &share), turns = velocity[which];
-  double P = 0.0, at_P = x[turns], Q = *t, at_Q = o[turns];
-  double N = zero_of(at_P, at_Q, Q, 2.0 * last[turns] / h, h);
-  double change = fabs(at_P - at_Q), before = 0.0, was[RESULTS];
-  for (int n = 1;; ++n) { // what is left of the last attempt is of the length that is returned
-    N = fmin(fmax(N, first), final);
-    *failed = part(c, h, N, m, x, last, d, o);
-    if (o[JUMP + which] == 0.0) return -1;
-    const int other = VELOCITIES > 1 ? first_turn(x, o, &share) : -1;
-    if (other >= 0 && other != which && n < ATTEMPTS) { // another one is earlier
-      which = other, turns = velocity[which];
-      low = 0.0, high = N;
-      P = 0.0, at_P = x[turns], Q = N, at_Q = o[turns], N = N * share;
-      change = fabs(at_P - at_Q), before = 0.0;
-      continue;
-    }
-    const double at_N = o[turns];
-    if (fabs(at_N) <= CLOSE * change || N <= first || N >= final || N == P || N == Q
-        || n == ATTEMPTS) break;
-    if (at_N * x[turns] > 0.0) low = N; else high = N;
-    const double slope = (at_N - at_P) / (N - P) + (at_N - at_Q) / (N - Q)
-        - (at_Q - at_P) / (Q - P);
-    const double next = N - at_N / slope;
-    if (fabs(at_N) <= NEAR * change && before > 0.0) { // the rest on the line through two attempts
-      const double share = (next - N) / (N - before);
-      #pragma omp simd
-      for (int k = 0; k < JUMP; ++k) o[k] += share * (o[k] - was[k]);
-      N = next;
-      break;
-    }
-    memcpy(was, o, sizeof(was));
-    before = N;
-    if (fabs(P - next) > fabs(Q - next)) P = N, at_P = at_N; else Q = N, at_Q = at_N;
-    N = next > low && next < high ? next : 0.5 * (low + high);
-  }
-  *t = N;
-  return which;
-}
-
-// Half the increment behind a zero of what had a before it: less by the jump of friction, which
-// opposes the other direction, and nothing where it holds.
-static inline double turned_back(double a, double j) {
-  return copysign(fmax(fabs(a) - j, 0.0), a);
-}
-
-// At the end of a part of length t of a substep h that was cut, from speeds x: what is zero there
-// in o, and last, half increments from which the next part is predicted.
-static inline void rest(const double *x, int which, double t, double h, double *o, double *last) {
-  for (int k = 0; k < NX; ++k) last[k] = o[NX + k] * (h / t);
-  for (int k = 0; k < VELOCITIES; ++k) {
-    const int v = velocity[k]; // bodies that are alike stop at once
-    if (k != which && fabs(o[v]) >= STILL * fabs(x[v])) continue;
-    o[v] = 0.0;
-    last[v] = turned_back(last[v], o[JUMP + k] * (h / t));
-  }
-}
-
-// A substep, repeated until it settles, and cut where velocities pass zero. known: o holds
-// velocities of the whole substep, which has settled, from an ordinary pass.
-static APART int located(const double *c, double h, const double *m, const double *x,
-    const double *d, int known, double *o, cuts *made) {
-  double at[NX], last[NX], guess[NX], sum[FLOWS + 1], left = h, share;
-  int failed = 0, before = 0;
-  memcpy(at, x, sizeof(at));
-  memcpy(last, d, sizeof(last));
-  memset(sum, 0, sizeof(sum));
-  for (int k = 0; k < VELOCITIES; ++k) o[JUMP + k] = known;
-  for (made->count = 0;; known = 0, ++made->count) {
-    if (!known) failed = part(c, h, left, m, at, last, guess, o);
-    const int turns = first_turn(at, o, &share) >= 0;
-    if (!turns && !known) break;
-    if (made->count == CUTS) { // there is no end to it
-      for (int k = 0; k < VELOCITIES; ++k)
-        if (at[velocity[k]] * o[velocity[k]] * o[JUMP + k] < 0.0) o[velocity[k]] = 0.0;
-      failed = 1;
-      break;
-    }
-    double t = left;
-    const int which = turns ? locate(c, h, &t, m, at, last, o, &failed) : -1;
-    if (which < 0) { // then once more, knowing nothing
-      --made->count;
-      continue;
-    }
-    before |= failed;
-    rest(at, which, t, h, o, last);
-    memcpy(at, o, sizeof(at));
-    for (int k = 0; k < FLOWS; ++k) sum[k] += o[FLOW + k] * (t / h);
-    made->which[made->count] = which;
-    made->length[made->count] = t;
-    left -= t;
-  }
-  if (made->count) {
-    for (int k = 0; k < NX; ++k) o[NX + k] *= h / left;
-    for (int k = 0; k < FLOWS; ++k) o[FLOW + k] = sum[k] + o[FLOW + k] * (left / h);
-  }
-  return failed | before;
-}
-"""
-
 
 def rare_substep(stages: Stages) -> str:
     """Return the C functions of a substep that is repeated or cut.
 
     ``constants(p, c)`` fills c, shape (CONSTANTS,), with what they read of the parameters p.
     """
-    velocities = stages.velocities
-    nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
     slots = _constants(stages)
     return f"""
 #if defined(QUICK) && !defined(__clang__)
@@ -191,28 +34,40 @@ def rare_substep(stages: Stages) -> str:
 #else
 #define RARE __attribute__((noinline, cold))
 #endif
-#define APART {APART}
+{rare_header(stages)}
+enum {{ CONSTANTS = {len(slots)}, POSED = {len(stages.posed)} }};
+{_constants_function(stages.graph, slots)}
+{_pass_function("fast_pass", APART, _lines(stages, rare_results(stages.fast), slots))}
+{PROJECTION if stages.rows else ""}{_pass_function("exact_pass", "RARE", _exact(stages, slots))}
+{CUT}"""
+
+
+def rare_header(stages: Stages) -> str:
+    """Return what the C text of `rare_text` is told of a model."""
+    nx, nr, nq = (len(stages.exact[kind]) for kind in ("x", "r", "q"))
+    velocities = stages.velocities
+    return f"""#define APART {APART}
 enum {{ NX = {nx}, FLOW = {2 * nx + nr}, FLOWS = {nq}, VELOCITIES = {len(velocities)},
-  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, CONSTANTS = {len(slots)},
+  JUMP = FLOW + FLOWS, DOUBT = JUMP + VELOCITIES, RESULTS = DOUBT + 1, SETS = {stages.rows},
   CAP = {CAP}, CUTS = {most_cuts(len(velocities))}, ATTEMPTS = {ATTEMPTS} }};
 #define EDGE {EDGE}
 #define CLOSE {CLOSE}
 #define NEAR {NEAR}
 #define STILL {STILL}
-static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};
-{_constants_function(stages.graph, slots)}
-{_pass_function(stages, stages.fast, slots, "fast_pass", APART)}
-{_pass_function(stages, stages.exact, slots, "exact_pass", "RARE")}
-{_SETTLE}{_CUT}"""
+#define NEVER {NEVER}
+#define NOTHING {NOTHING}
+#define RESIDUAL {RESIDUAL}
+static const int velocity[] = {{{", ".join(map(str, velocities or (0,)))}}};"""
+
+
+def rare_results(results: dict[str, list[Node]]) -> list[Node]:
+    """Return the results of a pass in the order of o."""
+    return [node for kind in (*STATE, "jump", "doubt") for node in results[kind]]
 
 
 def rare_roots(stages: Stages) -> list[Node]:
-    """Return all that the passes of a rare substep give."""
-    return [*_roots(stages.fast), *_roots(stages.exact)]
-
-
-def _roots(results: dict[str, list[Node]]) -> list[Node]:
-    return [node for kind in (*STATE, "jump", "doubt") for node in results[kind]]
+    """Return all that the passes of a rare substep compute."""
+    return [*rare_results(stages.fast), *stages.posed, *rare_results(stages.exact)]
 
 
 def _constants(stages: Stages) -> dict[Node, int]:
@@ -242,21 +97,38 @@ def _constants_function(graph: Graph, slots: dict[Node, int]) -> str:
 }}"""
 
 
-def _pass_function(
-    stages: Stages,
-    results: dict[str, list[Node]],
-    slots: dict[Node, int],
-    title: str,
-    attribute: str,
-) -> str:
-    graph, roots = stages.graph, _roots(results)
+def _exact(stages: Stages, slots: dict[Node, int]) -> list[str]:
+    """Return the statements of the exact pass, between whose halves forces are looked for."""
+    posed = _lines(stages, stages.posed, slots, "posed")
+    known = frozenset(needed(stages.graph, stages.posed, slots.__contains__))
+    after = _lines(stages, rare_results(stages.exact), slots, "o", known)
+    if not stages.rows:
+        return ["const double failed[] = {0.0};", "(void)failed;", *after]
+    return [
+        "double posed[POSED], w[SETS], force[SETS];",
+        *posed,
+        "const double failed[] = {project(posed, w, force)};",
+        *after,
+    ]
+
+
+def _lines(
+    stages: Stages, roots: list[Node], slots: dict[Node, int], target: str = "o",
+    known: Collection[Node] = frozenset(),
+) -> list[str]:  # fmt: skip
+    """Return the statements that compute roots, of which some operations are known."""
+    graph = stages.graph
     other = leaf_namer(graph, _leaf, lambda node: f"v{node}")
 
     def name(node: Node) -> str:
         return f"c[{slots[node]}]" if node in slots else other(node)
 
-    body = statements(graph, needed(graph, roots, slots.__contains__), name, "const double ")
-    body += [f"o[{k}] = {as_number(graph, node, name)};" for k, node in enumerate(roots)]
+    order = [n for n in needed(graph, roots, slots.__contains__) if n not in known]
+    body = statements(graph, order, name, "const double ")
+    return body + [f"{target}[{k}] = {as_number(graph, n, name)};" for k, n in enumerate(roots)]
+
+
+def _pass_function(title: str, attribute: str, body: list[str]) -> str:
     return f"""static {attribute} void {title}(const double *restrict c, double h,
     const double *restrict m, const double *restrict x, const double *restrict d,
     double *restrict o) {{

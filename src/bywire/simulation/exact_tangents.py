@@ -31,7 +31,7 @@ static APART void part_tangents(int lanes, const double *p, const double *c, dou
   }
 }
 
-// At the end of a part of length t: its flows join the sum of the substep h, its increments, and how
+// At the end of a part of length t: its flows join the sum of the substep h, its increments and how
 // they jump, become those of the whole.
 static inline void part_ends(double t, double h, const double *moved, const double *end,
     double *o_t, double *sum) {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,7 @@ from bywire.core.signals import Signal, signals_of
 from bywire.simulation.contact_set import contact_forces
 from bywire.simulation.model_check import check_model
 from bywire.simulation.scheme import Pass, Symbols, build_pass
+from bywire.simulation.set_valued import project_exact
 from bywire.simulation.stiff_contacts import contact_jacobians
 from bywire.simulation.symbols import SX, column, scalars, symbol_tuple
 
@@ -43,6 +45,9 @@ class Program:
     fast, exact
         ``(x, d, m, p, h) -> (x, d, reaction, flow, jump, flag, doubt)``, see ``scheme.Pass``; the
         flag is up where the pass is in doubt or a velocity turns round.
+    before, after
+        The exact pass in two: ``(x, d, m, p, h) -> (S, c, low, high)``, row by row, and
+        ``(x, d, m, p, h, w, force, failed)`` -> results, with the solution of that problem.
     ticks
         One ``(x, m, u, p) -> m`` per task.
     output
@@ -54,6 +59,8 @@ class Program:
     sizes: Sizes
     fast: Any
     exact: Any
+    before: Any
+    after: Any
     ticks: tuple[Any, ...]
     output: Any
     contact_jacobians: Any
@@ -68,6 +75,11 @@ class Program:
         """Indices of the states that carry dry friction."""
         states = self.model.State._fields
         return tuple(states.index(name) for name in self.model.frictions)
+
+    @property
+    def rows(self) -> int:
+        """How many set-valued forces an exact pass has: frictions, then one-sided limits."""
+        return len(self.model.frictions) + len(self.model.limits)
 
     @property
     def outputs(self) -> dict[str, Signal]:
@@ -100,6 +112,7 @@ def build_program(model: Model, par: ParameterSet) -> Program:
     )
     fast = build_pass(model, symbolic, s, exact=False)
     exact = build_pass(model, symbolic, s, exact=True)
+    before, after = _halves(s, exact)
     output = _output(model, symbolic, s, fast)
     tasks = model.tasks(par)
     u = SX.sym("u", len(model.Stimulus._fields))
@@ -116,7 +129,9 @@ def build_program(model: Model, par: ParameterSet) -> Program:
             output=len(model.Output._fields),
         ),
         fast=_pass_function("fast", s, fast),
-        exact=_pass_function("exact", s, exact),
+        exact=_joined(s, before, after),
+        before=before,
+        after=after,
         ticks=tuple(
             ca.Function(
                 f"tick_{k}",
@@ -148,10 +163,30 @@ def _ranges(par: ParameterSet, names: tuple[str, ...]) -> dict[str, tuple[float,
     return found
 
 
-def _pass_function(name: str, s: Symbols, result: Pass) -> Any:
+def _pass_function(name: str, s: Symbols, result: Pass, further: Sequence[Any] = ()) -> Any:
     flag = ca.fmax(result.doubt, result.turn)
     results = (result.x, result.d, result.reaction, result.flow, result.jump, flag, result.doubt)
-    return ca.Function(name, [s.x, s.d, s.m, s.p, s.h], [ca.densify(SX(r)) for r in results])
+    given = [s.x, s.d, s.m, s.p, s.h, *further]
+    return ca.Function(name, given, [ca.densify(SX(r)) for r in results])
+
+
+def _halves(s: Symbols, exact: Pass) -> tuple[Any, Any]:
+    """Return what comes before the set-valued forces are found, and what after."""
+    problem = exact.problem
+    assert problem is not None
+    found = problem.solution
+    posed = (ca.vec(problem.matrix.T), problem.start, problem.low, problem.high)
+    before = ca.Function("before", [s.x, s.d, s.m, s.p, s.h], [ca.densify(SX(r)) for r in posed])
+    return before, _pass_function("after", s, exact, (found.w, found.force, found.failed))
+
+
+def _joined(s: Symbols, before: Any, after: Any) -> Any:
+    """Return the exact pass as one function."""
+    given = [s.x, s.d, s.m, s.p, s.h]
+    rows, c, low, high = before(*given)
+    m = c.shape[0]
+    found = project_exact(ca.reshape(rows, m, m).T, c, low, high)
+    return ca.Function("exact", given, list(after(*given, found.w, found.force, found.failed)))
 
 
 def _output(model: Model, par: ParameterSet, s: Symbols, shape: Pass) -> Any:

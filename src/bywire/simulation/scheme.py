@@ -18,7 +18,7 @@ from bywire.core.parameters import ParameterSet
 from bywire.simulation.contact_set import overlaps, stiffness, violations
 from bywire.simulation.elimination import Reduced, eliminate
 from bywire.simulation.linear_form import Form, forms
-from bywire.simulation.set_valued import Projection, project_exact, project_fast, sliding
+from bywire.simulation.set_valued import Projection, project_fast, sliding
 from bywire.simulation.symbols import SX, column, nonlinear, scalars, symbol_tuple
 
 NEVER = 1e30  # bound of a one-sided limit's reaction
@@ -37,6 +37,25 @@ class Symbols:
     m: Any
     p: Any
     h: Any
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What set-valued forces of an exact pass must solve, and the symbols of their solution.
+
+    Parameters
+    ----------
+    matrix, start, low, high
+        S, c and bounds of `set_valued.project_exact`, shapes (m, m) and (m,).
+    solution
+        Velocities and forces, shape (m,) each, and whether they failed.
+    """
+
+    matrix: Any
+    start: Any
+    low: Any
+    high: Any
+    solution: Projection
 
 
 @dataclass(frozen=True)
@@ -59,6 +78,8 @@ class Pass:
         of its sign, by its mass alone, shape (m,).
     turn
         Positive where a velocity with dry friction does: where that jumps, the substep is cut.
+    problem
+        What is solved outside an exact pass; None in the other.
     """
 
     x: Any
@@ -68,6 +89,7 @@ class Pass:
     doubt: Any
     jump: Any
     turn: Any
+    problem: Problem | None
 
 
 @dataclass(frozen=True)
@@ -95,8 +117,8 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
         Arguments of the pass.
     exact
         False: the pass of nearly every substep, which leaves one-sided limits alone and only
-        checks them, and keeps at rest what rests. True: the repeated pass, with limits and every
-        combination of signs.
+        checks them, and keeps at rest what rests. True: the repeated pass, with limits, in which
+        every combination of signs is tried: outside, see `Problem`.
     """
     y = s.x + s.d
     changing = ca.vertcat(s.x, s.d)
@@ -118,7 +140,7 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     right = dict(enumerate(linear.rows))
     kept = _set_valued_states(model, exact)
     reduced = eliminate(A, right, kept, s.x, changing)
-    projection, reaction = _project(model, s, reduced, bounds, exact)
+    projection, reaction, problem = _project(model, s, reduced, bounds, exact)
     d, middle = _increments(s, reduced, projection)
     x = column(
         [projection.w[kept.index(k)] if k in kept else middle[k] + d[k] for k in range(d.shape[0])]
@@ -142,7 +164,8 @@ def build_pass(model: Model, par: ParameterSet, s: Symbols, exact: bool) -> Pass
     doubt = SX(0)
     for one in doubts:
         doubt = ca.fmax(doubt, one)
-    return Pass(x, d, reaction, column(flow), doubt, jump, _turn(model, s.x, x))
+    turn = _turn(model, s.x, x)
+    return Pass(x, d, reaction, column(flow), doubt, jump, turn, problem)
 
 
 def _turn(model: Model, start: Any, end: Any) -> Any:
@@ -213,8 +236,8 @@ def _acting(v: Any, low: Any, high: Any) -> tuple[Any, Any]:
 
 def _project(
     model: Model, s: Symbols, reduced: Reduced, bounds: list[Any], exact: bool
-) -> tuple[Projection, Any]:
-    """Return end-of-step values of the set-valued states, and all reactions."""
+) -> tuple[Projection, Any, Problem | None]:
+    """Return end-of-step values of the set-valued states, all reactions, and what is left open."""
     pairs = bounds
     if exact:
         pairs = [_acting(s.x[k], *pair) for k, pair in zip(reduced.kept, bounds, strict=False)]
@@ -223,8 +246,12 @@ def _project(
     # The unknowns are d = (w - x) / 2, so that S d = c + force is (S/2) w = c + (S/2) x + force.
     half = 0.5 * reduced.matrix
     c = column([reduced.start(row, half) for row in range(len(reduced.kept))])
+    problem = None
     if exact:
-        projection = project_exact(half, c, low, high)
+        m = len(reduced.kept)
+        w, force = SX.sym("w", m), SX.sym("force", m)
+        projection = Projection(w, force, SX.sym("failed"))
+        problem = Problem(half, c, low, high, projection)
     else:
         projection = project_fast(half, c, low, high, [s.x[k] for k in reduced.kept])
     reaction = ca.SX(projection.force)
@@ -233,7 +260,7 @@ def _project(
         reaction[k] = ca.if_else(projection.w[k] > 0, 0, ca.fmax(reaction[k], 0))
     if not exact:
         reaction = ca.vertcat(reaction, SX.zeros(len(model.limits)))
-    return projection, reaction
+    return projection, reaction, problem
 
 
 def _increments(s: Symbols, reduced: Reduced, projection: Projection) -> tuple[Any, Any]:

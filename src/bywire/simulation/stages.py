@@ -31,7 +31,12 @@ class Stages:
     ----------
     fast, exact
         Nodes per result of a pass: x, d, r (reactions), q (flows), jump, flag, doubt; see
-        ``Program``. The flag of the fast one is a truth value, and so is its ``doubtful``.
+        ``Program``. Flag and ``doubtful`` of the fast one are truth values; the exact one
+        follows from what solves ``posed``, of kinds w, force and failed.
+    posed
+        Nodes of S, row by row, c, low and high, for the set-valued forces of the exact pass.
+    rows
+        How many of these forces there are.
     ticks
         Nodes of the memory after each task.
     output
@@ -48,6 +53,8 @@ class Stages:
     graph: Graph
     fast: dict[str, list[Node]]
     exact: dict[str, list[Node]]
+    posed: list[Node]
+    rows: int
     ticks: list[list[Node]]
     output: list[Node]
     velocities: tuple[int, ...]
@@ -93,13 +100,14 @@ def build_stages(
     graph = Graph({**ranges, ("h", 0): NOT_NEGATIVE}, fixed)
     lengths = {
         "x": n.x, "d": n.x, "m": n.memory, "u": n.stimulus, "r": n.reaction,
-        "q": n.flow, "p": n.parameters, "h": 1,
+        "q": n.flow, "p": n.parameters, "h": 1, "w": program.rows, "force": program.rows,
+        "failed": 1,
     }  # fmt: skip
     leaves = {
         kind: [graph.leaf(kind, k) for k in range(length)] for kind, length in lengths.items()
     }
 
-    def add(function: Any, kinds: str) -> list[list[Node]]:
+    def add(function: Any, kinds: Sequence[str]) -> list[list[Node]]:
         return graph.add_function(function, [leaves[k] for k in kinds])
 
     def tangent(function: Any, kinds: str, fixed: str = "h") -> list[list[Node]]:
@@ -134,7 +142,9 @@ def build_stages(
         fast=fast,
         velocities=program.velocities,
         quadrature=quadrature,
-        exact=dict(zip(parts, add(program.exact, "xdmph"), strict=True)),
+        exact=dict(zip(parts, add(program.after, (*"xdmph", "w", "force", "failed")), strict=True)),
+        posed=[node for nodes in add(program.before, "xdmph") for node in nodes],
+        rows=program.rows,
         ticks=[add(tick, "xmup")[0] for tick in program.ticks],
         output=output,
         fast_t=dict(zip(parts, tangent(program.fast, "xdmph"), strict=True)),

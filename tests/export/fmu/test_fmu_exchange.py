@@ -78,6 +78,23 @@ def test_frictions_limits_and_contacts_are_met_as_the_kernel_meets_them(
     assert changes[-1] == sum(edges)
 
 
+def test_a_solver_is_told_to_begin_anew_where_rates_jump(thrown: ExportedFmu) -> None:
+    client = SolverClient(thrown.path).begin()
+
+    def is_new(inputs: dict[str, float]) -> bool:
+        assert np.isfinite(client["der(omega)"])  # as a solver asks for it
+        client.fmu.enterEventMode()
+        if inputs:
+            client.set(inputs)
+        again, _, _, changed, *_ = client.fmu.newDiscreteStates()
+        client.fmu.enterContinuousTimeMode()
+        assert not again
+        return bool(changed)
+
+    assert is_new({"v_source": 6.0})  # no state changes its value
+    assert not is_new({})
+
+
 def test_version_3_says_the_same_and_how_many_indicators_it_has(
     thrown: ExportedFmu, tmp_path: Path
 ) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shutil
 import subprocess
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -67,9 +68,13 @@ def test_every_row_is_the_benchs_own(bench: bywire.Bench, folder: Path) -> None:
     run, stimulus = recorded(bench)
     said, signals = driven(folder, stimulus=stimulus)
     assert said["settled"]
-    assert {each["module"] for each in said["imports"]} <= {"math"}
+    assert {each["module"] for each in said["imports"]} <= {"math", "env"}
     for name, row in signals.items():
         assert np.array_equal(row, run[name]), name
+
+
+def test_a_brake_takes_no_more_than_10_kb(folder: Path) -> None:
+    assert len(zlib.compress((folder / "stop.wasm").read_bytes(), 9)) < 10_000
 
 
 def test_changed_parameters_begin_at_rest_and_run_alike(folder: Path) -> None:

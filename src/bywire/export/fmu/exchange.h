@@ -71,17 +71,19 @@ static void refresh(run *r) {
   r->is_stale = 0;
 }
 
-/* Take the modes that state and inputs ask for; 1 where a state was set to zero for that. */
+/* Take the modes that state and inputs ask for; 1 where a solver must begin anew: a state was set to
+ * zero, or its rate may jump, by a mode or an input, behind which some clients' solvers go on as
+ * if nothing had happened unless states are said to have changed. */
 static int settle(run *r) {
   double balance[STATES], mass[STATES], low[MODAL + 1], high[MODAL + 1];
   double pressed[CONTACTS + 1], lack[CONTACTS + 1], mode[MODAL + 1], closed[CONTACTS + 1];
-  int is_moved = 0;
+  int is_new = r->is_set;
   memcpy(mode, r->mode, sizeof mode);
   memcpy(closed, r->closed, sizeof closed);
   for (int k = 0; k < MODAL; ++k) {
     double *x = &states(r)[modal_states[k]];
     if (mode[k] * *x > 0.0) continue; /* it goes on as it went */
-    is_moved |= *x != 0.0;
+    is_new |= *x != 0.0;
     *x = 0.0;
     r->mode[k] = 0.0;
   }
@@ -91,10 +93,12 @@ static int settle(run *r) {
     const double f = balance[modal_states[k]];
     if (r->mode[k] == 0.0) r->mode[k] = (f + low[k] > 0.0) - (f + high[k] < 0.0);
   }
-  if (memcmp(mode, r->mode, sizeof mode) || memcmp(closed, r->closed, sizeof closed))
+  if (memcmp(mode, r->mode, sizeof mode) || memcmp(closed, r->closed, sizeof closed)) {
     r->events += 1.0;
+    is_new = 1;
+  }
   r->is_set = 1;
-  return is_moved;
+  return is_new;
 }
 
 static void started(run *r) {

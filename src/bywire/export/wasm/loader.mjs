@@ -58,8 +58,14 @@ function rowsOf(description, given, count, interval) {
 export async function load(bytes, description) {
   const { exp, log, sin, cos, tan, atan, tanh, pow } = Math;
   const math = { exp, log, sin, cos, tan, atan, tanh, pow };
-  const { instance } = await WebAssembly.instantiate(bytes, { math });
-  const { memory, parameters, state, room, begin, advance } = instance.exports;
+  const formulas = new WebAssembly.Table({ element: "anyfunc", initial: 1 });
+  const env = { __indirect_function_table: formulas };
+  const { module, instance } = await WebAssembly.instantiate(bytes, { math, env });
+  const { memory, parameters, working, room, begin, advance } = instance.exports;
+  const [table] = WebAssembly.Module.customSections(module, "formulas");
+  const made = await functionsOf(table, { ...math, ...instance.exports }, working());
+  formulas.grow(made.length);
+  made.forEach((each, k) => formulas.set(k + 1, each));
   const { frame, recordFrames, stimulusFrames, stateLength } = description;
   const width = description.signals.length;
   return {
@@ -80,7 +86,7 @@ export async function load(bytes, description) {
       new Float64Array(memory.buffer, parameters(), vector.length).set(vector);
       new Float64Array(memory.buffer, u, rows.length).set(rows);
       begin(isChanged ? 1 : 0);
-      const begun = new Float64Array(memory.buffer, state(), stateLength);
+      const begun = new Float64Array(memory.buffer, working(), stateLength);
       if (!areFinite(begun))
         throw new RangeError("there is no state at rest with these parameters");
       advance(u, stimulusFrames, 0, frames, 1, recordFrames, rec);
@@ -92,7 +98,7 @@ export async function load(bytes, description) {
       });
       const time = new Float64Array(count);
       for (let row = 0; row < count; ++row) time[row] = row * recordFrames * frame;
-      const unsettled = new Float64Array(memory.buffer, state(), stateLength)[stateLength - 2];
+      const unsettled = new Float64Array(memory.buffer, working(), stateLength)[stateLength - 2];
       return { time, signals, settled: unsettled === 0 && areFinite(table) };
     },
   };

@@ -17,18 +17,22 @@ from bywire.core.errors import CompilerError
 from bywire.core.scratch import process_folder, scratch_folder
 from bywire.core.signals import Signal, signals_of
 from bywire.export.exported import Exported
-from bywire.export.initial_values import start_source
+from bywire.export.initial_values import start_nodes
 from bywire.export.interface import Interface, interface
-from bywire.export.model_header import model_header
 from bywire.export.variables import finite_range, parameter_variables
+from bywire.export.wasm.formulas import with_section
+from bywire.export.wasm.run_formulas import run_formulas
+from bywire.simulation.c_runtime import SCALAR
 from bywire.simulation.compiler import KERNEL_MATH, TIMEOUT
+from bywire.simulation.rare_text import CUT
 from bywire.simulation.run import sampled_stimulus
 
 HERE = Path(__file__).parent
+_LOADER = ("formulas.mjs", "loader.mjs")
 _FLAGS = (
-    "-target", "wasm32-freestanding", "-mbulk-memory", "-O2", "-std=c11", "-nostdlib",
+    "-target", "wasm32-freestanding", "-mbulk-memory", "-Os", "-std=c11", "-nostdlib",
     "-fno-builtin", "-fno-slp-vectorize", "-fno-unroll-loops", *KERNEL_MATH,
-    "-Wl,--no-entry", "-s",
+    "-Wl,--no-entry", "-Wl,--import-table", "-s",
 )  # fmt: skip
 
 
@@ -44,19 +48,26 @@ def module_files(
     CompilerError
         Without the extra ``compiler``, or when it fails.
     """
-    start, reads = start_source(made)
-    faces = interface(made, "brake", reads)
-    description = json.dumps(_description(made, name, bool(start), faces), indent=1)
+    start = start_nodes(made)
+    faces = interface(made, "brake", start.reads if start else frozenset())
+    description = json.dumps(_description(made, name, start is not None, faces), indent=1)
     return {
-        f"{name}.wasm": _compiled(made.kernel, model_header(made, faces, start, name), further),
+        f"{name}.wasm": _module(made, further),
         f"{name}.json": description.encode(),
-        "bywire.mjs": (HERE / "loader.mjs").read_bytes(),
+        "bywire.mjs": b"".join((HERE / each).read_bytes() for each in _LOADER),
         "bywire.d.mts": (HERE / "loader.d.ts").read_bytes(),
     }
 
 
-def _compiled(kernel: str, header: str, further: Mapping[str, str]) -> bytes:
-    """Return the module."""
+def _module(made: Exported, further: Mapping[str, str]) -> bytes:
+    """Return the module: what is the same for every bench in code, its formulas as a table."""
+    formulas = run_formulas(made)
+    headers = {"runtime.h": SCALAR, "layout.h": formulas.header, "cut.h": CUT}
+    return with_section(_compiled(headers, further), "formulas", formulas.table)
+
+
+def _compiled(headers: Mapping[str, str], further: Mapping[str, str]) -> bytes:
+    """Return what is compiled of a module."""
     if importlib.util.find_spec("ziglang") is None:
         raise CompilerError(
             "WebAssembly is compiled by the extra bywire[compiler], which is not installed: "
@@ -65,9 +76,9 @@ def _compiled(kernel: str, header: str, further: Mapping[str, str]) -> bytes:
     with scratch_folder(process_folder()) as folder:
         for name in ("math.h", "string.h", "page.c"):
             (folder / name).write_bytes((HERE / name).read_bytes())
-        (folder / "kernel.c").write_text(kernel, encoding="utf-8")
-        (folder / "model.h").write_text(header, encoding="utf-8")
-        sources = [folder / "kernel.c", folder / "page.c"]
+        for name, text in headers.items():
+            (folder / name).write_text(text, encoding="utf-8")
+        sources = [folder / "page.c"]
         for entry, text in further.items():
             sources.append(folder / f"{entry}.c")
             sources[-1].write_text(text, encoding="utf-8")

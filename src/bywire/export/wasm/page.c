@@ -1,36 +1,94 @@
-/* The kernel's entry for a page: parameters and state lie here, what is long behind __heap_base. */
+/* A run in a page. Its formulas are functions that the loader makes, in the table behind NONE; they
+ * read and write the working memory: state, parameters and what they hand on. What is long lies
+ * behind __heap_base. */
 #include <stdint.h>
 
-#include "model.h"
-
-void bw_run(const double *p, double h, const double *u, double *state, const int64_t *plan,
-    const int32_t *selection, double *rec);
-
 #define PAGE(name) __attribute__((export_name(#name)))
+#include "runtime.h"
+#include "layout.h"
 
-static double p[PARAMETERS + 1], state[STATE];
+enum { NONE, KEEP, STEPS, FAST, POSE, EXACT, INTEGRALS, OUTPUT, START, TICK };
+
+static double area[AREA];
 extern unsigned char __heap_base;
 
-PAGE(parameters) double *parameters(void) { return p; }
-PAGE(state) double *state_of_run(void) { return state; }
+PAGE(working) double *working(void) { return area; }
+PAGE(parameters) double *parameters(void) { return area + P_AT; }
 PAGE(room) void *room(void) { return &__heap_base; }
+
+static void compute(int formula) { ((void (*)(void))(intptr_t)formula)(); }
+
+/* What follows from parameters and from the length of a substep, where that is another. */
+static void keep(double h) {
+  if (area[H_AT] == h) return;
+  area[H_AT] = h;
+  compute(KEEP);
+}
+
+static void pass(int formula, double h, const double *x, const double *d) {
+  keep(h);
+  memcpy(area + X_AT, x, NX * sizeof(double));
+  memcpy(area + D_AT, d, NX * sizeof(double));
+  compute(formula);
+}
+
+static void fast_pass(const double *c, double h, const double *m, const double *x,
+    const double *d, double *o) {
+  pass(FAST, h, x, d);
+  memcpy(o, area + O_AT, RESULTS * sizeof(double));
+}
+
+static void exact_pass(const double *c, double h, const double *m, const double *x,
+    const double *d, double *o) {
+  pass(POSE, h, x, d);
+  area[FAILED_AT] = PROJECTED;
+  compute(EXACT);
+  memcpy(o, area + O_AT, RESULTS * sizeof(double));
+}
+
+#include "cut.h"
+
+/* A substep that is repeated, or cut. */
+static void repeat(void) {
+  double x[NX], d[NX], o[RESULTS];
+  cuts made;
+  memcpy(x, area + X_AT, sizeof(x));
+  memcpy(d, area + D_AT, sizeof(d));
+  area[COUNTERS_AT] += located(0, STEP, 0, x, d, 0, o, &made);
+  area[COUNTERS_AT + 1] += 1.0;
+  memcpy(area + X_AT, o, FLOW * sizeof(double)); /* x, d and reactions stand in a row */
+  for (int k = 0; k < FLOWS; ++k) area[Q_AT + k] += o[FLOW + k];
+  keep(STEP);
+}
 
 /* Take the initial values of the parameters as they are; those of the bench exactly as it has them,
  * where none is changed. */
 PAGE(begin) void begin(int is_changed) {
-  for (int k = 0; k < STATE; ++k) state[k] = state_start[k];
-  if (is_changed) bw_start(p, state);
+  for (int k = 0; k < STATE; ++k) area[k] = state_start[k];
+  if (is_changed) compute(START);
 }
 
 /* Advance from frame to frame with rows of the stimulus, each for some frames; record every so many
  * frames all signals, in the last frame too where it is asked for. */
 PAGE(advance) void advance(const double *u, int32_t held, int32_t first, int32_t end, int32_t last,
     int32_t every, double *rec) {
-  static const int64_t frames[] = TASK_FRAMES;
-  int32_t selection[ROWS + 1];
-  int64_t plan[8 + TASKS + 1] = {first, end, last, SUBSTEPS, held, every,
-      (first + every - 1) / every, ROWS};
-  for (int k = 0; k < ROWS; ++k) selection[k] = k;
-  for (int k = 0; k < TASKS; ++k) plan[8 + k] = frames[k];
-  bw_run(p, STEP, u, state, plan, selection, rec);
+  area[H_AT] = 0.0; /* parameters may be others than before */
+  keep(STEP);
+  for (int32_t f = first; f < end + last; ++f) {
+    memcpy(area + U_AT, u + f / held * STIMULI, STIMULI * sizeof(double));
+    for (int k = 0; k < TASKS; ++k)
+      if (f % task_frames[k] == 0) compute(TICK + k);
+    if (f % every == 0) {
+      compute(OUTPUT);
+      memcpy(rec, area + OUT_AT, ROWS * sizeof(double));
+      rec += ROWS;
+    }
+    if (f == end) break;
+    memset(area + S_AT, 0, PRODUCTS * sizeof(double));
+    for (int left = SUBSTEPS; left > 0;) {
+      left = ((int (*)(int))(intptr_t)STEPS)(left);
+      if (left-- > 0) repeat();
+    }
+    compute(INTEGRALS);
+  }
 }

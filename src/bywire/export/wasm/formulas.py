@@ -1,0 +1,205 @@
+"""Formulas of a run as a table, of which the loader makes WebAssembly: a third of its length.
+
+Instructions of straight-line code name their operands by number, in which little repeats. In the
+table what is read once has no number: operations stand behind their operands and take them from a
+stack. Of most others it says how many named values ago they were computed: small numbers, which
+deflate well. All formulas share one table, and each computes of it what its results need.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from bywire.core.errors import CompilerError
+from bywire.simulation.expressions import needed
+from bywire.simulation.graph import Graph
+from bywire.simulation.operation import Node
+
+OPERATIONS = (
+    "add", "sub", "mul", "neg", "inv", "fabs", "sqrt", "floor", "ceil", "copysign", "fmax", "fmin",
+    "lt", "le", "eq", "ne", "not", "and", "or", "if_else_zero", "select",
+    "exp", "log", "sin", "cos", "pow", "tan", "atan", "tanh",
+)  # fmt: skip
+"""In the order of their numbers in the table; the loader has the same."""
+
+_NEAR = 64  # named values back that a byte of an operand reaches; 0 is none, above it are others
+_MOST = 0xFFFF  # lengths and names have two bytes
+_EITHER = frozenset({"add", "mul", "eq", "ne", "and", "or"})  # operands may change places
+
+Places = Mapping[tuple[str, int], int]
+_Value = tuple[object, ...]
+_Token = tuple[str, int, bool]  # operation, which operands have names, whether it gets one
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A function of the table.
+
+    Parameters
+    ----------
+    graph, results
+        Expressions, and pairs of place in the working memory and node.
+    again
+        Zero, or in a loop how many results behind the first, which ends it, begin its next turn;
+        those behind them are added up.
+    """
+
+    graph: Graph
+    results: Sequence[tuple[int, Node]]
+    again: int = 0
+
+
+@dataclass
+class _Table:
+    """What is written of expressions: tokens, and operands by name with how many there were."""
+
+    names: dict[_Value, int]
+    tokens: list[_Token] = field(default_factory=list)
+    operands: list[tuple[int, int]] = field(default_factory=list)
+
+    def add(self, graph: Graph, named: Node) -> None:
+        """Append an expression that gets a name; operands without one are part of it."""
+        stack = [named]
+        while stack:
+            node = stack.pop()
+            if node < 0:
+                self._write(graph, ~node, ~node == named)
+                continue
+            stack.append(~node)
+            parts = _operands(graph, node, self.names)
+            stack += [a for a in reversed(parts) if _value(graph, a) not in self.names]
+        self.names[_value(graph, named)] = len(self.names)
+
+    def _write(self, graph: Graph, node: Node, is_named: bool) -> None:
+        read = [self.names.get(_value(graph, a)) for a in _operands(graph, node, self.names)]
+        mask = sum(1 << k for k, name in enumerate(read) if name is not None)
+        op = graph.nodes[node].op
+        self.tokens.append(("pow" if op == "constpow" else op, mask, is_named))
+        self.operands += [(name, len(self.names)) for name in read if name is not None]
+
+
+def _operands(graph: Graph, node: Node, names: Mapping[_Value, int]) -> list[Node]:
+    """Return the operands in the order in which they are written."""
+    op, parts = graph.nodes[node].op, list(graph.arguments(node))
+    if op in _EITHER:
+        parts.sort(key=lambda a: _value(graph, a) in names)
+    if op in ("fmax", "fmin"):
+        parts.sort(key=lambda a: graph.value(a) is not None)  # as in C
+    return parts
+
+
+def _value(graph: Graph, node: Node) -> _Value:
+    """Return what tells a value from those of other graphs: inputs and constants are shared."""
+    operation = graph.nodes[node]
+    is_leaf = operation.op in ("leaf", "const")
+    return (operation.op, *operation.args) if is_leaf else (id(graph), node)
+
+
+def table(formulas: Sequence[Formula], places: Places) -> bytes:
+    """Return the table of some formulas.
+
+    What the first of them computes the others read where that wrote it.
+
+    Parameters
+    ----------
+    places
+        Where inputs stand in the working memory, by kind and index.
+
+    Raises
+    ------
+    CompilerError
+        When there are more than the table can name.
+    """
+    orders = [needed(f.graph, [n for _, n in f.results], lambda _: False) for f in formulas]
+    uses, graphs = _uses(formulas, orders)
+    inputs = sorted((v for v in uses if v[0] == "leaf"), key=lambda v: places[v[1], v[2]])
+    constants = [v for v in uses if v[0] == "const"]
+    made = _Table({leaf: k for k, leaf in enumerate((*inputs, *constants))})
+    leaves = len(made.names)
+    for value, count in uses.items():
+        if value not in made.names and count > 1:
+            made.add(graphs[value], value[1])
+    numbers = [len(inputs), len(constants), len(formulas),
+               *_steps([places[v[1], v[2]] for v in inputs])]  # fmt: skip
+    for formula in formulas:
+        numbers += [formula.again, len(formula.results)]
+        numbers += _steps([made.names[_value(formula.graph, n)] for _, n in formula.results])
+        numbers += _steps([place for place, _ in formula.results])
+    return _packed(made, leaves, numbers, [float(v[1]) for v in constants])
+
+
+def _uses(
+    formulas: Sequence[Formula], orders: Sequence[Sequence[Node]]
+) -> tuple[dict[_Value, int], dict[_Value, Graph]]:
+    """Return how often every value is read, in an order in which operands come first."""
+    uses: dict[_Value, int] = {}
+    graphs: dict[_Value, Graph] = {}
+    for formula, order in zip(formulas, orders, strict=True):
+        graph = formula.graph
+        results = [node for _, node in formula.results]
+        for node in order:
+            value = _value(graph, node)
+            if value not in graphs:
+                graphs[value] = graph
+                for part in (_value(graph, a) for a in graph.arguments(node)):
+                    uses[part] = uses.get(part, 0) + 1
+                uses.setdefault(value, 0)
+        for node in results:
+            uses[_value(graph, node)] = uses.get(_value(graph, node), 0) + 2  # it needs a name
+    return uses, graphs
+
+
+def _steps(numbers: Sequence[int]) -> list[int]:
+    """Return the differences of numbers, which repeat where these go on in steps."""
+    return [(b - a) & 0xFFFF for a, b in zip([0, *numbers], numbers, strict=False)]
+
+
+def _packed(
+    made: _Table, leaves: int, numbers: list[int], constants: Sequence[float]
+) -> bytes:
+    """Return lengths and planes: bytes that are alike stand together."""
+    kinds = [kind for kind, _ in Counter(made.tokens).most_common()]
+    count = max(len(made.tokens), len(made.operands), len(numbers) + len(made.operands))
+    if count > _MOST or len(kinds) > 255:
+        raise CompilerError(
+            f"a module has room for {_MOST} operands of its formulas, and these have {count}: "
+            "export the run as an FMU, whose kernel is compiled"
+        )
+    far = Counter(name for name, count in made.operands if not _is_near(name, count, leaves))
+    often = sorted(name for name, _ in far.most_common(255 - _NEAR))
+    code = {name: _NEAR + 1 + k for k, name in enumerate(often)}
+    operands = bytearray()
+    escaped = []
+    for name, count in made.operands:
+        operands.append(count - name if _is_near(name, count, leaves) else code.get(name, 0))
+        if not operands[-1]:
+            escaped.append(name)
+    numbers = [*numbers, len(kinds), *(_number(kind) for kind in kinds), len(often),
+               *_steps(often), *escaped]  # fmt: skip
+    planes = [bytes(kinds.index(token) for token in made.tokens), bytes(operands),
+              bytes(n & 0xFF for n in numbers), bytes(n >> 8 for n in numbers),
+              struct.pack(f"<{len(constants)}d", *constants)]  # fmt: skip
+    return struct.pack("<3H", *(len(each) for each in planes[:3])) + b"".join(planes)
+
+
+def _is_near(name: int, count: int, leaves: int) -> bool:
+    return name >= leaves and count - name <= _NEAR
+
+
+def _number(kind: _Token) -> int:
+    op, mask, is_named = kind
+    return OPERATIONS.index(op) << 4 | mask << 1 | is_named
+
+
+def with_section(module: bytes, name: str, content: bytes) -> bytes:
+    """Return a module of WebAssembly with a section that engines leave alone."""
+    title = name.encode()
+    body = bytes([len(title)]) + title + content
+    length, left = bytearray(), len(body)
+    while left > 0x7F:
+        length.append(left & 0x7F | 0x80)
+        left >>= 7
+    return module + b"\0" + bytes(length) + bytes([left]) + body
