@@ -8,16 +8,16 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from bywire.core.errors import ParameterError
+from bywire.core.errors import ParameterError, unknown_name
 from bywire.core.typing import Array
 from bywire.simulation.advance import require_finite
 from bywire.simulation.compiler import IN_TURN, VECTOR, Compiler, find_compiler, load_library
-from bywire.simulation.engine import Prepared, built_once, prepare
+from bywire.simulation.engine import CUDA, Prepared, built_once, engine_names, prepare
 from bywire.simulation.kernel_cache import load
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import plan_array, pointer
@@ -64,6 +64,40 @@ class Ensemble:
         return np.asarray(self.values[:, :, self.names.index(name)])
 
 
+class CaseKernel(Protocol):
+    """What computes many cases, so many at a time.
+
+    Parameters
+    ----------
+    lanes
+        How many.
+    at_once
+        By how many threads it is best called.
+    """
+
+    layout: Layout
+    label: str
+    lanes: int
+    at_once: int
+
+    def rows(self, cases: int, rows: int) -> Array:
+        """Return room for what cases record, shape (cases, rows, signals)."""
+        ...
+
+    def advance(
+        self,
+        schedule: Schedule,
+        parameters: Array,
+        stimulus: Array,
+        vector: Array,
+        rows: Array,
+        end: int,
+        begin: int = 0,
+    ) -> None:
+        """Run frames begin..end of one group; see `LaneKernel.advance`."""
+        ...
+
+
 class LaneKernel:
     """Compiled kernel for a group of cases, of the signals that are wanted and nothing else.
 
@@ -77,7 +111,7 @@ class LaneKernel:
         self.layout, self.library, self.compiler = layout, library, compiler
         self._signals = signals
         loaded = load(library, self.ENTRY)
-        self.lanes = int(loaded.bw_lanes())
+        self.lanes, self.at_once = int(loaded.bw_lanes()), os.cpu_count() or 1
         self.label = f"compiled C in {self.lanes} lanes, {compiler.label}"
         self._run = loaded[self.ENTRY]
         self._run.restype = None
@@ -99,6 +133,10 @@ class LaneKernel:
         flags = IN_TURN if in_turn else VECTOR
         _, library = load_library(emit_lanes(stages, in_turn), flags, compiler, cls.ENTRY)
         return cls(layout_of(stages), library, compiler, len(selection))
+
+    def rows(self, cases: int, rows: int) -> Array:
+        """Return room for what cases record; see `CaseKernel`."""
+        return np.empty((cases, rows, self._signals))
 
     def advance(
         self,
@@ -144,6 +182,7 @@ def simulate_ensemble(
     variations: Variations,
     signals: Sequence[str],
     threads: int | None = None,
+    engine: str = "auto",
 ) -> Ensemble:
     """Compute one run for many values of its parameters.
 
@@ -159,6 +198,9 @@ def simulate_ensemble(
         Outputs to record.
     threads
         Threads to use, >= 1; all cores by default.
+    engine
+        ``auto`` and ``compiled``: in lanes, ``cuda``: on a graphics processor, a thread for each
+        case, both side by side; others, and ``auto`` without a compiler, one after the other.
 
     Returns
     -------
@@ -168,26 +210,28 @@ def simulate_ensemble(
     Raises
     ------
     UnknownNameError
-        When a parameter or a signal is unknown.
+        When a parameter, a signal or an engine is unknown.
     SolverError
         When a trajectory leaves the numbers.
     ParameterError
         When a value is out of range, lengths differ, or a sample time varies.
+    CompilerError
+        For ``compiled`` without a compiler.
+    DeviceError
+        For ``cuda`` where there is no graphics processor, or no room on it.
     """
     prepared = prepare(run.model, run.par)
     if threads is not None and threads < 1:
         raise ParameterError(f"threads = {threads} is not admissible: it must be >= 1")
     matrix = case_matrix(run, variations)
-    compiler = find_compiler()
-    if compiler is None:
-        return _one_by_one(run, variations, tuple(signals))
-    selection = selected(tuple(prepared.outputs), signals)
-    count = matrix.shape[1]
-    kernel = lane_kernel(prepared, compiler, tuple(selection.tolist()), count >= PAIRED)
-    schedule = run.schedule()
+    if not is_side_by_side(engine):
+        return _one_by_one(run, variations, tuple(signals), engine)
+    selection = tuple(selected(tuple(prepared.outputs), signals).tolist())
+    count, schedule = matrix.shape[1], run.schedule()
+    kernel = case_kernel(prepared, engine, selection, count, schedule)
     stimulus = sampled_stimulus(run, schedule)
     padded = -(-count // kernel.lanes) * kernel.lanes
-    values = np.empty((padded, schedule.rows, len(signals)))
+    values = kernel.rows(padded, schedule.rows)
     counters = np.zeros((2, padded))
     start = initial_vector(kernel.layout, run.state, run.memory)
 
@@ -202,7 +246,7 @@ def simulate_ensemble(
         require_finite(kernel.layout, vector, f"one of cases {first} to {last} left the numbers")
         counters[:, cases] = vector[kernel.layout.start["counters"] :]
 
-    with ThreadPoolExecutor(threads or os.cpu_count() or 1) as pool:
+    with ThreadPoolExecutor(threads or kernel.at_once) as pool:
         list(pool.map(group, range(0, padded, kernel.lanes)))
     return Ensemble(
         time=schedule.record_times,
@@ -212,6 +256,39 @@ def simulate_ensemble(
         repeated=counters[1, :count].astype(np.int64),
         engine=kernel.label,
     )
+
+
+def is_side_by_side(engine: str) -> bool:
+    """Return whether an engine computes many cases side by side here.
+
+    Raises
+    ------
+    UnknownNameError
+        When there is no such engine.
+    """
+    if engine not in engine_names():
+        raise unknown_name("engine", engine, engine_names())
+    return engine == CUDA or (engine in ("auto", "compiled") and find_compiler() is not None)
+
+
+def case_kernel(
+    prepared: Prepared, engine: str, selection: tuple[int, ...], count: int, schedule: Schedule
+) -> CaseKernel:
+    """Return the kernel of so many cases that records some outputs, by index.
+
+    Raises
+    ------
+    DeviceError
+        For ``cuda`` where there is no graphics processor, or no room on it.
+    """
+    if engine == CUDA:
+        from bywire.simulation import cuda_device, cuda_kernel
+
+        kernel = cuda_kernel.cuda_kernel(prepared, cuda_device.find_device(), selection)
+        return kernel.for_cases(count, schedule)
+    compiler = find_compiler()
+    assert compiler is not None
+    return lane_kernel(prepared, compiler, selection, count >= PAIRED)
 
 
 @built_once
@@ -233,14 +310,17 @@ def lane_kernel(
     return kernel
 
 
-def _one_by_one(run: Run, variations: Variations, signals: tuple[str, ...]) -> Ensemble:
-    """Serve without a compiler: the cases one after the other."""
+def _one_by_one(
+    run: Run, variations: Variations, signals: tuple[str, ...], engine: str
+) -> Ensemble:
+    """Serve engines without lanes, and without a compiler: the cases one after the other."""
     arrays = {name: np.atleast_1d(values) for name, values in variations.items()}
     count = next(iter(arrays.values())).size
     runs = [
         simulate(
-            replace(run, par=run.par.replace({n: float(v[k]) for n, v in arrays.items()})), signals
-        )
+            replace(run, par=run.par.replace({n: float(v[k]) for n, v in arrays.items()})),
+            signals, engine,
+        )  # fmt: skip
         for k in range(count)
     ]
     return Ensemble(

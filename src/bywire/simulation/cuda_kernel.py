@@ -1,0 +1,182 @@
+"""Many cases on a graphics processor, behind the face of a kernel in lanes.
+
+Cases go there in batches that its memory holds, and batches in pieces of time: what a piece records
+is fetched before the next one, and no piece keeps a display waiting.
+"""
+
+from __future__ import annotations
+
+import copy
+
+import numpy as np
+
+from bywire.core.errors import DeviceError
+from bywire.core.typing import Array
+from bywire.simulation.cuda_device import CudaDevice, find_device
+from bywire.simulation.emission import layout_of, leaf_count
+from bywire.simulation.emit_cuda import ENTRY, THREADS, emit_cuda
+from bywire.simulation.engine import Prepared, built_once
+from bywire.simulation.layout import Layout
+from bywire.simulation.native import Request, plan_array
+from bywire.simulation.schedule import Schedule
+from bywire.simulation.stages import Stages, build_stages
+
+MOST = 2**15
+"""cases of a batch: as many threads as the largest processors hold at once"""
+_SUBSTEPS = 5000  # of a piece of time
+_SHARE = 0.5  # of the free memory that a batch may take; threads' stacks and others take some
+_FLOAT = 8  # bytes
+
+
+class CudaKernel:
+    """Kernel for a batch of cases on a graphics processor.
+
+    Parameters
+    ----------
+    device
+        The graphics processor.
+    stages
+        What is computed, of the signals that are wanted.
+    """
+
+    at_once = 2
+    """batches at a time: one is set up, or taken apart, while another is computed"""
+
+    def __init__(self, device: CudaDevice, stages: Stages) -> None:
+        self.layout: Layout = layout_of(stages)
+        self.label = f"CUDA C, {device.label}"
+        self.lanes = 1
+        self._device, self._signals = device, len(stages.output)
+        self._inputs = leaf_count(stages, "p"), leaf_count(stages, "u")
+        self._function = device.load(emit_cuda(stages), ENTRY)
+
+    def for_cases(self, count: int, schedule: Schedule) -> CudaKernel:
+        """Return the kernel for batches of so many cases as memory holds, of about equal size.
+
+        Raises
+        ------
+        DeviceError
+            When it does not hold a single case.
+        """
+        free = self._device.free()
+        size = self._size(schedule)
+        most = min(MOST, int(_SHARE * free) // size)
+        if most < 1:
+            raise DeviceError(
+                f"{self._device.label} has {free / 1e6:.3g} MB free, of which a case may take half "
+                f"and takes {size / 1e6:.3g} MB: record fewer signals, or less often"
+            )
+        batches = -(-count // most)
+        sized = copy.copy(self)
+        sized.lanes = -(-count // batches)
+        return sized
+
+    def rows(self, cases: int, rows: int) -> Array:
+        """Return room for what cases record, shape (cases, rows, signals), as the device has it."""
+        return np.empty((rows, self._signals, cases)).transpose(2, 0, 1)
+
+    def advance(
+        self,
+        schedule: Schedule,
+        parameters: Array,
+        stimulus: Array,
+        vector: Array,
+        rows: Array,
+        end: int,
+        begin: int = 0,
+    ) -> None:
+        """Run frames begin..end of one batch; see ``ensemble.LaneKernel.advance``.
+
+        Raises
+        ------
+        DeviceError
+            When the device fails, or others have taken its memory meanwhile.
+        """
+        own = int(stimulus.ndim == 3)
+        with self._device.working() as memory:
+            state, par = memory.room(vector.nbytes), memory.room(parameters.nbytes)
+            memory.put(state, vector)
+            memory.put(par, parameters)
+            given = memory.room(stimulus[: _stimulus_rows(schedule)].nbytes)
+            plan = memory.room(_FLOAT * (len(schedule.task_frames) + 11))
+            room = memory.room(_FLOAT * self._signals * _most_rows(schedule) * self.lanes)
+            at = 0
+            for first, last in _pieces(schedule, begin, end):
+                ahead = first // schedule.stimulus_frames
+                memory.put(given, stimulus[ahead : last // schedule.stimulus_frames + 1])
+                said = [*plan_array(schedule, first, last, self._signals)]
+                memory.put(plan, np.array([*said, self.lanes, own, ahead], dtype=np.int64))
+                memory.run(
+                    self._function, -(-self.lanes // THREADS), THREADS,
+                    (par, float(schedule.step), given, state, plan, room),
+                )  # fmt: skip
+                count = rows_between(schedule, first, last)
+                if count:
+                    recorded = np.empty((count, self._signals, self.lanes))
+                    memory.get(room, recorded)
+                    rows[:, at : at + count] = recorded[:, :, : len(rows)].transpose(2, 0, 1)
+                    at += count
+            memory.get(state, vector)
+
+    def _size(self, schedule: Schedule) -> int:
+        """Return the bytes of a case with a stimulus of its own."""
+        parameters, inputs = self._inputs
+        stimulus = inputs * _stimulus_rows(schedule)
+        recorded = self._signals * _most_rows(schedule)
+        return _FLOAT * (parameters + self.layout.total + stimulus + recorded)
+
+
+def _frames(schedule: Schedule) -> int:
+    """Return the frames of a piece of time."""
+    return max(_SUBSTEPS // schedule.substeps, 1)
+
+
+def rows_between(schedule: Schedule, begin: int, end: int) -> int:
+    """Return how many rows are recorded from frame begin to before end; at the run's end its row.
+
+    As the kernel counts them by its plan.
+    """
+    every = schedule.record_frames
+    return -(-(end + int(end == schedule.frames)) // every) - -(-begin // every)
+
+
+def _stimulus_rows(schedule: Schedule) -> int:
+    """Return how many rows of a stimulus a piece of time reads at most."""
+    return _frames(schedule) // schedule.stimulus_frames + 2
+
+
+def _most_rows(schedule: Schedule) -> int:
+    """Return how many rows a piece records at most, that of the end among them."""
+    return _frames(schedule) // schedule.record_frames + 2
+
+
+def _pieces(schedule: Schedule, begin: int, end: int) -> list[tuple[int, int]]:
+    """Return the frames at which pieces begin and end; at the end of a run nothing but its row."""
+    edges = [*range(begin, end, _frames(schedule)), end]
+    return list(zip(edges, edges[1:], strict=False)) or [(begin, end)]
+
+
+@built_once
+def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ...]) -> CudaKernel:
+    """Return the kernel that records some outputs, by index; built once for a device."""
+    return CudaKernel(device, build_stages(prepared.program, outputs=selection))
+
+
+class CudaEngine:
+    """Single runs on the graphics processor: a batch of one, slow, with the digits of many."""
+
+    def __init__(self, prepared: Prepared) -> None:
+        every = tuple(range(len(prepared.outputs)))
+        self._kernel = cuda_kernel(prepared, find_device(), every)
+        self.layout, self.label = self._kernel.layout, self._kernel.label
+
+    def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:
+        """Run frames begin..end in place; see ``engine.Engine``."""
+        schedule, vector = request.schedule, state[:, None].copy()
+        count = rows_between(schedule, begin, end)
+        recorded = self._kernel.rows(1, count)
+        self._kernel.advance(
+            schedule, request.parameters[:, None], request.stimulus, vector, recorded, end, begin
+        )
+        rows[:count] = recorded[0][:, request.selection]
+        state[:] = vector[:, 0]
