@@ -14,8 +14,8 @@ from bywire.bench.bench_file import read
 from bywire.bench.ensemble import simulate_ensemble as simulate_ensemble_of_bench
 from bywire.core.brake import load_system
 from bywire.core.errors import DeviceError, UnknownNameError
-from bywire.simulation import cuda_kernel
-from bywire.simulation.ensemble import simulate_ensemble
+from bywire.simulation import cuda_device, cuda_kernel
+from bywire.simulation.ensemble import Ensemble, simulate_ensemble
 from bywire.simulation.run import Run, simulate
 from bywire.simulation.run_group import simulate_group
 from emulated_driver import OK, EmulatedDriver, Status, emulated
@@ -45,15 +45,20 @@ def run_of(experiment: str, changes: dict[str, str]) -> Run:
     return next(iter(read(experiment, changes).runs().values()))
 
 
-@pytest.mark.parametrize("experiment", BRAKES)
-def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monkeypatch):
+def computed(experiment: str) -> tuple[Ensemble, Ensemble]:
+    """Return an ensemble in lanes, and on a graphics processor."""
     load_system(EXAMPLES / "emb_caliper")
-    monkeypatch.setattr(cuda_kernel, "_SUBSTEPS", 1_500)
     changes, varied, signals = BRAKES[experiment]
     run = run_of(experiment, changes)
     cases = {varied: run.par.leaves()[varied] * np.linspace(0.9, 1.1, CASES)}
-    lanes = simulate_ensemble(run, cases, signals)
-    there = simulate_ensemble(run, cases, signals, engine="cuda")
+    lanes, there = (simulate_ensemble(run, cases, signals, engine=e) for e in ("auto", "cuda"))
+    return lanes, there
+
+
+@pytest.mark.parametrize("experiment", BRAKES)
+def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monkeypatch):
+    monkeypatch.setattr(cuda_kernel, "_SUBSTEPS", 1_500)
+    lanes, there = computed(experiment)
     assert there.engine == "CUDA C, emulated 0"
     assert set(driver.launches) == {128}
     assert len(driver.launches) > 2
@@ -61,6 +66,18 @@ def test_every_case_has_the_digits_that_it_has_in_lanes(experiment, driver, monk
     np.testing.assert_array_equal(there.repeated, lanes.repeated)
     assert lanes.repeated.max() > 0
     assert not driver.places  # all memory was given back
+
+
+@pytest.mark.parametrize("experiment", BRAKES)
+def test_a_processor_that_is_there_agrees_with_this_machines(experiment):
+    try:
+        device = cuda_device.find_device()
+    except DeviceError as error:
+        pytest.skip(str(error))
+    lanes, there = computed(experiment)
+    assert there.engine == f"CUDA C, {device.label}"
+    largest = np.abs(lanes.values).max(axis=(0, 1))
+    assert np.all(np.abs(there.values - lanes.values).max(axis=(0, 1)) <= 1e-9 * largest)
 
 
 @pytest.fixture(scope="module")
