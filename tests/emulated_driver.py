@@ -1,8 +1,7 @@
-"""A graphics processor emulated by the processor: its driver's functions, as NVIDIA's bindings give
-them, on this machine's memory.
+"""A graphics processor emulated by this machine's: what NVIDIA's bindings of its driver do.
 
-A kernel is the CUDA C as it was emitted, compiled as C: a few definitions stand before it, and
-behind it a loop over the threads.
+Its memory is this machine's. A kernel is the CUDA C as it was emitted, compiled as C: a few
+definitions stand before it, and behind it a loop over the threads.
 """
 
 from __future__ import annotations
@@ -150,7 +149,7 @@ class EmulatedDriver:
 
 @contextmanager
 def emulated(driver: EmulatedDriver) -> Iterator[EmulatedDriver]:
-    """Have a driver's processors in place of this machine's; kernels stay the text that they are."""
+    """Have a driver's processors in place of this machine's; kernels stay text."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(cuda_device, "bindings", lambda _: driver)
         patch.setattr(cuda_device, "cuda_binary", lambda source, *_: source.encode())

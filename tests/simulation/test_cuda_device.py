@@ -34,7 +34,7 @@ def test_one_that_is_not_there_is_refused(wanted, driver, monkeypatch):
         find_device()
 
 
-@pytest.mark.parametrize("started, count, said", [
+@pytest.mark.parametrize(("started", "count", "said"), [
     (RuntimeError("no library"), 1, "the driver's library is not there"),
     (Status.CUDA_ERROR_NO_DEVICE, 1, "CUDA_ERROR_NO_DEVICE"),
     (Status.CUDA_SUCCESS, 0, "graphics processor of NVIDIA's: see that nvidia-smi lists one"),

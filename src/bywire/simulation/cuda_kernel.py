@@ -7,6 +7,7 @@ is fetched before the next one, and no piece keeps a display waiting.
 from __future__ import annotations
 
 import copy
+from itertools import pairwise
 
 import numpy as np
 
@@ -15,9 +16,9 @@ from bywire.core.typing import Array
 from bywire.simulation.cuda_device import CudaDevice, find_device
 from bywire.simulation.emission import layout_of, leaf_count
 from bywire.simulation.emit_cuda import ENTRY, THREADS, emit_cuda
-from bywire.simulation.engine import Prepared, built_once
 from bywire.simulation.layout import Layout
 from bywire.simulation.native import Request, plan_array
+from bywire.simulation.program import Program
 from bywire.simulation.schedule import Schedule
 from bywire.simulation.stages import Stages, build_stages
 
@@ -85,7 +86,7 @@ class CudaKernel:
         end: int,
         begin: int = 0,
     ) -> None:
-        """Run frames begin..end of one batch; see ``ensemble.LaneKernel.advance``.
+        """Run frames begin..end of one batch; see ``case_kernels.LaneKernel.advance``.
 
         Raises
         ------
@@ -153,21 +154,14 @@ def _most_rows(schedule: Schedule) -> int:
 def _pieces(schedule: Schedule, begin: int, end: int) -> list[tuple[int, int]]:
     """Return the frames at which pieces begin and end; at the end of a run nothing but its row."""
     edges = [*range(begin, end, _frames(schedule)), end]
-    return list(zip(edges, edges[1:], strict=False)) or [(begin, end)]
-
-
-@built_once
-def cuda_kernel(prepared: Prepared, device: CudaDevice, selection: tuple[int, ...]) -> CudaKernel:
-    """Return the kernel that records some outputs, by index; built once for a device."""
-    return CudaKernel(device, build_stages(prepared.program, outputs=selection))
+    return list(pairwise(edges)) or [(begin, end)]
 
 
 class CudaEngine:
     """Single runs on the graphics processor: a batch of one, slow, with the digits of many."""
 
-    def __init__(self, prepared: Prepared) -> None:
-        every = tuple(range(len(prepared.outputs)))
-        self._kernel = cuda_kernel(prepared, find_device(), every)
+    def __init__(self, program: Program) -> None:
+        self._kernel = CudaKernel(find_device(), build_stages(program))
         self.layout, self.label = self._kernel.layout, self._kernel.label
 
     def advance(self, request: Request, state: Array, begin: int, end: int, rows: Array) -> None:

@@ -17,7 +17,8 @@ THREADS = 64
 
 # Behind `emission.PLAN`: how many cases, whether each has a stimulus of its own, and which row of
 # the stimulus is the first in memory.
-_BEGIN = """const int64_t cases = plan[8 + {tasks}], own = plan[9 + {tasks}], ahead = plan[10 + {tasks}];
+_BEGIN = """const int64_t cases = plan[8 + {tasks}], own = plan[9 + {tasks}];
+  const int64_t ahead = plan[10 + {tasks}];
   const int64_t at = (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
   if (at >= cases) return;
   const int64_t wide = own ? cases : 1;

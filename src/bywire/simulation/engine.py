@@ -151,7 +151,7 @@ class Prepared:
         if kind == CUDA:
             from bywire.simulation.cuda_kernel import CudaEngine
 
-            return CudaEngine(self)
+            return CudaEngine(self.program)
         compiler = None if kind == "virtual-machine" else find_compiler()
         make = declared_engines().get(kind)
         if compiler is not None:
