@@ -129,7 +129,8 @@ class EmulatedDriver:
 
     def cuModuleLoadData(self, binary: bytes) -> Any:
         compiler = find_compiler()
-        assert compiler is not None
+        if compiler is None:
+            pytest.skip("no C compiler")
         source = _BEFORE + binary.decode() + _BEHIND
         return OK, load_library(source, SINGLE, compiler, "emulated")[0]
 
