@@ -101,6 +101,15 @@ def test_runs_go_there_in_batches_that_its_memory_holds(runs, driver, monkeypatc
     np.testing.assert_array_equal(there.vectors.T, alone)
 
 
+def test_an_ensemble_goes_there_in_batches(runs, driver, monkeypatch):
+    signals, cases = BRAKES["hard-braking"][2], {"motor.R_m": np.linspace(0.3, 0.4, 5)}
+    lanes = simulate_ensemble(runs[0], cases, signals)
+    monkeypatch.setattr(cuda_kernel, "MOST", 2)
+    there = simulate_ensemble(runs[0], cases, signals, engine="cuda")
+    assert len(driver.launches) == 3
+    np.testing.assert_array_equal(there.values, lanes.values)
+
+
 def test_a_single_run_is_a_batch_of_one(runs, driver):
     there, here = (simulate(runs[0], ["i", "p_mc"], engine) for engine in ("cuda", "compiled"))
     assert there.engine == "CUDA C, emulated 0"

@@ -7,6 +7,7 @@ is fetched before the next one, and no piece keeps a display waiting.
 from __future__ import annotations
 
 import copy
+import math
 from itertools import pairwise
 
 import numpy as np
@@ -99,24 +100,22 @@ class CudaKernel:
             memory.put(state, vector)
             memory.put(par, parameters)
             given = memory.room(stimulus[: _stimulus_rows(schedule)].nbytes)
-            plan = memory.room(_FLOAT * (len(schedule.task_frames) + 11))
-            room = memory.room(_FLOAT * self._signals * _most_rows(schedule) * self.lanes)
-            at = 0
+            plan = memory.room(_FLOAT * (len(schedule.task_frames) + 14))
+            recording = _Recording(rows, self.lanes, _most_rows(schedule))
+            room = memory.room(recording.size)
             for first, last in _pieces(schedule, begin, end):
                 ahead = first // schedule.stimulus_frames
                 memory.put(given, stimulus[ahead : last // schedule.stimulus_frames + 1])
+                recording.begin(rows_between(schedule, first, last))
                 said = [*plan_array(schedule, first, last, self._signals)]
-                memory.put(plan, np.array([*said, self.lanes, own, ahead], dtype=np.int64))
+                said += [self.lanes, own, ahead, *recording.apart]
+                memory.put(plan, np.array(said, dtype=np.int64))
                 memory.run(
                     self._function, -(-self.lanes // THREADS), THREADS,
                     (par, float(schedule.step), given, state, plan, room),
                 )  # fmt: skip
-                count = rows_between(schedule, first, last)
-                if count:
-                    recorded = np.empty((count, self._signals, self.lanes))
-                    memory.get(room, recorded)
-                    rows[:, at : at + count] = recorded[:, :, : len(rows)].transpose(2, 0, 1)
-                    at += count
+                memory.get(room, recording.place)
+                recording.end()
             memory.get(state, vector)
 
     def _size(self, schedule: Schedule) -> int:
@@ -130,6 +129,38 @@ class CudaKernel:
 def _frames(schedule: Schedule) -> int:
     """Return the frames of a piece of time."""
     return max(_SUBSTEPS // schedule.substeps, 1)
+
+
+class _Recording:
+    """Where the rows of a piece of time go: in the order of those who want them.
+
+    Straight into their array where the piece has it to itself, else through room of its own.
+    """
+
+    def __init__(self, rows: Array, lanes: int, most: int) -> None:
+        self._rows, self._lanes, self._at = rows, lanes, 0
+        self._order = sorted(range(3), key=lambda axis: -rows.strides[axis])
+        self._room = np.empty(lanes * most * rows.shape[2])
+        self.size = self._room.nbytes
+        self.begin(0)
+
+    def begin(self, count: int) -> None:
+        """Take so many rows more."""
+        shape = self._lanes, count, self._rows.shape[2]
+        self._target = self._rows[:, self._at : self._at + count]
+        own = self._room[: math.prod(shape)].reshape([shape[axis] for axis in self._order])
+        straight = self._target.transpose(self._order)
+        is_whole = straight.shape == own.shape and straight.flags.c_contiguous
+        self.place = straight if is_whole else own
+        seen = self.place.transpose(np.argsort(self._order))
+        self._seen = None if is_whole else seen
+        self.apart = [stride // _FLOAT for stride in seen.strides]
+        self._at += count
+
+    def end(self) -> None:
+        """Have the rows where they are wanted."""
+        if self._seen is not None:
+            self._target[:] = self._seen[: len(self._target)]
 
 
 def rows_between(schedule: Schedule, begin: int, end: int) -> int:
