@@ -10,13 +10,15 @@ import ctypes
 from collections.abc import Iterator
 from contextlib import contextmanager
 from enum import IntEnum
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from bywire.simulation import cuda_device
-from bywire.simulation.compiler import SINGLE, find_compiler, load_library
+from bywire.simulation.compiler import SINGLE, compile_library, find_compiler
+from bywire.simulation.kernel_cache import load
 
 _BEFORE = """
 #include <stdint.h>
@@ -47,6 +49,14 @@ class Status(IntEnum):
 
 
 OK = Status.CUDA_SUCCESS
+
+
+def compiled_here(source: str) -> Path:
+    """Return the library of a kernel, whose function ``emulated`` runs blocks of threads."""
+    compiler = find_compiler()
+    if compiler is None:
+        pytest.skip("no C compiler")
+    return compile_library(_BEFORE + source + _BEHIND, SINGLE, compiler, "emulated")
 
 
 class EmulatedDriver:
@@ -128,11 +138,7 @@ class EmulatedDriver:
         return (OK,)
 
     def cuModuleLoadData(self, binary: bytes) -> Any:
-        compiler = find_compiler()
-        if compiler is None:
-            pytest.skip("no C compiler")
-        source = _BEFORE + binary.decode() + _BEHIND
-        return OK, load_library(source, SINGLE, compiler, "emulated")[0]
+        return OK, load(compiled_here(binary.decode()), "emulated")
 
     def cuModuleGetFunction(self, module: Any, name: bytes) -> Any:
         assert name == b"bw_run_cases"
