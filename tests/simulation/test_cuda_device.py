@@ -45,6 +45,14 @@ def test_a_machine_without_one_is_told(started, count, said, driver):
         find_device()
 
 
+def test_one_that_is_full_before_it_begins_is_told(driver, monkeypatch):
+    full, unknown = Status.CUDA_ERROR_OUT_OF_MEMORY, Status.CUDA_ERROR_INVALID_CONTEXT
+    monkeypatch.setattr(driver, "cuDevicePrimaryCtxRetain", lambda _: (full, None))
+    monkeypatch.setattr(driver, "cuMemGetInfo", lambda: (unknown, None, None))
+    with pytest.raises(DeviceError, match="emulated 0 has no memory left: end what else"):
+        find_device()
+
+
 def test_what_is_not_installed_is_named_with_the_command(monkeypatch):
     monkeypatch.setitem(sys.modules, "cuda.bindings.driver", None)
     find_device.cache_clear()

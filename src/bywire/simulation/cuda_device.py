@@ -95,11 +95,14 @@ class CudaDevice:
         if not int(status):
             return values[0] if len(values) == 1 else values
         if int(status) == _OUT_OF_MEMORY:
-            free, total = (each / _MEGA for each in self._checked(self._driver.cuMemGetInfo()))
+            unknown, *sizes = self._driver.cuMemGetInfo()  # it may have no room to begin with
+            left = "" if int(unknown) else "{:.4g} of {:.4g} MB are free: ".format(
+                *(size / _MEGA for size in sizes)
+            )
+            what = f"no room for {wanted / _MEGA:.3g} MB" if wanted else "no memory left"
             raise DeviceError(
-                f"{self.label} has no room for {wanted / _MEGA:.3g} MB: {free:.4g} of "
-                f"{total:.4g} MB are free: end what else computes there, name another one by "
-                f"{VARIABLE}, {OTHERWISE}"
+                f"{self.label} has {what}: {left}end what else computes there, name another one "
+                f"by {VARIABLE}, {OTHERWISE}"
             )
         _, said = self._driver.cuGetErrorString(status)
         text = (said or b"").decode(errors="replace") or status.name

@@ -31,9 +31,9 @@ from bywire.studies.chunk import (
 )
 from bywire.studies.plan import StudyPlan
 
-# Chunks that a graphics processor is given at once: 8,192 cases, which with their stimuli and rows
-# take some 2 GB of this machine's memory.
-_TOGETHER = 128
+# Chunks that a graphics processor is given at once: 4,096 cases, of hard braking 2 GB of this
+# machine's memory for stimuli and rows.
+_TOGETHER = 64
 _AHEAD = 2  # chunks, or tasks of a cluster, in flight for each worker, so that none waits for us
 _SECONDS = 10.0  # to reach a cluster
 _TASK = 0.5  # s that a task of a cluster is to take
